@@ -9,6 +9,7 @@ import pytest
 
 import signedheat as sh
 from signedheat import samples
+from signedheat.cli import main
 
 ROOT = Path(__file__).parents[1] / "blender"
 
@@ -37,21 +38,15 @@ def holed():
     return mesh, np.array(mesh.vertices), mesh.faces.tolist()
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="the program here is a shell's")
 @pytest.mark.parametrize("distance", [0.0, -0.1])
-def test_surfaces_are_closed_and_where_they_should_be(command, distance):
+def test_surfaces_are_closed_and_where_they_should_be(monkeypatch, distance):
+    """With the command in this process: the next test runs the program."""
+    monkeypatch.setattr(protocol, "run", lambda _, *words: main([*words, "--quiet"]))
     _, vertices, polygons = holed()
-    places, triangles = protocol.surface_at(command, vertices, polygons, distance, 48)
+    places, triangles = protocol.surface_at("signedheat", vertices, polygons, distance, 48)
     edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
     np.testing.assert_allclose(np.linalg.norm(places, axis=1), 1.0 + distance, atol=0.06)
-
-
-def test_polygons_of_any_size_are_written(tmp_path):
-    polygons = [[0, 1, 2, 3], [4, 5, 6], [0, 1, 2, 3, 4]]
-    protocol.write_ply(tmp_path / "mesh.ply", np.arange(21.0).reshape(7, 3), polygons)
-    mesh = sh.read(tmp_path / "mesh.ply")
-    assert [face.tolist() for face in np.split(mesh.corners, mesh.offsets[1:-1])] == polygons
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the program here is a shell's")
@@ -60,6 +55,13 @@ def test_fields_are_volumes(command, tmp_path):
     protocol.field_of(command, vertices, polygons, 32, str(tmp_path / "ball.vdb"))
     field = sh.load_field(tmp_path / "ball.vdb")
     assert field.values.min() < 0 < field.values.max()
+
+
+def test_polygons_of_any_size_are_written(tmp_path):
+    polygons = [[0, 1, 2, 3], [4, 5, 6], [0, 1, 2, 3, 4]]
+    protocol.write_ply(tmp_path / "mesh.ply", np.arange(21.0).reshape(7, 3), polygons)
+    mesh = sh.read(tmp_path / "mesh.ply")
+    assert [face.tolist() for face in np.split(mesh.corners, mesh.offsets[1:-1])] == polygons
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the program here is a shell's")

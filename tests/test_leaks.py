@@ -70,8 +70,8 @@ def grown(first: int, last: int) -> int:
 
 @READS_PROC
 def test_many_solvers_grids_and_fields_leave_nothing():
-    """125 solvers with two fields each, 60 grids and other domains, after 150 that fill what is kept on purpose."""
-    assert grown(150, 275) < 5_000_000  # 40 kB a solver; one that is kept takes 400
+    """80 solvers with two fields each, 40 grids and other domains, after 100 that fill what is kept on purpose."""
+    assert grown(100, 180) < 4_000_000  # 50 kB a solver; one that is kept takes 400
 
 
 @pytest.mark.slow
