@@ -418,14 +418,6 @@ def test_points_with_normals_and_noisy_soups_are_completed_by_heat():
         assert (solid.origins == -1).all()
 
 
-def test_the_completion_of_the_paper_is_one_word_away():
-    mesh = samples.without_patches(samples.sphere(4), 3, 0.4)
-    lids, heat = sh.complete(mesh), sh.complete(mesh, completion="heat")
-    points = np.random.default_rng(0).uniform(-1.5, 1.5, (3000, 3))
-    assert np.abs(lids.distance(points) - heat.distance(points)).max() < 0.1
-    assert len(heat.completion.faces)
-
-
 def test_closest_names_faces_of_the_shape_and_places_in_them():
     mesh = samples.without_patches(samples.sphere(3), 1, 0.6)
     solid = sh.complete(mesh)

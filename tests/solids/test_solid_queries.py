@@ -30,7 +30,7 @@ SHAPES = {
     ),
     "noise": lambda: samples.with_noise(samples.torus(0.8, 0.3, 40, 20), 0.02),
     "two cones": two_cones,
-    "loose": lambda: samples.soup(samples.sphere(3), 0.01),
+    "points": lambda: samples.oriented_points(samples.sphere(3), 500),
 }
 
 
@@ -69,6 +69,8 @@ def test_where_sides_change_but_across_triangles_is_known():
     assert 1e-3 < gaps.windings.sided_beyond < 0.2  # seams between faces and the zero set of φ
     points = points_around(gaps)
     np.testing.assert_array_equal(gaps.distance(points) < 0, gaps.inside(points))
+    assert len(gaps.completion.faces)  # that of the paper, which is one word away
+    assert np.abs(lids.distance(points) - gaps.distance(points)).max() < 0.1
 
 
 def test_vertices_at_which_cones_touch_are_not_regular():
