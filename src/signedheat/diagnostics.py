@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,12 @@ SMALL = 0.005
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Note(Frozen, ShortRepr):
-    """A note on a computation; ``str(note)`` is its text."""
+    """A note on a computation; ``str(note)`` is its text, in which `text` names values of the note."""
+
+    text: ClassVar[str] = ""
+
+    def __str__(self) -> str:
+        return self.text.format(self)
 
     @property
     def important(self) -> bool:
@@ -148,13 +153,11 @@ class OrientedPoints(Note):
 
     normals_fitted: int
     normals_turned: int
+    text: ClassVar[str] = "{0.normals_fitted} normals fitted, {0.normals_turned} turned"
 
     @property
     def important(self) -> bool:
         return self.normals_fitted > 0 or self.normals_turned > 0
-
-    def __str__(self) -> str:
-        return f"{self.normals_fitted} normals fitted, {self.normals_turned} turned"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -198,13 +201,11 @@ class FacesRestored(Note):
 
     restored_faces: int
     restored_area: float
+    text: ClassVar[str] = "lost faces restored: {0.restored_faces}, {0.restored_area:.1%} of the area"
 
     @property
     def important(self) -> bool:
         return True
-
-    def __str__(self) -> str:
-        return f"lost faces restored: {self.restored_faces}, {self.restored_area:.1%} of the area"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -212,9 +213,7 @@ class SharpenedToShape(Note):
     """Fraction of the zero set's triangles that distance is measured to, where the shape has no faces."""
 
     completed_zero_set: float
-
-    def __str__(self) -> str:
-        return f"{self.completed_zero_set:.1%} of the zero set completes the shape"
+    text: ClassVar[str] = "{0.completed_zero_set:.1%} of the zero set completes the shape"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -252,13 +251,11 @@ class BoundsNothing(Note):
     """Fraction of the area that bounds nothing: both of its sides are outside, and distance to it is positive."""
 
     open_area: float
+    text: ClassVar[str] = "{0.open_area:.1%} of the area bounds nothing: distance to it is positive on both sides"
 
     @property
     def important(self) -> bool:
         return self.open_area > SMALL
-
-    def __str__(self) -> str:
-        return f"{self.open_area:.1%} of the area bounds nothing: distance to it is positive on both sides"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -266,9 +263,7 @@ class TetsTurned(Note):
     """Number of tets given with negative volume, which have been turned."""
 
     tets_turned: int
-
-    def __str__(self) -> str:
-        return f"tets turned: {self.tets_turned}"
+    text: ClassVar[str] = "tets turned: {0.tets_turned}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -276,9 +271,7 @@ class EdgesLengthened(Note):
     """Length that mollification has added to every edge, so that no triangle is flat."""
 
     added_to_edge_lengths: float
-
-    def __str__(self) -> str:
-        return f"added to edge lengths: {self.added_to_edge_lengths:.3g}"
+    text: ClassVar[str] = "added to edge lengths: {0.added_to_edge_lengths:.3g}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -286,9 +279,7 @@ class LargeAngles(Note):
     """Fraction of angles above 120°, if it is 1 % or more: an intrinsic triangulation is then more accurate."""
 
     large_angles: float
-
-    def __str__(self) -> str:
-        return f"{self.large_angles:.0%} of the angles exceed 120°"
+    text: ClassVar[str] = "{0.large_angles:.0%} of the angles exceed 120°"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -306,9 +297,7 @@ class SmallLoops(Note):
     """Number of closed curves that are smaller than a few triangles, to which the method is inaccurate."""
 
     small_loops: int
-
-    def __str__(self) -> str:
-        return f"closed curves smaller than a few triangles: {self.small_loops}"
+    text: ClassVar[str] = "closed curves smaller than a few triangles: {0.small_loops}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -316,9 +305,7 @@ class VerticesAdded(Note):
     """Number of vertices added so that sources run along edges."""
 
     vertices_added: int
-
-    def __str__(self) -> str:
-        return f"vertices added for sources: {self.vertices_added}"
+    text: ClassVar[str] = "vertices added for sources: {0.vertices_added}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -326,9 +313,7 @@ class IntrinsicTriangles(Note):
     """The intrinsic triangulation on which distance was computed: summary of its angles."""
 
     intrinsic_triangulation: str
-
-    def __str__(self) -> str:
-        return f"intrinsic triangulation: {self.intrinsic_triangulation}"
+    text: ClassVar[str] = "intrinsic triangulation: {0.intrinsic_triangulation}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -413,9 +398,7 @@ class RoundCorners(Note):
     """Number of vertices whose path to the zero set bends around the boundary of the mesh."""
 
     round_corners: int
-
-    def __str__(self) -> str:
-        return f"round corners: {self.round_corners}"
+    text: ClassVar[str] = "round corners: {0.round_corners}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -424,9 +407,7 @@ class ConvexRounds(Note):
 
     rounds: int
     residual: float
-
-    def __str__(self) -> str:
-        return f"{self.rounds} rounds, residual {self.residual:.3g}"
+    text: ClassVar[str] = "{0.rounds} rounds, residual {0.residual:.3g}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

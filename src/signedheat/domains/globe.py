@@ -119,7 +119,7 @@ def longitudes_and_latitudes(ways: NDArray[np.float64]) -> NDArray[np.float64]:
     [[0.0, 0.0], [-90.0, 0.0], [90.0, 45.0]]
     """
     x, y, z = ways.T
-    return np.asarray(np.degrees(np.column_stack([np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))])))
+    return np.degrees(np.column_stack([np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))]))
 
 
 def great_circles(points: NDArray[np.float64], closed: bool, step: float) -> NDArray[np.float64]:

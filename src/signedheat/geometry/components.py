@@ -24,7 +24,7 @@ def connected_components(n: int, one: NDArray[np.integer], other: NDArray[np.int
     >>> connected_components(4, np.array([0, 3]), np.array([2, 3])).tolist()
     [0, 1, 0, 2]
     """
-    return np.asarray(_labels(n, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (one, other))))
+    return _labels(n, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (one, other)))
 
 
 def element_components(elements: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -122,7 +122,7 @@ def sums_of(values: NDArray[np.float64], groups: NDArray[np.integer], n: int) ->
     """
     columns = values.reshape(len(values), int(np.prod(values.shape[1:]))).T
     sums = np.stack([np.bincount(groups, column, n) for column in columns], axis=1)
-    return np.asarray(sums.reshape(n, *values.shape[1:]))
+    return np.asarray(sums.reshape(n, *values.shape[1:]), np.float64)
 
 
 @compiled

@@ -101,7 +101,7 @@ class TetShapes:
         """(m,) length of each tet's longest edge."""
         points = [self.vertices[self.tets[:, k]] for k in range(4)]
         squares = [np.square(points[i] - points[j]).sum(axis=1) for i in range(4) for j in range(i)]
-        return np.asarray(np.sqrt(np.max(squares, axis=0)))
+        return np.sqrt(np.max(squares, axis=0))
 
     @cached_property
     def thickness(self) -> NDArray[np.float64]:
@@ -130,4 +130,4 @@ def signed_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int64]) -> ND
     array([1.])
     """
     a, b, c, d = (vertices[tets[:, k]] for k in range(4))
-    return np.asarray(np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6)
+    return np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6

@@ -42,7 +42,7 @@ def welded(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
     [0, 1, 0, 1]
     """
     smallest = float(np.nextafter(np.abs(points).max(initial=0.0), np.inf)) * 2.0**-60
-    return np.asarray(_weld(np.ascontiguousarray(points), max(tolerance, smallest, 1e-300)))
+    return _weld(np.ascontiguousarray(points), max(tolerance, smallest, 1e-300))
 
 
 def same_positions(points: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -65,7 +65,7 @@ def same_rows(rows: NDArray[np.integer]) -> NDArray[np.int64]:
     [0, 1, 0]
     """
     numbers = np.ascontiguousarray(rows)
-    return np.asarray(_same_rows(numbers.view(np.int64) if numbers.itemsize == 8 else numbers.astype(np.int64)))
+    return _same_rows(numbers.view(np.int64) if numbers.itemsize == 8 else numbers.astype(np.int64))
 
 
 def distinct_rows(rows: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -215,7 +215,7 @@ def _product(form: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np
 
 
 def _over(firsts: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(firsts / np.where(weights > 0, weights, 1.0))
+    return firsts / np.where(weights > 0, weights, 1.0)
 
 
 def _of_pairs(values: NDArray[np.float64]) -> NDArray[np.float64]:

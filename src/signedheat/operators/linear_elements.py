@@ -75,7 +75,7 @@ class LinearElements:
 
     def divergence(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """b of Eq. 13, ``b_i = ∫ ⟨∇λ_i, Y⟩``, for one vector per cell."""
-        return np.asarray(self.slope_matrix.T @ (self.sizes[:, None] * vectors).ravel())
+        return self.slope_matrix.T @ (self.sizes[:, None] * vectors).ravel()
 
     def slope_error(self, values: NDArray[np.float64]) -> float:
         """Root mean square of ``|∇φ| − 1`` over the cells in which φ is known."""

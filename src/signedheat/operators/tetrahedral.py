@@ -40,13 +40,13 @@ class Tetrahedra(TetShapes):
     @cached_property
     def weights(self) -> NDArray[np.float64]:
         """(m,) w: one, less than one for thin tets, zero for flat ones."""
-        return np.asarray(np.minimum(self.thickness / THIN, 1))
+        return np.minimum(self.thickness / THIN, 1)
 
     @cached_property
     def ties(self) -> NDArray[np.float64]:
         """(m,) extra stiffness between any two faces of a flat tet, whose own stiffness is nearly zero."""
         lengths = np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
-        return np.asarray(lengths * (1 - np.minimum(self.thickness / FLAT, 1)))
+        return lengths * (1 - np.minimum(self.thickness / FLAT, 1))
 
     def face_mass(self) -> NDArray[np.float64]:
         """(f,) M of Eq. 12, lumped: a quarter of the volume at each face.

@@ -80,7 +80,7 @@ def _spread(corners: NDArray[np.float64], order: NDArray[np.int64], counts: NDAr
     root = np.sqrt(u)
     weights = np.stack([1 - root, root * (1 - v), root * v], axis=1)
     weights = np.where((counts == 1)[:, None], 1 / 3, weights)
-    return np.asarray((weights[:, :, None] * corners).sum(axis=1))
+    return (weights[:, :, None] * corners).sum(axis=1)
 
 
 def odds_at_corners(

@@ -226,4 +226,4 @@ def _mostly_again(
     ways, way = np.unique(parts[faces] * n + parts[others], return_inverse=True)
     shared = np.bincount(way, areas[faces])
     whole = (shared >= ALMOST_ALL * totals[ways // n]) & (ways // n != ways % n)
-    return np.asarray(whole[way])
+    return whole[way]

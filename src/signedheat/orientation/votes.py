@@ -81,7 +81,7 @@ def containers(
     >>> containers(np.array([0, 4]), np.array([0, 1, 1, 0]), entering, bounding).tolist()
     [-1, 0, 0, -1]
     """
-    return np.asarray(_containers(starts, parts, entering, bounding))
+    return _containers(starts, parts, entering, bounding)
 
 
 @compiled

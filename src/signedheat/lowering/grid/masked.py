@@ -313,4 +313,4 @@ class FreeNodes:
         """(n,) whether the line from each free node to its target (n, d), in cells, avoids the boxes of solid nodes."""
         counts = np.array(self.grid.shape)
         strides = np.append(np.cumprod(counts[:0:-1])[::-1], 1)
-        return np.asarray(lines_are_clear(self.indices, targets, self.solid, counts, strides))
+        return lines_are_clear(self.indices, targets, self.solid, counts, strides)

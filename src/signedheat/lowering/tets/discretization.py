@@ -158,7 +158,7 @@ class TetDiscretization(DiffusesEach):
         planes, centers = self.planes, self.mesh.tet_barycenters
         nearest = source.centers[scipy.spatial.cKDTree(source.centers).query(centers)[1]]
         begins, ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
-        return np.asarray(visible(planes, self.mesh.faces.neighbors, begins, ends, GRAZING * self.spacing))
+        return visible(planes, self.mesh.faces.neighbors, begins, ends, GRAZING * self.spacing)
 
     @cached_property
     def _laplacian(self) -> sparse.csr_matrix:
@@ -255,4 +255,4 @@ class TetIntegration(SpringIntegration):
     def _quadratic_correction(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
         """(s,) φ minus its linear interpolant, on the source."""
         assert isinstance(source, TetSource)
-        return np.asarray(source.quadratic_correction @ self.gradients(np.nan_to_num(values)).ravel())
+        return source.quadratic_correction @ self.gradients(np.nan_to_num(values)).ravel()

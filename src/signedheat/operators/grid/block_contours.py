@@ -176,7 +176,7 @@ def contour_parts(
 def _on_walls(points: NDArray[np.float64], window: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which points, in cells, lie on the walls of a window."""
     size = WINDOW * SIDE
-    return np.asarray(((points == window * size) | (points == (window + 1) * size)).any(axis=1))
+    return ((points == window * size) | (points == (window + 1) * size)).any(axis=1)
 
 
 def _seams_around(seams: dict[tuple[int, ...], _Seam], window: NDArray[np.int64]) -> list[_Seam]:

@@ -68,7 +68,7 @@ def solve_poisson(
     padded = padded_shape(transformed.shape)
     eigenvalues = [np.zeros(1)] * (4 - len(eigenvalues)) + eigenvalues
     by_slabs(padded, _divide, eigenvalues, transformed.reshape(padded))
-    return np.asarray(scipy.fft.idctn(transformed, type=2, overwrite_x=True, workers=workers))
+    return scipy.fft.idctn(transformed, type=2, overwrite_x=True, workers=workers)
 
 
 def interpolation_stencil(
