@@ -6,7 +6,7 @@ import math
 import shutil
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, Protocol, TypeVar, cast
@@ -212,7 +212,7 @@ def prepared(solid: Evaluated) -> tuple[FaceTree, Windings]:
 def in_threads(solve: Callable[[NDArray[np.int64]], Result], places: Iterable[NDArray[np.int64]]) -> Iterator[Result]:
     """Results, in order, few of which are held at a time."""
     with ThreadPoolExecutor(n_threads()) as pool:
-        jobs: deque = deque()  # type: ignore[type-arg]
+        jobs: deque[Future[Result]] = deque()
         try:
             for place in places:
                 jobs.append(pool.submit(solve, place))

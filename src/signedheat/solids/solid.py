@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -349,7 +350,9 @@ class Solid(Frozen, ShortRepr):
         """
         files.save_solid(self, path)
 
-    def _in_order(self, points: NDArray[np.float64], function) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
+    def _in_order(
+        self, points: NDArray[np.float64], function: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64]]]
+    ) -> NDArray[np.float64]:
         order = order_in_space(points)
         result = np.empty(len(points))
         (result[order],) = in_chunks(function, points[order])
@@ -375,7 +378,7 @@ class Solid(Frozen, ShortRepr):
             inside[~clear] = self.windings.inside(points[~clear])
         return inside
 
-    def _closest(self, points: NDArray[np.float64]) -> tuple[NDArray, ...]:  # type: ignore[type-arg]
+    def _closest(self, points: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
         found = self.tree.search(points)
         ids = self.features.ids[found.faces]
         signs = np.where(self._inside(points, found), -1.0, 1.0)

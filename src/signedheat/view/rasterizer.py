@@ -97,8 +97,8 @@ def rasterize(
     depth, face, value : (height, width) arrays
         Those of the nearest triangle at each pixel; face −1 and value NaN where there is none.
     """
-    triangles = np.arange(3 * len(corners)).reshape(-1, 3)
-    vertices, triangles, frame = (read_only(each) for each in (corners.reshape(-1, 3), triangles, np.eye(3)))
+    vertices, frame = read_only(corners.reshape(-1, 3)), read_only(np.eye(3))
+    triangles = read_only(np.arange(3 * len(corners)).reshape(-1, 3))
     shape, none = np.array([width, height]), np.zeros(3)
     ids, _, places = crossings_at_pixels(vertices, triangles, frame, none, 1.0, none[:2], shape, 0)
     order = np.argsort(places[:, 0], kind="stable")  # the nearest is written last
