@@ -132,13 +132,13 @@ def _by_sight(found: Votes) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
 
 
 def _hint(parts: Parts, found: Votes) -> NDArray[np.float64]:
-    """Evidence for the orientation as given, from the votes for all other parts, as logarithms of odds: 3 at most.
+    """Evidence for the orientation as given, from clear votes for all other parts, as logarithms of odds: 3 at most.
 
     Parts of which a tenth was given the other way round count less: so may a small part have been.
     """
     trust = np.where(parts.fixed, 0.0, 2 * parts.agreement - 1)
-    balance = trust * found.seen_votes
-    total = max(float(np.abs(found.seen_votes).sum()), 1.0)
+    sure = np.where(clear(found.seen_votes, found.seen, LEAST_VOTE), found.seen_votes, 0)
+    balance, total = trust * sure, max(float(np.abs(sure).sum()), 1.0)
     return 3.0 * np.where(parts.agreement >= LEAST_AGREEMENT, (balance.sum() - balance) / total, 0.0)
 
 
