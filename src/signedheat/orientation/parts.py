@@ -113,7 +113,7 @@ def _outward(parts: Parts, found: Votes) -> tuple[NDArray[np.int64], NDArray[np.
     return signs, by_volume | clear(found.own_votes, found.own, LEAST_VOTE)
 
 
-def clear(balance: NDArray[np.int64], cast: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
+def clear(balance: NDArray[np.int64] | NDArray[np.float64], cast: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
     """Whether a vote is clear: beyond the share, and beyond two standard deviations of votes at random."""
     return np.abs(balance) > share * cast + 2.0 * np.sqrt(cast)
 
@@ -132,14 +132,17 @@ def _by_sight(found: Votes) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
 
 
 def _hint(parts: Parts, found: Votes) -> NDArray[np.float64]:
-    """Evidence for the orientation as given, from clear votes for all other parts, as logarithms of odds: 3 at most.
+    """Evidence for the orientation as given, from the votes for all other parts, as logarithms of odds: 3 at most.
 
-    Parts of which a tenth was given the other way round count less: so may a small part have been.
+    Parts of which a tenth was given the other way round count less: so may a small part have been. Votes that are no
+    more than chance are no evidence: those of a large sheet say nothing about the small boxes on it.
     """
     trust = np.where(parts.fixed, 0.0, 2 * parts.agreement - 1)
-    sure = np.where(clear(found.seen_votes, found.seen, LEAST_VOTE), found.seen_votes, 0)
-    balance, total = trust * sure, max(float(np.abs(sure).sum()), 1.0)
-    return 3.0 * np.where(parts.agreement >= LEAST_AGREEMENT, (balance.sum() - balance) / total, 0.0)
+    balance = trust * found.seen_votes
+    others, cast = balance.sum() - balance, found.seen.sum() - found.seen
+    total = max(float(np.abs(found.seen_votes).sum()), 1.0)
+    evident = (parts.agreement >= LEAST_AGREEMENT) & clear(others, cast, 0.0)
+    return 3.0 * np.where(evident, others / total, 0.0)
 
 
 def _nested(
