@@ -173,7 +173,7 @@ class LeftOut(Note):
     cut_faces : int
         Those that lie inside in part, and were cut.
     merged_faces : int
-        Duplicates.
+        Duplicates, and small loose pieces that lie along a body, nearer than they are large.
     doubled_walls : int
         Faces that are there twice, once facing each way; they stay, unless they lie inside a body.
     """

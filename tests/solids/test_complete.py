@@ -451,3 +451,43 @@ def test_a_crack_is_sewn_up():
     solid = sh.complete((vertices, faces))
     assert not any(isinstance(note, BoundsNothing) for note in solid.diagnostics.notes)
     assert volume(solid) == pytest.approx(0.1, rel=1e-6)
+
+
+@pytest.mark.parametrize("flipped", [0.0, 0.5, 1.0])
+def test_small_open_boxes_on_a_large_ground_sheet_are_solid_each(flipped):
+    rng = np.random.default_rng(7)
+    places = 10.0 * np.stack(np.meshgrid(np.arange(5), np.arange(4)), axis=-1).reshape(-1, 2)
+    meshes, middles = [grid_sheet((-20.0, -20.0, 0.0), (100.0, 0, 0), (0, 100.0, 0), 20)], []
+    for number, place in enumerate(places):
+        size, bottom = rng.uniform(0.5, 2.0, 3), (0.0, 0.05, -0.2)[number % 3]
+        vertices, faces = box(size, (*place, bottom), without=(number % 6,), n=1)
+        meshes.append((vertices, faces[:, ::-1] if rng.random() < flipped else faces))
+        middles.append(np.array([*place, bottom]) + size / 2)
+    solid = sh.complete(joined(*meshes))
+    assert solid.inside(np.array(middles)).all()
+    assert not solid.inside(np.add(middles, [0, 0, 3])).any()
+
+
+def test_leaves_anywhere_bound_nothing():
+    rng = np.random.default_rng(0)
+    leaves = rng.normal(size=(400, 1, 3)) + 0.2 * rng.normal(size=(400, 3, 3))
+    solid = sh.complete((leaves.reshape(-1, 3), np.arange(1200).reshape(-1, 3)))
+    assert not solid.inside(rng.normal(size=(1000, 3))).any()
+
+
+@pytest.mark.parametrize("n", [1, 12])
+@pytest.mark.parametrize("away", [0.02, 0.2])
+def test_a_sheet_near_a_body_is_kept(n, away):
+    sheet = grid_sheet((0.1, 0.1, 1 + away), (0.8, 0, 0), (0, 0.8, 0), n)
+    solid = sh.complete(joined(box(), sheet))
+    assert solid.distance([[0.5, 0.5, 1 + away], [0.5, 0.5, 1 + away / 2]]) == pytest.approx([0, away / 2])
+    assert any(isinstance(note, BoundsNothing) for note in solid.diagnostics.notes)
+
+
+def test_small_copies_of_a_body_are_left_out_and_counted():
+    vertices, faces = box(n=20)
+    shift = 0.003 * np.random.default_rng(0).normal(size=(len(faces), 1, 3))
+    copies = (vertices[faces] + shift).reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
+    solid = sh.complete(joined((vertices, faces), copies))
+    assert volume(solid) == pytest.approx(1)
+    assert [note.merged_faces for note in solid.diagnostics.notes if isinstance(note, LeftOut)] == [len(faces)]

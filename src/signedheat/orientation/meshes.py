@@ -13,6 +13,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
 from ..frozen import Frozen
+from ..geometry.part_levels import own_levels
 from ..reprs import ShortRepr
 from .inner_walls import inner_walls
 from .mesh_faces import Mesh, MeshFaces
@@ -28,6 +29,8 @@ MANY = 500_000
 """Triangles from which on lines have 8 directions only, not 16: each costs a look at all of them."""
 N_AIMED = 8
 """Closed parts that fewer of them cross get lines of their own."""
+N_CLEAR = 64
+"""Open parts that fewer of them cross face out of themselves by their own winding number, if that is clear."""
 FEW = 0.75
 """Logarithm of the odds from which parts turn that have but a hint: that all other parts must turn."""
 NEARLY_CLOSED = 0.8
@@ -182,7 +185,7 @@ def orientation(shape: Mesh | ForeignShape) -> Orientation:
     surface = faces.surface
     lines, crossed = _crossings(faces, lines, crossed)
     walls = _doubled_walls(surface, lines, surface.orientation.parts[crossed])
-    parts = _table(faces, walls)
+    parts = _table(faces, walls, crossed)
     if walls.any():
         lines, crossed = _without(lines, crossed, walls[surface.orientation.parts[crossed]])
     found = orient_parts(parts, lines, surface.orientation.parts[crossed])
@@ -293,19 +296,39 @@ def _doubled_walls(surface: SurfaceParts, lines: LineCrossings, crossed: NDArray
     return mostly & ~encloses
 
 
-def _table(faces: MeshFaces, walls: NDArray[np.bool_]) -> Parts:
+def _table(faces: MeshFaces, walls: NDArray[np.bool_], crossed: NDArray[np.int64]) -> Parts:
+    """What is known of parts without lines; levels of the open ones that few lines cross."""
     surface, (areas, volumes) = faces.surface, faces.measures
     turned = surface.orientation.turned
     alike, opposite = surface.copies
     totals = surface.part_sums(areas * (alike + opposite))
     as_given = surface.part_sums(areas * np.where(turned, opposite, alike))
+    counts = np.bincount(surface.orientation.parts[crossed], minlength=surface.n_parts)
+    scarce = surface.is_part & ~surface.orientation.closed & (counts < N_CLEAR)
     return Parts(
         areas=surface.part_sums(areas),
         volumes=surface.part_sums(np.where(turned, -volumes, volumes)),
         closed=surface.orientation.closed & surface.is_part,
+        levels=_levels(faces, scarce),
         agreement=as_given / np.where(totals > 0, totals, 1),
         fixed=walls | ~surface.orientation.orientable | ~surface.is_part,
     )
+
+
+def _levels(faces: MeshFaces, chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(n_parts,) levels of some parts, and 0."""
+    surface, levels = faces.surface, np.zeros(faces.surface.n_parts)
+    owners = surface.orientation.parts[faces.triangle_faces]
+    some = np.flatnonzero(chosen[owners] & surface.is_first[faces.triangle_faces])
+    if len(some):
+        corners, backwards = (
+            faces.positions[faces.triangles[some]],
+            surface.orientation.turned[faces.triangle_faces[some]],
+        )
+        corners[backwards] = corners[backwards, ::-1]
+        names, labels = np.unique(owners[some], return_inverse=True)
+        levels[names] = own_levels(corners, labels)
+    return levels
 
 
 def _without(

@@ -15,6 +15,9 @@ LEAST_VOTE = 0.1
 of the crossings vote. Below this share (D > .8 A) the surface counts as a sheet."""
 LEAST_CLOSED = 0.5
 """From this share on (D < A / 3) a part with holes has an inside that others may lie in."""
+HALF = 0.3
+"""Level (`geometry.part_levels`) from which a part that few lines cross has an inside: half a ball has .31, three sides
+of a box .22."""
 LEAST_AGREEMENT = 0.6
 """From this share of its area on, that given the same way round, a part's own orientation is a hint."""
 CERTAIN = 20.0
@@ -33,6 +36,8 @@ class Parts:
         Signed volumes, as the parts are oriented now.
     closed : bool
         Whether every edge has two faces.
+    levels : float
+        Of open parts that few lines cross, as they are oriented now; 0 of others.
     agreement : float
         Share of the area that was given as it is oriented now, at least one half.
     fixed : bool
@@ -42,6 +47,7 @@ class Parts:
     areas: NDArray[np.float64]
     volumes: NDArray[np.float64]
     closed: NDArray[np.bool_]
+    levels: NDArray[np.float64]
     agreement: NDArray[np.float64]
     fixed: NDArray[np.bool_]
 
@@ -89,7 +95,9 @@ def orient_parts(parts: Parts, lines: LineCrossings, crossed: NDArray[np.int64])
     """
     found = votes(lines.starts, crossed, lines.entering, len(parts.areas))
     outward, is_clear = _outward(parts, found)
-    bounding = ~parts.fixed & (parts.closed | (is_clear & (np.abs(found.own_votes) >= LEAST_CLOSED * found.own)))
+    halves = np.abs(parts.levels) >= HALF
+    bounding = is_clear & (np.abs(found.own_votes) >= LEAST_CLOSED * found.own)
+    bounding = ~parts.fixed & (parts.closed | halves | bounding)
     if np.count_nonzero(found.crossings) > 1:
         within = containers(lines.starts, crossed, lines.entering == (outward[crossed] > 0), bounding)
     else:
@@ -99,7 +107,7 @@ def orient_parts(parts: Parts, lines: LineCrossings, crossed: NDArray[np.int64])
     odds, decided = _by_sight(found)
     hint = _hint(parts, found)
     odds = np.where(decided, odds, 0.0) + hint
-    alone = ~parts.fixed & (parts.closed | (nested >= 0) | (~decided & is_clear))
+    alone = ~parts.fixed & (parts.closed | halves | (nested >= 0) | (~decided & is_clear))
     odds = np.where(alone, CERTAIN * outward * np.where(cavity, -1, 1), odds)
     odds[parts.fixed] = 0
     return PartOrientation(odds, (decided | alone) & ~parts.fixed, nested, cavity)
@@ -109,8 +117,9 @@ def _outward(parts: Parts, found: Votes) -> tuple[NDArray[np.int64], NDArray[np.
     """The sign that turns each part out of itself, and whether that is clear."""
     flat = np.abs(parts.volumes) <= 1e-12 * parts.areas**1.5
     by_volume = parts.closed & ~flat
-    signs = np.where(by_volume, np.where(parts.volumes < 0, -1, 1), np.where(found.own_votes < 0, -1, 1))
-    return signs, by_volume | clear(found.own_votes, found.own, LEAST_VOTE)
+    halves = np.abs(parts.levels) >= HALF
+    alone = np.where(by_volume, parts.volumes, np.where(halves, parts.levels, found.own_votes))
+    return np.where(alone < 0, -1, 1), by_volume | halves | clear(found.own_votes, found.own, LEAST_VOTE)
 
 
 def clear(balance: NDArray[np.int64] | NDArray[np.float64], cast: NDArray[np.int64], share: float) -> NDArray[np.bool_]:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.cut_faces import cut_faces
-from .parts import face_areas, parts_of
+from ..geometry.part_levels import face_areas
+from .parts import parts_of
 from .winding import Windings
 
 

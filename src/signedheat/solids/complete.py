@@ -23,6 +23,7 @@ from ..domains.validation import flag
 from ..errors import SignedHeatError, SourceError
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
+from ..geometry.part_levels import face_areas
 from ..geometry.welding import roundoff, same_positions, welded
 from ..memory import refuse_beyond_memory
 from ..operators.grid.fitted_points import mean_gap
@@ -33,7 +34,7 @@ from . import parts
 from .bounding import pieces_of
 from .closing import lids_of
 from .heat import Heat, heat_surface
-from .loose import bound_together, fragments, scatter_of, without_copies
+from .loose import are_copies, bound_together, fragments, scatter_of
 from .lost_faces import lost_faces
 from .rims import open_edges
 from .solid import Solid
@@ -219,20 +220,25 @@ def completed(
     every = Surface(vertices[mesh.faces[proper]], ids[proper], proper, True)
     bounding = np.ones(len(proper), dtype=bool) if inner is None else ~inner[proper]
     given, walls = _some(every, bounding, True), [_some(every, ~bounding, False)]
-    if not parts.face_areas(given.triangles).any():
+    if not face_areas(given.triangles).any():
         raise SourceError("no face of the shape has an area", element="shape")
     if completion == "heat":
         return united(_by_heat(given, method) + walls, keep_overlaps)
     lost = lost_faces(vertices, given.ids)
     ends = wall_ends(vertices, np.concatenate([given.ids, lost]))
-    surfaces = _by_lids(given, np.concatenate([lost, ends]), vertices, method)
-    restored = float(parts.face_areas(vertices[lost]).sum() / parts.face_areas(given.triangles).sum())
+    surfaces, copies = _by_lids(given, np.concatenate([lost, ends]), vertices, method)
+    restored = float(face_areas(vertices[lost]).sum() / face_areas(given.triangles).sum())
     notes = [FacesRestored(len(lost), restored / (1 + restored))] if len(lost) else []
-    return united(surfaces + walls, keep_overlaps, notes)
+    return united(surfaces + walls, keep_overlaps, notes, copies=copies)
 
 
-def _by_lids(given: Surface, added: NDArray[np.int64], vertices: NDArray[np.float64], method: Heat) -> list[Surface]:
-    """Bodies, with the faces added between their vertices, and their lids; sheets; what loose pieces are."""
+def _by_lids(
+    given: Surface, added: NDArray[np.int64], vertices: NDArray[np.float64], method: Heat
+) -> tuple[list[Surface], int]:
+    """Bodies, with the faces added between their vertices, and their lids; sheets; what loose pieces are.
+
+    Also how many faces are left out as copies of others.
+    """
     whole = Surface(
         np.concatenate([given.triangles, vertices[added]]),
         np.concatenate([given.ids, added]),
@@ -240,10 +246,10 @@ def _by_lids(given: Surface, added: NDArray[np.int64], vertices: NDArray[np.floa
         True,
     )
     labels, is_body = parts.bodies(whole.triangles, whole.ids)
-    kept = is_body[labels]
-    if not kept.all():
-        kept[~kept] = without_copies(whole.triangles[~kept], labels[~kept], whole.triangles[kept])
-    whole, labels = _some(whole, kept, True), labels[kept]
+    copies = ~is_body[labels]
+    if copies.any():
+        copies[copies] = are_copies(whole.triangles[copies], labels[copies], whole.triangles[~copies])
+    whole, labels = _some(whole, ~copies, True), labels[~copies]
     surfaces, lidded = [], is_body[labels]
     opened = np.isin(np.arange(len(is_body)), open_edges(whole.ids, labels)[1])
     for chosen in fragments(whole.triangles, labels, ~is_body, is_body & opened):
@@ -255,7 +261,8 @@ def _by_lids(given: Surface, added: NDArray[np.int64], vertices: NDArray[np.floa
             surfaces.append(_some(pieces, loose, False))
     bodies = _some(whole, lidded, True)
     lids = lids_of(bodies.triangles, bodies.ids, labels[lidded], vertices)
-    return [bodies, *(Surface(lid, _new_ids(lid), np.full(len(lid), -1), True) for lid in lids), *surfaces]
+    closing = (Surface(lid, _new_ids(lid), np.full(len(lid), -1), True) for lid in lids)
+    return [bodies, *closing, *surfaces], int(copies.sum())
 
 
 def _scattered(pieces: Surface, labels: NDArray[np.int64], method: Heat) -> list[Surface]:
@@ -311,6 +318,7 @@ def united(
     keep_overlaps: bool,
     notes: Sequence[Note] = (),
     points: NDArray[np.float64] | None = None,
+    copies: int = 0,
 ) -> Solid:
     """The solid that surfaces close: without what lies inside, where bodies overlap, and without idle completion."""
     whole = _joined(surfaces)
@@ -324,9 +332,9 @@ def united(
     kept = np.where(given, ~buried | keep_overlaps, bounds | ~closing[pieces.origins])
     if not kept.any():
         kept[:] = True
-    areas = parts.face_areas(pieces.triangles)
+    areas = face_areas(pieces.triangles)
     confidence = _confidence(pieces.triangles[kept], given[kept], whole, points)
-    found = _notes(pieces.triangles, areas, origins, kept, buried & ~kept, bounds)
+    found = _notes(pieces.triangles, areas, origins, kept, buried & ~kept, bounds, copies)
     diagnostics = Diagnostics(notes=(*notes, *found))
     bounding = (pieces.behind & ~pieces.ahead)[kept]
     return Solid(pieces.triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics)
@@ -339,15 +347,16 @@ def _notes(
     kept: NDArray[np.bool_],
     buried: NDArray[np.bool_],
     bounds: NDArray[np.bool_],
+    copies: int,
 ) -> list[Note]:
     notes: list[Note] = []
     given = origins >= 0
     total = max(float(areas[given].sum()), np.finfo(float).tiny)
     covered = buried & given
-    if covered.any():
+    if covered.any() or copies:
         faces, others = np.unique(origins[covered]), np.unique(origins[given & kept])
         cut = int(np.isin(faces, others).sum())
-        notes.append(LeftOut(len(faces), float(areas[covered].sum()) / total, cut))
+        notes.append(LeftOut(len(faces), float(areas[covered].sum()) / total, cut, copies))
     made = kept & ~given
     if made.any():
         area = float(areas[made].sum())

@@ -29,8 +29,8 @@ SURE = 0.4
 """How far from 0 and 1 the winding number, over what it is inside, may be where it decides instead of φ, which bulges
 towards the corners of the box: of half a cow as points 11 % are wrong (20 with .25, 32 without it)."""
 FRAGMENTS = 0.06
-"""Mean of the winding number on both sides of a shape up to which it bounds nothing: an eighth of the faces of a ball
-has .0625."""
+"""Level of a whole shape up to which it bounds nothing: an eighth of the faces of a ball has .0625, 400 leaves anywhere
+up to .034, 40 on a stem .043."""
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from ..geometry.components import connected_components
 from ..geometry.face_tree import FaceTree
+from ..geometry.part_levels import face_areas, level, own_levels
 from ..geometry.welding import same_positions
 from ..geometry.winding_tree import WindingTree
-from .parts import face_areas, level, own_levels
+from .heat import FRAGMENTS
 
 COPY = 0.5
 """Distance from a body, over the size of a piece, up to which the piece is a copy of what is there."""
@@ -23,25 +24,28 @@ CLOSING = 0.4
 """Rise of the level of a part by pieces, over that if all were faces of one body, from which on they are: what is left
 at random of balls, boxes and parts has .43 to .95, sheets in an open box .37, litter in and around it .16."""
 ISLANDS = 0.003
-"""Area of pieces over that of a part up to which they are islands in its holes, and change nothing: ten triangles
+"""Area of pieces over that of a part up to which they may be its copies, or are islands in its holes: ten triangles
 between sixty holes of a ball have .0008, what half of a box's triangles, gone at random, leave .006. Halved or
 doubled it changes five shapes of which half is gone by .5 % at most."""
 MATCH = (1e-6, 0.75)
 """Distance of corners over the size of pieces between which they were one corner, before noise moved them."""
 
 
-def without_copies(
+def are_copies(
     triangles: NDArray[np.float64], labels: NDArray[np.int64], bodies: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """(m,) triangles of pieces that are no copies of a body: pieces that lie on it, nearer than their own size."""
+    """(m,) triangles of pieces that are copies of a part of bodies: small, and nearer to them than they are large.
+
+    To leave them out moves the surface by less than a thirtieth of the size of the bodies.
+    """
     if not len(bodies):
-        return np.ones(len(triangles), dtype=bool)
+        return np.zeros(len(triangles), dtype=bool)
     tree = FaceTree.of_triangles(bodies)
     n = int(labels.max()) + 1
-    sizes, farthest = np.sqrt(np.bincount(labels, face_areas(triangles), n)), np.zeros(n)
+    areas, farthest = np.bincount(labels, face_areas(triangles), n), np.zeros(n)
     np.maximum.at(farthest, labels, tree.distances(triangles.reshape(-1, 3)).reshape(-1, 3).max(axis=1))
-    kept: NDArray[np.bool_] = (farthest >= COPY * sizes)[labels]
-    return kept
+    copies = (farthest < COPY * np.sqrt(areas)) & (areas < ISLANDS * face_areas(bodies).sum())
+    return np.asarray(copies[labels])
 
 
 def clusters_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> list[NDArray[np.int64]]:
@@ -138,7 +142,8 @@ def bound_together(triangles: NDArray[np.float64], labels: NDArray[np.int64], lo
         return False
     pieces = np.bincount(np.unique(labels[loose], return_inverse=True)[1], areas)
     n = pieces.sum() ** 2 / (pieces**2).sum()
-    return level(triangles, np.flatnonzero(loose)) * float(np.sqrt(n)) >= CHANCE
+    joint = level(triangles, np.flatnonzero(loose))
+    return joint >= FRAGMENTS and joint * float(np.sqrt(n)) >= CHANCE
 
 
 def scatter_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> float:

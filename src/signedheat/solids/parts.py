@@ -1,8 +1,6 @@
 """Which parts of an oriented shape bound something: those at whose faces its winding number is high enough.
 
-The winding number jumps by one across a face. The mean of its two sides, here a part's *level*, is ½ on a closed
-surface and 0 on a flat sheet; between, it says how much of a body a part is: half a ball has .31, a quarter .20. Where
-faces are missing everywhere, it is half of the share that is there.
+The level of a part (`geometry.part_levels`) says how much of a body it is.
 """
 
 from __future__ import annotations
@@ -10,11 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
 from ..geometry.components import connected_components, element_components
 from ..geometry.directions import unit
 from ..geometry.edges import edge_table
-from ..geometry.winding_tree import WindingTree, solid_angle
+from ..geometry.part_levels import own_levels
 from .rims import meeting_edges, open_edges
 
 SHEET = 0.15
@@ -23,10 +20,6 @@ ball .16, a quarter .20, three sides of a box .22."""
 UPRIGHT = 0.45
 """Uprightness of the rims of a part from which on it is a body, however thin. Three sides of a cube at a corner have
 .58, of a flat box .54, a tray 1; a half pipe .32, a shallow dome .34, a sheet folded at a right angle .24."""
-PLACES = 4096
-"""Faces of a large part that its level is the mean of."""
-FEW = 256
-"""Faces up to which those of a part are summed one by one."""
 
 
 def parts_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -72,22 +65,6 @@ def _joined_along_rims(
     return connected_components(len(counts), owners[one], owners[other])[labels]
 
 
-def own_levels(triangles: NDArray[np.float64], parts: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(p,) mean over the faces of each part of its own winding number, between the two sides of a face."""
-    order = np.argsort(parts, kind="stable")
-    counts = np.bincount(parts)
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    corners = np.ascontiguousarray(triangles[order]).reshape(-1, 9)
-    areas = face_areas(triangles[order])
-    total = np.bincount(parts[order], areas)
-    levels = np.bincount(parts[order], areas * _among_few(corners, starts, FEW)) / np.maximum(
-        total, np.finfo(float).tiny
-    )
-    for part in np.flatnonzero(counts > FEW):
-        levels[part] = level(triangles[order[starts[part] : starts[part + 1]]])
-    return levels
-
-
 def uprightness(
     triangles: NDArray[np.float64], ids: NDArray[np.int64], parts: NDArray[np.int64], n_parts: int
 ) -> NDArray[np.float64]:
@@ -118,40 +95,3 @@ def uprightness(
 
 def _sums(owners: NDArray[np.int64], vectors: NDArray[np.float64], n: int) -> NDArray[np.float64]:
     return np.stack([np.bincount(owners, column, n) for column in vectors.T], axis=1)
-
-
-def level(triangles: NDArray[np.float64], faces: NDArray[np.int64] | None = None) -> float:
-    """The mean over all faces, or some, of the winding number of all, between the two sides of a face."""
-    some = np.arange(len(triangles)) if faces is None else faces
-    some = some[:: max(1, len(some) // PLACES)]
-    areas = face_areas(triangles[some])
-    if not areas.any():
-        return 0.0
-    behind = WindingTree.of(triangles).behind(some, triangles[some].mean(axis=1))
-    return float(np.average(behind, weights=areas)) - 0.5
-
-
-def face_areas(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m,) areas."""
-    a, b, c = triangles.transpose(1, 0, 2)
-    areas: NDArray[np.float64] = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return areas
-
-
-@compiled
-def _among_few(corners: NDArray[np.float64], starts: NDArray[np.int64], few: int) -> NDArray[np.float64]:
-    levels = np.zeros(len(corners))
-    for p in range(len(starts) - 1):
-        if starts[p + 1] - starts[p] > few:
-            continue
-        for i in range(starts[p], starts[p + 1]):
-            x = (corners[i, 0] + corners[i, 3] + corners[i, 6]) / 3
-            y = (corners[i, 1] + corners[i, 4] + corners[i, 7]) / 3
-            z = (corners[i, 2] + corners[i, 5] + corners[i, 8]) / 3
-            total = 0.0
-            for j in range(starts[p], starts[p + 1]):
-                if j != i:
-                    rest, volume = solid_angle(corners, j, x, y, z)
-                    total += 2.0 * np.arctan2(volume, rest)
-            levels[i] = total / (4.0 * np.pi)
-    return levels

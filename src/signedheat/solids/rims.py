@@ -13,6 +13,8 @@ PLACES = 8
 ALONG = 0.1
 """Distance over the length of the longer edge up to which two edges run along each other: chords of the same arc are
 less than .05 apart where it has 16 or more."""
+OPPOSITE = -0.7
+"""Cosine of their directions up to which they run in opposite directions; with 0, leaves that cross are one part."""
 
 
 def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -80,7 +82,7 @@ def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray
     one = np.repeat(owners, [len(each) for each in found])
     other = owners[np.concatenate([np.asarray(each, dtype=np.int64) for each in found])] if len(one) else one
     pairs = np.unique(np.sort(np.stack([one, other], axis=1)), axis=0)
-    one, other = pairs[(ways[pairs[:, 0]] * ways[pairs[:, 1]]).sum(axis=1) < 0.0].T
+    one, other = pairs[(ways[pairs[:, 0]] * ways[pairs[:, 1]]).sum(axis=1) < OPPOSITE].T
     same = (ends[one] == ends[other, ::-1]).all(axis=(1, 2))
     return one[~same], other[~same]
 

@@ -8,8 +8,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..geometry.part_levels import face_areas
 from .lids import area_vector, cut_to_pieces
-from .parts import face_areas, parts_of
+from .parts import parts_of
 from .rims import loops, open_edges
 
 NARROW = 0.3
