@@ -116,24 +116,34 @@ def _lid(
 ) -> lids.Lid:
     if len(corners) == 3:
         return lids.Lid(corners, np.array([[0, 1, 2]]), 3)
-    rim, cut = lids.SmoothRim.of(corners), lids.cut_to_pieces(corners)
-    pattern, smooth = _spanned(rim, cut)
-    width, points = bending.width_of(smooth), smooth.vertices[: smooth.n_rim]
+    for frame in (lids.frame_of(corners), None):
+        if lid := _spanned(corners, frame, own, tree, patches, ends):
+            return lid
+    raise AssertionError("a disc has room for every loop")
+
+
+def _spanned(
+    corners: NDArray[np.float64],
+    frame: lids.Frame | None,
+    own: NDArray[np.float64],
+    tree: BoxTree,
+    patches: NDArray[np.int64],
+    ends: NDArray[np.int64],
+) -> lids.Lid | None:
+    """The lid of a loop, triangulated in a plane or without one in a disc; None if it crosses itself in that plane."""
+    rim = lids.SmoothRim.of(corners)
+    smooth = lids.pattern(rim.points, frame, float(rim.places[0]))
+    if smooth is None:
+        return None
+    flat = lids.film(smooth)
+    width, points = bending.width_of(flat), flat.vertices[: flat.n_rim]
     near = bending.samples_near(own, tree, patches, scipy.spatial.cKDTree(points), bending.REACH * width)
-    normals, curvatures, held = bending.continuation(smooth, near, ends[rim.edges_at(points)], width)
-    bent = lids.plate(smooth, normals, curvatures, held) if held.any() else None
-    if bent is not None:
-        return lids.draped(pattern, bent)
-    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
-    nearest = scipy.spatial.cKDTree(points).query(middles)[1]
-    return creases.creased(corners, normals[nearest]) or lids.draped(pattern, smooth)
-
-
-def _spanned(rim: lids.SmoothRim, cut: NDArray[np.float64]) -> tuple[lids.Film, lids.Film]:
-    """The pattern of a loop, and a film over the smooth one, triangulated in the same plane or disc."""
-    frame = lids.frame_of(cut)
-    if frame is not None:
-        pattern, smooth = lids.pattern(cut, frame), lids.pattern(rim.points, frame)
-        if pattern is not None and smooth is not None:
-            return pattern, lids.film(smooth)
-    return lids.disc_pattern(cut), lids.film(lids.disc_pattern(rim.points, float(rim.places[0])))
+    normals, curvatures, held = bending.continuation(flat, near, ends[rim.edges_at(points)], width)
+    bent = lids.plate(flat, normals, curvatures, held) if held.any() else None
+    if bent is None:
+        middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
+        nearest = scipy.spatial.cKDTree(points).query(middles)[1]
+        if lid := creases.creased(corners, normals[nearest]):
+            return lid
+    pattern = lids.pattern(lids.cut_to_pieces(corners), frame)
+    return None if pattern is None else lids.draped(pattern, bent or flat)

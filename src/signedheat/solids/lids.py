@@ -152,22 +152,21 @@ def frame_of(rim: NDArray[np.float64]) -> Frame | None:
     return None if axes is None else (rim[0], axes)
 
 
-def pattern(rim: NDArray[np.float64], frame: Frame) -> Film | None:
-    """A film before it is solved for, flat inside its rim; None if the loop's shadow in the plane crosses itself."""
+def pattern(rim: NDArray[np.float64], frame: Frame | None, begin: float = 0.0) -> Film | None:
+    """A film before it is solved for; None if the loop's shadow in the plane crosses itself.
+
+    It is flat inside its rim, or without a plane triangulated in a disc, around which the loop begins at a share of the
+    circle.
+    """
+    if frame is None:
+        plane, faces = _in_disc(rim, begin)
+        return Film(np.concatenate([rim, np.zeros((len(plane) - len(rim), 3))]), faces, len(rim), plane)
     origin, axes = frame
     found = _in_polygon(rim, (rim - origin) @ axes)
     if found is None:
         return None
     rim, plane, faces = found
     return Film(np.concatenate([rim, origin + plane[len(rim) :] @ axes.T]), faces, len(rim), plane)
-
-
-def disc_pattern(rim: NDArray[np.float64], begin: float = 0.0) -> Film:
-    """The same, triangulated in a disc, around which the loop begins at a share of the circle."""
-    plane, faces = _in_disc(rim, begin)
-    vertices = np.zeros((len(plane), 3))
-    vertices[: len(rim)] = rim
-    return Film(vertices, faces, len(rim), plane)
 
 
 def film(pattern: Film) -> Film:
