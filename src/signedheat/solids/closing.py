@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from ..geometry.box_tree import BoxTree
 from ..geometry.components import connected_components
@@ -29,17 +30,16 @@ def lids_of(
     edges, owners = open_edges(ids, parts)
     order = np.argsort(parts, kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(parts))])
-    made = []
-    for part in np.unique(owners):
-        here = order[starts[part] : starts[part + 1]]
-        own = triangles[here]
-        patches, tree = bending.smooth_patches(own, ids[here]), BoxTree.of(own.min(axis=1), own.max(axis=1))
-        ends = _Ends.of(ids[here], patches, len(vertices))
-        rims = loops(edges[np.searchsorted(owners, part) : np.searchsorted(owners, part, side="right")])
-        for loop in _openings(rims, vertices):
-            lid = _lid(vertices[loop], own, tree, patches, ends.at(loop))
-            made.append(lid.vertices[lid.faces])
-    return made
+    made: list[lids.Lid] = []
+    with threadpool_limits(1, "blas"):  # systems of a few hundred unknowns: threads would only wait
+        for part in np.unique(owners):
+            here = order[starts[part] : starts[part + 1]]
+            own = triangles[here]
+            patches, tree = bending.smooth_patches(own, ids[here]), BoxTree.of(own.min(axis=1), own.max(axis=1))
+            ends = _Ends.of(ids[here], patches, len(vertices))
+            rims = loops(edges[np.searchsorted(owners, part) : np.searchsorted(owners, part, side="right")])
+            made += [_lid(vertices[loop], own, tree, patches, ends.at(loop)) for loop in _openings(rims, vertices)]
+    return [lid.vertices[lid.faces] for lid in made]
 
 
 def _openings(rims: list[NDArray[np.int64]], vertices: NDArray[np.float64]) -> list[NDArray[np.int64]]:
