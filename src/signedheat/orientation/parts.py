@@ -51,6 +51,12 @@ class Parts:
     agreement: NDArray[np.float64]
     fixed: NDArray[np.bool_]
 
+    @property
+    def halves(self) -> NDArray[np.bool_]:
+        """(n_parts,) open parts that few lines cross, and whose level says that they have an inside."""
+        halves: NDArray[np.bool_] = np.abs(self.levels) >= HALF
+        return halves
+
 
 @dataclass(frozen=True, eq=False)
 class PartOrientation:
@@ -77,7 +83,8 @@ class PartOrientation:
 def orient_parts(parts: Parts, lines: LineCrossings, crossed: NDArray[np.int64]) -> PartOrientation:
     """Let each part face out of the solid.
 
-    Closed parts first face out of themselves, by the sign of their volume. Parts that are seen from outside, closed or
+    Closed parts first face out of themselves, by the sign of their volume; so do open ones that few lines cross and
+    that are at least half of a body, by their own winding numbers. Parts that are seen from outside, closed or
     open, then face to where they are seen from: lines enter a solid where they first meet it. A part hidden in another
     is a body inside a body if both were given the same way round, and the wall of a cavity if not, or if a part was
     given without a clear majority; whatever lies in a cavity is a body. Open parts that cannot be seen face so that
@@ -95,9 +102,8 @@ def orient_parts(parts: Parts, lines: LineCrossings, crossed: NDArray[np.int64])
     """
     found = votes(lines.starts, crossed, lines.entering, len(parts.areas))
     outward, is_clear = _outward(parts, found)
-    halves = np.abs(parts.levels) >= HALF
     bounding = is_clear & (np.abs(found.own_votes) >= LEAST_CLOSED * found.own)
-    bounding = ~parts.fixed & (parts.closed | halves | bounding)
+    bounding = ~parts.fixed & (parts.closed | parts.halves | bounding)
     if np.count_nonzero(found.crossings) > 1:
         within = containers(lines.starts, crossed, lines.entering == (outward[crossed] > 0), bounding)
     else:
@@ -107,7 +113,7 @@ def orient_parts(parts: Parts, lines: LineCrossings, crossed: NDArray[np.int64])
     odds, decided = _by_sight(found)
     hint = _hint(parts, found)
     odds = np.where(decided, odds, 0.0) + hint
-    alone = ~parts.fixed & (parts.closed | halves | (nested >= 0) | (~decided & is_clear))
+    alone = ~parts.fixed & (parts.closed | parts.halves | (nested >= 0) | (~decided & is_clear))
     odds = np.where(alone, CERTAIN * outward * np.where(cavity, -1, 1), odds)
     odds[parts.fixed] = 0
     return PartOrientation(odds, (decided | alone) & ~parts.fixed, nested, cavity)
@@ -117,9 +123,8 @@ def _outward(parts: Parts, found: Votes) -> tuple[NDArray[np.int64], NDArray[np.
     """The sign that turns each part out of itself, and whether that is clear."""
     flat = np.abs(parts.volumes) <= 1e-12 * parts.areas**1.5
     by_volume = parts.closed & ~flat
-    halves = np.abs(parts.levels) >= HALF
-    alone = np.where(by_volume, parts.volumes, np.where(halves, parts.levels, found.own_votes))
-    return np.where(alone < 0, -1, 1), by_volume | halves | clear(found.own_votes, found.own, LEAST_VOTE)
+    alone = np.where(by_volume, parts.volumes, np.where(parts.halves, parts.levels, found.own_votes))
+    return np.where(alone < 0, -1, 1), by_volume | parts.halves | clear(found.own_votes, found.own, LEAST_VOTE)
 
 
 def clear(balance: NDArray[np.int64] | NDArray[np.float64], cast: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
