@@ -30,7 +30,8 @@ MANY = 500_000
 N_AIMED = 8
 """Closed parts that fewer of them cross get lines of their own."""
 N_CLEAR = 64
-"""Open parts that fewer of them cross face out of themselves by their own winding number, if that is clear."""
+"""Open parts that fewer of them cross face out of themselves by their own winding number, if that is clear. Half or
+twice as many change none of 125 shapes and of 200 boxes on a sheet."""
 FEW = 0.75
 """Logarithm of the odds from which parts turn that have but a hint: that all other parts must turn."""
 NEARLY_CLOSED = 0.8
@@ -321,10 +322,8 @@ def _levels(faces: MeshFaces, chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
     owners = surface.orientation.parts[faces.triangle_faces]
     some = np.flatnonzero(chosen[owners] & surface.is_first[faces.triangle_faces])
     if len(some):
-        corners, backwards = (
-            faces.positions[faces.triangles[some]],
-            surface.orientation.turned[faces.triangle_faces[some]],
-        )
+        corners = faces.positions[faces.triangles[some]]
+        backwards = surface.orientation.turned[faces.triangle_faces[some]]
         corners[backwards] = corners[backwards, ::-1]
         names, labels = np.unique(owners[some], return_inverse=True)
         levels[names] = own_levels(corners, labels)

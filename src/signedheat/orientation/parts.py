@@ -17,7 +17,7 @@ LEAST_CLOSED = 0.5
 """From this share on (D < A / 3) a part with holes has an inside that others may lie in."""
 HALF = 0.3
 """Level (`geometry.part_levels`) from which a part that few lines cross has an inside: half a ball has .31, three sides
-of a box .22."""
+of a box .22. Halved, it turns no other part of 125 shapes and 200 boxes on a sheet; without it 46 boxes are wrong."""
 LEAST_AGREEMENT = 0.6
 """From this share of its area on, that given the same way round, a part's own orientation is a hint."""
 CERTAIN = 20.0
