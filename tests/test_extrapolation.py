@@ -58,10 +58,10 @@ def test_changes_with_time_are_those_of_other_times():
     surface = discretize(mesh)
     curve = mesh.level_set(np.hypot(*mesh.vertices[:, :2].T), 0.9)
     source = surface.lower(curve, 2.0)
-    x, once, twice = (surface.triangles.sum_in_faces(c) for c in replaced(surface, source, extrapolated=True).T)
+    x, once, twice = surface.triangles.sums_in_faces(replaced(surface, source, extrapolated=True)).T
     step = 1e-3
     early, late = (
-        surface.triangles.sum_in_faces(replaced(surface, source, time=source.time * np.exp(s))[:, 0])
+        surface.triangles.sums_in_faces(replaced(surface, source, time=source.time * np.exp(s)))[:, 0]
         for s in (-step, step)
     )
     turned, now, later = np.angle(early / x), np.angle(x / x), np.angle(late / x)

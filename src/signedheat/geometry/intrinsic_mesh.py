@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from ..errors import GeometryError
 from ..frozen import Frozen
@@ -195,9 +196,25 @@ class IntrinsicMesh(Frozen):
         of_face = vectors[self.edges.face_edges[faces]]
         return self.edge_directions[faces] * np.where(self.reflected[faces], np.conj(of_face), of_face)
 
-    def sum_in_faces(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """(m,) sum of the vectors at the three edges of each face, in its layout: three times the average of Sec. 6."""
-        return self.in_face_frames(vectors).sum(axis=1)
+    def sums_in_faces(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """(m, c) sums over the edges of each face, in its layout, of the columns of an (e, c) edge array.
+
+        Three times the means of Sec. 6.
+        """
+        straight, mirrored = self._face_sums
+        sums: NDArray[np.complex128] = straight @ vectors
+        return sums + mirrored @ np.conj(vectors) if mirrored.nnz else sums
+
+    @cached_property
+    def _face_sums(self) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """(m, e) the matrices of `sums_in_faces`, for vectors and for their mirror images."""
+        shape = self.n_faces, self.n_edges
+        starts, edges, directions = np.arange(0, 3 * self.n_faces + 1, 3), self.edges.face_edges, self.edge_directions
+        if self.is_consistently_oriented:
+            return sparse.csr_array((directions.ravel(), edges.ravel(), starts), shape), sparse.csr_array(shape)
+        parts = np.where(self.reflected, 0, directions), np.where(self.reflected, directions, 0)
+        straight, mirrored = (sparse.csr_array((part.ravel(), edges.ravel(), starts), shape) for part in parts)
+        return straight, mirrored
 
 
 MARGIN = 1e-14

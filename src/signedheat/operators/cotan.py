@@ -35,9 +35,11 @@ def divergence(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> 
     The negative of the divergence in the paper, as C is the negative of its Laplacian.
     The area-weighted gradient of corner k's hat function is half the opposite edge, turned inward by 90°.
     """
-    opposite = np.roll(triangles.corner_positions, -2, axis=1) - np.roll(triangles.corner_positions, -1, axis=1)
-    fluxes = 0.5 * (np.conj(opposite) * directions[:, None]).imag
-    return np.asarray(np.bincount(triangles.corner_vertices.ravel(), fluxes.ravel(), triangles.n_vertices), np.float64)
+    facing = np.roll(triangles.corner_vertices, 1, axis=1)  # edge k faces corner k + 2
+    starts, shape = np.arange(0, facing.size + 1, 3), (triangles.n_vertices, triangles.n_faces)
+    edges = sparse.csc_array((triangles.edge_vectors.ravel(), facing.ravel(), starts), shape)
+    fluxes: NDArray[np.float64] = -0.5 * (edges @ np.conj(directions)).imag
+    return fluxes
 
 
 def assemble(

@@ -161,14 +161,11 @@ class SurfaceDiscretization:
 
         Each face takes it from the last stage in which all of its edges are known.
         """
-        sums = self._sums(stages[0])
+        sums = self.triangles.sums_in_faces(stages[0])
         for stage in stages[1:]:
-            later = self._sums(stage)
+            later = self.triangles.sums_in_faces(stage)
             sums = np.where(np.isnan(later), sums, later)
         return extrapolated(sums) if sums.shape[1] > 1 else sums[:, 0]
-
-    def _sums(self, stage: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        return np.stack([self.triangles.sum_in_faces(column) for column in stage.T], axis=1)
 
     def divergence(self, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
         """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
