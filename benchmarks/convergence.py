@@ -20,7 +20,6 @@ from scipy.sparse import linalg
 import signedheat as sh
 from benchmarks.reproduction.baselines import cotan_laplacian, error
 from benchmarks.reproduction.shapes import mean_edge, organic, subdivided
-from signedheat.domains.foreign import to_pyvista
 
 Array = np.ndarray
 Way = Callable[[sh.TriangleMesh, list[sh.Curve]], sh.VertexField[sh.TriangleMesh]]
@@ -57,7 +56,7 @@ def meshes(paths: list[str]) -> Iterator[tuple[str, sh.TriangleMesh]]:
 def decimated(mesh: sh.TriangleMesh) -> sh.TriangleMesh:
     """About `VERTICES` vertices, by quadric errors; the largest connected part, of diameter 1."""
     share = VERTICES / mesh.n_vertices
-    fewer = to_pyvista(mesh).clean().decimate(1 - share) if share < 1 else to_pyvista(mesh)
+    fewer = mesh.to_pyvista().clean().decimate(1 - share) if share < 1 else mesh.to_pyvista()
     parts = trimesh.Trimesh(fewer.points, fewer.regular_faces).split(only_watertight=False)
     largest = max(parts, key=lambda part: len(part.faces))
     points = largest.vertices - largest.vertices.mean(axis=0)

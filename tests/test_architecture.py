@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
 import subprocess
 import sys
 from pathlib import Path
@@ -49,6 +51,20 @@ def test_no_circle_of_imports():
 
 def test_imports_point_down():
     assert upward_imports(import_graph(PACKAGE), FLOORS) == []
+
+
+@pytest.mark.parametrize("folder", ["benchmarks", "blender", "examples", "shapes", "tools"])
+def test_programs_around_the_package_find_what_they_import(folder):
+    """Many of them need other programs and run by hand only."""
+    absent = [
+        f"{file.name}: {node.module}.{name.name}"
+        for file in (PACKAGE.parents[1] / folder).rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "signedheat"
+        for name in node.names
+        if not hasattr(importlib.import_module(node.module), name.name)
+    ]
+    assert absent == []
 
 
 def test_importing_the_package_leaves_slow_packages_alone():
