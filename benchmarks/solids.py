@@ -141,7 +141,8 @@ def spread(seconds: list[float]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("damages", nargs="*", metavar="DAMAGE", help=f"some of: {', '.join(DAMAGES).replace('%', '%%')}")
+    names = ", ".join(DAMAGES).replace("%", "%%")
+    parser.add_argument("damages", nargs="*", metavar="DAMAGE", help=f"some of: {names}")
     parser.add_argument("--repeats", type=int, default=3)
     arguments = parser.parse_args()
     unknown = set(arguments.damages) - set(DAMAGES)
