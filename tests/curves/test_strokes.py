@@ -76,17 +76,30 @@ def test_what_belongs_nowhere_is_left_out_or_told(damage, seed):
     assert told or wrong_share(drawing, phi.values) < 0.06
 
 
-@pytest.mark.parametrize("copies", [0, 1])
-def test_a_stroke_that_contradicts_itself_is_announced_unless_drawn_again(copies):
-    """A straight stroke closes the open end of a U, and goes on for as long as that; or the whole U is drawn again."""
+@pytest.mark.parametrize(("gone", "guessed"), [(0.25, False), (0.45, True)])
+def test_a_stroke_with_a_wide_gap_of_its_own_is_a_guess(gone, guessed):
+    """An arc of a circle next to pieces of another one: what is missing is little of all, but not of the arc."""
     mesh = disk(24, 2)
-    u = np.array([[-0.3, 0.4, 0], [-0.3, -0.3, 0], [0.3, -0.3, 0], [0.3, 0.4, 0]])
-    cap = np.array([[0.3, 0.4, 0], [-0.3, 0.4, 0]]) if copies else np.array([[0.9, 0.4, 0], [-0.3, 0.4, 0]])
-    given = [mesh.polyline(line) for line in (u, cap, *([u + 0.01] * copies))]
-    with warnings.catch_warnings(record=True) as told:
+
+    def arc(x: float, begin: float, end: float) -> sh.Curve:
+        angles = 2 * np.pi * np.linspace(begin, end, 60)
+        return mesh.polyline(np.stack([x + 0.4 * np.cos(angles), 0.4 * np.sin(angles), 0 * angles], axis=1))
+
+    with warnings.catch_warnings(record=True) as announced:
         warnings.simplefilter("always")
-        sh.signed_distance(given, mesh)
-    assert bool(told) != bool(copies)
+        sh.signed_distance([*(arc(-0.45, k / 4, k / 4 + 0.22) for k in range(4)), arc(0.45, 0.0, 1 - gone)], mesh)
+    assert ["curve number 4" in str(each.message) for each in announced] == [True] * guessed
+
+
+@pytest.mark.parametrize("copies", [1, 2])
+def test_two_copies_of_a_stroke_that_face_either_way_are_a_guess_unless_there_is_a_third(copies):
+    ball = sphere(3)
+    circles = [ball.level_set(ball.vertices[:, 2], height)[0] for height in (0.31, 0.315, 0.32)]
+    drawn = [strokes.arc(ball, circle, 0.0, 0.97) for circle in circles[: 1 + copies]]
+    with warnings.catch_warnings(record=True) as announced:
+        warnings.simplefilter("always")
+        sh.signed_distance([drawn[0].reversed(), *drawn[1:]], ball)
+    assert bool(announced) == (copies == 1)
 
 
 @pytest.mark.parametrize(("gone", "guessed"), [(0.1, False), (0.2, False), (0.48, True), (0.6, True)])

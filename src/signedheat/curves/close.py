@@ -86,7 +86,7 @@ def close_curves(
     >>> corner = np.arange(40).reshape(8, 5)[:-1, :-1].ravel()
     >>> faces = np.concatenate([corner[:, None] + [0, 5, 6], corner[:, None] + [0, 6, 1]])
     >>> mesh = sh.TriangleMesh(np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1), faces)
-    >>> broken = [mesh.polyline([[0, 2.5, 0], [2, 2.5, 0]]), mesh.polyline([[5, 2.5, 0], [7, 2.5, 0]])]
+    >>> broken = [mesh.polyline([[0, 2.5, 0], [2, 2.5, 0]]), mesh.polyline([[4, 2.5, 0], [7, 2.5, 0]])]
     >>> whole = sh.close_curves(mesh, broken)
     >>> whole
     [Curve(21 points, open, oriented)]

@@ -31,10 +31,6 @@ from .directions import Decision, Pieces, decide
 from .orientation import with_turned
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
 
-WIDE = 0.4
-"""Length of the widest gap, relative to that of all curves, from which its completion is a guess. Of 398 drawings of
-which up to a third is gone two have wider ones, with 0.3 six; of seven loops that are wrong, 60 % gone, all but those
-whose ends are nearer than a fifth of what is left."""
 APART = 0.1
 """Share of the area on whose side the shortest completion and that by heat differ where neither can be trusted. Halved,
 no more of 259 drawings are announced; two of 30 curves in twelve pieces, half gone, are so by it alone,
@@ -76,8 +72,9 @@ def distance_to_pieces(
     unless most of them do not. Where faces look either way, as on surfaces with one side, pieces are taken as they are:
     left of a curve is another side from face to face.
 
-    There is a warning if it could have been decided in another way that is nearly as good, if most bound nothing, if a
-    gap is wide, and if heat completes the curves otherwise than by what is shortest.
+    There is a warning if most of them bound nothing, if loops were turned that might as well be right, if the inside
+    hangs on a piece for which wide gaps are closed, and if heat completes the curves otherwise than by what is
+    shortest.
 
     Parameters
     ----------
@@ -116,7 +113,7 @@ def distance_to_pieces(
 def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> str:
     """Why what the pieces bound is a guess, and what to do; empty if it is none."""
     as_given = "as_oriented=True takes curves as they are"
-    if decision.joined_but_bounds_nothing:
+    if decision.bounds_nothing:
         return (
             "most of the curves bound nothing together: which side is which away from them is a guess. Draw what is "
             f"missing, or turn curves that face the wrong way; {as_given}"
@@ -124,23 +121,17 @@ def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[Curv
     against = decision.turned_loops()
     if len(against):
         return (
-            f"{named(against)} as a whole ran against the others, and was turned: which of them are right is a guess. "
-            f"{as_given}"
+            f"{named(against)} ran against about as much of the others, and {'were' if len(against) > 1 else 'was'} "
+            f"turned: which of them are right is a guess. {as_given}"
         )
-    contradictory = decision.contradictory()
-    if len(contradictory):
+    hinges = decision.worth_little()
+    if len(hinges):
         return (
-            f"a part of {named(contradictory)} bounds something together with the others, and another part does not: "
-            "what is bounded is a guess. Remove what belongs to no curve, turn what faces the wrong way, or draw more; "
+            f"what is bounded hangs on {named(hinges)}, and closing the gaps takes lines more than half as long: that "
+            "is a guess. Remove what belongs to no curve, turn what faces the wrong way, or draw what is missing; "
             f"{as_given}"
         )
     strokes = decision.pieces.strokes
-    gap = strokes.widest_gap(decision.best) / strokes.lengths.sum()
-    if gap > WIDE:
-        return (
-            f"the widest gap of the curves is {gap:.0%} as long as they are: how it is completed is a guess. Draw more "
-            "of them"
-        )
     if not decision.all_bound or not all(isinstance(curve, Curve) and curve.oriented for curve in curves):
         return ""  # other curves and points have sides of their own
     surface = strokes.surface

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..geometry.components import connected_components, members_of
+from ..geometry.components import members_of
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.geodesics.sources import PlacedSegments
 from ..geometry.intrinsic_mesh import IntrinsicMesh
@@ -159,15 +159,6 @@ class Strokes:
         explained = signs * (self.means @ sides)
         boundary = self._boundary(sides, falling, rising).sum()
         return Inside(signs, sides, explained, float(boundary - REWARD * (self.lengths @ explained)))
-
-    def widest_gap(self, inside: Inside) -> float:
-        """Length of the longest stretch of the boundary of an inside along which there is no stroke."""
-        boundary = self._boundary(inside.sides, *self._uncovered(inside.signs))
-        sides = self.surface.triangles.edges.face_edges
-        bare = boundary[sides] > 0
-        through = bare.sum(axis=1) == 2  # faces through which the boundary runs on
-        stretch = connected_components(len(boundary), *sides[through][bare[through]].reshape(-1, 2).T)
-        return float(np.bincount(stretch, boundary).max(initial=0.0))
 
     def _uncovered(self, signs: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """(e,) cost of each edge between sides that fall from its first vertex to its second, and that rise."""
