@@ -171,39 +171,6 @@ def test_open_level_sets_end_at_the_boundary():
     assert enclosed_volume(lid) == pytest.approx(4 * 0.8, rel=1e-6)
 
 
-def run(*words) -> int:
-    from signedheat.cli import main
-
-    try:
-        return int(main([str(word) for word in words]) or 0)
-    except SystemExit as ended:
-        return int(ended.code or 0)
-
-
-def test_command_line(tmp_path, capsys):
-    sh.save(sphere(2), tmp_path / "ball.stl")
-    lattice_field, own_field = tmp_path / "lattice.vtu", tmp_path / "own.msh"
-    assert run("volume", tmp_path / "ball.stl", "-o", lattice_field, "--tets", "--resolution", 6) == 0
-    mesh = boxes((6, 6, 6), 0.5)
-    sh.TetMesh(mesh.vertices - 1.5, mesh.tets).save(tmp_path / "box.mesh")
-    picture = tmp_path / "slices.png"
-    assert (
-        run("volume", tmp_path / "ball.stl", "--tets", tmp_path / "box.mesh", "-o", own_field, "--preview", picture)
-        == 0
-    )
-    assert picture.stat().st_size > 10_000
-    for path in (lattice_field, own_field):
-        phi = sh.load_field(path)
-        assert rms(phi.values - (np.linalg.norm(phi.mesh.vertices, axis=1) - 1)) < 0.08
-    assert run("contour", lattice_field, 0.1, "-o", tmp_path / "out.stl") == 0
-    capsys.readouterr()
-    assert run("info", tmp_path / "box.mesh") == 0
-    assert "1296" in capsys.readouterr().out
-    assert run("volume", tmp_path / "ball.stl", "-o", lattice_field, "--tets", "--spacing", "0.1") == 2
-    assert run("volume", tmp_path / "ball.stl", "-o", lattice_field, "--tets", tmp_path / "ball.stl") == 1
-    assert "holds no tets" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("package", ["tetgen", "pytetwild"])
 def test_tets_of_other_programs(package):
     pytest.importorskip(package)

@@ -26,8 +26,8 @@ from ..operators.grid.block_contours import Refine, block_contour, contour_parts
 from ..operators.grid.blocks import SIDE, Blocks, BlockValues
 from ..packages import lazy_module
 from ..parallel import in_chunks
-from .booleans import Combinable, Rule
-from .levels import on_level
+from .arithmetic import Combinable, Rule
+from .levels import on_level, refuse_beyond_walls
 from .solid_queries import Closest, SolidQueries
 
 files = lazy_module("signedheat.io.fields", "files")
@@ -121,7 +121,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             raise GeometryError("a field in a band has a coarse one for what lies beyond", element="coarse")
 
     def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
-        """φ at points in space: exact where the field knows its solid, else that of `interpolate`.
+        """φ at points in space: exact where the field has its solid, else that of `interpolate`.
 
         Parameters
         ----------
@@ -166,7 +166,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return values.reshape(points.shape[:-1]) if points.ndim > 1 else values[0]
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
-        """∇φ at points in space: exact where the field knows its solid, else central differences, interpolated.
+        """∇φ at points in space: exact where the field has its solid, else central differences, interpolated.
 
         Outside the grid these are the gradient at the nearest point of the bounding box of the grid.
 
@@ -209,7 +209,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         Raises
         ------
         SourceError
-            If the field does not know its solid: it was read from a file, or computed otherwise.
+            If the field has no solid: it was read from a file, or computed otherwise.
 
         Examples
         --------
@@ -220,7 +220,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         """
         if self.solid is None:
             raise SourceError(
-                "the field does not know the solid that it is the distance to",
+                "the field has no solid that it is the distance to",
                 remedy="take it from signed_distance or Solid.field, not from a file",
                 element="field",
             )
@@ -297,15 +297,15 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return TriangleMesh(vertices, faces if refine is None else flipped_along_creases(vertices, faces))
 
     def _refined(self, level: float) -> Refine | None:
-        """What moves points of a level onto it, where that is known."""
-        solid = self.solid
+        """A function that moves points of a level onto it; None if the field has no solid."""
+        if self.solid is None:
+            return None
+        distance = self.solid.distance
         values = self.values if self.blocks is None else BlockValues(self.blocks, self.values)
-        if solid is not None:
-            return lambda points: on_level(solid, points, values, self.grid, level)
-        return None
+        return lambda points: on_level(distance, points, values, self.grid, level)
 
     def _placed(self, refine: Refine | None) -> Refine:
-        """From points in cells to places in space, moved onto the level where that is known."""
+        """From points in cells to places in space, moved onto the level if there is a way to."""
 
         def placed(cells: NDArray[np.float64]) -> NDArray[np.float64]:
             points = self.grid.origin + cells * self.grid.spacing
@@ -416,19 +416,11 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         >>> disk.offset(-0.1)
         [Polyline(32 points, closed)]
         """
-        self.refuse_beyond_walls(finite_number(distance, "distance"))
+        distance = finite_number(distance, "distance")
+        walls = np.concatenate([self.whole.values.take([0, -1], axis).ravel() for axis in range(self.grid.dimension)])
+        padding = f"use a padding of more than {abs(distance):g}, or a larger diffusion where wide gaps stay open"
+        refuse_beyond_walls(walls, distance, "grid", padding)
         return self.contour(distance)
-
-    def refuse_beyond_walls(self, distance: float) -> None:
-        """Raise `OutsideError` if what lies at a distance leaves the grid although the shape itself does not."""
-        walls = self._wall_range()
-        bounded = walls[0] > 0 or walls[1] < 0
-        if bounded and walls[0] < distance < walls[1]:
-            limit = walls[0] if walls[0] > 0 else walls[1]
-            raise OutsideError(
-                f"what lies at distance {distance:g} leaves the grid, which holds distances up to {limit:g}",
-                remedy=f"use a padding of more than {abs(distance):g}, or a larger diffusion where wide gaps stay open",
-            )
 
     def with_values(self, values: NDArray[np.float64]) -> GridField[Dimension]:
         """Other values on the same grid, without the diagnostics, confidence and solid of these."""
@@ -479,7 +471,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         Returns
         -------
         (n,) float
-            From 0 to 1; at points outside the grid, that of the nearest point of its box. 1 if nothing is known of it.
+            From 0 to 1; at points outside the grid, that of the nearest point of its box; 1 if the field has none.
 
         Examples
         --------
@@ -526,14 +518,6 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         """
         files.write_field(self, path)
 
-    def _wall_range(self) -> tuple[float, float]:
-        """Least and greatest φ on the walls of the box."""
-        values = np.concatenate([self.whole._walls(axis).ravel() for axis in range(self.grid.dimension)])
-        return float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
-
-    def _walls(self, axis: int) -> NDArray[np.float64]:
-        return self.values.take([0, -1], axis=axis)
-
     def _checked(self, points: ArrayLike) -> NDArray[np.float64]:
         return query_points(points, self.grid.dimension)
 
@@ -558,18 +542,18 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             beyond = np.isnan(values)
             values[beyond] = self.whole.interpolate(points[beyond])
             return values
-        if self._known is None:
+        if self._defined is None:
             return scipy.ndimage.map_coordinates(self.values, index, order=1, mode="nearest")
-        filled, known = self._known
+        filled, defined = self._defined
         sums = scipy.ndimage.map_coordinates(filled, index, order=1, mode="nearest")
-        weights = scipy.ndimage.map_coordinates(known, index, order=1, mode="nearest")
+        weights = scipy.ndimage.map_coordinates(defined, index, order=1, mode="nearest")
         return np.where(weights > 0, sums / np.where(weights > 0, weights, 1.0), np.nan)
 
     @cached_property
-    def _known(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    def _defined(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Values with 0 where there is none, and 1 where there is one, else 0; or None if all nodes have one."""
-        known = ~np.isnan(self.values)
-        return None if known.all() else (np.where(known, self.values, 0.0), known.astype(np.float64))
+        defined = ~np.isnan(self.values)
+        return None if defined.all() else (np.where(defined, self.values, 0.0), defined.astype(np.float64))
 
     def _slopes(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Central differences of the interpolant, which are those at the nodes, interpolated."""

@@ -1,13 +1,15 @@
-"""Points of the levels of a field, moved to where the distance to its solid passes them."""
+"""Levels of a field: which leave its domain, and points moved to where the distance to its solid passes them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.grid import Grid
+from ..errors import OutsideError
 from ..geometry.marching import CLEARANCE
 
 CLOSE = 1e-3
@@ -24,14 +26,26 @@ class NodeValues(Protocol):
     def __getitem__(self, nodes: tuple[NDArray[np.int64], ...], /) -> NDArray[np.float64]: ...
 
 
-class Distance(Protocol):
-    """What has a distance at points."""
+def refuse_beyond_walls(walls: NDArray[np.float64], distance: float, domain: str, remedy: str) -> None:
+    """Raise `OutsideError` if what lies at a distance leaves a domain although the shape itself does not.
 
-    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    `walls` are the values at its boundary, `domain` and `remedy` words of the message.
+    """
+    low, high = float(np.fmin.reduce(walls)), float(np.fmax.reduce(walls))
+    if (low > 0 or high < 0) and low < distance < high:
+        raise OutsideError(
+            f"what lies at distance {distance:g} leaves the {domain}, which holds distances up to "
+            f"{low if low > 0 else high:g}",
+            remedy=remedy,
+        )
 
 
 def on_level(
-    solid: Distance, points: NDArray[np.float64], values: NodeValues, grid: Grid, level: float
+    distance: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    points: NDArray[np.float64],
+    values: NodeValues,
+    grid: Grid,
+    level: float,
 ) -> NDArray[np.float64]:
     """Points on edges of a grid, where values of the nodes pass a level, moved along to where distance does.
 
@@ -39,8 +53,8 @@ def on_level(
 
     Parameters
     ----------
-    solid : Solid or Offset
-        What the values are the distance to.
+    distance : callable
+        The distance at (n, 3) points, which the values are at the nodes.
     points : (n, 3) float
         Where linear interpolation passes the level.
     values : (*shape) float
@@ -75,7 +89,7 @@ def on_level(
         at = base[active].astype(np.float64)
         at[np.arange(len(active)), axis[active]] += share
         places = grid.origin + at * grid.spacing
-        off = solid.distance(places) - level
+        off = distance(places) - level
         moved[movable[active]] = places
         same = (off < 0) == (low[active] < 0)
         ahead, behind = active[same], active[~same]

@@ -70,7 +70,9 @@ def redistance(
     walls = np.isnan(given) | (np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else False)
     steps, again = positive_steps(spacing, "spacing", given.ndim), _axes(periodic, given.ndim)
     if walls.all() or np.isinf(given[~walls]).any():
-        raise GeometryError("values must be known somewhere, and finite there", remedy="mask others", element="values")
+        raise GeometryError(
+            "values must be numbers somewhere, and finite there", remedy="mask others", element="values"
+        )
     if walls.any() and any(again):
         raise GeometryError(
             "distance around walls is not measured on periodic grids",

@@ -15,14 +15,15 @@ from ..discretization import SourceTerm
 from ..domains.exchange import Displayed, with_values
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import contiguous, finite_number
-from ..errors import GeometryError, OutsideError, UnsupportedTypeError
+from ..domains.validation import contiguous, finite_number, query_points
+from ..errors import GeometryError, UnsupportedTypeError
 from ..frozen import Frozen
 from ..geometry.marching_tets import closed_level_set
 from ..geometry.nearest import TriangleTree
 from ..geometry.tet_clipping import Planes, barycentric, containing_tets
 from ..packages import lazy_module
-from .booleans import Combinable
+from .arithmetic import Combinable
+from .levels import refuse_beyond_walls
 
 files = lazy_module("signedheat.io.fields", "files")
 
@@ -98,7 +99,7 @@ class TetField(Displayed, Combinable, Frozen):
         (n,) float, or one float
             Signed distances; NaN where the nearest tet has a vertex without a value.
         """
-        points = _checked(points)
+        points = query_points(points, 3)
         places = points.reshape(-1, 3)
         corners, weights, away = self._place(places)
         steps = (places - away)[:, None] - self.mesh.vertices[corners]
@@ -108,7 +109,7 @@ class TetField(Displayed, Combinable, Frozen):
         if len(outside):
             slopes = np.einsum("pk,pki->pi", weights[outside], self._vertex_gradients[corners[outside]])
             values[outside] += np.einsum("pi,pi->p", slopes, away[outside])
-        return values if points.ndim == 2 else values[0]
+        return values.reshape(points.shape[:-1]) if points.ndim > 1 else values[0]
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
         """∇φ at points in space: volume-weighted means at the vertices, interpolated.
@@ -131,7 +132,7 @@ class TetField(Displayed, Combinable, Frozen):
         >>> TetField(mesh, [0.0, 1.0, 2.0, 3.0]).gradient([0.2, 0.2, 0.2])
         array([[1., 2., 3.]])
         """
-        corners, weights, _ = self._place(_checked(points).reshape(-1, 3))
+        corners, weights, _ = self._place(query_points(points, 3).reshape(-1, 3))
         return np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners])
 
     @property
@@ -193,15 +194,8 @@ class TetField(Displayed, Combinable, Frozen):
         [0.0, 0.75]
         """
         distance = finite_number(distance, "distance")
-        walls = self.values[np.unique(self.mesh.boundary.faces)]
-        low, high = np.nanmin(walls), np.nanmax(walls)
-        bounded = low > 0 or high < 0
-        if bounded and low < distance < high:
-            limit = low if low > 0 else high
-            raise OutsideError(
-                f"the surface at distance {distance:g} leaves the tet mesh, which holds distances up to {limit:g}",
-                remedy=f"use a mesh that reaches more than {abs(distance):g} beyond the shape",
-            )
+        remedy = f"use a mesh that reaches more than {abs(distance):g} beyond the shape"
+        refuse_beyond_walls(self.values[np.unique(self.mesh.boundary.faces)], distance, "tet mesh", remedy)
         return self.contour(distance)
 
     def with_values(self, values: NDArray[np.float64]) -> TetField:
@@ -251,10 +245,3 @@ class TetField(Displayed, Combinable, Frozen):
     def __repr__(self) -> str:
         low, high = (float(f.reduce(self.values)) for f in (np.fmin, np.fmax))
         return f"TetField({self.mesh!r}, values from {low:.4g} to {high:.4g})"
-
-
-def _checked(points: ArrayLike) -> NDArray[np.float64]:
-    array = contiguous(points, "points")
-    if array.ndim not in (1, 2) or array.shape[-1] != 3 or not np.isfinite(array).all():
-        raise GeometryError("points must be finite, with 3 coordinates each", element="points")
-    return array

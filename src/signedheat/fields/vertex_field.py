@@ -27,7 +27,7 @@ from ..errors import OutsideError
 from ..frozen import Frozen
 from ..geometry.meshes import gradients_along
 from ..packages import lazy_module
-from .booleans import Combinable, Rule
+from .arithmetic import Combinable, Rule
 
 files = lazy_module("signedheat.io.fields", "files")
 
