@@ -17,6 +17,7 @@ from signedheat import samples
 from signedheat.batches import pool
 from signedheat.batches.inputs import expand
 from signedheat.batches.manifest import Manifest
+from signedheat.batches.worker import Worker
 
 
 @pytest.fixture
@@ -103,6 +104,20 @@ def test_what_was_short_of_memory_is_tried_again_alone(tmp_path, files):
     folder = files("a.ply", "hungry.ply", "z.ply")
     batch = sh.batches.run(folder, tmp_path / "out", measure, workers=2)
     assert [outcome.state for outcome in batch.outcomes] == ["done"] * 3
+
+
+def test_a_process_that_dies_before_it_gets_a_shape_is_replaced(tmp_path, files, monkeypatch):
+    start, started = Worker._started, []
+
+    def dying_first(worker):
+        started.append(start(worker))
+        if len(started) == 1:
+            started[0].kill()
+        return started[-1]
+
+    monkeypatch.setattr(Worker, "_started", dying_first)
+    batch = sh.batches.run(files("a.ply", "z.ply"), tmp_path / "out", measure, workers=1)
+    assert [outcome.state for outcome in batch.outcomes] == ["done", "done"] and len(started) == 2
 
 
 def test_results_do_not_depend_on_the_number_of_workers(tmp_path):

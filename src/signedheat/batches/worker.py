@@ -25,7 +25,7 @@ from signal import SIG_IGN, SIGINT, Signals, signal
 from typing import Any
 
 from ..errors import MemoryLimitError, SignedHeatError
-from ..io.files import moved, replaceable, writing
+from ..io.files import move_into_place, replaceable, writing
 from .inputs import Input
 from .manifest import Outcome, State, source_of
 
@@ -33,6 +33,8 @@ Function = Callable[[Path, Path], Mapping[str, object]]
 """Called with a file and the beginning of the names of what it writes; returns figures, ready for JSON."""
 Done = tuple[Outcome, bool]
 """What came of a shape, and whether memory was short: it may suffice when other processes have ended."""
+DEATHS = (EOFError, OSError, pickle.UnpicklingError)
+"""What reading from a process that has died raises, and writing to it."""
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """Variables that say how many threads a process takes."""
 
@@ -97,7 +99,7 @@ class Task:
             with writing(folder / file.name):
                 replaceable(folder / file.name)
         for file in made:
-            moved(file, folder / file.name)
+            move_into_place(file, folder / file.name)
         return [file.name for file in made]
 
 
@@ -122,11 +124,8 @@ class Worker:
             cause, remedy = f"the job cannot be sent to a worker ({error})", "define it at the top of a module"
             raise SignedHeatError(cause, remedy=remedy) from error
         begin, timer = time.perf_counter(), None
-        process = self._process = self._process or self._started()
         try:
-            if self.is_closed:
-                raise EOFError
-            pickle.load(process.stdout)  # type: ignore[arg-type]  # it is ready
+            process = self._ready()
             begin = time.perf_counter()
             if time_limit is not None:
                 timer = threading.Timer(time_limit, process.kill)
@@ -135,7 +134,7 @@ class Worker:
             process.stdin.write(message)  # type: ignore[union-attr]
             process.stdin.flush()  # type: ignore[union-attr]
             done: Done | str = pickle.load(process.stdout)  # type: ignore[arg-type]
-        except (EOFError, OSError, pickle.UnpicklingError):
+        except DEATHS:
             seconds, last = time.perf_counter() - begin, self.close()
             shutil.rmtree(task.scratch, ignore_errors=True)
             if timer is not None and time_limit is not None and seconds >= time_limit:
@@ -145,6 +144,24 @@ class Worker:
             if timer is not None:
                 timer.cancel()
         return (task.outcome("failed", 0.0, done), False) if isinstance(done, str) else done
+
+    def _ready(self, tries: int = 2) -> subprocess.Popen[bytes]:
+        """The process, once it waits for a task. One that dies before says nothing about the shape, and is replaced.
+
+        So it is where a process cannot start for a moment, as while the package that it imports is being updated, or
+        where the system took its memory as it waited. One of `DEATHS` is raised if the next dies, too.
+        """
+        process = self._process = self._process or self._started()
+        try:
+            if self.is_closed:
+                raise EOFError
+            pickle.load(process.stdout)  # type: ignore[arg-type]
+        except DEATHS:
+            if self.is_closed or tries == 1:
+                raise
+            self.close()
+            return self._ready(tries - 1)
+        return process
 
     def stop(self) -> None:
         """Kill the process, whatever it is doing, and start none again; its task then ends as one that died."""
@@ -174,7 +191,7 @@ class Worker:
         self._errors = tempfile.TemporaryFile()
         path = os.pathsep.join(path for path in sys.path if path)
         return subprocess.Popen(
-            [sys.executable, "-c", f"from {__name__} import main; main()"],
+            [sys.executable, "-c", f"from {__name__} import serve; serve()"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
@@ -193,8 +210,8 @@ def do_apart(task: Task, threads: int, time_limit: float | None) -> Done:
     return _here.worker.do(task, time_limit)
 
 
-def main() -> None:
-    """In a worker's process: say that it is ready, and answer, for each task on standard input."""
+def serve() -> None:
+    """Do tasks from standard input, in a worker's process: say that it is ready, and answer, for each."""
     signal(SIGINT, SIG_IGN)  # for the process that started this one
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what anybody prints must not come between the answers
