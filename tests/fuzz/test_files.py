@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-import signedheat as sh
 from fuzz.cases_files import KINDS
 from fuzz.frame import families, run
 
@@ -28,10 +27,3 @@ def test_a_short_run_on_damaged_files():
     assert not tally.failures, "\n".join(map(str, tally.failures))
     assert sum(sum(kinds.values()) for kinds in tally.counts.values()) == CASES * len(names)
     assert all(any(kind.startswith("refused") for kind in kinds) for kinds in tally.counts.values())
-
-
-def test_an_error_names_the_file(tmp_path):
-    (tmp_path / "odd.stl").write_bytes(b"solid")
-    with pytest.raises(sh.errors.SignedHeatError) as caught:
-        sh.read(tmp_path / "odd.stl")
-    assert caught.value.path == str(tmp_path / "odd.stl")

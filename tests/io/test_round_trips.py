@@ -49,17 +49,18 @@ def test_polygons(folder, ending, seed, sides):
     assert [list(p) for p in back.polygons] == polygons
 
 
-@pytest.mark.parametrize("ending", ["npz", "vti", "nrrd"])
-@given(seed=seeds, shape=st.tuples(*[st.integers(2, 6)] * 3), scale=scales)
+@pytest.mark.parametrize("ending", ["npz", "npy", "vti", "nrrd"])
+@given(seed=seeds, shape=st.lists(st.integers(2, 6), min_size=2, max_size=3), scale=scales)
 def test_fields_on_grids(folder, ending, seed, shape, scale):
-    rng = np.random.default_rng(seed)
-    grid = sh.Grid(scale * rng.normal(size=3), scale * rng.uniform(0.1, 1, 3), shape)
+    rng, dimension = np.random.default_rng(seed), len(shape)
+    grid = sh.Grid(scale * rng.normal(size=dimension), scale * rng.uniform(0.1, 1, dimension), shape)
     field = sh.GridField(grid, scale * rng.normal(size=shape))
     field.save(folder / f"field.{ending}")
     back = sh.load_field(folder / f"field.{ending}")
     np.testing.assert_array_equal(back.values, field.values)
     np.testing.assert_array_equal(back.grid.origin, grid.origin)
     np.testing.assert_array_equal(back.grid.spacing, grid.spacing)
+    assert back.grid.shape == grid.shape
 
 
 @pytest.mark.parametrize("ending", ["txt", "json"])

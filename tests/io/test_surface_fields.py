@@ -34,16 +34,3 @@ def test_shapes_without_values_are_no_fields_but_are_looked_at(tmp_path, ending)
     with refused(sh.errors.FileFormatError):
         sh.load_field(path)
     assert main(["view", str(path), "-o", str(tmp_path / "ball.png")]) == 0
-
-
-def test_fields_on_surfaces_are_looked_at_and_have_levels(tmp_path):
-    ball = samples.sphere(2)
-    sh.VertexField(ball, ball.vertices[:, 2]).save(tmp_path / "phi.vtp")
-    assert main(["view", str(tmp_path / "phi.vtp"), "-o", str(tmp_path / "phi.png")]) == 0
-    ball.save(tmp_path / "ball.vtp")
-    assert main(["view", str(tmp_path / "ball.vtp"), "-o", str(tmp_path / "ball.png")]) == 0
-    assert (tmp_path / "phi.png").read_bytes() != (tmp_path / "ball.png").read_bytes()
-    assert main(["contour", str(tmp_path / "phi.vtp"), "0.5", "-o", str(tmp_path / "line.json")]) == 0
-    (line,) = sh.io.read_curves(tmp_path / "line.json", ball)
-    at = np.einsum("nk,nkd->nd", line.barycentric, ball.vertices[ball.faces[line.faces]])
-    assert at[:, 2] == pytest.approx(0.5)

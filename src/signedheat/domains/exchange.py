@@ -235,19 +235,6 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         return to_open3d(self._elements)
 
 
-def elements_of(package: str, thing: Any) -> Elements:
-    """What an object of a package is made of; a pair (vertices, faces) is one of NumPy.
-
-    Raises
-    ------
-    UnsupportedTypeError
-        If it is no shape, such as lines.
-    GeometryError
-        If it has nothing that is taken.
-    """
-    return _FROM[package](thing)
-
-
 def from_trimesh(thing: Any) -> Elements:
     """From a `trimesh.Trimesh`, `trimesh.PointCloud`, or all meshes of a `trimesh.Scene`, each in its place."""
     if hasattr(thing, "geometry") and hasattr(thing, "graph"):
@@ -422,10 +409,11 @@ def _no_shape(thing: object, taken: str, remedy: str) -> UnsupportedTypeError:
     )
 
 
-_FROM: dict[str, Callable[[Any], Elements]] = {
+ELEMENTS_OF: dict[str, Callable[[Any], Elements]] = {
     "meshio": from_meshio,
     "numpy": from_arrays,
     "open3d": from_open3d,
     "pyvista": from_pyvista,
     "trimesh": from_trimesh,
 }
+"""What an object of a package is made of, by the package; a pair (vertices, faces) is one of NumPy."""

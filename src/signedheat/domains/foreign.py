@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import UnsupportedTypeError
 from .digital_surface import DigitalSurface
-from .exchange import Elements, elements_of
+from .exchange import ELEMENTS_OF, Elements
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
 from .tet_mesh import TetMesh
@@ -21,7 +21,7 @@ from .triangle_mesh import TriangleMesh
 
 Thing = TypeVar("Thing")
 
-PACKAGES = {"meshio": "meshio", "open3d": "open3d", "pyvista": "pyvista", "trimesh": "trimesh"}
+PACKAGES = frozenset({"meshio", "open3d", "pyvista", "trimesh"})
 """Packages whose objects are taken, by the name with which the modules of their classes begin."""
 
 
@@ -111,7 +111,7 @@ def package_of(thing: object) -> str | None:
     True
     """
     roots = (kind.__module__.partition(".")[0] for kind in type(thing).__mro__)
-    return next((PACKAGES[root] for root in roots if root in PACKAGES), None)
+    return next((root for root in roots if root in PACKAGES), None)
 
 
 def is_pair(thing: object) -> bool:
@@ -172,7 +172,7 @@ def as_shape(thing: Shape | ForeignShape) -> Shape:
 def converted(thing: Thing) -> Thing:
     """A shape of another package as one of ours; everything else, such as curves, as it is."""
     package = "numpy" if is_pair(thing) else package_of(thing)
-    return thing if package is None else cast("Thing", shape_of(elements_of(package, thing)))
+    return thing if package is None else cast("Thing", shape_of(ELEMENTS_OF[package](thing)))
 
 
 def shape_of(elements: Elements) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh:

@@ -14,7 +14,7 @@ from ..geometry.meshes import Triangles
 from .curves import Curve, SurfacePoints
 from .surface import Surface
 
-SAME = 1e-14
+ONE_POINT = 1e-14
 """Distance of points, relative to the size of a surface, up to which they are one."""
 
 
@@ -98,4 +98,4 @@ def _is_point(domain: Surface, curve: Curve) -> bool:
     if not hasattr(triangles, "vertices") or not ((curve.faces >= 0) & (curve.faces < triangles.n_faces)).all():
         return False
     extent = np.ptp(domain.positions(curve), axis=0).max()
-    return bool(extent <= SAME * np.ptp(triangles.bounds, axis=0).max())
+    return bool(extent <= ONE_POINT * np.ptp(triangles.bounds, axis=0).max())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
+from typing import TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from .polygon_mesh import PolygonMesh
 from .polyline import Polyline
 from .tet_mesh import TetMesh
 from .triangle_mesh import TriangleMesh
+
+Body: TypeAlias = tuple[NDArray[np.float64], NDArray[np.int64]]
+"""(n, 3) vertices and (m, 3) faces."""
 
 
 def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
@@ -54,11 +57,21 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
     return TriangleMesh(*joined_triangles(meshes))
 
 
-def joined_triangles(
-    parts: Sequence[TriangleMesh | PolygonMesh], origin: NDArray[np.float64] | float = 0.0
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def joined_triangles(parts: Sequence[TriangleMesh | PolygonMesh], origin: NDArray[np.float64] | float = 0.0) -> Body:
     """(n, 3) vertices, relative to `origin`, and (m, 3) triangles of all meshes together."""
     meshes = [part.triangulation for part in parts]
-    starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
-    return np.concatenate([mesh.vertices - origin for mesh in meshes]), np.concatenate(faces)
+    return concatenated([(mesh.vertices - origin, mesh.faces) for mesh in meshes])
+
+
+def concatenated(bodies: Sequence[Body]) -> Body:
+    """Vertices and faces of several bodies, one after another; nothing is merged.
+
+    Examples
+    --------
+    >>> corners, triangle = np.eye(3), np.array([[0, 1, 2]])
+    >>> concatenated([(corners, triangle), (corners, triangle)])[1].tolist()
+    [[0, 1, 2], [3, 4, 5]]
+    """
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
+    faces = [own + start for (_, own), start in zip(bodies, starts, strict=False)]
+    return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)

@@ -34,10 +34,10 @@ T = TypeVar("T")
 PACKAGE = f"{__package__.partition('.')[0]}."
 TAKEN = {".off": 14, ".stl": 5, ".xyz": 4, ".ply": 2}
 """Bytes that a shape takes while it is read for each byte of its file, measured with some hundred thousand faces; less
-where files may hold more than positions and faces. Of other formats more is known once they are read in part."""
+where files may hold more than positions and faces. Of other formats the parts that are read first say more."""
 NEEDED = {".nrrd": ("nrrd", "NRRD files"), ".vtkhdf": ("h5py", "VTKHDF files")}
 """Packages by which formats are written."""
-READERS = f"{__package__}.", run_limited.__module__, f"{PACKAGE}packages"
+READING_MODULES = f"{__package__}.", run_limited.__module__, f"{PACKAGE}packages"
 """Modules that read, and those by which they call parsers of other packages."""
 
 
@@ -49,9 +49,11 @@ def extension(path: PathLike) -> str:
 
 def format_for(path: PathLike, formats: Mapping[str, T], purpose: str) -> T:
     """What a table of formats has for the extension of a file; `FileFormatError` if that is not in it."""
-    if extension(path) not in formats:
-        raise unknown_extension(path, formats, purpose)
-    return formats[extension(path)]
+    ending = extension(path)
+    if ending not in formats:
+        cause = f"'{ending}' is not a known format" if ending else "the name has no extension"
+        raise FileFormatError(f"{cause} for {purpose}", remedy=f"use one of {' '.join(sorted(formats))}", path=path)
+    return formats[ending]
 
 
 def distinct_names(numbers: Sequence[float]) -> list[str]:
@@ -72,13 +74,6 @@ def distinct_names(numbers: Sequence[float]) -> list[str]:
 def damaged(cause: str, element: str | None = None) -> FileFormatError:
     """The error for a file that is truncated or damaged; `reading` says which file it is."""
     return FileFormatError(cause, remedy="write or download it again", element=element)
-
-
-def unknown_extension(path: PathLike, formats: Collection[str], purpose: str) -> FileFormatError:
-    """The error for an extension that is not supported."""
-    ending = extension(path)
-    cause = f"'{ending}' is not a known format" if ending else "the name has no extension"
-    return FileFormatError(f"{cause} for {purpose}", remedy=f"use one of {' '.join(sorted(formats))}", path=path)
 
 
 def refuse_kind(kind: str, path: PathLike, holds: str, instead: str) -> FileFormatError:
@@ -125,7 +120,7 @@ def _is_ours(error: BaseException) -> bool:
     """Whether an exception comes from our code beyond the readers, or from what that calls."""
     names = [str(frame.f_globals.get("__name__")) for frame, _ in walk_tb(error.__traceback__)]
     ours = [name for name in names if name.startswith(PACKAGE)]
-    return bool(ours) and not ours[-1].startswith(READERS)
+    return bool(ours) and not ours[-1].startswith(READING_MODULES)
 
 
 def parsed_by_others(parse: Callable[[], T], size: int) -> T:
@@ -235,7 +230,7 @@ def companion_contents(path: PathLike, name: str) -> bytes:
     return contents(named)
 
 
-def ensure_fits(size: int, path: PathLike) -> None:
+def ensure_fits(size: int, path: PathLike, remedy: str = "check that it is not damaged, or free some memory") -> None:
     """Check before anything is allocated that so many bytes, which a file has or announces, are free.
 
     Raises
@@ -247,7 +242,7 @@ def ensure_fits(size: int, path: PathLike) -> None:
     if free is not None and size > free:
         raise MemoryLimitError(
             f"what it holds takes about {size / 1e9:.3g} GB, and {free / 1e9:.3g} GB of memory are free",
-            remedy="check that it is not damaged, or free some memory",
+            remedy=remedy,
             path=path,
         )
 
@@ -294,8 +289,7 @@ def ensure_writable(path: PathLike, formats: Collection[str], purpose: str) -> N
     MissingPackageError
         If the format needs a package that is not installed.
     """
-    if extension(path) not in formats:
-        raise unknown_extension(path, formats, purpose)
+    format_for(path, dict.fromkeys(formats), purpose)
     if extension(path) in NEEDED:
         require(*NEEDED[extension(path)])
     with writing(path):
@@ -323,7 +317,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
                 temporary.unlink()
 
 
-def moved(source: Path, path: PathLike) -> None:
+def move_into_place(source: Path, path: PathLike) -> None:
     """Give a whole file its place: that of the file that `path` leads to, whose permissions stay, or a new one.
 
     Raises
@@ -389,7 +383,7 @@ def writing(path: PathLike) -> Iterator[None]:
         ) from error
 
 
-def numbers(tokens: list[Any], what: str, kind: type = float) -> NDArray[Any]:
+def parsed_numbers(tokens: list[Any], what: str, kind: type = float) -> NDArray[Any]:
     """Words of a text file as an array of numbers."""
     try:
         return np.array(tokens, dtype=np.float64 if kind is float else np.int64)

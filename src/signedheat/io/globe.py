@@ -75,10 +75,9 @@ def write_geojson(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> s
     if not isinstance(domain, TriangleMesh | PolygonMesh):
         raise UnsupportedTypeError(f"a globe is a mesh, and this is a {type(domain).__name__}", element="domain")
     center, _ = globe_frame(domain)
-    mesh, features = domain.triangulation, []
+    features = []
     for curve in curves:
-        points = np.einsum("ik,ikj->ij", curve.barycentric, mesh.vertices[mesh.faces[curve.faces]])
-        places = longitudes_and_latitudes(points - center).tolist()
+        places = longitudes_and_latitudes(domain.positions(curve) - center).tolist()
         if isinstance(curve, Curve) and curve.closed:
             places.append(places[0])
         kind = "LineString" if isinstance(curve, Curve) else "MultiPoint"

@@ -30,7 +30,7 @@ from .files import (
     damaged,
     ensure_fits,
     format_for,
-    numbers,
+    parsed_numbers,
     reading,
     unpacked,
     with_messages,
@@ -186,7 +186,7 @@ def _nrrd_values(data: bytes, header: dict[str, Any], count: int, dtype: np.dtyp
         words = data[max(skip, 0) :].split()
         if len(words) < count:
             raise _truncated(len(words), count)
-        return numbers(words[:count], "values").astype(dtype.newbyteorder("="))
+        return parsed_numbers(words[:count], "values").astype(dtype.newbyteorder("="))
     ensure_fits(size, path)
     if encoding in ("gzip", "gz"):
         data = unpacked(data, zlib.decompressobj(zlib.MAX_WBITS | 16), size + max(skip, 0))

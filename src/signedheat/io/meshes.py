@@ -15,7 +15,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
 from ..geometry.directions import unit
 from ..geometry.welding import distinct_rows
-from .files import PathLike, contents, damaged, ensure_fits, numbers, reading, refuse_kind, text
+from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers, reading, refuse_kind, text
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 BYTES = 400
@@ -66,7 +66,7 @@ def _text_corners(data: bytes) -> NDArray[np.float64]:
     at = [k for k, word in enumerate(words) if word == b"vertex"]
     if len(at) % 3 or (at and at[-1] + 3 >= len(words)):
         raise damaged("a facet has fewer than 3 vertices: the file is truncated or damaged")
-    return numbers([words[k + 1 : k + 4] for k in at], "vertices").reshape(-1, 3)
+    return parsed_numbers([words[k + 1 : k + 4] for k in at], "vertices").reshape(-1, 3)
 
 
 def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:
@@ -151,7 +151,7 @@ def _coordinates(rows: list[list[Any]], what: str) -> NDArray[np.float64]:
     if short is not None:
         cause = f"number {short} of the {what} has {len(rows[short]) - 1} coordinates instead of 3: it may be truncated"
         raise damaged(cause, element=f"number {short}")
-    return numbers([row[1:4] for row in rows], what).reshape(-1, 3)
+    return parsed_numbers([row[1:4] for row in rows], what).reshape(-1, 3)
 
 
 def _elements(words: list[list[Any]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -160,7 +160,7 @@ def _elements(words: list[list[Any]]) -> tuple[NDArray[np.int64], NDArray[np.int
     flat = [word for element in words for word in element[1:]]
     if any("/" in word for word in flat):
         flat = [word.partition("/")[0] for word in flat]
-    ids = numbers(flat, "vertex ids", int)
+    ids = parsed_numbers(flat, "vertex ids", int)
     if (ids == 0).any():
         raise damaged("a face names vertex 0, but OBJ counts from 1: the file is damaged")
     before = np.array([element[0] for element in words], dtype=np.int64)
@@ -177,7 +177,7 @@ def read_off(path: PathLike) -> Elements:
     rows = rows if rows[0] else rows[1:]
     if not rows or len(rows[0]) < 2:
         raise damaged("the numbers of vertices and faces are missing: it may be truncated")
-    n_vertices, n_faces = numbers(rows[0][:2], "counts", int).tolist()
+    n_vertices, n_faces = parsed_numbers(rows[0][:2], "counts", int).tolist()
     if n_vertices < 0 or n_faces < 0:
         raise damaged(f"{n_vertices} vertices and {n_faces} faces are announced: the file is damaged")
     lines = iter(rows[1:])
@@ -190,16 +190,16 @@ def read_off(path: PathLike) -> Elements:
         )
     if any(len(row) < 3 for row in vertex_rows):
         raise damaged("a vertex has fewer than 3 coordinates: it may be truncated")
-    vertices = numbers([row[:3] for row in vertex_rows], "vertices").reshape(-1, 3)
+    vertices = parsed_numbers([row[:3] for row in vertex_rows], "vertices").reshape(-1, 3)
     if not n_faces:
         has_normals = "N" in kind[:-3] and all(len(row) >= 6 for row in vertex_rows)
-        normals = numbers([row[3:6] for row in vertex_rows], "normals") if has_normals else None
+        normals = parsed_numbers([row[3:6] for row in vertex_rows], "normals") if has_normals else None
         return Elements(vertices, normals=normals)
-    counts = numbers([row[0] for row in face_rows], "numbers of corners", int)
+    counts = parsed_numbers([row[0] for row in face_rows], "numbers of corners", int)
     if any(len(row) <= count for row, count in zip(face_rows, counts.tolist(), strict=True)):
         raise damaged("a face has fewer corners than it says: it may be truncated")
     corners = [word for row, count in zip(face_rows, counts.tolist(), strict=True) for word in row[1 : 1 + count]]
-    return Elements(vertices, numbers(corners, "vertex ids", int), counts)
+    return Elements(vertices, parsed_numbers(corners, "vertex ids", int), counts)
 
 
 def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> Iterator[list[str]]:

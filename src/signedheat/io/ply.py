@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..domains.exchange import Elements
 from ..errors import FileFormatError
-from .files import PathLike, contents, damaged, ensure_writable, numbers, replacing
+from .files import PathLike, contents, damaged, ensure_writable, parsed_numbers, replacing
 
 _TYPES = {
     name: code
@@ -327,10 +327,10 @@ def _text_reader(body: bytes) -> Any:
         try:
             for name, kind in element.properties.items():
                 if isinstance(kind, str):
-                    table[name] = numbers([row[k] for row, k in zip(rows, starts, strict=True)], f"'{name}'")
+                    table[name] = parsed_numbers([row[k] for row, k in zip(rows, starts, strict=True)], f"'{name}'")
                     starts = [k + 1 for k in starts]
                     continue
-                counts = numbers([row[k] for row, k in zip(rows, starts, strict=True)], f"'{name}'", int)
+                counts = parsed_numbers([row[k] for row, k in zip(rows, starts, strict=True)], f"'{name}'", int)
                 ends = [k + 1 + n for k, n in zip(starts, counts.tolist(), strict=True)]
                 if any(n < 0 for n in counts.tolist()):
                     raise IndexError
@@ -338,7 +338,7 @@ def _text_reader(body: bytes) -> Any:
                     raise IndexError
                 flat = [word for row, k, end in zip(rows, starts, ends, strict=True) for word in row[k + 1 : end]]
                 entry = float if kind[1].startswith("f") else int
-                table[name] = numbers(flat, f"'{name}'", entry), counts
+                table[name] = parsed_numbers(flat, f"'{name}'", entry), counts
                 starts = ends
         except IndexError:
             raise _truncated(element) from None

@@ -148,14 +148,12 @@ def svg(lines: Sequence[Polyline]) -> str:
     )
 
 
-def table(lines: Sequence[Polyline]) -> str:
-    """x and y on each line, an empty line between polylines."""
-    return write_point_lists([(line.points, line.closed) for line in lines])
-
-
 READERS: dict[str, Callable[[PathLike], list[tuple[NDArray[np.float64], bool]]]] = {
     ".csv": lambda path: read_point_lists(path, 2),
     ".svg": read_svg,
 }
-WRITERS: dict[str, Callable[[Sequence[Polyline]], str]] = {".csv": table, ".svg": svg}
+WRITERS: dict[str, Callable[[Sequence[Polyline]], str]] = {
+    ".csv": lambda lines: write_point_lists([(line.points, line.closed) for line in lines]),
+    ".svg": svg,
+}
 POLYLINE_FORMATS = frozenset(READERS)

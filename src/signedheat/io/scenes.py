@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.joining import Body, concatenated
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
 from ..geometry.welding import welded
@@ -65,17 +66,12 @@ ANGLE = 0.3
 SEAM = 1e-6
 """Distance over the diagonal within which corners of neighbouring faces are one: Open CASCADE's own precision."""
 
-Body = tuple[NDArray[np.float64], NDArray[np.int64]]
-"""Vertices and faces."""
-
 
 def _joined(bodies: Sequence[Body]) -> TriangleMesh:
     """One mesh of all bodies, one after another."""
     if not bodies:
         raise FileFormatError("it holds no triangles", remedy="export the shape as a mesh")
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
-    faces = [own + start for (_, own), start in zip(bodies, starts, strict=False)]
-    return TriangleMesh(np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces))
+    return TriangleMesh(*concatenated(bodies))
 
 
 def read_glb(path: PathLike) -> TriangleMesh:

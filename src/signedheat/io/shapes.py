@@ -15,7 +15,7 @@ from .meshes import read_obj, read_off, read_stl, write_obj, write_off, write_pc
 from .ply import read_ply, write_ply
 from .points import read_e57, read_las, read_pcd, read_xyz, write_xyz
 from .scenes import read_3mf, read_glb, step_mesh
-from .tets import TET_FORMATS, read_tets, write_tets
+from .tets import TET_FORMATS, read_tets, store_cells
 from .voxels import read_volume
 from .vtk_hdf import write_vtkhdf
 from .vtk_xml import read_vtp, write_vtp
@@ -142,7 +142,7 @@ def save(shape: Shape | ForeignShape, path: PathLike) -> None:
     """
     shape = as_shape(shape)
     if isinstance(shape, TetMesh):
-        return write_tets(shape, path)
+        return store_cells(shape.to_meshio(), path)
     write = format_for(path, WRITERS, "a shape")
     if isinstance(shape, DigitalSurface):
         shape = shape.squares

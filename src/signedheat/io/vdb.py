@@ -21,11 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.exchange import NAME
-from ..errors import FileFormatError, MemoryLimitError
+from ..errors import FileFormatError
 from ..fields.grid_field import GridField
-from ..memory import available_memory
 from ..operators.grid.blocks import SIDE, Blocks
-from .files import PathLike, contents, format_for, replacing
+from .files import PathLike, contents, ensure_fits, format_for, replacing
 
 MAGIC, FILE_VERSION, LIBRARY = 0x56444220, 224, (10, 0)
 """First number of every file, the format's version, and that of a library that writes it so."""
@@ -124,7 +123,7 @@ def read_vdb(path: PathLike) -> VdbGrid:
     Raises
     ------
     FileFormatError
-        If the file is no OpenVDB file with a float grid, is truncated, or is compressed in a way that is not known.
+        If the file is no OpenVDB file with a float grid, is truncated, or is compressed in a way that is not supported.
     """
     data = contents(path)
     try:
@@ -158,13 +157,7 @@ def read_vdb_image(path: PathLike) -> tuple[NDArray[np.float32], NDArray[np.floa
         voxels = grid.places[rows] + np.stack(inner, axis=1)
         first = voxels.min(axis=0)
         counts = voxels.max(axis=0) + 1 - first
-    room, needed = available_memory(), 12 * int(np.prod(counts))
-    if room is not None and needed > room:
-        raise MemoryLimitError(
-            f"its {' × '.join(map(str, counts))} voxels need {needed / 1e9:.1f} GB, and {room / 1e9:.1f} are free",
-            remedy="save bands as .npz, which stay bands",
-            path=path,
-        )
+    ensure_fits(12 * int(np.prod(counts)), path, "save bands as .npz, which stay bands")
     values = np.full(counts, grid.background, dtype=np.float32)
     for place, size, value in grid.tiles:
         _fill(values, place - first, size, np.float32(value))

@@ -28,7 +28,7 @@ VOLUME_FORMATS = (".npy", ".nrrd", ".vti")
 LABEL_FORMATS = (*VOLUME_FORMATS, *NIFTI)
 SQUARE = 1e-4
 """Cosine between axes up to which they are at right angles: NIfTI files keep them in single precision."""
-AXES = {
+SPACES = {
     "right-anterior-superior": (1, 1, 1),
     "left-posterior-superior": (-1, -1, 1),
     "left-anterior-superior": (-1, 1, 1),
@@ -150,7 +150,7 @@ class LabelImage:
         if extension(path) in NIFTI:
             require(*NIBABEL)
             ensure_writable(path, {extension(path)}, "a field")
-            if self.space is not None and self.space not in AXES:
+            if self.space is not None and self.space not in SPACES:
                 raise FileFormatError(
                     f"NIfTI files have no space '{self.space}'", remedy="write a .nrrd file", path=path
                 )
@@ -166,7 +166,7 @@ class LabelImage:
     def _nifti(self, field: GridField, axes: NDArray[np.float64], first: NDArray[np.float64], path: PathLike) -> bytes:
         affine = np.eye(4)
         affine[:3, :3], affine[:3, 3] = axes, first
-        signs = AXES[self.space] if self.space is not None else (1, 1, 1)
+        signs = SPACES[self.space] if self.space is not None else (1, 1, 1)
         image = nibabel.Nifti1Image(field.values, np.diag([*signs, 1]) @ affine)
         packed: bytes = image.to_bytes()
         return gzip.compress(packed, mtime=0) if extension(path) == ".nii.gz" else packed

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ..domains.exchange import Elements
 from ..errors import FileFormatError
-from .files import PathLike, contents, damaged, ensure_fits, numbers, unpacked
+from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers, unpacked
 
 _TYPES = {f"{kind}{8 * size}": f"{kind[0].lower()}{size}" for kind in ("Int", "UInt") for size in (1, 2, 4, 8)}
 _TYPES |= {"Float32": "f4", "Float64": "f8"}
@@ -68,7 +68,7 @@ def read_vti(
     """Values (first scalar array), origin and spacing of image data; the array named `other`, if there is one."""
     root, arrays = parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
-    extent = numbers(image.get("WholeExtent", "").split() if image is not None else [], "extent", int)
+    extent = parsed_numbers(image.get("WholeExtent", "").split() if image is not None else [], "extent", int)
     if (
         image is None
         or piece is None
@@ -77,15 +77,15 @@ def read_vti(
     ):
         raise FileFormatError("the image is not in one piece", remedy="write it anew as a single .vti file")
     direction = image.get("Direction", "1 0 0 0 1 0 0 0 1")
-    if numbers(direction.split(), "direction").tolist() != np.eye(3).ravel().tolist():
+    if parsed_numbers(direction.split(), "direction").tolist() != np.eye(3).ravel().tolist():
         raise FileFormatError(f"the axes of the image are turned ({direction})", remedy="resample it along x, y, z")
     shape = extent[1::2] - extent[::2] + 1
     n_nodes = math.prod(shape.tolist())
     if shape.min() < 1 or abs(extent).max() >= 2**53:
         raise damaged(f"its extent is {' '.join(map(str, extent.tolist()))}: it is damaged")
     dimension = 3 if shape[2] > 1 else 2 if shape[1] > 1 else 1
-    spacing = numbers(image.get("Spacing", "1 1 1").split(), "spacing")
-    origin = numbers(image.get("Origin", "0 0 0").split(), "origin")
+    spacing = parsed_numbers(image.get("Spacing", "1 1 1").split(), "spacing")
+    origin = parsed_numbers(image.get("Origin", "0 0 0").split(), "origin")
     if extent[::2].any():
         origin = origin + spacing * extent[::2]
     nodes = piece.find("PointData")
@@ -275,7 +275,7 @@ class _Arrays:
             raise FileFormatError(f"arrays of type '{element.get('type')}' are not supported", remedy="use Float64")
         form, inline = element.get("format"), (element.text or "").split()
         if form == "ascii":
-            return self._counted(numbers(inline, "values").astype(code), count)
+            return self._counted(parsed_numbers(inline, "values").astype(code), count)
         size = count * np.dtype(code).itemsize
         ensure_fits(size, self.path)
         try:
