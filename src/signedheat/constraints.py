@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .discretization import Integration, Levels, SourceTerm
-from .domains.validation import LARGEST, finite_number, numbers
+from .domains.validation import LARGEST, numbers, positive_number
 from .errors import ConstraintError
 from .reprs import ShortRepr
 
@@ -171,12 +171,8 @@ class Soft:
     weight: float | None = None
 
     def __post_init__(self) -> None:
-        if self.weight is None:
-            return
-        weight = finite_number(self.weight, "weight", error=ConstraintError)
-        if weight <= 0:
-            raise ConstraintError(f"the weight of a soft constraint must be positive, not {weight:g}", element="weight")
-        object.__setattr__(self, "weight", weight)
+        if self.weight is not None:
+            object.__setattr__(self, "weight", positive_number(self.weight, "weight", ConstraintError))
 
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm

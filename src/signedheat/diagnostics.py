@@ -96,12 +96,10 @@ class SampledSource(Note):
     samples: int
     area_outside: float
     area_cancelled: float
-
-    def __str__(self) -> str:
-        return (
-            f"{self.samples} samples of the source; {self.area_outside:.3g} of its area lies outside the grid, "
-            f"{self.area_cancelled:.3g} cancels"
-        )
+    text: ClassVar[str] = (
+        "{0.samples} samples of the source; {0.area_outside:.3g} of its area lies outside the grid, "
+        "{0.area_cancelled:.3g} cancels"
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -183,16 +181,14 @@ class LeftOut(Note):
     cut_faces: int = 0
     merged_faces: int = 0
     doubled_walls: int = 0
+    text: ClassVar[str] = (
+        "left out: {0.covered_faces} faces, {0.covered_area:.1%} of the area, that lie inside other bodies "
+        "({0.cut_faces} of them in part), and {0.merged_faces} duplicates"
+    )
 
     @property
     def important(self) -> bool:
         return self.covered_faces > 0
-
-    def __str__(self) -> str:
-        return (
-            f"left out: {self.covered_faces} faces, {self.covered_area:.1%} of the area, that lie inside other bodies "
-            f"({self.cut_faces} of them in part), and {self.merged_faces} duplicates"
-        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -366,12 +362,10 @@ class SharpenedToCurves(Note):
     completed_length: float
     free_ends: int
     sides_by_curves: float
-
-    def __str__(self) -> str:
-        return (
-            f"{self.completed_length:.1%} of the curve completed between {self.free_ends} free ends; "
-            f"curves decide the sign of {self.sides_by_curves:.1%} of the vertices"
-        )
+    text: ClassVar[str] = (
+        "{0.completed_length:.1%} of the curve completed between {0.free_ends} free ends; curves decide the sign of "
+        "{0.sides_by_curves:.1%} of the vertices"
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

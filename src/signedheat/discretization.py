@@ -74,7 +74,7 @@ class Integration(Protocol):
 
 
 class Adaptable(Protocol):
-    """What becomes a discretisation once the sources are known."""
+    """What becomes a discretisation when the sources are given."""
 
     def adapt(self, sources: Sequence[Any]) -> tuple[Discretization, Sequence[Any]]:
         """A discretisation that can represent these sources, and the sources on it: usually ``(self, sources)``.

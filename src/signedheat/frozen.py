@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,13 +33,14 @@ class Frozen:
     def __getstate__(self) -> tuple[dict[str, object], frozenset[str]]:
         names = {entry.name for entry in fields(self)} if is_dataclass(self) else self.__dict__.keys()
         held = {name: value for name, value in self.__dict__.items() if name in names}
-        return held, frozenset(name for name, value in held.items() if _is_read_only(value))
+        arrays = {name: value for name, value in held.items() if isinstance(value, np.ndarray)}
+        return held, frozenset(name for name, array in arrays.items() if not array.flags.writeable)
 
     def __setstate__(self, state: tuple[dict[str, object], frozenset[str]]) -> None:
         held, read_only = state
         self.__dict__.update(held)
         for name in read_only:
-            _set_read_only(held[name])
+            cast("NDArray[np.generic]", held[name]).flags.writeable = False
 
 
 def read_only(array: NDArray[Number]) -> NDArray[Number]:
@@ -47,12 +48,3 @@ def read_only(array: NDArray[Number]) -> NDArray[Number]:
     view: NDArray[Number] = array.view()
     view.flags.writeable = False
     return view
-
-
-def _is_read_only(value: object) -> bool:
-    return isinstance(value, np.ndarray) and not value.flags.writeable
-
-
-def _set_read_only(value: object) -> None:
-    assert isinstance(value, np.ndarray)
-    value.flags.writeable = False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout  # the builtin one only since Python 3.11
@@ -54,15 +55,13 @@ def run_limited(job: Callable[[], Any], seconds: float) -> Any:
     >>> run_limited(lambda: 6 * 7, 10.0)
     42
     """
-    thread, future = _started(job)
-    try:
-        return future.result(seconds)
-    except FutureTimeout:
-        if future.done():  # the timeout is the job's own
-            raise
-        raise TimeoutError(f"it takes more than {seconds:.0f} seconds") from None
-    finally:
-        _stop(thread, future)
+    end = time.monotonic() + seconds
+
+    def refuse_to_wait() -> None:
+        if time.monotonic() > end:
+            raise TimeoutError(f"it takes more than {seconds:.0f} seconds")
+
+    return run_cancellable(job, refuse_to_wait)
 
 
 def _started(job: Callable[[], Any]) -> tuple[Thread, Future[Any]]:

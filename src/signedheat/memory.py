@@ -30,7 +30,7 @@ counted: the system takes back what it holds of them, which is 75 to 140 MB, as 
 
 
 MAPPED = {"VmSize": 685_000_000, "VmData": 165_000_000}
-"""Bytes that libraries still map besides, and hardly touch: they count where a process's own limits do."""
+"""Bytes that libraries map in addition, and hardly touch: they count where a process's own limits do."""
 
 
 ROOM = 1.1

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from .domains.curves import Curve, CurveOrPoints, CurvesAndPoints
 from .domains.digital_surface import DigitalSurface
 from .domains.foreign import as_shape
-from .domains.grid import Grid, room_around
+from .domains.grid import RESOLUTION, Grid, room_around
+from .domains.joining import concatenated
 from .domains.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
 from .domains.point_cloud import PointCloud
 from .domains.polygon_mesh import PolygonMesh
@@ -27,7 +28,7 @@ from .domains.tet_mesh import TetMesh
 from .domains.triangle_mesh import TriangleMesh
 from .domains.validation import finite_number, positive_number
 from .errors import GeometryError, SignedHeatError, SourceError, UnsupportedTypeError
-from .fields.booleans import smooth_difference, smooth_intersection, smooth_union
+from .fields.arithmetic import smooth_difference, smooth_intersection, smooth_union
 from .fields.grid_field import GridField
 from .fields.to_field import Field
 from .fields.vertex_field import VertexField
@@ -59,9 +60,8 @@ __all__ = [
     "thicken",
 ]
 
-RESOLUTION = 128
-ROOM = 0.15
-"""Share of its longest side by which a shape is padded, besides what its offsets take."""
+ROOM_FOR_OFFSETS = 0.15
+"""Share of its longest side by which a shape is padded, in addition to what its offsets take."""
 BYTES_PER_NODE = 31.0
 """Measured: what each node of a grid takes where a sheet is thickened."""
 
@@ -162,8 +162,7 @@ def dilate(
     >>> bool(abs(np.linalg.norm(dilate(ball, 0.5, resolution=32).vertices, axis=1) - 1.5).max() < 0.02)
     True
     """
-    distance = finite_number(distance, "the distance", least=0)
-    return _offsets(shape, (distance,), domain, resolution, measure)
+    return _offsets(shape, distance, (1,), domain, resolution, measure)
 
 
 @_by_kind_of_shape
@@ -184,8 +183,7 @@ def erode(
     >>> bool(abs(np.linalg.norm(erode(ball, 0.5, resolution=48).vertices, axis=1) - 0.5).max() < 0.02)
     True
     """
-    distance = finite_number(distance, "the distance", least=0)
-    return _offsets(shape, (-distance,), domain, resolution, measure)
+    return _offsets(shape, distance, (-1,), domain, resolution, measure)
 
 
 @_by_kind_of_shape
@@ -206,8 +204,7 @@ def opening(
     >>> bool(opened.points[:, 0].max() < 1.1)
     True
     """
-    distance = finite_number(distance, "the distance", least=0)
-    return _offsets(shape, (-distance, distance), domain, resolution, measure)
+    return _offsets(shape, distance, (-1, 1), domain, resolution, measure)
 
 
 @_by_kind_of_shape
@@ -227,8 +224,7 @@ def closing(
     >>> len(gap), len(closing(gap, 0.2))  # what is .2 apart grows together
     (2, 1)
     """
-    distance = finite_number(distance, "the distance", least=0)
-    return _offsets(shape, (distance, -distance), domain, resolution, measure)
+    return _offsets(shape, distance, (1, -1), domain, resolution, measure)
 
 
 def offset(
@@ -375,8 +371,9 @@ def shell(
             )
         outside = solid.surface(keep_faces=True, spacing=grid.spacing)
         inside = solid.surface(inner, spacing=grid.spacing)
-        faces = np.concatenate([outside.faces, inside.faces[:, ::-1] + outside.n_vertices])
-        wall = TriangleMesh(np.concatenate([outside.vertices, inside.vertices]), faces)
+        wall = TriangleMesh(
+            *concatenated([(outside.vertices, outside.faces), (inside.vertices, inside.faces[:, ::-1])])
+        )
     else:
         wall = GridField(grid, np.maximum(inner - field.values, field.values - outer)).offset(0.0)
     wall = _without_crumbs(wall, outer - inner)
@@ -511,10 +508,8 @@ def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
     below, above = np.full(SIDES, 2 * SIDES), np.full(SIDES, 2 * SIDES + 1)
     sides = (a, b, below), (b + SIDES, a + SIDES, above), (b, a, b + SIDES), (a, a + SIDES, b + SIDES)  # facing inwards
     faces = np.concatenate([np.stack(each, axis=1) for each in sides])
-    both = TriangleMesh(
-        np.concatenate([wall.vertices, vertices]), np.concatenate([wall.faces, faces + wall.n_vertices])
-    )
-    solid = complete(both, as_oriented=True)
+    both = concatenated([(wall.vertices, wall.faces), (vertices, faces)])
+    solid = complete(TriangleMesh(*both), as_oriented=True)
     try:
         return solid.surface(keep_faces=True, spacing=cell)
     except GeometryError:
@@ -535,14 +530,20 @@ def _sided(domain: Domain, shape: Sources) -> Field:
 
 
 def _offsets(
-    shape: Sources, distances: tuple[float, ...], domain: Domain | None, resolution: int, measure: Measure | None
+    shape: Sources,
+    distance: float,
+    signs: tuple[int, ...],
+    domain: Domain | None,
+    resolution: int,
+    measure: Measure | None,
 ) -> Boundary:
-    """Successive offsets, each of the distance to the previous one."""
+    """Successive offsets, outward for a sign of 1 and inward for −1, each of the distance to the previous one."""
+    distance = finite_number(distance, "the distance", least=0)
     if domain is None:
-        domain = _room(shape, max(0.0, *distances), resolution)
-    for distance in distances:
+        domain = _room(shape, distance if 1 in signs else 0.0, resolution)
+    for sign in signs:
         field = (measure or _field)(shape, domain)
-        boundary = field.contour(distance) if isinstance(field, VertexField) else field.offset(distance)
+        boundary = (field.contour if isinstance(field, VertexField) else field.offset)(sign * distance)
         shape = boundary
     return boundary
 
@@ -556,7 +557,7 @@ def _room(shape: Sources, reach: float, resolution: int) -> Grid:
             remedy="pass that surface as the domain",
         )
     bounds = bounds_around(shapes)
-    return Grid.around(bounds, resolution, room_around(bounds, reach, ROOM))
+    return Grid.around(bounds, resolution, room_around(bounds, reach, ROOM_FOR_OFFSETS))
 
 
 def _grid(domain: object) -> Grid[Literal[3]]:

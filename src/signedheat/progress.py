@@ -27,12 +27,12 @@ class Announcement:
     """Whether any are; not where nothing but results are to be printed."""
 
     def __init__(self, text: str, logged: str) -> None:
-        self._text, self._logged, self._was_told = text, logged, False
+        self._text, self._logged, self._is_printed = text, logged, False
 
     def __call__(self, about: object) -> None:
         logger.info(self._logged, about)
-        if self.are_wanted and not self._was_told and sys.stderr is not None and sys.stderr.isatty():
-            self._was_told = True
+        if self.are_wanted and not self._is_printed and sys.stderr is not None and sys.stderr.isatty():
+            self._is_printed = True
             sys.stderr.write(f"\r\x1b[2Ksignedheat: {self._text}\n")
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .domains.grid import Grid
+from .domains.joining import joined_triangles
 from .domains.point_cloud import PointCloud
 from .domains.triangle_mesh import TriangleMesh
 from .fields.grid_field import GridField
@@ -105,9 +106,7 @@ def broken_duck() -> TriangleMesh:
 
 def union(*meshes: TriangleMesh) -> TriangleMesh:
     """One mesh with all faces of several; no vertices are merged."""
-    starts = np.cumsum([0] + [mesh.n_vertices for mesh in meshes])
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
-    return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+    return TriangleMesh(*joined_triangles(meshes))
 
 
 def without_patches(mesh: TriangleMesh, n_patches: int, radius: float, seed: int = 0) -> TriangleMesh:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
-from typing import Literal, cast, get_args, overload
+from typing import Any, Literal, cast, get_args, overload
 
 from numpy.typing import ArrayLike
 
@@ -13,18 +13,23 @@ from .curves.distance import distance_to_curves
 from .curves.plane import distance_to_lines
 from .domains.curves import Curve, CurvesAndPoints, ElementList, SurfacePoints
 from .domains.foreign import ForeignShape, as_shapes, converted
-from .domains.grid import Dimension, Grid
+from .domains.grid import Dimension, Grid, room_around
 from .domains.kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
+from .domains.polygon_mesh import PolygonMesh
 from .domains.polyline import Polyline
 from .domains.tet_mesh import TetMesh
+from .domains.triangle_mesh import TriangleMesh
 from .errors import SourceError, UnsupportedTypeError
 from .extrapolation import Diffusion
 from .fields.grid_field import GridField
 from .fields.tet_field import TetField
 from .fields.to_field import Field
 from .fields.vertex_field import VertexField
+from .lowering.area_elements import bounds_around
+from .orientation.orient import orient
 from .progress import Progress
 from .solids.distance import distance_to_shapes
+from .solver import SignedHeatSolver, as_list
 
 
 @overload
@@ -201,6 +206,28 @@ def signed_distance(
                 f"{option} is no option here", remedy=f"the options are {', '.join(accepted)}", element=option
             )
     return measure(source, domain, **options)
+
+
+def plain_distance(
+    shape: Any,
+    domain: Grid | TetMesh,
+    constraint: Constraint,
+    diffusion: float,
+    as_oriented: bool,
+    progress: Progress | None = None,
+) -> Any:
+    """The method's own field of a shape in space: its faces are oriented, and nothing is completed or sharpened."""
+    if isinstance(shape, TriangleMesh | PolygonMesh) and not as_oriented:
+        shape = orient(shape)
+    return SignedHeatSolver[Any](domain, diffusion, progress).distance(shape, constraint)
+
+
+def grid_around(
+    shape: Any, reach: float, resolution: int, padding: float | None, spacing: ArrayLike | None = None
+) -> Grid:
+    """A grid around a shape or several, by default with room for offsets up to `reach`."""
+    bounds = bounds_around(as_list(shape))
+    return Grid.around(bounds, resolution, room_around(bounds, reach) if padding is None else padding, spacing)
 
 
 def _measure(source: object, domain: Domain | None) -> Callable[..., Field]:

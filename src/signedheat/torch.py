@@ -24,7 +24,7 @@ and no step of an optimiser."""
 
 
 def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Tensor:
-    """Signed distances of points, negative inside, that know their gradients.
+    """Signed distances of points, negative inside, that PyTorch differentiates.
 
     The distance d at a point p has its nearest place q at weights w in a face with the corners v. It changes by
     ``∇d · (δp − Σ w δv)``, since q moves along the surface only. Where q lies on the completion it does not depend on

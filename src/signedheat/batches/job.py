@@ -10,10 +10,8 @@ from typing import Any, Literal, cast
 
 from ..constraints import Constraint, ZeroSet
 from ..domains.digital_surface import DigitalSurface
-from ..domains.grid import Grid, room_around
+from ..domains.grid import RESOLUTION, Grid
 from ..domains.kinds import ShapeLike
-from ..domains.polygon_mesh import PolygonMesh
-from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number, whole_number
 from ..errors import FileFormatError, InexactWarning, SignedHeatError
 from ..fields.grid_field import GridField
@@ -22,14 +20,12 @@ from ..io.fields import BAND_FORMATS
 from ..io.figures import describe, shape_figures
 from ..io.files import distinct_names
 from ..io.shapes import read, save
-from ..lowering.area_elements import bounds_around
-from ..orientation.orient import orient
+from ..signed_distance import grid_around, plain_distance
 from ..solids.complete import complete
 from ..solids.distance import distance_to_shapes
 from ..solids.sampling import WIDTHS, Layout, sample
 from ..solids.training import training_points
 from ..solids.watertight import closed_surface, figures_of
-from ..solver import SignedHeatSolver, as_list
 from .inputs import Input
 
 
@@ -110,7 +106,7 @@ class Job:
     surfaces: str = ".stl"
     samples: Sampling | None = None
     info: bool = False
-    resolution: int = 128
+    resolution: int = RESOLUTION
     spacing: float | tuple[float, ...] | None = None
     padding: float | None = None
     band: float | None = None
@@ -168,10 +164,8 @@ class Job:
             return figures
         if isinstance(shape, DigitalSurface):
             shape = shape.smooth_surface
-        bounds = bounds_around(as_list(shape))
-        padding = room_around(bounds, max(map(abs, self.offsets), default=0.0))
-        padding = padding if self.padding is None else self.padding
-        phi = self._distance(shape, Grid.around(bounds, self.resolution, padding, self.spacing))
+        reach = max(map(abs, self.offsets), default=0.0)
+        phi = self._distance(shape, grid_around(shape, reach, self.resolution, self.padding, self.spacing))
         figures |= {"notes": [str(note) for note in phi.diagnostics.important], "field": describe(phi)}
         if self.volume is not None:
             phi.save(f"{stem}{self.volume}")
@@ -191,9 +185,7 @@ class Job:
 
     def _distance(self, shape: ShapeLike, grid: Grid) -> GridField:
         if self.plain:
-            if isinstance(shape, TriangleMesh | PolygonMesh) and not self.as_oriented:
-                shape = orient(shape)
-            return SignedHeatSolver(grid, self.diffusion).distance(shape, self.constraint)
+            return cast("GridField", plain_distance(shape, grid, self.constraint, self.diffusion, self.as_oriented))
         options: dict[str, Any] = {"as_oriented": self.as_oriented, "keep_overlaps": self.keep_overlaps}
         options |= {"constraint": self.constraint, "diffusion": self.diffusion}
         return cast("GridField", distance_to_shapes(shape, grid, band=self.band, **options))

@@ -57,7 +57,9 @@ def _run(argv: Sequence[str] | None) -> int:
     arguments = parser_of(import_module(f"{__name__}.shell").COMMANDS).parse_args(argv)
     if arguments.check is not None:
         arguments.check(arguments)
-    import_module("signedheat.public")
+    public = import_module("signedheat.public")
+    if arguments.preview is not None:
+        public.view.ensure_picture_writable(arguments.preview)
     import_module("signedheat.progress").Announcement.are_wanted = not (arguments.quiet or arguments.json)
     with import_module(f"{__name__}.standard").standard_files(arguments) as standard:
         summary, text = arguments.run(arguments)

@@ -218,7 +218,7 @@ def listed(inputs: list[str]) -> list[str]:
 
 
 def job_of(arguments: Namespace) -> sh.batches.Job:
-    """The job that the options ask for."""
+    """The job that the options describe."""
     sampling = None
     if arguments.sample is not None:
         named = {name: getattr(arguments, name) for name in ("near", "seed", "normalize", "layout")}
@@ -230,7 +230,7 @@ def job_of(arguments: Namespace) -> sh.batches.Job:
         offsets=tuple(arguments.offset),
         surfaces=f".{arguments.surface}",
         samples=sampling,
-        resolution=arguments.resolution or shapes.RESOLUTION,
+        resolution=arguments.resolution or sh.batches.Job.resolution,
         spacing=spacing[0] if spacing is not None and len(spacing) == 1 else spacing,
         constraint=shapes.constraint_of(arguments.constraint),
         **{name: getattr(arguments, name) for name in same},

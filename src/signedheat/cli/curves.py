@@ -99,10 +99,8 @@ def about_curves(written: str) -> tuple[Option, ...]:
 def surface(arguments: Namespace) -> Summary:
     """Read, check that the results can be written, compute, write."""
     sh.io.ensure_writable(arguments.output, sh.io.VERTEX_FIELD_FORMATS, "a field on a surface")
-    if arguments.preview:
-        sh.view.ensure_picture_writable(arguments.preview)
     domain, sources = surface_and_curves(arguments)
-    field = measured(domain, sources, arguments)
+    field = distance_on_surface(domain, sources, arguments)
     (field.subdivided() if arguments.subdivide else field).save(arguments.output)
     low, high = float(numpy.nanmin(field.values)), float(numpy.nanmax(field.values))
     summary = {
@@ -148,8 +146,6 @@ def surface(arguments: Namespace) -> Summary:
 def close(arguments: Namespace) -> Summary:
     """Read, check that the results can be written, complete, write."""
     sh.io.ensure_writable(arguments.output, sh.io.CURVE_FORMATS, "curves")
-    if arguments.preview:
-        sh.view.ensure_picture_writable(arguments.preview)
     domain, sources = surface_and_curves(arguments)
     with shapes.prefix_errors(arguments.curves), ProgressBar(is_quiet(arguments)) as progress:
         closing.refuse_without_sides(sources)
@@ -200,7 +196,7 @@ def surface_and_curves(arguments: Namespace) -> tuple[Any, list[Any]]:
     return domain, (sh.io.read_globe_curves if arguments.globe else sh.io.read_curves)(arguments.curves, domain)
 
 
-def measured(domain: Any, sources: list[Any], arguments: Namespace) -> sh.VertexField:
+def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -> sh.VertexField:
     """The distance to the curves."""
     constraint = shapes.constraint_of(arguments.constraint)
     intrinsic: Literal[True, "auto"] = True if arguments.intrinsic else "auto"

@@ -60,7 +60,7 @@ class Parser(argparse.ArgumentParser):
 
 @dataclass(frozen=True)
 class Option:
-    """An argument of a command: its names, and what argparse is to know about it."""
+    """An argument of a command: its names, and its settings for argparse."""
 
     names: tuple[str, ...]
     settings: Mapping[str, Any]
@@ -144,7 +144,7 @@ def parser_of(commands: Iterable[Command]) -> Parser:
 
 
 def option(*names: str, **settings: Any) -> Option:
-    """An option or an argument, with what argparse is to know about it."""
+    """An option or an argument, with its settings for argparse."""
     return Option(names, settings)
 
 
@@ -341,7 +341,7 @@ TILES = group(
         "--tiles",
         metavar="FOLDER",
         help="compute the band in tiles, which are kept in this folder: for bands larger than memory; the same command "
-        "goes on where it was stopped",
+        "continues where it was stopped",
     ),
     workers("processes for them (threads of this one)"),
     SCHEDULER,

@@ -18,12 +18,11 @@ from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, Ze
 from ..curves.plane import distance_to_lines
 from ..diagnostics import SampledSource
 from ..domains.digital_surface import DigitalSurface
-from ..domains.grid import Grid, room_around
+from ..domains.grid import RESOLUTION, Grid
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
 from ..domains.transforms import transform
-from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError, SignedHeatError, SourceError
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
@@ -45,22 +44,17 @@ from ..io.files import contents, distinct_names, extension
 from ..io.images import CONFIDENCE, NIFTI
 from ..io.scenes import METRES, unit_of
 from ..io.voxels import LabelImage, read_labels
-from ..lowering.area_elements import bounds_around
 from ..lowering.tets.discretization import memory_estimate
 from ..memory import refuse_beyond_memory
-from ..orientation.orient import orient
 from ..progress import Progress, within
+from ..signed_distance import grid_around, plain_distance
 from ..solids.complete import complete
 from ..solids.distance import distance_to_shapes
-from ..solver import SignedHeatSolver, as_list
 from ..tets.tetrahedralize import tetrahedralize
 from .options import IMAGES, is_planar, is_quiet
 from .terminal import ProgressBar, say
 
-RESOLUTION = 128
 TET_RESOLUTION = 32
-SECTION_NODES = 64
-"""Nodes along the longest side of the grid that shows a field on tets."""
 COMPLETED = 0.3
 """Share of the progress of a band that completing the shape is."""
 CANCELLED = 0.9
@@ -97,7 +91,7 @@ def read_source(arguments: Namespace) -> Any:
 
 
 def placement(arguments: Namespace) -> NDArray[np.float64] | None:
-    """The map that ``--units`` and ``--transform`` ask for, units first; None if neither is given."""
+    """The map of ``--units`` and ``--transform``, units first; None if neither is given."""
     if arguments.units is None and arguments.transform is None:
         return None
     matrix = np.eye(4)
@@ -148,9 +142,7 @@ def grid_for(shape: Any, arguments: Namespace, reach: float | None = None, image
         if reach is None:
             return image.grid
         spacing = image.spacing
-    bounds = bounds_around(as_list(shape))
-    padding = room_around(bounds, reach or 0.0) if arguments.padding is None else arguments.padding
-    return Grid.around(bounds, resolution=arguments.resolution or RESOLUTION, padding=padding, spacing=spacing)
+    return grid_around(shape, reach or 0.0, arguments.resolution or RESOLUTION, arguments.padding, spacing)
 
 
 def constraint_of(word: str) -> Constraint:
@@ -199,10 +191,7 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
             solid = complete(shape, **options, **repair, progress=within(progress, 0.0, COMPLETED))
             field = in_band(solid, domain, arguments, within(progress, COMPLETED, 1.0))
         elif arguments.plain or not isinstance(constraint, Free | ZeroSet | Soft):
-            if isinstance(shape, TriangleMesh | PolygonMesh) and not arguments.as_oriented:
-                shape = orient(shape)
-            solver: Any = SignedHeatSolver(domain, arguments.diffusion, progress)
-            field = solver.distance(shape, constraint)
+            field = plain_distance(shape, domain, **options, as_oriented=arguments.as_oriented, progress=progress)
         elif isinstance(domain, Grid) and domain.dimension == 2:
             field = distance_to_lines(shape, domain, **options, progress=progress)
         else:
@@ -260,12 +249,6 @@ def on_tets(arguments: Namespace) -> tuple[Any, TetField]:
                 lambda fits: f"lower the resolution from {resolution} to {int(resolution * math.sqrt(fits / n))}",
             )
         return shape, compute(shape, mesh, arguments)
-
-
-def section_of(field: TetField) -> GridField:
-    """A field on tets at the nodes of a coarse grid around its mesh, for pictures."""
-    grid = Grid.around(field.mesh.bounds, resolution=SECTION_NODES, padding=0.0)
-    return GridField(grid, field(grid.points.reshape(-1, 3)).reshape(grid.shape))
 
 
 def field_or_image(path: str) -> Any:
@@ -336,7 +319,7 @@ def ensure_surface_writable(path: str, planar: bool = False) -> None:
 def save_level(what: Any, path: str, image: LabelImage | None = None, field: GridField | None = None) -> None:
     """Write a surface, or polylines in the plane: a surface in the place of the image that it is from.
 
-    Where the field that it is of knows the confidence, and the format has room for it, it stands at each vertex.
+    Where the field has a confidence, and the format has room for it, that is written at each vertex.
     """
     if isinstance(what, list):
         return write_polylines(path, what)

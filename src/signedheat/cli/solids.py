@@ -77,8 +77,6 @@ def check_volume(arguments: Namespace) -> None:
 )
 def volume(arguments: Namespace) -> Summary:
     """Read, check that the result can be written, compute, write."""
-    if arguments.preview:
-        sh.view.ensure_picture_writable(arguments.preview)
     if arguments.tets is not None:
         return _on_tets(arguments)
     image = shapes.image_of(arguments)
@@ -92,7 +90,7 @@ def volume(arguments: Namespace) -> Summary:
     else:
         image.save(field, arguments.output)
     if arguments.preview:
-        sh.view.save_slices(field.whole, arguments.preview, shape)
+        sh.view.save_slices(field, arguments.preview, shape)
     summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), **shapes.place_of(image)}
     nodes = " × ".join(map(str, field.grid.shape))
     there = "" if arguments.band is None else f" ({summary['nodes']:,} of them there)"
@@ -107,7 +105,7 @@ def _on_tets(arguments: Namespace) -> Summary:
     shape, field = shapes.on_tets(arguments)
     field.save(arguments.output)
     if arguments.preview:
-        sh.view.save_slices(shapes.section_of(field), arguments.preview, shape)
+        sh.view.save_slices(field, arguments.preview, shape)
     n_tets = field.mesh.n_tets
     summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), "n_tets": n_tets}
     return summary, f"{arguments.output}: {n_tets} tets, {shapes.range_in_words(summary)}"
@@ -147,8 +145,6 @@ def offset(arguments: Namespace) -> Summary:
     planar = is_planar(arguments.shape)
     for path in outputs:
         shapes.ensure_surface_writable(path, planar)
-    if arguments.preview:
-        sh.view.ensure_picture_writable(arguments.preview)
     image = shapes.image_of(arguments)
     shape, field = shapes.measured(arguments, image, max(map(abs, arguments.distances)))
     with shapes.prefix_errors(arguments.shape):
@@ -156,7 +152,7 @@ def offset(arguments: Namespace) -> Summary:
     for what, path in zip(found, outputs, strict=True):
         shapes.save_level(what, path, image, field)
     if arguments.preview:
-        sh.view.save_slices(field.whole, arguments.preview, shape, arguments.distances)
+        sh.view.save_slices(field, arguments.preview, shape, arguments.distances)
     written = [
         {"distance": distance, "output": path, **shapes.counts(what)}
         for distance, path, what in zip(arguments.distances, outputs, found, strict=True)
@@ -204,8 +200,6 @@ def check_morph(arguments: Namespace) -> None:
 def morph(arguments: Namespace) -> Summary:
     """Read, check that the result can be written, compute, write."""
     shapes.ensure_surface_writable(arguments.output)
-    if arguments.preview:
-        sh.view.ensure_picture_writable(arguments.preview)
     shape = shapes.read_source(arguments)
     fields: list[sh.GridField] = []
 

@@ -1,4 +1,4 @@
-"""The terminal: text to standard output and error, whatever these are; a progress bar; signals that ask to stop."""
+"""The terminal: text to standard output and error, whatever these are; a progress bar; signals that stop it."""
 
 from __future__ import annotations
 

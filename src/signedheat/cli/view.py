@@ -48,10 +48,8 @@ def view(arguments: Namespace) -> Summary:
     with shapes.prefix_errors(arguments.file):
         if isinstance(thing, sh.VertexField):
             sh.view.save_surface(thing, output, up=up)
-        elif isinstance(thing, sh.GridField):
-            sh.view.save_slices(thing.whole, output)
-        elif isinstance(thing, sh.TetField):
-            sh.view.save_slices(shapes.section_of(thing), output)
+        elif isinstance(thing, sh.GridField | sh.TetField):
+            sh.view.save_slices(thing, output)
         else:
             sh.view.save_scene(thing, output, up)
     return {"input": arguments.file, "output": output}, output
@@ -65,7 +63,7 @@ def has_window() -> bool:
 
 
 def display_answers() -> bool:
-    """Whether there is an X server: where there is none, VTK shows nothing and goes on."""
+    """Whether there is an X server: where there is none, VTK shows nothing, and says so in no way."""
     name = os.environ.get("DISPLAY", "")
     if not name:
         return False

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..fields.piecewise_field import PiecewiseField, chains
+from ..fields.piecewise_field import PiecewiseField
 from ..geometry.components import connected_components
 from ..geometry.face_pairs import FacePairs, split_corners
 from ..geometry.intrinsic_mesh import IntrinsicMesh
+from ..geometry.polylines import assemble_polylines
 from ..linear import factorize
 from ..operators.cotan import cotan_matrix, divergence
 
@@ -108,7 +109,8 @@ def without_twigs(edges: NDArray[np.int64], high: NDArray[np.bool_]) -> NDArray[
     keeps[which.ravel()[high]] = True
     left = np.arange(len(once))
     while True:
-        low = [chain for chain, _ in chains(once[left]) if not keeps[left[chain]].any()]
+        chains = assemble_polylines(*once[left].T, directed=False)
+        low = [chain for chain, _, _ in chains if not keeps[left[chain]].any()]
         if not low:
             result: NDArray[np.bool_] = np.isin(which.ravel(), left)
             return result
@@ -176,7 +178,7 @@ def lines_by_height(
     height = np.abs(pairs.ends(values)).mean(axis=1)[cut]
     edges, which = np.unique(pairs.edges[cut], return_inverse=True)
     mean = np.bincount(which, height) / np.bincount(which)
-    lines = [chain for chain, _ in chains(triangles.edges.vertices[edges])]
+    lines = [chain for chain, _, _ in assemble_polylines(*triangles.edges.vertices[edges].T, directed=False)]
     return [edges[line] for line in sorted(lines, key=lambda line: float(mean[line].mean()))]
 
 

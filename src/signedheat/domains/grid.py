@@ -31,6 +31,8 @@ from .validation import (
     whole_numbers,
 )
 
+RESOLUTION = 128
+"""Nodes along the longest side of a grid, if nothing else is said."""
 ROOM = 0.2
 """Share of its longest side by which a shape is padded on every side."""
 if TYPE_CHECKING:
@@ -126,7 +128,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
     def around(
         cls: type[Grid[int]],
         bounds: ArrayLike | Shape | Polyline | ForeignShape | Sequence[Shape | Polyline | ForeignShape],
-        resolution: int = 128,
+        resolution: int = RESOLUTION,
         padding: float | None = None,
         spacing: ArrayLike | None = None,
     ) -> Grid[int]:

@@ -294,7 +294,7 @@ def intrinsic_delaunay(
         Limit on the number of vertices; by default 20 for every vertex of the mesh and the kept curves, plus 10,000.
     coarsest : float
         Largest circumradius that refinement leaves, in multiples of that of an equilateral triangle of the mean area
-        that there would be otherwise; at least 1. Flat parts of CAD meshes, which small angles do not ask to be split,
+        that there would be otherwise; at least 1. Flat parts of CAD meshes, which no small angle makes it split,
         are then about as fine as the rest.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.

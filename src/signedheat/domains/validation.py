@@ -142,7 +142,7 @@ def query_points(values: object, columns: int) -> NDArray[np.float64]:
     if farthest > LARGEST:
         raise GeometryError(
             f"points reach as far as {farthest:.3g}: the squares of such lengths cannot be computed with",
-            remedy=f"ask at points up to {LARGEST:g}",
+            remedy=f"evaluate at points up to {LARGEST:g}",
             element="points",
         )
     return points
@@ -185,11 +185,11 @@ def _float(value: Real | NDArray[Any]) -> float:
         return math.nan
 
 
-def positive_number(value: object, name: str) -> float:
+def positive_number(value: object, name: str, error: type[SignedHeatError] = SignedHeatError) -> float:
     """`value` as a finite positive float."""
-    number = finite_number(value, name)
+    number = finite_number(value, name, error=error)
     if number <= 0:
-        raise SignedHeatError(f"{name} must be positive and finite, not {number:g}", element=name)
+        raise error(f"{name} must be positive and finite, not {number:g}", element=name)
     return number
 
 

@@ -23,6 +23,7 @@ from ..frozen import Frozen
 from ..geometry.face_pairs import FacePairs, face_pairs, split_corners
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.meshes import gradients_along
+from ..geometry.polylines import assemble_polylines
 from ..geometry.surface_points import barycentric_in, locate_points
 from .arithmetic import Arithmetic
 from .vertex_field import VertexField
@@ -152,11 +153,12 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         np.maximum.at(largest, which, height)
         lengths = self.triangles.lengths_of_edges
         lines = []
-        for chain, forward in chains(self.triangles.edges.vertices[edges]):
-            ends = self.triangles.edges.vertices[edges[chain]]
-            ends = np.where(forward[:, None], ends, ends[:, ::-1])
+        for chain, backwards, _ in assemble_polylines(*self.triangles.edges.vertices[edges].T, directed=False):
+            ends, jumps = (
+                np.where(backwards[:, None], pairs[chain][:, ::-1], pairs[chain])
+                for pairs in (self.triangles.edges.vertices[edges], largest)
+            )
             vertices = np.concatenate([ends[:, 0], ends[-1:, 1]])
-            jumps = np.where(forward[:, None], largest[chain], largest[chain][:, ::-1])
             lines.append(Cut(vertices, self.surface.vertices[vertices], jumps, lengths[edges[chain]]))
         return sorted(lines, key=lambda line: -line.length)
 
@@ -193,46 +195,6 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
     def __repr__(self) -> str:
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
         return f"PiecewiseField({self.domain!r}, values from {low:.4g} to {high:.4g}, {len(self.cut)} cuts)"
-
-
-def chains(edges: NDArray[np.int64]) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
-    """Join edges end to end into polylines, which end where not exactly two edges meet.
-
-    Parameters
-    ----------
-    edges : (k, 2) int
-        Vertex ids.
-
-    Returns
-    -------
-    list of ((j,) int, (j,) bool)
-        Edges of each polyline in order, and whether each is traversed from its first vertex to its second.
-
-    Examples
-    --------
-    >>> [(edges.tolist(), forward.tolist()) for edges, forward in chains(np.array([[5, 7], [9, 7], [9, 2]]))]
-    [([0, 1, 2], [True, False, True])]
-    """
-    at: dict[int, list[int]] = {}
-    for k, (tail, head) in enumerate(edges.tolist()):
-        at.setdefault(tail, []).append(k)
-        at.setdefault(head, []).append(k)
-    left = np.ones(len(edges), dtype=bool)
-    ends = [v for v, incident in at.items() if len(incident) != 2]
-    starts = [(v, k) for v in ends for k in at[v]] + [(int(tail), k) for k, tail in enumerate(edges[:, 0])]
-    found = []
-    for vertex, edge in starts:
-        line, forward = [], []
-        while left[edge]:
-            left[edge] = False
-            line.append(edge)
-            forward.append(bool(edges[edge, 0] == vertex))
-            vertex = int(edges[edge, 1] if forward[-1] else edges[edge, 0])
-            if len(at[vertex]) == 2:
-                edge = at[vertex][0] if at[vertex][1] == edge else at[vertex][1]
-        if line:
-            found.append((np.array(line), np.array(forward)))
-    return found
 
 
 class IntrinsicPiecewiseField(PiecewiseField):

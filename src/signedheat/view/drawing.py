@@ -13,6 +13,7 @@ import numpy as np
 from ..domains.digital_surface import DigitalSurface
 from ..domains.foreign import converted
 from ..domains.grid import Grid
+from ..domains.kinds import Shape
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.polyline import Polyline
@@ -26,7 +27,7 @@ from ..fields.vertex_field import VertexField, on_simple_surface
 from ..io.files import PathLike
 from ..packages import lazy_module
 from .figures import new_figure, picture
-from .slices import clearest_layer, draw_plane, draw_slices
+from .slices import clearest_layer, draw_line, draw_plane, draw_slices
 from .surfaces import draw_shape, draw_surface
 
 pillow = lazy_module("PIL.Image", "pictures")
@@ -97,28 +98,18 @@ def draw(thing: Any, axes: Any, **options: Any) -> bool:
 @draw.register(TriangleMesh)
 @draw.register(PolygonMesh)
 @draw.register(PointCloud)
-def _(shape: TriangleMesh | PolygonMesh | PointCloud, axes: Any, **options: Any) -> bool:
-    positions = shape.points if isinstance(shape, PointCloud) else shape.vertices
-    if positions.shape[1] != 3:
+@draw.register(TetMesh)
+@draw.register(DigitalSurface)
+def _(shape: Shape, axes: Any, **options: Any) -> bool:
+    if isinstance(shape, PointCloud) and shape.points.shape[1] != 3:
         return False
     draw_shape(shape, axes, **options)
     return True
 
 
 @draw.register
-def _(shape: TetMesh, axes: Any, **options: Any) -> bool:
-    return draw(shape.boundary, axes, **options)
-
-
-@draw.register
-def _(shape: DigitalSurface, axes: Any, **options: Any) -> bool:
-    return draw(shape.squares, axes, **options)
-
-
-@draw.register
 def _(line: Polyline, axes: Any, **options: Any) -> bool:
-    points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
-    axes.plot(*points.T, color="#d4145a", linewidth=2.0)
+    draw_line(line, axes)
     axes.set_aspect("equal")
     return True
 

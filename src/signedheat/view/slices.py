@@ -10,12 +10,14 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..domains.grid import Grid
 from ..domains.kinds import SpaceSources
 from ..domains.point_cloud import PointCloud
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
+from ..fields.tet_field import TetField
 from ..geometry.marching import level_lines
 from ..io.files import PathLike
 from ..packages import lazy_module
@@ -29,10 +31,12 @@ if TYPE_CHECKING:
 mpl_collections = lazy_module("matplotlib.collections", "pictures")
 
 AXES = "xyz"
+TET_NODES = 64
+"""Nodes along the longest side of the grid at which a field on tets is drawn."""
 
 
 def save_slices(
-    field: GridField, path: PathLike, shape: SpaceSources | None = None, levels: Sequence[float] = ()
+    field: GridField | TetField, path: PathLike, shape: SpaceSources | None = None, levels: Sequence[float] = ()
 ) -> None:
     """Write three orthogonal slices through a field, each where it cuts most of the inside, with the shape.
 
@@ -41,7 +45,7 @@ def save_slices(
 
     Parameters
     ----------
-    field : GridField
+    field : GridField or TetField
         A field in two or three dimensions.
     path : str or path
         The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
@@ -57,6 +61,9 @@ def save_slices(
     GeometryError
         If the field has one dimension, or more than three.
     """
+    if isinstance(field, TetField):
+        grid = Grid.around(field.mesh.bounds, resolution=TET_NODES, padding=0.0)
+        field = GridField(grid, field(grid.points.reshape(-1, 3)).reshape(grid.shape))
     if field.grid.dimension not in (2, 3):
         raise GeometryError(
             f"fields are drawn in 2 and 3 dimensions, and this one has {field.grid.dimension}", element="field"
@@ -129,10 +136,15 @@ def draw_plane(field: GridField, axes: Axes, shape: SpaceSources | None = None, 
         if isinstance(line, PointCloud):
             axes.scatter(line.points[:, 0], line.points[:, 1], s=6, c="#d4145a", linewidths=0, zorder=3)
         elif isinstance(line, Polyline):
-            points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
-            axes.plot(*points.T, color="#d4145a", linewidth=2.0, zorder=3)
+            draw_line(line, axes)
     axes.set(xlabel=AXES[0], ylabel=AXES[1])
     add_color_bar(axes.figure, [axes], colors, isolines, step)
+
+
+def draw_line(line: Polyline, axes: Axes) -> None:
+    """Draw a polyline in red, above what there is."""
+    points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
+    axes.plot(*points.T, color="#d4145a", linewidth=2.0, zorder=3)
 
 
 def _look(field: GridField) -> tuple[ScalarMappable, NDArray[np.float64], float]:

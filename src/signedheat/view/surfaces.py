@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
 
-OUTSIDE, INSIDE = np.array([0.96, 0.86, 0.55]), np.array([0.80, 0.25, 0.20])
+OUTER_COLOR, INNER_COLOR = np.array([0.96, 0.86, 0.55]), np.array([0.80, 0.25, 0.20])
 MOST_POINTS = 200_000
 """Of larger clouds an even subset is drawn."""
 
@@ -59,7 +59,7 @@ def draw_shape(shape: Shape | ForeignShape, axes: Axes, view: tuple[float, float
     corners = camera.pixels(mesh.vertices)[mesh.faces]
     _, face, _ = rasterize(corners, np.zeros((mesh.n_faces, 3)), camera.width, camera.height)
     outwards = mesh.face_area_vectors @ camera.frame[2] > 0
-    colors = np.where(outwards[:, None], OUTSIDE, INSIDE) * camera.shades(mesh.face_area_vectors)[:, None]
+    colors = np.where(outwards[:, None], OUTER_COLOR, INNER_COLOR) * camera.shades(mesh.face_area_vectors)[:, None]
     axes.imshow(np.where((face >= 0)[..., None], colors[face], 1.0), origin="lower", interpolation="antialiased")
 
 

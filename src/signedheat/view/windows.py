@@ -19,7 +19,7 @@ from ..fields.tet_field import TetField
 from ..fields.vertex_field import VertexField
 from ..packages import lazy_module
 from .figures import even_colors, isolines_between
-from .surfaces import INSIDE, OUTSIDE
+from .surfaces import INNER_COLOR, OUTER_COLOR
 
 pyvista = lazy_module("pyvista", "windows")
 
@@ -44,7 +44,7 @@ def add(thing: Any, plotter: Any) -> None:
     if not mesh.faces.size:
         plotter.add_mesh(mesh, color=BODY, render_points_as_spheres=True, point_size=5, line_width=3)
         return
-    plotter.add_mesh(mesh, color=OUTSIDE, backface_params={"color": INSIDE})
+    plotter.add_mesh(mesh, color=OUTER_COLOR, backface_params={"color": INNER_COLOR})
 
 
 @add.register
