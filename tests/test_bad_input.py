@@ -254,6 +254,10 @@ def folder(tmp_path):
     header = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
     faces = b"element face 1\nproperty list uchar int vertex_indices\nend_header\n"
     (tmp_path / "nan.ply").write_bytes(header + faces + b"0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n")
+    (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+    (tmp_path / "bare.xyz").write_text("0 0 0\n1 0 0\n0 1 0\n")
+    (tmp_path / "arc.csv").write_text("0,0\n1,0\n1,1\n")
+    BOX.save(tmp_path / "box.mesh")
     (tmp_path / "folder").mkdir()
     return tmp_path
 
@@ -299,10 +303,63 @@ CLOSE = [
     ("ball.ply ring.txt -o out.obj --constraint levels:1,2,3", 1, "ring.txt: 3 level values"),
 ]
 
+SURFACE = [
+    ("missing.ply ring.txt -o out.ply", 1, "there is no such file"),
+    ("ball.ply missing.txt -o out.ply", 1, "there is no such file"),
+    ("box.mesh ring.txt -o out.ply", 1, "this is a TetMesh"),
+    ("ball.ply ring.txt -o out.docx", 1, "use one of"),
+    ("ball.ply ring.txt -o out.ply --diffusion=-1", 2, "not positive"),
+    ("ball.ply ring.txt -o out.ply --constraint levels:a", 2, "no finite number"),
+    ("ball.ply ring.txt -o out.ply --constraint soft:-1", 2, "argument --constraint: -1 is not positive ("),
+    ("ball.ply ring.txt -o out.ply --constraint zero", 2, "free, zero-set, hard, each-component, soft, soft:WEIGHT, l"),
+]
+VOLUME = [
+    ("ball.ply", 2, "--output"),
+    ("flat.obj -o out.npz --resolution 16", 1, "flat.obj"),
+    ("bare.xyz -o out.npz --resolution 16", 1, "bare.xyz"),
+    ("ball.ply -o out.npz --spacing 0", 2, "not positive"),
+    ("ball.ply -o out.npz --spacing 0.1 0.1", 2, "--spacing: 1 or 3"),
+    ("ball.ply -o out.npz --resolution 16 --spacing 0.1", 2, "do not go together"),
+    ("ball.ply -o out.npz --origin 0 0 0", 2, "--origin, --spacing and --shape"),
+    ("ball.ply -o out.npz --diffusion 0", 2, "not positive"),
+    ("ball.ply -o out.npz --constraint loose", 2, "none of"),
+    ("ball.ply -o out.npz --constraint soft:-1", 2, "not positive"),
+    ("arc.csv -o out.npz --spacing 0.1 0.1 0.1", 2, "--spacing: 1 or 2"),
+    ("arc.csv -o out.npz --origin 0 --spacing 1 --shape 5 5", 2, "--origin: 2"),
+    ("arc.csv -o out.npz --origin 0 0 --spacing 1 --shape 5", 2, "--shape: 2"),
+    ("ball.ply -o out.vtu --tets --spacing 0.1", 2, "--tets"),
+    ("ball.ply -o out.vtu --tets --mask x.npy", 2, "--mask"),
+    ("ball.ply -o out.vtu --tets ball.ply", 1, "holds no tets"),
+]
+OTHERS = [
+    ("", 2, "COMMAND"),
+    ("inflate", 2, "invalid choice"),
+    ("offset arc.csv 0.1 -o out.stl", 1, "lines in the plane"),
+    ("morph dilate ball.ply 0.1 -o out.stl --spacing 0.1 --resolution 20", 2, "do not go together"),
+    ("morph dilate ball.ply 0.1 -o out.stl --spacing 0.1 0.1", 2, "--spacing"),
+    ("morph dilate ball.ply 0.1 -o out.stl --drain 1", 2, "for shells"),
+    ("morph thicken ball.ply 0.1 -o out.stl --plain", 2, "for solids"),
+    ("sample ball.ply -o out.npz --near 2", 2, "more than 1"),
+    ("sample ball.ply -o out.npz --widths=-1", 2, "negative"),
+    ("sample ball.ply -o out.npz -n 0", 2, "whole number"),
+    ("sample ball.ply -o out.npz --mask a.npy", 2, "unrecognized"),
+    ("sample ball.ply -o out.txt", 1, "not a known format"),
+    ("batch ball.ply -o made", 2, "nothing to make"),
+    ("batch ball.ply -o made --sample --plain", 2, "plain"),
+    ("batch ball.ply -o made --info --workers 2 --scheduler tcp://localhost:1", 2, "do not go together"),
+    ("batch ball.ply -o made --volume --spacing 0.1 --resolution 16", 2, "do not go together"),
+    ("batch ball.ply -o made --volume --spacing 0.1 0.1", 2, "--spacing"),
+    ("batch ball.ply -o made --volume stl", 2, "invalid choice"),
+    ("watertight ball.ply -o made --resolution 9 --spacing 1", 2, "do not go together"),
+    ("watertight ball.ply -o made --thickness=-1", 2, "not positive"),
+    ("watertight ball.ply -o made --surface txt", 2, "invalid choice"),
+]
+TABLES = {"morph ": MORPH, "close ": CLOSE, "surface ": SURFACE, "volume ": VOLUME, "": OTHERS}
+
 
 @pytest.mark.parametrize(
     ("words", "status", "message"),
-    [(f"morph {w}", s, m) for w, s, m in MORPH] + [(f"close {w}", s, m) for w, s, m in CLOSE],
+    [(command + words, *ends) for command, table in TABLES.items() for words, *ends in table],
 )
 def test_commands(folder, monkeypatch, capsys, words, status, message):
     """One line that names the file, a status, and an output that was there before is still there."""

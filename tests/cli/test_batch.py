@@ -45,22 +45,6 @@ def test_a_list_on_standard_input(tmp_path, folder, capsys, monkeypatch):
     assert "standard input" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        [],
-        ["--sample", "--plain"],
-        ["--info", "--workers", "2", "--scheduler", "tcp://localhost:1"],
-        ["--volume", "--spacing", "0.1", "--resolution", "16"],
-        ["--volume", "--spacing", "0.1", "0.1"],
-        ["--volume", "stl"],
-    ],
-)
-def test_bad_usage(tmp_path, folder, capsys, options):
-    assert main(["batch", str(folder), "-o", str(tmp_path / "out"), *options]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-
-
 @pytest.mark.usefixtures("in_this_process")
 def test_bands_of_many_shapes(tmp_path, folder, capsys):
     (folder / "bad.stl").unlink()

@@ -139,23 +139,6 @@ def test_bad_polylines_are_one_line(tmp_path, capsys, name, content, message):
     assert not (tmp_path / "phi.npz").exists()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["volume", "arcs.csv", "-o", "o.npz", "--spacing", "0.1", "0.1", "0.1"], "--spacing: 1 or 2"),
-        (["volume", "arcs.csv", "-o", "o.npz", "--origin", "0", "--spacing", "1", "--shape", "5", "5"], "--origin: 2"),
-        (["volume", "arcs.csv", "-o", "o.npz", "--origin", "0", "0", "--spacing", "1", "--shape", "5"], "--shape: 2"),
-    ],
-)
-def test_numbers_of_the_wrong_dimension_are_bad_usage(arcs, capsys, monkeypatch, arguments, message):
-    monkeypatch.chdir(arcs)
-    assert message in fail(capsys, *arguments, code=2)
-
-
-def test_surfaces_are_no_offset_in_the_plane(arcs, capsys):
-    assert "lines in the plane" in fail(capsys, "offset", arcs / "arcs.csv", "0.1", "-o", arcs / "o.stl")
-
-
 @pytest.mark.parametrize("curves", ["half.csv", "half.json", "half.obj"])
 def test_curves_in_space_on_a_mesh(ball, capsys, curves):
     out = ball / "phi.npz"
@@ -191,13 +174,6 @@ def test_surface_of_points_and_of_polygons(ball, capsys):
     (ball / "line.csv").write_text("0 3.5 0\n8 3.5 0\n")
     succeed(capsys, "surface", ball / "squares.off", ball / "line.csv", "-o", out)
     np.testing.assert_allclose(np.load(out)["values"], y.ravel() - 3.5, atol=1e-6)
-
-
-def test_surface_needs_something_that_curves_lie_on(ball, capsys):
-    tets = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
-    tets.save(ball / "tet.mesh")
-    error = fail(capsys, "surface", ball / "tet.mesh", ball / "half.csv", "-o", ball / "phi.npz")
-    assert "this is a TetMesh" in error
 
 
 def test_close_completes_curves(ball, capsys):
@@ -288,5 +264,10 @@ def test_tets_from_the_command_line(tmp_path, capsys):
         succeed(capsys, "view", tmp_path / name, "-o", tmp_path / "picture.png")
     fields[0].mesh.save(tmp_path / "bare.vtu")
     succeed(capsys, "view", tmp_path / "bare.vtu", "-o", tmp_path / "picture.png")
-    message = fail(capsys, "volume", tmp_path / "ball.stl", *flags, "--mask", "x.npy", "-o", tmp_path / "x.vtu", code=2)
-    assert "--mask" in message and "--tets" in message
+    fields[0].mesh.save(tmp_path / "own.mesh")
+    own = ("--tets", tmp_path / "own.mesh", "--preview", tmp_path / "slices.png")
+    succeed(capsys, "volume", tmp_path / "ball.stl", *own, "-o", tmp_path / "own.msh")
+    np.testing.assert_allclose(sh.load_field(tmp_path / "own.msh").values, fields[0].values, atol=1e-9)
+    assert (tmp_path / "slices.png").stat().st_size > 10_000
+    told = json.loads(succeed(capsys, "info", tmp_path / "own.mesh", "--json"))
+    assert told["n_tets"] == fields[0].mesh.n_tets

@@ -97,17 +97,6 @@ def test_shells_keep_their_outside_and_have_a_drain(tmp_path):
     assert made.n_vertices - made.n_faces // 2 == 2  # outside and inside are joined by one hole
 
 
-@pytest.mark.parametrize(
-    "options",
-    [["--spacing", "0.1", "--resolution", "20"], ["--spacing", "0.1", "0.1"], ["--plain", "thicken"], ["--drain", "1"]],
-)
-def test_bad_usage_of_morph(tmp_path, ball, capsys, options):
-    operation = "thicken" if "thicken" in options else "dilate"
-    given = [option for option in options if option != "thicken"]
-    assert main(["morph", operation, ball, "0.1", "-o", str(tmp_path / "a.stl"), *given]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-
-
 def test_what_packages_tell_each_other_is_no_warning_of_a_command(tmp_path, monkeypatch, capsys):
     """As matplotlib 3.8 about pyparsing, which has warnings of its own shown."""
 

@@ -42,12 +42,3 @@ def test_deepsdf_layout_in_the_unit_sphere(tmp_path, ball, capsys):
     assert rows.shape == (500, 4)
     # the completion may be off a cell
     assert np.abs(rows[:, 3] - (np.linalg.norm(rows[:, :3], axis=1) - 1)).max() < 0.13
-
-
-@pytest.mark.parametrize(
-    ("options", "code"),
-    [(["--near", "2"], 2), (["--widths", "-1"], 2), (["-n", "0"], 2), (["--mask", "a.npy"], 2), (["-o", "a.txt"], 1)],
-)
-def test_bad_usage(tmp_path, ball, capsys, options, code):
-    assert main(["sample", ball, "-o", str(tmp_path / "a.npz"), *options]) == code
-    assert capsys.readouterr().err.count("\n") == 1

@@ -214,69 +214,6 @@ def test_quiet_prints_nothing(tmp_path, ball, capsys):
     assert succeed(capsys, "offset", ball, "0.1", "-o", str(tmp_path / "a.stl"), "--resolution", "16", "--quiet") == ""
 
 
-USAGE = {
-    "no command": [],
-    "unknown command": ["inflate"],
-    "no output": ["volume", "BALL"],
-    "spacing zero": ["volume", "BALL", "-o", "OUT", "--spacing", "0"],
-    "spacing negative": ["volume", "BALL", "-o", "OUT", "--spacing", "-0.1"],
-    "two spacings": ["volume", "BALL", "-o", "OUT", "--spacing", "0.1", "0.1"],
-    "resolution one": ["volume", "BALL", "-o", "OUT", "--resolution", "1"],
-    "resolution and spacing": ["volume", "BALL", "-o", "OUT", "--resolution", "16", "--spacing", "0.1"],
-    "origin alone": ["volume", "BALL", "-o", "OUT", "--origin", "0", "0", "0"],
-    "padding nan": ["volume", "BALL", "-o", "OUT", "--padding", "nan"],
-    "diffusion": ["volume", "BALL", "-o", "OUT", "--diffusion", "0"],
-    "constraint": ["volume", "BALL", "-o", "OUT", "--constraint", "loose"],
-    "soft": ["volume", "BALL", "-o", "OUT", "--constraint", "soft:-1"],
-    "distance": ["offset", "BALL", "far", "-o", "OUT"],
-}
-
-
-@pytest.mark.parametrize("case", USAGE)
-def test_bad_usage_is_one_line_and_status_2(tmp_path, ball, capsys, case):
-    swap = {"BALL": ball, "OUT": str(tmp_path / "phi.npz")}
-    fail(capsys, *(swap.get(word, word) for word in USAGE[case]), code=2)
-    assert not (tmp_path / "phi.npz").exists()
-
-
-BAD_SHAPES = {
-    "missing.stl": (None, "no such file"),
-    "cut.stl": (b"x" * 80 + (9).to_bytes(4, "little"), "truncated"),
-    "what.iges": (b"ISO", "not a known format"),
-    "empty.off": (b"OFF\n0 0 0\n", "no points"),
-    "nan.obj": (b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "NaN or infinity"),
-    "range.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "vertex ids go from"),
-    "flat.obj": (b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "area"),
-    "bare.xyz": (b"0 0 0\n1 0 0\n0 1 0\n", "points"),
-}
-
-
-@pytest.mark.parametrize("command", ["volume", "offset"])
-@pytest.mark.parametrize("name", BAD_SHAPES)
-def test_bad_shapes_are_one_line_that_names_the_file(tmp_path, capsys, name, command):
-    content, reason = BAD_SHAPES[name]
-    if content is not None:
-        (tmp_path / name).write_bytes(content)
-    output = tmp_path / ("a.npz" if command == "volume" else "a.stl")
-    output.write_text("precious")
-    distance = ["0.1"] if command == "offset" else []
-    error = fail(capsys, command, str(tmp_path / name), *distance, "-o", str(output), "--resolution", "16")
-    assert name in error
-    assert reason in error
-    assert output.read_text() == "precious"
-
-
-@pytest.mark.parametrize(
-    ("name", "error"), [("flat.obj", sh.errors.GeometryError), ("bare.xyz", sh.errors.SourceError)]
-)
-def test_bad_shapes_raise_in_python(tmp_path, name, error):
-    (tmp_path / name).write_bytes(BAD_SHAPES[name][0])
-    shape = sh.read(tmp_path / name)
-    with pytest.raises(sh.errors.SignedHeatError) as caught:
-        sh.SignedHeatSolver(sh.Grid.around(shape, 16)).distance(shape)
-    assert isinstance(caught.value, (error, sh.errors.SourceError))
-
-
 def test_grids_that_cannot_be(tmp_path, ball, capsys):
     output = tmp_path / "phi.npz"
     output.write_text("precious")

@@ -63,38 +63,6 @@ def test_levels(files, capsys):
     assert "4 level values" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("change", "status", "message"),
-    [
-        ({"curves": "missing.txt"}, 1, "there is no such file"),
-        ({"mesh": "missing.ply"}, 1, "there is no such file"),
-        ({"out": "phi.docx"}, 1, "use one of"),
-        ({"constraint": "hopeful"}, 2, "none of"),
-        ({"diffusion": "-1"}, 2, "not positive"),
-        ({"constraint": "levels:a"}, 2, "no finite number"),
-        ({"constraint": "soft:-1"}, 2, "argument --constraint: -1 is not positive ("),
-        (
-            {"constraint": "zero"},
-            2,
-            "'zero' is none of free, zero-set, hard, each-component, soft, soft:WEIGHT, l",
-        ),
-    ],
-)
-def test_failures_are_one_line(files, capsys, change, status, message):
-    given = {
-        "mesh": "ball.ply",
-        "curves": "curves.txt",
-        "out": "phi.ply",
-        "constraint": "free",
-        "diffusion": "1",
-    } | change
-    arguments = ["surface", str(files / given["mesh"]), str(files / given["curves"]), "-o", str(files / given["out"])]
-    arguments += [f"--constraint={given['constraint']}", f"--diffusion={given['diffusion']}"]
-    assert main(arguments) == status
-    error = capsys.readouterr().err
-    assert message in error and len(error.strip().splitlines()) == 1
-
-
 def test_info_says_what_lies_where(tmp_path, capsys):
     mesh = square(6)
     mesh.save(tmp_path / "flat.ply")

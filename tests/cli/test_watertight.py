@@ -59,12 +59,6 @@ def test_sheets_need_a_thickness(tmp_path, capsys):
     assert found["volume"] == pytest.approx(area * thickness + rim * np.pi * thickness**2 / 8, rel=0.02)
 
 
-def test_bad_usage(tmp_path, folder, capsys):
-    for options in (["--resolution", "9", "--spacing", "1"], ["--thickness", "-1"], ["--surface", "txt"]):
-        assert main(["watertight", str(folder), "-o", str(tmp_path / "out"), *options]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
-
-
 @pytest.mark.usefixtures("in_this_process")
 def test_samples_for_trainers(tmp_path, folder, capsys):
     """Of a box with a face gone: all in closed form."""
