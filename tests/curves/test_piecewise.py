@@ -15,9 +15,9 @@ from signedheat.curves.cut_lines import smoothed, unforked
 from signedheat.curves.jumps import JumpProblem, minimize
 from signedheat.diagnostics import Jumps
 from signedheat.discretization import discretize
-from signedheat.fields.piecewise_field import chains
 from signedheat.geometry.face_pairs import face_pairs
 from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
+from signedheat.geometry.polylines import assemble_polylines
 from signedheat.samples import sphere, torus
 
 
@@ -374,9 +374,10 @@ def test_certificate_against_brute_force():
         assert solution.bound == pytest.approx(6.0, rel=3e-3)
 
 
-def test_chains_close_and_end_at_forks():
-    lines = chains(np.array([[0, 1], [1, 2], [2, 0], [5, 6], [6, 7], [6, 8]]))
-    assert sorted(len(line) for line, _ in lines) == [1, 1, 1, 3]
+def test_polylines_close_and_end_at_forks():
+    edges = np.array([[0, 1], [1, 2], [2, 0], [5, 6], [6, 7], [6, 8]])
+    lines = assemble_polylines(*edges.T, directed=False)
+    assert sorted((len(line), closed) for line, _, closed in lines) == [(1, False)] * 3 + [(3, True)]
 
 
 @pytest.mark.parametrize(
