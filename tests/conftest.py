@@ -32,7 +32,9 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile all kernels before workers begin, each of which would compile them; 3 s where all are compiled."""
     is_worker = hasattr(session.config, "workerinput")
     if not is_worker and session.config.getoption("numprocesses", None):
-        subprocess.run([sys.executable, "-m", "signedheat", "warmup", "--quiet"], check=False)
+        done = subprocess.run([sys.executable, "-m", "signedheat", "warmup", "--quiet"], check=False)
+        if done.returncode:  # it says why on standard error; what it could not compile, tests would report many times
+            pytest.exit(f"signedheat warmup failed with status {done.returncode}", returncode=1)
 
 
 @pytest.fixture
