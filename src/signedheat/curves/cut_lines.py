@@ -109,7 +109,7 @@ def without_twigs(edges: NDArray[np.int64], high: NDArray[np.bool_]) -> NDArray[
     keeps[which.ravel()[high]] = True
     left = np.arange(len(once))
     while True:
-        chains = assemble_polylines(*once[left].T, directed=False)
+        chains = assemble_polylines(once[left, 0], once[left, 1], directed=False)
         low = [chain for chain, _, _ in chains if not keeps[left[chain]].any()]
         if not low:
             result: NDArray[np.bool_] = np.isin(which.ravel(), left)
@@ -178,7 +178,8 @@ def lines_by_height(
     height = np.abs(pairs.ends(values)).mean(axis=1)[cut]
     edges, which = np.unique(pairs.edges[cut], return_inverse=True)
     mean = np.bincount(which, height) / np.bincount(which)
-    lines = [chain for chain, _, _ in assemble_polylines(*triangles.edges.vertices[edges].T, directed=False)]
+    tails, heads = triangles.edges.vertices[edges].T
+    lines = [chain for chain, _, _ in assemble_polylines(tails, heads, directed=False)]
     return [edges[line] for line in sorted(lines, key=lambda line: float(mean[line].mean()))]
 
 

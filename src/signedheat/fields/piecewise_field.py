@@ -152,11 +152,10 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         largest = np.zeros((len(first), 2))
         np.maximum.at(largest, which, height)
         lengths = self.triangles.lengths_of_edges
-        lines = []
-        for chain, backwards, _ in assemble_polylines(*self.triangles.edges.vertices[edges].T, directed=False):
+        ids, lines = self.triangles.edges.vertices[edges], []
+        for chain, backwards, _ in assemble_polylines(ids[:, 0], ids[:, 1], directed=False):
             ends, jumps = (
-                np.where(backwards[:, None], pairs[chain][:, ::-1], pairs[chain])
-                for pairs in (self.triangles.edges.vertices[edges], largest)
+                np.where(backwards[:, None], pairs[chain][:, ::-1], pairs[chain]) for pairs in (ids, largest)
             )
             vertices = np.concatenate([ends[:, 0], ends[-1:, 1]])
             lines.append(Cut(vertices, self.surface.vertices[vertices], jumps, lengths[edges[chain]]))
