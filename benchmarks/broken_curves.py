@@ -37,6 +37,8 @@ from signedheat.geometry.geodesics.sources import PlacedSegments
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from surface_winding import winding_side
 
+from shapes.triangulated import upward
+
 N_PIECES = 12
 DAMAGES = {
     "10 % gone": {"lost": 0.1},
@@ -182,15 +184,15 @@ def meshes() -> dict[str, tuple[sh.TriangleMesh, np.ndarray]]:
     patch = 0.55 - np.linalg.norm(ring.vertices - [1.0, 0.0, 0.4], axis=1)
     plane = rng.uniform(-1, 1, (2500, 2))
     plane = np.concatenate([plane, rim(50)])
-    flat = Delaunay(plane).simplices
+    faces = upward(plane, Delaunay(plane).simplices)
     star = np.hypot(*plane.T) - 0.55 * (1 + 0.25 * np.cos(5 * np.arctan2(plane[:, 1], plane[:, 0])))
     hills = 0.25 * np.sin(4 * plane[:, 0]) * np.cos(3 * plane[:, 1])
     return {
         "sphere": (sh.TriangleMesh(unit, ball.faces), wave),
         "bumpy sphere": (sh.TriangleMesh(unit * bumps[:, None], ball.faces), wave),
         "torus": (sh.TriangleMesh(ring.vertices, ring.faces), patch),
-        "random square": (upward(np.pad(plane, ((0, 0), (0, 1))), flat), star),
-        "hills": (upward(np.column_stack([plane, hills]), flat), star),
+        "random square": (sh.TriangleMesh(np.pad(plane, ((0, 0), (0, 1))), faces), star),
+        "hills": (sh.TriangleMesh(np.column_stack([plane, hills]), faces), star),
     }
 
 
@@ -199,13 +201,6 @@ def rim(n: int) -> np.ndarray:
     s = np.linspace(-1, 1, n, endpoint=False)
     one = np.ones(n)
     return np.concatenate([np.stack(side, axis=1) for side in ((s, -one), (one, s), (-s, one), (-one, -s))])
-
-
-def upward(points: np.ndarray, faces: np.ndarray) -> sh.TriangleMesh:
-    a, b, c = (points[faces[:, k], :2] for k in range(3))
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    faces = np.where(area[:, None] > 0, faces, faces[:, ::-1])
-    return sh.TriangleMesh(points, faces[np.abs(area) > 1e-9])
 
 
 def broken(mesh, heights, curve, lost, jitter, rng) -> list[sh.Curve]:

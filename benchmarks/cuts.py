@@ -14,53 +14,19 @@ import numpy as np
 
 import signedheat as sh
 from benchmarks.reproduction.shapes import organic, subdivided
+from shapes.triangulated import angles, cylinder, grid, klein_bottle, moebius
 from signedheat.diagnostics import Jumps
 from signedheat.samples import sphere, torus
 
 Case = tuple[sh.TriangleMesh, list[sh.Curve]]
 
 
-def grid(points: np.ndarray, turned: bool = False, closed_across: bool = True) -> sh.TriangleMesh:
-    """Triangles on an (n, m, 3) grid of points that closes along its first axis, turned over if asked, and across."""
-    n, m = points.shape[:2]
-    ids = np.arange(n * m).reshape(n, m)
-    back = -np.arange(m) % m if closed_across else np.arange(m)[::-1]
-    following = np.vstack([ids[1:], ids[:1, back if turned else np.arange(m)]])
-    rolled = [np.roll(a, -1, axis=1) for a in (following, ids)]
-    a, b, c, d = (each if closed_across else each[:, :-1] for each in (ids, following, *rolled))
-    faces = np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, b, c), (a, c, d))])
-    return sh.TriangleMesh(points.reshape(-1, 3), faces)
-
-
-def angles(n: int, m: int) -> list[np.ndarray]:
-    return np.meshgrid(2 * np.pi * np.arange(n) / n, 2 * np.pi * np.arange(m) / m, indexing="ij")
-
-
-def klein_bottle(n: int = 96, m: int = 48) -> sh.TriangleMesh:
-    u, v = angles(n, m)
-    out, up = np.sin(v), np.sin(2 * v)
-    ring, z = 3 + np.cos(u / 2) * out - np.sin(u / 2) * up, np.sin(u / 2) * out + np.cos(u / 2) * up
-    return grid(np.stack([ring * np.cos(u), ring * np.sin(u), z], axis=-1), turned=True)
-
-
-def moebius(n: int = 120, m: int = 12) -> sh.TriangleMesh:
-    u, v = np.meshgrid(2 * np.pi * np.arange(n) / n, np.linspace(-0.3, 0.3, m + 1), indexing="ij")
-    ring = 1 + v * np.cos(u / 2)
-    points = np.stack([ring * np.cos(u), ring * np.sin(u), v * np.sin(u / 2)], axis=-1)
-    return grid(points, turned=True, closed_across=False)
-
-
-def cylinder(n: int = 96, m: int = 48) -> sh.TriangleMesh:
-    u, v = np.meshgrid(2 * np.pi * np.arange(n) / n, np.linspace(0, 2, m), indexing="ij")
-    return grid(np.stack([np.cos(u), np.sin(u), v], axis=-1), closed_across=False)
-
-
 def sheared_torus() -> sh.TriangleMesh:
     """Triangles with large angles."""
-    u, v = angles(96, 32)
+    u, v = np.meshgrid(angles(96), angles(32), indexing="ij")
     u = u + 0.25 * np.sin(v + 0.5)
     ring = 1 + 0.4 * np.cos(v)
-    return grid(np.stack([ring * np.cos(u), ring * np.sin(u), 0.4 * np.sin(v)], axis=-1))
+    return grid(np.stack([ring * np.cos(u), ring * np.sin(u), 0.4 * np.sin(v)], axis=-1), around=1, across=True)
 
 
 def bumpy_sphere(seed: int, level: int = 5) -> sh.TriangleMesh:
@@ -100,10 +66,10 @@ def cases() -> Iterator[tuple[str, Callable[[], Case]]]:
     yield "bumpy sphere, halves", lambda: halves(bumpy_sphere(1))
     yield "bumpy sphere, arc", lambda: ((m := bumpy_sphere(2)), [part(section(m, [0.3, 0.2, 1.0]), 0, 0.4)])
     yield "decimated sphere, halves", lambda: halves(subdivided(organic(2, 300), 1))
-    yield "Klein bottle, loop", lambda: ((m := klein_bottle()), [m.path(np.arange(48) + 480, closed=True)])
-    yield "Klein bottle, path", lambda: ((m := klein_bottle()), [m.path(np.arange(60) * 48 + 12)])
-    yield "Moebius strip, core", lambda: ((m := moebius()), [m.path(np.arange(120) * 13 + 6, closed=True)])
-    yield "cylinder, line", lambda: ((m := cylinder()), [m.path(np.arange(48))])
+    yield "Klein bottle, loop", lambda: ((m := klein_bottle(96, 48)), [m.path(np.arange(48) + 480, closed=True)])
+    yield "Klein bottle, path", lambda: ((m := klein_bottle(96, 48)), [m.path(np.arange(60) * 48 + 12)])
+    yield "Moebius strip, core", lambda: ((m := moebius(120, 12)), [m.path(np.arange(120) * 13 + 6, closed=True)])
+    yield "cylinder, line", lambda: ((m := cylinder(96, 48)), [m.path(np.arange(48))])
 
 
 def row(mesh: sh.TriangleMesh, curves: list[sh.Curve], **options: object) -> str:

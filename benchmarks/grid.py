@@ -17,32 +17,29 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import signedheat as sh
 
-HALF = 1.6
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from shapes.grid_cases import box, relative_error
+from shapes.grid_cases import sphere as spiral_sphere
+from shapes.surface_cases import flipped
+
 OFFSET = 0.2
 REPEATS = 6
 
 
 def sphere(n_vertices: int, missing: float = 0.0) -> sh.TriangleMesh:
     """The unit sphere, without the faces within round holes that make up a fraction of it."""
-    from scipy.spatial import ConvexHull
-
-    i = np.arange(n_vertices) + 0.5
-    z, angle = 1 - 2 * i / n_vertices, np.pi * (1 + 5**0.5) * i
-    points = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z], axis=1)
-    faces = ConvexHull(points).simplices.astype(np.int64)
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
-    faces[inward] = faces[inward][:, ::-1]
+    whole = spiral_sphere(n_vertices)
     spots = np.random.default_rng(7).normal(size=(60, 3))
     spots /= np.linalg.norm(spots, axis=1)[:, None]
-    nearness = (points[faces].mean(axis=1) @ spots.T).max(axis=1)
-    return sh.TriangleMesh(points, faces[nearness <= np.quantile(nearness, 1 - missing)])
+    nearness = (whole.vertices[whole.faces].mean(axis=1) @ spots.T).max(axis=1)
+    return sh.TriangleMesh(whole.vertices, whole.faces[nearness <= np.quantile(nearness, 1 - missing)])
 
 
 def scattered(missing: float) -> sh.TriangleMesh:
@@ -52,28 +49,12 @@ def scattered(missing: float) -> sh.TriangleMesh:
     return sh.TriangleMesh(whole.vertices, whole.faces[kept])
 
 
-def flipped(part: float) -> sh.TriangleMesh:
-    """The unit sphere with some faces inside out."""
-    whole = sphere(10_000)
-    faces, turned = whole.faces.copy(), np.random.default_rng(7).random(whole.n_faces) < part
-    faces[turned] = faces[turned][:, ::-1]
-    return sh.TriangleMesh(whole.vertices, faces)
-
-
 def soup(noise: float) -> sh.TriangleMesh:
     """The unit sphere's faces, each moved a little on its own."""
     whole = sphere(10_000)
     moves = noise * np.random.default_rng(7).normal(size=(whole.n_faces, 1, 3))
     corners = (whole.vertices[whole.faces] + moves).reshape(-1, 3)
     return sh.TriangleMesh(corners, np.arange(len(corners)).reshape(-1, 3))
-
-
-def box(n: int) -> sh.Grid:
-    return sh.Grid([-HALF] * 3, 2 * HALF / (n - 1), (n, n, n))
-
-
-def relative_error(values: np.ndarray, exact: np.ndarray) -> float:
-    return float(np.sqrt(np.mean((values - exact) ** 2)) / (exact.max() - exact.min()))
 
 
 def best(job: Callable[[], Any]) -> tuple[float, Any]:
@@ -165,7 +146,7 @@ def peers(n: int) -> None:
         "sphere, 82k faces": sphere(41_000),
         "sphere, 35 % missing in 60 places": sphere(10_000, 0.35),
         "sphere, 35 % missing here and there": scattered(0.35),
-        "sphere, 10 % flipped": flipped(0.1),
+        "sphere, 10 % flipped": flipped(sphere(10_000), 0.1, seed=7),
         "sphere, a soup with noise": soup(0.01),
     }
     for name, shape in shapes.items():

@@ -5,14 +5,19 @@ python benchmarks/growth.py
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
-from scipy.spatial import ConvexHull, cKDTree
+from scipy.spatial import cKDTree
 
 import signedheat as sh
 from signedheat import samples
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from shapes.triangulated import hull, spiral
 
 
 def fine_curve_in_a_face(n: int) -> Callable[[], object]:
@@ -80,14 +85,8 @@ def open_boxes(n: int) -> Callable[[], object]:
 
 def holes_in_one_part(n: int) -> Callable[[], object]:
     """The solid of a ball with n holes, of 200 faces each."""
-    angles = np.pi * (1 + 5**0.5) * (np.arange(100 * n) + 0.5)
-    heights = 1 - 2 * (np.arange(100 * n) + 0.5) / (100 * n)
-    wide = np.sqrt(1 - heights**2)
-    points = np.stack([wide * np.cos(angles), wide * np.sin(angles), heights], axis=1)
-    faces = ConvexHull(points).simplices
-    a, b, c = points[faces].transpose(1, 0, 2)
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
-    faces[inward] = faces[inward, ::-1]
+    points = spiral(100 * n)
+    faces = hull(points)
     away = cKDTree(points[50::100]).query(points[faces].mean(axis=1))[0]
     shape = sh.TriangleMesh(points, faces[away > 0.8 / n**0.5])
     return lambda: sh.complete(shape)

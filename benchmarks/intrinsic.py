@@ -14,6 +14,7 @@ where z is 0.3 of the largest. Without a folder shapes made here are taken.
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 import warnings
 from collections.abc import Iterator
@@ -26,6 +27,9 @@ from scipy.spatial import Delaunay
 import signedheat as sh
 from signedheat.geometry.geodesics.exact import distance_to_zero_line
 from signedheat.samples import sphere, torus
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from shapes.triangulated import cut_quads, upward
 
 
 @dataclass(frozen=True)
@@ -78,10 +82,7 @@ class Case:
 def template(inner: list[list[float]], stretch: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """A triangle cut at inner points as if `stretch` times as wide: their barycentric coordinates, and faces."""
     points = np.concatenate([np.eye(3), inner])[:, 1:]
-    faces = Delaunay(points * [stretch, 1]).simplices
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    double = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    return np.array(inner), np.where(double[:, None] > 0, faces, faces[:, ::-1])
+    return np.array(inner), upward(points, Delaunay(points * [stretch, 1]).simplices, 0.0)
 
 
 HEIGHTS = np.array([0.15, 0.5, 0.3, 0.6, 0.2])  # of points on a line, in the wrong order
@@ -121,9 +122,8 @@ def sheet(n: int, m: int, shape, jitter: float = 0.0, around: int = 0) -> sh.Tri
     ids = np.arange((n + 1) * (m + 1)).reshape(n + 1, m + 1)
     if around:
         ids[-1] = ids[0, ::around]
-    a, b, c, d = ids[:-1, :-1].ravel(), ids[1:, :-1].ravel(), ids[1:, 1:].ravel(), ids[:-1, 1:].ravel()
     points = np.stack(shape(u.ravel(), v.ravel()), axis=1)[: len(u.ravel()) - (m + 1 if around else 0)]
-    return sh.TriangleMesh(points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
+    return sh.TriangleMesh(points, cut_quads(ids))
 
 
 def moebius(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:

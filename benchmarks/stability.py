@@ -12,7 +12,9 @@ than a thousandth of the shape do not count. Afterwards a hole that grows, a pla
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,9 @@ from scipy.spatial.transform import Rotation
 
 import signedheat as sh
 from signedheat import samples
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from shapes.triangulated import grid
 
 PLACES = 2048
 NEAR = 1e-3
@@ -39,10 +44,8 @@ def box(
         places = np.empty((cells + 1, cells + 1, 3))
         places[..., axis] = end
         places[..., (axis + 1) % 3], places[..., (axis + 2) % 3] = u, v
-        number = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
-        a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-        faces = np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
-        sides.append(sh.TriangleMesh(np.array(lower) + places.reshape(-1, 3) * size, faces if end else faces[:, ::-1]))
+        mesh = grid(np.array(lower) + places * size)
+        sides.append(mesh if end else reversed_faces(mesh))
     return samples.union(*sides)
 
 

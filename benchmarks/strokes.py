@@ -81,16 +81,7 @@ def outcome(damage: str, seed: int, fine: int) -> Outcome:
         warnings.simplefilter("always")
         values = sh.signed_distance(drawing.given, drawing.mesh).values
     seconds = time.perf_counter() - begin
-    return Outcome(damage, seed, wrong_share(drawing, values), "; ".join(str(w.message) for w in told), seconds)
-
-
-def wrong_share(drawing: strokes.Drawing, values: np.ndarray) -> float:
-    """Share of the area with another sign than was meant, two edges or more from the curves."""
-    mesh = drawing.mesh
-    exact = np.abs(sh.signed_distance(drawing.whole, mesh, as_oriented=True).values)
-    areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3, 3), mesh.n_vertices)
-    wrong = (np.sign(values) != drawing.sides) & (exact > 2 * strokes.edge_length(mesh))
-    return float(areas[wrong].sum() / areas.sum())
+    return Outcome(damage, seed, strokes.wrong_share(drawing, values), "; ".join(str(w.message) for w in told), seconds)
 
 
 def table(outcomes: list[Outcome]) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import Delaunay
 
 import signedheat as sh
+
+from .triangulated import flat
 
 
 def stretched_square(n: int, stretch: float, seed: int = 0) -> sh.TriangleMesh:
@@ -16,12 +17,7 @@ def stretched_square(n: int, stretch: float, seed: int = 0) -> sh.TriangleMesh:
     ones = np.ones_like(side)
     rim = [np.stack(pair, axis=1) for pair in ((side, ones), (side, -ones), (ones, side), (-ones, side))]
     points = np.unique(np.concatenate([inner, *rim]), axis=0)
-    faces = Delaunay(points * [stretch, 1]).simplices.astype(np.int64)
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    double = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    faces[double < 0] = faces[double < 0][:, ::-1]
-    faces = faces[np.abs(double) > 1e-12]
-    return sh.TriangleMesh(np.column_stack([points, np.zeros(len(points))]), faces)
+    return flat(points, stretch, least=1e-12)
 
 
 def with_needles(mesh: sh.TriangleMesh, nearness: float) -> sh.TriangleMesh:

@@ -3,33 +3,16 @@
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull
 
 import signedheat as sh
+
+from .triangulated import hull, spiral
 
 
 def sphere(n_vertices, radius=1.0, center=(0.0, 0.0, 0.0)):
     """Triangles between points of a spiral on a sphere, outward."""
-    i = np.arange(n_vertices) + 0.5
-    z, angle = 1 - 2 * i / n_vertices, np.pi * (1 + 5**0.5) * i
-    ring = np.sqrt(1 - z * z)
-    points = np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=1)
-    faces = ConvexHull(points).simplices.astype(np.int64)
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
-    faces[inward] = faces[inward][:, ::-1]
-    return sh.TriangleMesh(radius * points + np.asarray(center), faces)
-
-
-def torus(n, m, major=1.0, minor=0.4):
-    """Triangles of a torus around the z axis, outward."""
-    u, v = np.meshgrid(2 * np.pi * np.arange(n) / n, 2 * np.pi * np.arange(m) / m, indexing="ij")
-    ring = major + minor * np.cos(v)
-    points = np.stack([ring * np.cos(u), ring * np.sin(u), minor * np.sin(v)], axis=-1).reshape(-1, 3)
-    i, j = (x.ravel() for x in np.meshgrid(np.arange(n), np.arange(m), indexing="ij"))
-    a, b = i * m + j, (i + 1) % n * m + j
-    c, d = (i + 1) % n * m + (j + 1) % m, i * m + (j + 1) % m
-    return sh.TriangleMesh(points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
+    points = spiral(n_vertices)
+    return sh.TriangleMesh(radius * points + np.asarray(center), hull(points))
 
 
 def box(n, half=1.6):

@@ -72,6 +72,15 @@ def surface(random: Random, fine: int = 3) -> sh.TriangleMesh:
     return sh.TriangleMesh(x + random.normal(size=3) * np.ptp(x), faces)
 
 
+def wrong_share(drawing: Drawing, values: np.ndarray) -> float:
+    """Share of the area on the wrong side, two edges or more from the curves: they are drawn by hand."""
+    mesh = drawing.mesh
+    exact = np.abs(sh.signed_distance(drawing.whole, mesh, as_oriented=True).values)
+    areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3, 3), mesh.n_vertices)
+    wrong = (np.sign(values) != drawing.sides) & (exact > 2 * edge_length(mesh))
+    return float(areas[wrong].sum() / areas.sum())
+
+
 def edge_length(mesh: sh.TriangleMesh) -> float:
     """Mean length of an edge."""
     return float(mesh.edge_lengths.mean())

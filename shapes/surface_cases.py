@@ -6,6 +6,8 @@ import numpy as np
 
 import signedheat as sh
 
+from .triangulated import grid
+
 
 def square(n: int, jitter: float = 0.0, seed: int = 0) -> sh.TriangleMesh:
     """[−1, 1]² as 2 (n − 1)² triangles; inner vertices moved by up to `jitter` cells."""
@@ -13,9 +15,7 @@ def square(n: int, jitter: float = 0.0, seed: int = 0) -> sh.TriangleMesh:
     points = np.stack([x, y, 0 * x], axis=-1)
     moved = np.random.default_rng(seed).uniform(-jitter, jitter, (n, n, 2)) * 2 / (n - 1)
     points[1:-1, 1:-1, :2] += moved[1:-1, 1:-1]
-    corner = np.arange(n * n).reshape(n, n)[:-1, :-1].ravel()
-    faces = np.concatenate([corner[:, None] + [0, n, n + 1], corner[:, None] + [0, n + 1, 1]])
-    return sh.TriangleMesh(points.reshape(-1, 3), faces)
+    return grid(points)
 
 
 def sphere(subdivisions: int) -> sh.TriangleMesh:

@@ -5,6 +5,8 @@ import numpy as np
 import signedheat as sh
 from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
 
+from .triangulated import angles, flat
+
 
 def split_quads(a, b, c, d, rng):
     """Two triangles for each quad abcd, along either diagonal."""
@@ -30,23 +32,13 @@ def surface_of_revolution(radius, length, around, along, seed=0, amount=0.2):
 
 def disk(rings, seed=0):
     """Unit disk: a jittered Delaunay triangulation."""
-    from scipy.spatial import Delaunay
-
     rng = np.random.default_rng(seed)
     radii = np.arange(rings + 1) / rings
     polar = [(r, a + 0.5 * k) for k, r in enumerate(radii) for a in angles(max(1, round(2 * np.pi * r * rings)))]
     r, angle = np.array(polar).T
     points = np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1)
     points[r < 1] += rng.uniform(-0.15, 0.15, ((r < 1).sum(), 2)) / rings
-    faces = Delaunay(points).simplices
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    faces = np.where(area[:, None] > 0, faces, faces[:, ::-1])[np.abs(area) > 1e-6 / rings**2]
-    return sh.TriangleMesh(np.pad(points, ((0, 0), (0, 1))), faces)
-
-
-def angles(n):
-    return np.arange(n) * 2 * np.pi / n
+    return flat(points, least=1e-6 / rings**2)
 
 
 class FlatGluing:

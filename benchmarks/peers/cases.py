@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 
 import signedheat as sh
+from shapes.triangulated import grid
 from signedheat import samples
 
 
@@ -70,10 +71,7 @@ def outline(share: float) -> list[np.ndarray]:
 def sheet() -> sh.TriangleMesh:
     """A wavy sheet with a border."""
     x, y = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 41), indexing="ij")
-    at = np.arange(41 * 41).reshape(41, 41)
-    a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel(), at[:-1, 1:].ravel()
-    vertices = np.stack([x, y, 0.2 * np.sin(3 * x) * np.cos(3 * y)], -1).reshape(-1, 3)
-    return sh.TriangleMesh(vertices, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
+    return grid(np.stack([x, y, 0.2 * np.sin(3 * x) * np.cos(3 * y)], -1))
 
 
 def closed_wall(vertices: np.ndarray, faces: np.ndarray) -> str:

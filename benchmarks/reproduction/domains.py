@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
 import signedheat as sh
+from shapes.triangulated import angles, cut_quads, moebius
 from signedheat import samples
 from signedheat.view import draw_surface, new_figure
 
 from . import baselines
 from .pages import Page, figure
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 
 @figure("16", "Polygon meshes, point clouds, digital surfaces")
@@ -83,9 +79,7 @@ def robust_domains(page: Page) -> None:
 def _sheet(n: int) -> tuple[np.ndarray, np.ndarray]:
     """A jittered unit square, with n vertices along each side, and its triangles."""
     x, y = np.meshgrid(np.linspace(0, 1, n), np.linspace(-1, 1, 2 * n - 1), indexing="ij")
-    ids = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = (q.ravel() for q in (ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]))
-    return np.stack([x.ravel(), y.ravel()], axis=1), np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return np.stack([x.ravel(), y.ravel()], axis=1), cut_quads(np.arange(x.size).reshape(x.shape))
 
 
 def _book() -> tuple[str, sh.TriangleMesh, sh.Curve, np.ndarray, list[float]]:
@@ -111,16 +105,12 @@ def _book() -> tuple[str, sh.TriangleMesh, sh.Curve, np.ndarray, list[float]]:
 
 def _moebius() -> tuple[str, sh.TriangleMesh, sh.Curve, np.ndarray, list[float]]:
     """A Möbius strip; the curve crosses it once, so that distance is along the strip; known near the curve only."""
-    n, m, width = 180, 13, 0.35
-    angle, across = np.meshgrid(np.arange(n) * 2 * np.pi / n, np.linspace(-width, width, m), indexing="ij")
-    radius = 1 + across * np.cos(angle / 2)
-    vertices = np.stack([radius * np.cos(angle), radius * np.sin(angle), across * np.sin(angle / 2)], -1).reshape(-1, 3)
-    ids = np.arange(n * m).reshape(n, m)
-    following = np.concatenate([ids[1:], ids[:1, ::-1]])
-    a, b, c, d = (q.ravel() for q in (ids[:, :-1], following[:, :-1], following[:, 1:], ids[:, 1:]))
-    mesh = sh.TriangleMesh(vertices, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
-    curve = mesh.path(ids[n // 2])
-    middle = np.where(across == 0, angle - np.pi, np.nan).ravel()
+    n, m = 180, 12
+    mesh = moebius(n, m, 0.35)
+    curve = mesh.path(n // 2 * (m + 1) + np.arange(m + 1))
+    middle = np.full((n, m + 1), np.nan)
+    middle[:, m // 2] = angles(n) - np.pi
+    middle = middle.ravel()
     middle[np.abs(middle) > 0.8] = np.nan
     return "Möbius strip", mesh, curve, middle, [-0.5, -1.2, 1.2]
 

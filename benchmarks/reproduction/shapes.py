@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, Delaunay
 
 import signedheat as sh
+from shapes.triangulated import flat, hull
 from signedheat import samples
 
 Array = NDArray[np.float64]
@@ -30,10 +30,7 @@ def organic(seed: int, n_vertices: int = 300, handles: int = 0) -> sh.TriangleMe
             strength = 1 / ((away**2).sum(axis=2) + 1e-2) ** 1.5
             points = points + 0.02 * (away * strength[..., None]).mean(axis=1)
             points /= np.linalg.norm(points, axis=1, keepdims=True)
-        faces = ConvexHull(points).simplices.astype(np.int64)
-        a, b, c = (points[faces[:, k]] for k in range(3))
-        inward = (np.cross(b - a, c - a) * a).sum(axis=1) < 0
-        faces[inward] = faces[inward][:, ::-1]
+        faces = hull(points)
     waves, phases = 1.6 * rng.normal(size=(6, 3)), rng.uniform(0, 2 * np.pi, 6)
     swell = 1 + 0.11 * np.cos(points @ waves.T + phases).sum(axis=1) / np.sqrt(2)
     return sh.TriangleMesh(points * swell[:, None], faces)
@@ -108,7 +105,7 @@ def flat_disk(n: int, seed: int = 0) -> sh.TriangleMesh:
     )
     inner = np.linalg.norm(points, axis=1) < 2 - 1e-9
     points[inner] += rng.uniform(-0.25, 0.25, (int(inner.sum()), 2)) * 2 / rings
-    return _triangulated(points, 1e-3 / rings**2)
+    return flat(points, least=1e-3 / rings**2)
 
 
 def flat_square(n: int, seed: int = 1) -> sh.TriangleMesh:
@@ -117,16 +114,7 @@ def flat_square(n: int, seed: int = 1) -> sh.TriangleMesh:
     along, one = np.linspace(-2, 2, side, endpoint=False), np.full(side, 2.0)
     rim = [np.stack(pair, axis=1) for pair in ((along, -one), (one, along), (-along, one), (-one, -along))]
     inner = np.random.default_rng(seed).uniform(-2, 2, (n - 4 * side, 2)) * (1 - 1 / side)
-    return _triangulated(np.concatenate([*rim, inner]), 1e-9)
-
-
-def _triangulated(points: Array, least: float) -> sh.TriangleMesh:
-    """Delaunay's triangles on points of the plane, facing up, without those of less area than `least`."""
-    faces = Delaunay(points).simplices
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    faces = np.where(area[:, None] > 0, faces, faces[:, ::-1])[np.abs(area) > least]
-    return sh.TriangleMesh(np.pad(points, ((0, 0), (0, 1))), faces)
+    return flat(np.concatenate([*rim, inner]))
 
 
 def placed(mesh: sh.TriangleMesh, line: sh.Polyline) -> sh.Curve:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import signedheat as sh
+from shapes.triangulated import flat
 from signedheat import samples
 from signedheat.view import draw_surface, new_figure
 
@@ -247,16 +248,10 @@ def intrinsic_triangulations(page: Page) -> None:
 
 def sheared_square(n: int, stretch: float) -> tuple[sh.TriangleMesh, sh.Curve]:
     """A square whose vertices are joined as if it were `stretch` times as wide, and a circle on it."""
-    from scipy.spatial import Delaunay
-
     inner = np.random.default_rng(0).uniform(-0.98, 0.98, (n, 2))
     side = np.linspace(-1, 1, 24)
     points = np.unique(
         np.concatenate([inner, np.reshape([[(x, s), (s, x)] for x in side for s in (-1, 1)], (-1, 2))]), axis=0
     )
-    faces = Delaunay(points * [stretch, 1]).simplices
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    faces = np.where(area[:, None] > 0, faces, faces[:, ::-1])[np.abs(area) > 1e-9]
-    mesh = sh.TriangleMesh(np.pad(points, ((0, 0), (0, 1))), faces)
+    mesh = flat(points, stretch)
     return mesh, shapes.placed(mesh, circle(0.55))

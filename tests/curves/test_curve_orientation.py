@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from shapes.surface_cases import square
 from signedheat.samples import sphere, torus
 
 
@@ -91,11 +92,7 @@ def test_what_has_no_direction_or_no_end_stays():
 
 def test_given_normals_turn_instead_of_the_direction():
     """Quarters of a circle in a plane, whose normals, not their directions, are to agree."""
-    line = np.linspace(-1, 1, 41)
-    points = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
-    ids = np.arange(41 * 41).reshape(41, 41)
-    a, b, c, d = (corner.ravel() for corner in (ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]))
-    mesh = sh.TriangleMesh(np.pad(points, ((0, 0), (0, 1))), np.concatenate([np.c_[a, b, c], np.c_[a, c, d]]))
+    mesh = square(41)
     pieces = []
     for k, (outward, backward) in enumerate([(1, False), (-1, False), (1, True), (1, False)]):
         angle = 0.5 * np.pi * k + np.linspace(0.1, 1.4, 20)[:: -1 if backward else 1]

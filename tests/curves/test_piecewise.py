@@ -10,6 +10,8 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from shapes.jump_program import minimize_exactly
+from shapes.surface_cases import flipped
+from shapes.triangulated import cylinder, klein_bottle, moebius
 from signedheat.curves import piecewise
 from signedheat.curves.cut_lines import smoothed, unforked
 from signedheat.curves.jumps import JumpProblem, minimize
@@ -19,20 +21,6 @@ from signedheat.geometry.face_pairs import face_pairs
 from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
 from signedheat.geometry.polylines import assemble_polylines
 from signedheat.samples import sphere, torus
-
-
-def moebius(n: int = 80, m: int = 8, width: float = 0.3, flips: float = 0.0) -> sh.TriangleMesh:
-    """A strip with half a twist around the z axis; vertex (i, j) is number i (m + 1) + j."""
-    u, v = np.meshgrid(np.arange(n), np.arange(m + 1), indexing="ij")
-    angle, across = 2 * np.pi * u / n, width * (2 * v / m - 1)
-    ring = 1 + across * np.cos(angle / 2)
-    points = np.stack([ring * np.cos(angle), ring * np.sin(angle), across * np.sin(angle / 2)], axis=-1)
-    ids = np.arange(n * (m + 1)).reshape(n, m + 1)
-    following = np.vstack([ids[1:], ids[:1, ::-1]])
-    a, b, c, d = ids[:, :-1], following[:, :-1], following[:, 1:], ids[:, 1:]
-    faces = np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, b, c), (a, c, d))])
-    turned = np.random.default_rng(0).random(len(faces)) < flips
-    return sh.TriangleMesh(points.reshape(-1, 3), np.where(turned[:, None], faces[:, ::-1], faces))
 
 
 def shaken(mesh: sh.TriangleMesh, amount: float) -> sh.TriangleMesh:
@@ -131,7 +119,7 @@ def test_orientation_of_faces_does_not_matter():
     """The same strip, 30 % of its faces turned over, with the source's normals given: the same field."""
     fields = []
     for flips in (0.0, 0.3):
-        mesh = moebius(flips=flips)
+        mesh = flipped(moebius(), flips)
         ids = np.arange(9) + 9 * 20
         across = mesh.path(ids)
         along = np.cross(np.diff(mesh.vertices[ids], axis=0), [0.0, 0.0, 1.0])
@@ -469,21 +457,9 @@ def test_triangles_on_which_slopes_mean_nothing_are_told():
     assert fine.diagnostics.note(Jumps).continuous
 
 
-def cylinder(n: int = 64, m: int = 32, height: float = 2.0) -> sh.TriangleMesh:
-    """An open cylinder of radius one round the z axis; vertex (i, j) is number i m + j."""
-    angle, z = np.meshgrid(2 * np.pi * np.arange(n) / n, np.linspace(0, height, m), indexing="ij")
-    points = np.stack([np.cos(angle), np.sin(angle), z], axis=-1).reshape(-1, 3)
-    ids = np.arange(n * m).reshape(n, m)
-    following = np.roll(ids, -1, axis=0)
-    a, b, c, d = ids[:, :-1], following[:, :-1], following[:, 1:], ids[:, 1:]
-    return sh.TriangleMesh(
-        points, np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, b, c), (a, c, d))])
-    )
-
-
 def test_line_along_a_cylinder_is_distance_on_the_strip_cut_open():
     """φ is the way round, with one straight cut from rim to rim, at which it falls by all of the way round."""
-    mesh = cylinder()
+    mesh = cylinder(64, 32)
     phi = sh.piecewise_distance(mesh, mesh.path(range(32)))
     (cut,) = phi.cut
     around = 64 * 2 * np.sin(np.pi / 64)
@@ -504,18 +480,10 @@ def bumpy_halves(seed: int) -> tuple[sh.TriangleMesh, list[sh.Curve]]:
     return mesh, [parts[0], parts[1].reversed()]
 
 
-def figure_eight_bottle(n: int = 60, m: int = 32) -> tuple[sh.TriangleMesh, sh.Curve]:
-    """A Klein bottle: a figure of eight, turned by half while it goes round; the source goes once round the eight."""
-    u, v = np.meshgrid(2 * np.pi * np.arange(n) / n, 2 * np.pi * np.arange(m) / m, indexing="ij")
-    out, up = np.sin(v), np.sin(2 * v)
-    ring, z = 3 + np.cos(u / 2) * out - np.sin(u / 2) * up, np.sin(u / 2) * out + np.cos(u / 2) * up
-    points = np.stack([ring * np.cos(u), ring * np.sin(u), z], axis=-1).reshape(-1, 3)
-    ids = np.arange(n * m).reshape(n, m)
-    following = np.vstack([ids[1:], ids[:1, -np.arange(m) % m]])
-    a, b, c, d = ids, following, np.roll(following, -1, axis=1), np.roll(ids, -1, axis=1)
-    faces = np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, b, c), (a, c, d))])
-    mesh = sh.TriangleMesh(points, faces)
-    return mesh, mesh.path(ids[0], closed=True)
+def loop_of_a_klein_bottle() -> tuple[sh.TriangleMesh, sh.Curve]:
+    """Once round the figure of eight."""
+    mesh = klein_bottle(60, 32)
+    return mesh, mesh.path(np.arange(32), closed=True)
 
 
 def arc_round_a_torus() -> tuple[sh.TriangleMesh, sh.Curve]:
@@ -529,8 +497,8 @@ FORKED = {
     "halves": lambda: bumpy_halves(5),
     "open arc": CASES["open arc"],
     "arc round a torus": arc_round_a_torus,
-    "loop of a Klein bottle": figure_eight_bottle,
-    "path on a Klein bottle": lambda: ((m := figure_eight_bottle(96, 48)[0]), m.path(np.arange(60) * 48 + 12)),
+    "loop of a Klein bottle": loop_of_a_klein_bottle,
+    "path on a Klein bottle": lambda: ((m := klein_bottle(96, 48)), m.path(np.arange(60) * 48 + 12)),
 }
 
 
@@ -582,7 +550,7 @@ def test_few_functions_are_made_for_many_lines(spare):
 
 
 def test_slack_is_never_exceeded():
-    mesh, curve = figure_eight_bottle()
+    mesh, curve = loop_of_a_klein_bottle()
     notes = [sh.piecewise_distance(mesh, curve, slack=s).diagnostics.note(Jumps) for s in (0.01, 0.1)]
     assert notes[0].objective <= 1.01 * notes[0].least
     assert notes[1].objective > 1.01 * notes[1].least

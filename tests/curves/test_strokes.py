@@ -50,20 +50,11 @@ def test_agreement_of_strokes_is_that_of_the_surface_whatever_its_diagonals(arou
     np.testing.assert_allclose(found[[0, 1], [2, 3]], 0.0022, atol=5e-4)
 
 
-def wrong_share(drawing: strokes.Drawing, values: np.ndarray) -> float:
-    """Share of the area on the wrong side, two edges or more from the curves: they are drawn by hand."""
-    mesh = drawing.mesh
-    exact = np.abs(sh.signed_distance(drawing.whole, mesh, as_oriented=True).values)
-    areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3, 3), mesh.n_vertices)
-    wrong = (np.sign(values) != drawing.sides) & (exact > 2 * strokes.edge_length(mesh))
-    return float(areas[wrong].sum() / areas.sum())
-
-
 @pytest.mark.parametrize("damage", ["gap", "pieces", "pieces_turned", "twice", "twice_turned", "overlapping", "bits"])
 @pytest.mark.parametrize("seed", range(2))
 def test_strokes_are_right_without_a_warning(damage, seed):
     drawing = strokes.drawing(np.random.default_rng(seed), damage, 3)
-    assert wrong_share(drawing, sh.signed_distance(drawing.given, drawing.mesh).values) < 0.03
+    assert strokes.wrong_share(drawing, sh.signed_distance(drawing.given, drawing.mesh).values) < 0.03
 
 
 @pytest.mark.parametrize("damage", ["long_strays", "scribbles", "loop_turned"])
@@ -73,7 +64,7 @@ def test_what_belongs_nowhere_is_left_out_or_told(damage, seed):
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         phi = sh.signed_distance(drawing.given, drawing.mesh)
-    assert told or wrong_share(drawing, phi.values) < 0.06
+    assert told or strokes.wrong_share(drawing, phi.values) < 0.06
 
 
 @pytest.mark.parametrize(("gone", "guessed"), [(0.25, False), (0.45, True)])

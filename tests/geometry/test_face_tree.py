@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from shapes.grid_cases import sphere, torus
+from shapes.grid_cases import sphere
 from signedheat.geometry.face_features import FaceFeatures
 from signedheat.geometry.face_tree import FaceTree
 from signedheat.geometry.nearest import foot_on_triangle
+from signedheat.samples import torus
 
 
 def soup(n, seed=0):
@@ -17,7 +18,9 @@ def soup(n, seed=0):
     return sh.TriangleMesh(corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3))
 
 
-@pytest.mark.parametrize("mesh", [sphere(700), torus(40, 20), soup(301), soup(3), sphere(80, 1e-3, (50.0, 0, 0))])
+@pytest.mark.parametrize(
+    "mesh", [sphere(700), torus(n_around=40, n_across=20), soup(301), soup(3), sphere(80, 1e-3, (50.0, 0, 0))]
+)
 def test_the_nearest_face_is_that_of_all(mesh):
     features = FaceFeatures.of(mesh.vertices, mesh.faces)
     tree = FaceTree.of(features)
@@ -31,7 +34,7 @@ def test_the_nearest_face_is_that_of_all(mesh):
 
 
 def test_discs_hold_the_corners_of_what_is_below_them():
-    mesh = torus(60, 30)
+    mesh = torus(n_around=60, n_across=30)
     features = FaceFeatures.of(mesh.vertices, mesh.faces)
     tree = FaceTree.of(features)
     leaves = len(tree.tree.bounds) // 2

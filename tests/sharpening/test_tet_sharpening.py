@@ -8,24 +8,8 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from shapes.domain_cases import fitted_order
-from shapes.tet_cases import boxes, lattice, rectangle, rms, sphere
+from shapes.tet_cases import boxes, ell, lattice, rectangle, rms, round_ball, sphere
 from signedheat.diagnostics import ConvexRounds, RoundCorners, SlopeErrors
-
-
-def ell(n: int) -> tuple[sh.TetMesh, sh.TriangleMesh, np.ndarray]:
-    """An L of jittered tets, n to the unit; a wall across one arm, and the distance from it, round the corner."""
-    mesh = boxes((2 * n, 2 * n, n // 2), 1 / n, keep=lambda c: ~((c[:, 0] > 1) & (c[:, 1] > 1)), jitter=0.1)
-    x, y, _ = mesh.vertices.T
-    wall = rectangle([1.55, -0.5, -0.5], [0, 3, 0], [0, 0, 3])
-    exact = np.where((x <= 1) & (y > 1), -(0.55 + np.hypot(x - 1, y - 1)), x - 1.55)
-    return mesh, wall, exact * np.sign(wall.face_area_vectors[0, 0])
-
-
-def round_ball() -> sh.TriangleMesh:
-    """A polyhedron with the volume of the unit ball, so that its faces lie as much outside of it as inside."""
-    ball = sphere(4)
-    volume = np.einsum("ij,ij->", ball.vertices[ball.faces[:, 0]], ball.face_area_vectors) / 3
-    return sh.TriangleMesh(ball.vertices * (4 / 3 * np.pi / volume) ** (1 / 3), ball.faces)
 
 
 def ball_around(mesh: sh.TetMesh) -> np.ndarray:

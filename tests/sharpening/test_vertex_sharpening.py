@@ -8,6 +8,7 @@ from scipy.spatial import Delaunay
 
 import signedheat as sh
 from refusals import refused
+from shapes.triangulated import disk, planks, polygon_distance, star
 from signedheat.diagnostics import ConvexRounds, SlopeErrors
 from signedheat.discretization import discretize
 from signedheat.geometry.curve_segments import CurveSegments
@@ -16,38 +17,7 @@ from signedheat.geometry.geodesics.sources import PlacedSegments
 from signedheat.geometry.surface_points import points_at_vertices
 from signedheat.samples import sphere, torus
 
-
-def disk(n: int, stretch: float = 1.0, jitter: float = 0.0) -> sh.TriangleMesh:
-    """The unit disk in about 2n triangles; Delaunay after a stretch, hence obtuse where it is not 1."""
-    i = np.arange(n) + 0.5
-    radius, angle = np.sqrt(i / n), np.pi * (1 + 5**0.5) * i
-    inner = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)[radius < 1 - 1 / np.sqrt(n)]
-    inner += np.random.default_rng(n).uniform(-jitter, jitter, inner.shape) / np.sqrt(n)
-    rim = np.linspace(0, 2 * np.pi, int(2 * np.sqrt(np.pi * n)), endpoint=False)
-    points = np.concatenate([inner, np.stack([np.cos(rim), np.sin(rim)], axis=1)])
-    faces = Delaunay(points * [stretch, 1.0]).simplices
-    a, b, c = points[faces].transpose(1, 0, 2)
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    faces = np.where((area < 0)[:, None], faces[:, ::-1], faces)[np.abs(area) > 1e-9]
-    return sh.TriangleMesh(np.pad(points, ((0, 0), (0, 1))), faces)
-
-
-def incident_faces(n: int = 1500) -> np.ndarray:
-    t = np.linspace(0, 2 * np.pi, n, endpoint=False)
-    radius = 0.5 * (1 + 0.3 * np.cos(5 * t))
-    return np.stack([radius * np.cos(t), radius * np.sin(t)], axis=1)
-
-
-def polygon_distance(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Exact signed distance in the plane, positive inside a counter-clockwise polygon."""
-    from matplotlib.path import Path
-
-    sides = np.roll(corners, -1, axis=0) - corners
-    distance = np.full(len(points), np.inf)
-    for a, e in zip(corners, sides, strict=True):
-        t = np.clip((points - a) @ e / (e @ e), 0, 1)
-        distance = np.minimum(distance, np.hypot(*(points - a - t[:, None] * e).T))
-    return np.where(Path(corners).contains_points(points), distance, -distance)
+STAR = star(0.3)
 
 
 def error(phi: np.ndarray, exact: np.ndarray) -> float:
@@ -145,7 +115,7 @@ def test_work_is_linear():
 def test_star_in_the_disk(diffusion, stretch, jitter):
     """Never worse than before; on any triangles and after any diffusion below 0.2 % at 5 thousand faces."""
     mesh = disk(2500, stretch, jitter)
-    exact = polygon_distance(mesh.vertices[:, :2], incident_faces())
+    exact = polygon_distance(mesh.vertices[:, :2], STAR)
     plain = sh.SignedHeatSolver(mesh, diffusion, intrinsic=False).distance(
         mesh.level_set(exact, 0.0), sh.ZeroSet(hard=True)
     )
@@ -158,22 +128,12 @@ def test_star_in_the_disk(diffusion, stretch, jitter):
     assert slopes.slope_error_after < slopes.slope_error_before
 
 
-def plank(n: int, ratio: float) -> sh.TriangleMesh:
-    """The square around the unit disk in about 2n right triangles, `ratio` times as long as wide."""
-    along_x, along_y = (int(np.sqrt(n * r)) for r in (1 / ratio, ratio))
-    x, y = np.meshgrid(np.linspace(-1, 1, along_x + 1), np.linspace(-1, 1, along_y + 1), indexing="ij")
-    a = (np.arange(along_x)[:, None] * (along_y + 1) + np.arange(along_y)).ravel()
-    b = a + along_y + 1
-    faces = np.concatenate([np.stack([a, b, b + 1], 1), np.stack([a, b + 1, a + 1], 1)])
-    return sh.TriangleMesh(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), faces)
-
-
 AWKWARD = {
     "jittered": lambda: disk(2500, jitter=0.35),
     "obtuse 4:1": lambda: disk(2500, 4.0),
     "obtuse 10:1": lambda: disk(2500, 10.0),
-    "anisotropic 5:1": lambda: plank(2500, 5.0),
-    "anisotropic 30:1": lambda: plank(2500, 30.0),
+    "anisotropic 5:1": lambda: planks(2500, 5.0),
+    "anisotropic 30:1": lambda: planks(2500, 30.0),
 }
 
 
@@ -187,7 +147,7 @@ def test_never_much_worse_than_before_on_awkward_triangles(kind, curve, diffusio
     """
     mesh = AWKWARD[kind]()
     t = np.linspace(0, 2 * np.pi, 1500, endpoint=False)
-    corners = incident_faces() if curve == "star" else 0.5 * np.stack([np.cos(t), np.sin(t)], axis=1)
+    corners = STAR if curve == "star" else 0.5 * np.stack([np.cos(t), np.sin(t)], axis=1)
     exact = polygon_distance(mesh.vertices[:, :2], corners)
     plain = sh.SignedHeatSolver(mesh, diffusion, intrinsic=False).distance(
         mesh.level_set(exact, 0.0), sh.ZeroSet(hard=True)
@@ -197,7 +157,7 @@ def test_never_much_worse_than_before_on_awkward_triangles(kind, curve, diffusio
 
 def test_convex_method_mends_a_long_diffusion():
     mesh = disk(2500)
-    exact = polygon_distance(mesh.vertices[:, :2], incident_faces())
+    exact = polygon_distance(mesh.vertices[:, :2], STAR)
     solver = sh.SignedHeatSolver(mesh, 100.0, intrinsic=False)
     plain = solver.distance(mesh.level_set(exact, 0.0), sh.ZeroSet(hard=True))
     sharp = sh.sharpen(plain, method=sh.Convex())
