@@ -41,7 +41,11 @@ def test_the_crease_between_two_balls_has_no_teeth(field):
     grid = field.grid
     toothed = sh.TriangleMesh(
         *closed_surface(
-            field.values, grid.origin, grid.spacing, 0.3, lambda p: on_level(field.solid, p, field.values, grid, 0.3)
+            field.values,
+            grid.origin,
+            grid.spacing,
+            0.3,
+            lambda p: on_level(field.solid.distance, p, field.values, grid, 0.3),
         )
     )
     assert np.array_equal(toothed.vertices, made.vertices)

@@ -11,9 +11,9 @@ from shapes.grid_cases import (
     rms,
     sphere,
     sphere_distance,
-    torus,
     torus_distance,
 )
+from signedheat import samples
 from signedheat.diagnostics import SampledSource
 from signedheat.discretization import discretize
 from signedheat.lowering.grid.discretization import memory_estimate
@@ -42,7 +42,9 @@ def test_few_nodes(n):
     assert rms(field.values - sphere_distance(grid)) <= 0.06 * grid.spacing[0]
 
 
-@pytest.mark.parametrize("shape, distance", [(sphere(40000), sphere_distance), (torus(300, 150), torus_distance)])
+@pytest.mark.parametrize(
+    "shape, distance", [(sphere(40000), sphere_distance), (samples.torus(1.0, 0.4, 300, 150), torus_distance)]
+)
 def test_sharpened_distance_is_second_order(shape, distance):
     nodes = np.array([24, 40, 64])
     errors = [rms(sh.sharpen(sh.SignedHeatSolver(box(n)).distance(shape)).values - distance(box(n))) for n in nodes]
@@ -95,7 +97,7 @@ def test_units_reversal_order_and_repetition():
 
 
 def test_triangles_quadrilaterals_and_points_agree():
-    tube = torus(120, 60)
+    tube = samples.torus(1.0, 0.4, 120, 60)
     quads = np.concatenate([tube.faces[: 120 * 60], tube.faces[120 * 60 :, 2:]], axis=1)
     grid = box(48)
     triangles = sh.SignedHeatSolver(grid).distance(tube).values
@@ -153,7 +155,7 @@ def level_at(field, shape):
 
 
 def test_constraints():
-    shape, grid = torus(100, 50), box(40)
+    shape, grid = samples.torus(1.0, 0.4, 100, 50), box(40)
     solver, h = sh.SignedHeatSolver(grid), box(40).spacing[0]
     source = discretize(grid).lower([shape], 1.0)
 
