@@ -202,6 +202,27 @@ def test_a_curve_that_bounds_nothing():
     assert note.completed_length > 0.3
 
 
+def test_a_loop_round_a_small_hole_through_a_plate_bounds_nothing():
+    """The sides meet in the hole, whose circumference is a twentieth of the loop's or less."""
+    n = 61
+    ids = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    x, y = np.unravel_index(ids.ravel(), ids.shape)
+    corners = np.stack([ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]], axis=-1).reshape(-1, 4)
+    corners = np.delete(corners, len(corners) // 2, axis=0)
+    top = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+    halfedges = np.concatenate([top[:, [0, 1]], top[:, [1, 2]], top[:, [2, 0]]])
+    rim = set(map(tuple, halfedges.tolist())) - set(map(tuple, halfedges[:, ::-1].tolist()))
+    (a, b), below = np.array(sorted(rim)).T, ids.size
+    walls = np.concatenate([np.stack([b, a, a + below], axis=1), np.stack([b, a + below, b + below], axis=1)])
+    positions = np.concatenate([np.stack([x, y, z + 0 * x], axis=1) for z in (0, -1)]) - [n / 2, n / 2, 0]
+    plate = sh.TriangleMesh(positions, np.concatenate([top, top[:, ::-1] + below, walls]))
+    radius = np.hypot(*positions[:, :2].T)
+    loop = plate.level_set(np.where(positions[:, 2] == 0, 24.3 - radius, -1 - radius))[0]
+    with pytest.warns(sh.errors.InexactWarning, match="bound no region"):
+        note = sh.signed_distance(loop, plate).diagnostics.note(SharpenedToCurves)
+    assert 0.001 < note.completed_length < 0.05
+
+
 def test_levels_of_their_own_are_refused():
     mesh = sphere(2)
     curve = mesh.level_set(mesh.vertices[:, 2], 0.3)

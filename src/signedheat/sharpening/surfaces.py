@@ -40,6 +40,14 @@ ROUGHLY = 1e-4
 INVENTED = 0.05
 """Share of the zero set, apart from curves without an end, from which there is a warning that these bound nothing."""
 
+UNDECIDED = 0.1
+"""Share of the vertices whose sides curves without an end decide, up to which they bound nothing: where they bound a
+region of meshes, they decide all but those next to them. At that, no level set of 96 on eight meshes is announced."""
+
+NEGLIGIBLE = 1e-3
+"""Share of the zero set, apart from curves that bound nothing, up to which they are not announced: a loop round a hole
+through a plate has that share of the hole's circumference in its own."""
+
 FALSE_ZERO_WIDTH = 4.0
 """Distance from an unoriented source, relative to h, within which zeros of φ may be due to that source alone."""
 
@@ -202,9 +210,11 @@ def nearest_curve(
     there_length = sum(float(part.lengths.sum()) for part in parts)
     share = completed / (completed + there_length or 1.0)
     note = SharpenedToCurves(share, len(sides.free_ends), float(bounded.mean()))
-    if note.completed_length > INVENTED and not note.free_ends:
+    reached = ~np.isnan(values)
+    decided = (bounded & reached).sum() / max(reached.sum(), 1)
+    if share > (INVENTED if decided > UNDECIDED else NEGLIGIBLE) and not note.free_ends:
         warn_user(
-            f"curves without free ends bound no region: {note.completed_length:.0%} of what distance is measured to is "
+            f"curves without free ends bound no region: {100 * share:.2g} % of what distance is measured to is "
             "where its sign must change elsewhere. piecewise_distance lets it jump there",
             InexactWarning,
         )
