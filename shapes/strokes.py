@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 import signedheat as sh
 from shapes.surfaces import disk
@@ -288,3 +289,22 @@ def drawing(random: Random, damage: str, fine: int = 3) -> Drawing:
     """A random surface with curves damaged in one way."""
     drawn = whole(surface(random, fine), random)
     return Drawing(drawn.mesh, DAMAGES[damage](random, drawn), drawn.curves, np.sign(drawn.heights))
+
+
+def drawing_in_plane(random: Random, damage: str, fine: int = 70) -> tuple[Drawing, list[sh.Polyline]]:
+    """The same on a square, and the strokes as polylines: at any angle, and of any size."""
+    side = np.linspace(-1, 1, fine)
+    points = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
+    inner = (np.abs(points) < 1).all(axis=1)
+    points += inner[:, None] * random.uniform(-0.4, 0.4, points.shape) / fine
+    faces = scipy.spatial.Delaunay(points).simplices
+    (x, u), (y, v) = (points[faces[:, k]].T - points[faces[:, 0]].T for k in (1, 2))
+    clockwise = x * v < u * y
+    faces[clockwise] = faces[clockwise][:, ::-1]
+    turn = random.uniform(0, 2 * np.pi)
+    points = 10 ** random.uniform(-2, 2) * points @ [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    mesh = sh.TriangleMesh(np.pad(points, ((0, 0), (0, 1))), faces)
+    drawn = whole(mesh, random)
+    given = DAMAGES[damage](random, drawn)
+    lines = [sh.Polyline(positions(mesh, curve)[:, :2], curve.closed) for curve in given]
+    return Drawing(mesh, given, drawn.curves, np.sign(drawn.heights)), lines

@@ -58,6 +58,8 @@ def signed_distance(
     padding: float | None = None,
     constraint: Constraint | None = None,
     diffusion: Diffusion | None = None,
+    as_oriented: bool = False,
+    every_piece: bool = False,
     progress: Progress | None = None,
 ) -> GridField[Literal[2]]: ...
 @overload
@@ -114,10 +116,9 @@ def signed_distance(
     """Signed distance to a shape, however broken: exact where the shape is there, completed where it is missing.
 
     Shapes in space are completed (`complete`), and distance is measured to what was given and to its completion. Of
-    curves on a surface, pieces are turned until they bound something together, and those that bound nothing are left
-    out; distance is measured along the surface. Of drawings in the plane, lines are taken as they are drawn. On
-    surfaces and in the plane, the zero set of the signed heat method stands where curves are missing. The method alone
-    is `SignedHeatSolver`.
+    curves on a surface, and of drawings in the plane, strokes are turned until they bound something together, and those
+    that bound nothing are left out; the zero set of the signed heat method stands where curves are missing, and
+    distance is measured along the surface. The method alone is `SignedHeatSolver`.
 
     Parameters
     ----------
@@ -144,11 +145,11 @@ def signed_distance(
     diffusion : float
         τ in ``t = τ h²``, likewise; larger values close gaps along rounder lines.
     as_oriented : bool
-        In space and on surfaces: turn nothing.
+        Turn nothing; leave no curve out.
     keep_overlaps : bool
         In space: count what lies inside other bodies as surface.
     every_piece : bool
-        On surfaces: leave no curve out.
+        On surfaces and in the plane: leave no curve out.
     intrinsic : "auto", True or False
         On surfaces: on what triangles the method runs, see `SignedHeatSolver`.
     progress : callable, optional

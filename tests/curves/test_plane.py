@@ -5,8 +5,11 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
+from shapes import strokes
 from shapes.bodies import distance_to_box
 from signedheat import samples
+from signedheat.curves.distance import CurvesTaken
+from signedheat.errors import InexactWarning
 
 SQUARE = np.array([[-1.0, -1], [-1, 1], [1, 1], [1, -1]])
 
@@ -42,6 +45,44 @@ def test_a_turned_and_scaled_drawing_has_the_same_distances():
     one = sh.signed_distance(sides(0.1), resolution=160)
     other = sh.signed_distance([sh.Polyline(1e3 * line.points @ turn) for line in sides(0.1)], resolution=160)
     assert np.abs(other(1e3 * points @ turn) / 1e3 - one(points)).max() < 0.03
+
+
+@pytest.mark.parametrize("damage", ["pieces_turned", "twice_turned", "bits", "long_strays", "scribbles"])
+def test_strokes_are_turned_or_left_out(damage):
+    drawing, lines = strokes.drawing_in_plane(np.random.default_rng(4), damage)
+    places = drawing.mesh.vertices[:, :2]
+    field = sh.signed_distance(lines, sh.Grid.around([places.min(axis=0), places.max(axis=0)], 97, padding=0.0))
+    assert strokes.wrong_share(drawing, field(places)) < 0.03
+
+
+def test_what_was_done_with_strokes_is_noted_and_may_be_refused():
+    lines = sides(0.1)
+    lines[1] = lines[1].reversed()
+    scribble = sh.Polyline([[0.2, 0.3], [0.4, 0.35], [0.5, 0.2]])
+    field = sh.signed_distance([*lines, scribble], resolution=48)
+    note = field.diagnostics.note(CurvesTaken)
+    assert note.turned.tolist() == [1]
+    assert note.left_out.tolist() == [4]
+    np.testing.assert_array_equal(field.values, sh.signed_distance(sides(0.1), field.grid).values)
+    assert sh.signed_distance([*lines, scribble], field.grid, as_oriented=True)([[0.0, 0.9]]) > 0
+    kept = sh.signed_distance([*sides(0.1), scribble], field.grid, every_piece=True)
+    assert abs(kept([scribble.points[1]])) < 0.05
+
+
+def test_a_guess_is_announced():
+    with pytest.warns(InexactWarning, match="curve"):
+        sh.signed_distance([side.reversed() if k % 2 else side for k, side in enumerate(sides(0.05))], resolution=32)
+
+
+def test_strokes_are_turned_alike_wherever_distance_is_asked():
+    lines = sides(0.1)
+    lines[2] = lines[2].reversed()
+    near = sh.signed_distance(lines, sh.Grid.around([[-1.5, -1.5], [0.5, 0.5]], 40, padding=0.0))
+    far = sh.signed_distance(lines, sh.Grid.around([[-9.0, -9], [9, 9]], 200, padding=0.0))
+    assert near([[0.0, 0.0]]) < 0
+    assert near([[0.0, -1.2]]) > 0
+    assert far([[0.0, 0.0]]) < 0
+    assert far([[5.0, -5.0]]) > 0
 
 
 def test_points_with_normals_in_the_plane():

@@ -12,6 +12,7 @@ import signedheat as sh
 from shapes import strokes
 from shapes.surfaces import disk
 from signedheat.curves.directions import Pieces
+from signedheat.curves.distance import CurvesTaken
 from signedheat.discretization import discretize
 from signedheat.geometry.minimum_cut import CutGraph
 from signedheat.samples import sphere, torus, with_flipped_faces
@@ -55,6 +56,33 @@ def test_agreement_of_strokes_is_that_of_the_surface_whatever_its_diagonals(arou
 def test_strokes_are_right_without_a_warning(damage, seed):
     drawing = strokes.drawing(np.random.default_rng(seed), damage, 3)
     assert strokes.wrong_share(drawing, sh.signed_distance(drawing.given, drawing.mesh).values) < 0.03
+
+
+def test_a_stroke_may_be_given_in_bits():
+    """Bits that go on in each other are one stroke, whatever their order: the same curves are turned and left out."""
+    drawing = strokes.drawing(np.random.default_rng(3), "pieces_turned", 3)
+    bits, of = [], []
+    for k, stroke in enumerate(drawing.given):
+        cuts = np.linspace(0, stroke.n_points - 1, 4).astype(int)
+        for begin, end in itertools.pairwise(cuts[np.append(True, np.diff(cuts) > 0)]):
+            bits.append(sh.Curve(stroke.faces[begin : end + 1], stroke.barycentric[begin : end + 1]))
+            of.append(k)
+    order = np.random.default_rng(0).permutation(len(bits))
+    whole = sh.curve_orientation(drawing.given, drawing.mesh)
+    cut = sh.curve_orientation([bits[k] for k in order], drawing.mesh)
+    assert whole.turned.any()
+    np.testing.assert_array_equal(cut.turned, whole.turned[np.array(of)[order]])
+    np.testing.assert_allclose(cut.agreement, whole.agreement[np.array(of)[order]], atol=1e-9)
+
+
+def test_bits_of_a_whole_loop_leave_nothing_to_decide():
+    mesh = sphere(3)
+    [loop] = mesh.level_set(mesh.vertices[:, 2], 0.03)
+    index = np.arange(loop.n_points + 1) % loop.n_points
+    bits = [sh.Curve(loop.faces[index[k : k + 2]], loop.barycentric[index[k : k + 2]]) for k in range(loop.n_points)]
+    taken = sh.signed_distance(bits[::-1], mesh)
+    assert taken.diagnostics.note(CurvesTaken) is None
+    np.testing.assert_allclose(taken.values, sh.signed_distance(loop, mesh).values, atol=1e-9)
 
 
 @pytest.mark.parametrize("damage", ["long_strays", "scribbles", "loop_turned"])

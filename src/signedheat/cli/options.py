@@ -308,7 +308,7 @@ GRID = group(
 )
 REPAIR = group(
     "steps (all taken by default)",
-    option("--as-oriented", action="store_true", help="turn no face or normal, put back no face"),
+    option("--as-oriented", action="store_true", help="turn no face, normal or line, put back no face"),
     option("--keep-overlaps", action="store_true", help="count what lies inside other bodies as surface"),
 )
 STEPS = group(

@@ -193,7 +193,7 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
         elif arguments.plain or not isinstance(constraint, Free | ZeroSet | Soft):
             field = plain_distance(shape, domain, **options, as_oriented=arguments.as_oriented, progress=progress)
         elif isinstance(domain, Grid) and domain.dimension == 2:
-            field = distance_to_lines(shape, domain, **options, progress=progress)
+            field = distance_to_lines(shape, domain, **options, as_oriented=arguments.as_oriented, progress=progress)
         else:
             field = distance_to_shapes(shape, domain, **options, **repair, progress=progress)
     if not arguments.quiet:

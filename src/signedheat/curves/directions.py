@@ -13,7 +13,7 @@ from scipy import sparse
 from ..domains.curves import Curve, CurveOrPoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..geometry.components import connected_components
-from ..geometry.curve_segments import CurveSegments, interpolation_at
+from ..geometry.curve_segments import CurveSegments, interpolation_at, joined_end_to_end
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.signed_graph import best_signs
 from ..lowering.surface.discretization import SurfaceDiscretization
@@ -52,19 +52,24 @@ drawings; doubled, 15 and 6."""
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Oriented curves on a surface; those that end inside the surface may be turned.
+    """Oriented curves on a surface, as strokes; those that end inside the surface may be turned.
+
+    Curves that go on in each other, head to tail, are one stroke: a line may be given in as many bits as one likes.
 
     Attributes
     ----------
-    numbers : (k,) int
+    numbers : (j,) int
         Which of the curves given are oriented.
+    stroke : (j,) int
+        The stroke that each of these is part of.
     movable : (k,) bool
-        Whether each is a piece: open, and not from boundary to boundary of the surface.
+        Whether each stroke is a piece: open, and not from boundary to boundary of the surface.
     strokes : Strokes
         The energy of the sets that they may bound.
     """
 
     numbers: NDArray[np.int64]
+    stroke: NDArray[np.int64]
     movable: NDArray[np.bool_]
     strokes: Strokes
 
@@ -72,11 +77,21 @@ class Pieces:
     def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> Pieces | None:
         """The pieces; None if there are none."""
         listed = {k: c for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented}
-        parts = [part for (part,) in surface.segments([[curve] for curve in listed.values()])]
-        movable = np.array([is_piece(surface.triangles, c, p) for c, p in zip(listed.values(), parts, strict=True)])
+        if not listed:
+            return None
+        each = [part for (part,) in surface.segments([[curve] for curve in listed.values()])]
+        by_points = np.array([curve.normals is None for curve in listed.values()])  # not by normals: they may disagree
+        parts, stroke = joined_end_to_end(each, by_points)
+        movable = np.array([is_piece(surface.triangles, part) for part in parts])
         if not movable.any():
             return None
-        return cls(np.array(list(listed), dtype=np.int64), movable, Strokes.of(surface, parts, drawn_edge(surface)))
+        strokes = Strokes.of(surface, parts, drawn_edge(surface))
+        return cls(np.array(list(listed), dtype=np.int64), stroke, movable, strokes)
+
+    def curves(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Numbers of the curves that make up the strokes chosen by (k,) bool."""
+        result: NDArray[np.int64] = self.numbers[chosen[self.stroke]]
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,20 +115,19 @@ class Decision:
     def turned(self, n: int) -> NDArray[np.bool_]:
         """(n,) which of all curves given are turned."""
         result = np.zeros(n, dtype=bool)
-        result[self.pieces.numbers] = self.best.signs < 0
+        result[self.pieces.curves(self.best.signs < 0)] = True
         return result
 
     @property
-    def loose(self) -> NDArray[np.int64]:
-        """Numbers of the pieces that bound nothing, where others do."""
+    def loose(self) -> NDArray[np.bool_]:
+        """(k,) which strokes bound nothing, where others do."""
         movable, explained = self.pieces.movable, self.best.explained >= EXPLAINED
-        return self.pieces.numbers[movable & ~explained & (movable & explained).any()]
+        return movable & ~explained & (movable & explained).any()
 
     @property
     def all_bound(self) -> bool:
         """Whether every stroke that is not left out bounds the inside."""
-        kept = ~np.isin(self.pieces.numbers, self.loose)
-        return not self.bounds_nothing and bool((self.best.explained[kept] >= EXPLAINED).all())
+        return not self.bounds_nothing and bool((self.best.explained[~self.loose] >= EXPLAINED).all())
 
     def turned_loops(self) -> NDArray[np.int64]:
         """Numbers of the pieces turned of loops of which nearly half of the length is turned, or more.
@@ -140,8 +154,7 @@ class Decision:
         complete = (~self.pieces.movable & (explained > 0) & ~mostly).any()
         found = mostly & (best.signs < 0) & (explained > 0)
         few = explained[found].sum() < TURNED * explained.sum()
-        result: NDArray[np.int64] = self.pieces.numbers[found & (not few) & (not complete)]
-        return result
+        return self.pieces.curves(found & (not few) & (not complete))
 
     def worth_little(self) -> NDArray[np.int64]:
         """Numbers of the curves on which the inside hangs, and that are worth less than half of their length.
@@ -156,8 +169,10 @@ class Decision:
         without = settled_from(strokes, [altered(best.signs, [k], 0.0) for k in chosen.tolist()], self.pieces.movable)
         worth = np.array([cost(strokes, other) - cost(strokes, best) for other in without])
         changed = np.array([areas[other.sides != best.sides].sum() for other in without])
-        found = (worth < WORTH * strokes.lengths[chosen]) & (changed > OTHERWISE * areas.sum())
-        return np.sort(self.pieces.numbers[chosen[found]])
+        little = (worth < WORTH * strokes.lengths[chosen]) & (changed > OTHERWISE * areas.sum())
+        found = np.zeros(len(best.signs), dtype=bool)
+        found[chosen[little]] = True
+        return self.pieces.curves(found)
 
 
 def drawn_edge(surface: SurfaceDiscretization) -> float:
@@ -167,9 +182,9 @@ def drawn_edge(surface: SurfaceDiscretization) -> float:
     return float(mesh.edge_lengths.mean())
 
 
-def is_piece(triangles: IntrinsicMesh, curve: Curve, part: CurveSegments) -> bool:
-    """Whether an oriented curve has an end away from the boundary of the surface, and from nonmanifold edges."""
-    if curve.closed or part.ends[0, 0] == part.ends[-1, 1]:
+def is_piece(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
+    """Whether a stroke has an end away from the boundary of the surface, and from nonmanifold edges."""
+    if part.ends[0, 0] == part.ends[-1, 1]:
         return False
     edges = triangles.edges
     at_boundary = np.zeros(triangles.n_vertices, dtype=bool)

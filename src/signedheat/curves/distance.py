@@ -17,12 +17,7 @@ from ..domains.kinds import AnySurface, SurfaceDomain
 from ..domains.level_sets import is_consistent
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import flag
-from ..errors import (
-    CancellingNormalsError,
-    ConstraintError,
-    InexactWarning,
-    warn_user,
-)
+from ..errors import ConstraintError, InexactWarning, warn_user
 from ..fields.vertex_field import VertexField
 from ..progress import Progress
 from ..sharpening.sharpen import sharpen
@@ -97,7 +92,9 @@ def distance_to_pieces(
         return distance_unwarned(solver, listed, constraint), listed
     decision = decide(pieces)
     turn = decision.turned(len(listed))
-    left_out = np.empty(0, dtype=np.int64) if every_piece or decision.bounds_nothing else decision.loose
+    left_out = pieces.curves(decision.loose)
+    if every_piece or decision.bounds_nothing:
+        left_out = left_out[:0]
     taken = [curve for k, curve in enumerate(with_turned(listed, turn)) if k not in set(left_out.tolist())]
     field = distance_unwarned(once, taken, constraint)
     turn[left_out] = False
@@ -187,13 +184,7 @@ def distance_to_curves(
             return distance_unwarned(by, listed, constraint), listed
         return distance_to_pieces(by, listed, constraint, every_piece)
 
-    chosen = intrinsic == "auto"
-    try:
-        field, taken = on_resolving_triangles(measured, solver, listed) if chosen else measured(solver)
-    except CancellingNormalsError:  # loops inside single faces
-        if not chosen or not isinstance(solver.domain, TriangleMesh):
-            raise
-        field, taken = measured(replace(solver, intrinsic=True))
+    field, taken = on_resolving_triangles(measured, solver, listed) if intrinsic == "auto" else measured(solver)
     rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))
     sharpened = sharpen(field, taken, progress=rest)
     return sharpened if left_out is None else replace(sharpened, diagnostics=sharpened.diagnostics.noting(left_out))

@@ -103,7 +103,8 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | F
     if pieces is not None:
         decision = decide(pieces)
         turned = decision.turned(len(listed))
-        agreement[pieces.numbers[pieces.movable]] = np.clip(decision.best.explained[pieces.movable], 0.0, 1.0)
+        explained = np.where(pieces.movable, np.clip(decision.best.explained, 0.0, 1.0), 1.0)
+        agreement[pieces.numbers] = explained[pieces.stroke]
     return CurveOrientation(with_turned(listed, turned), turned, agreement)
 
 

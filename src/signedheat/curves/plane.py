@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Literal, cast
 
@@ -13,6 +14,8 @@ from ..constraints import Constraint, EachComponent, LevelValues
 from ..domains.grid import Grid
 from ..domains.kinds import Sources
 from ..domains.polyline import Polyline
+from ..domains.triangle_mesh import TriangleMesh
+from ..domains.validation import flag
 from ..errors import ConstraintError
 from ..extrapolation import Diffusion
 from ..fields.grid_field import GridField
@@ -21,7 +24,12 @@ from ..geometry.face_tree import FaceTree
 from ..lowering.area_elements import bounds_around
 from ..progress import Progress, within
 from ..solver import SignedHeatSolver, as_list
+from .distance import CurvesTaken, distance_to_pieces
+from .resolution import on_resolving_triangles
 
+STROKE_NODES = 96
+"""Nodes along the longest side of the triangles on which strokes are compared. Of 150 drawings none is wrong in silence
+and 7 are right with a warning; halved 0 and 5, doubled 0 and 6."""
 NEAR = 1.5
 """Cells from a line within which it decides the side itself: φ is smooth over about a cell."""
 
@@ -35,12 +43,15 @@ def distance_to_lines(
     padding: float | None = None,
     constraint: Constraint | None = None,
     diffusion: Diffusion | None = None,
+    as_oriented: bool = False,
+    every_piece: bool = False,
     progress: Progress | None = None,
 ) -> GridField:
     """Signed distance to polylines in the plane: see `signed_distance`, which calls this.
 
-    The signed heat method decides the sides, and its zero set completes the lines. On grids with solid nodes, and in
-    other dimensions than two, φ is returned as the method gives it.
+    Strokes are turned until they bound something together, and those left out that do not; the signed heat method
+    decides the sides, and its zero set completes the lines. On grids with solid nodes, and in other dimensions than
+    two, lines are taken as they are, and φ is returned as the method gives it.
     """
     if isinstance(constraint, EachComponent | LevelValues):
         raise ConstraintError(
@@ -50,9 +61,16 @@ def distance_to_lines(
     listed: list[Any] = as_list(lines)
     if domain is None:
         domain = Grid.around(bounds_around(listed), resolution, padding, spacing)
-    phi: GridField = SignedHeatSolver(domain, diffusion, within(progress, 0.0, 0.8)).distance(listed, constraint)
+    as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
+    measurable = domain.mask is None and domain.dimension == 2
+    note = None
+    if measurable and not as_oriented and all(isinstance(line, Polyline) for line in listed):
+        listed, note = strokes_that_agree(listed, every_piece, within(progress, 0.0, 0.4))
+    phi: GridField = SignedHeatSolver(domain, diffusion, within(progress, 0.4, 0.8)).distance(listed, constraint)
+    if note is not None:
+        phi = replace(phi, diagnostics=phi.diagnostics.noting(note))
     drawn = [line for line in listed if isinstance(line, Polyline)]
-    if domain.mask is not None or domain.dimension != 2 or not np.isfinite(phi.values).all():
+    if not measurable or not np.isfinite(phi.values).all():
         return phi
     if progress is not None:
         progress(0.8, "measure")
@@ -62,6 +80,43 @@ def distance_to_lines(
     )
     timings = {**phi.diagnostics.timings, "measure": time.perf_counter() - begin}
     return GridField(domain, values, replace(phi.diagnostics, timings=timings))
+
+
+def strokes_that_agree(
+    lines: Sequence[Polyline], every_piece: bool = False, progress: Progress | None = None
+) -> tuple[list[Polyline], CurvesTaken | None]:
+    """Strokes turned so that together they bound something, without those that bound nothing; and what was done.
+
+    The plane is a surface like others (`distance_to_pieces`): a rectangle of triangles around the drawing, with a rim
+    to which lines may run. It does not depend on where distance is asked.
+    """
+    if all(line.closed for line in lines):
+        return list(lines), None
+    bounds = bounds_around(lines)
+    size = float(np.ptp(bounds, axis=0).max())
+    sheet = _triangles_around((bounds - bounds[0]) / size)
+    curves = [sheet.polyline(np.pad((line.points - bounds[0]) / size, ((0, 0), (0, 1))), line.closed) for line in lines]
+    field, _ = on_resolving_triangles(
+        lambda solver: distance_to_pieces(solver, curves, None, every_piece),
+        SignedHeatSolver(sheet, 1.0, progress),
+        curves,
+    )
+    note = field.diagnostics.note(CurvesTaken)
+    if note is None:
+        return list(lines), None
+    turned, left_out = set(note.turned.tolist()), set(note.left_out.tolist())
+    return [line.reversed() if k in turned else line for k, line in enumerate(lines) if k not in left_out], note
+
+
+def _triangles_around(bounds: NDArray[np.float64]) -> TriangleMesh:
+    """A rectangle around a box, with the usual room: squares that are cut along one diagonal or the other in turn."""
+    nodes = Grid.around(bounds, STROKE_NODES)
+    index = np.arange(nodes.n_nodes).reshape(nodes.shape)
+    a, b, c, d = (each.ravel() for each in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
+    rising = np.indices(index[1:, 1:].shape).sum(axis=0).ravel() % 2 == 0
+    first = np.where(rising, [a, b, c], [a, b, d])
+    second = np.where(rising, [a, c, d], [b, c, d])
+    return TriangleMesh(np.pad(nodes.points.reshape(-1, 2), ((0, 0), (0, 1))), np.hstack([first, second]).T)
 
 
 def _measured(phi: GridField[Literal[2]], given: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from ..discretization import discretize
 from ..domains.curves import CurveOrPoints, CurvesAndPoints
 from ..domains.kinds import SurfaceDomain
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import GeometryError, SourceError
+from ..errors import CancellingNormalsError, GeometryError, SourceError
 from ..extrapolation import Diffusion
 from ..lowering.surface.curve_groups import CurveGroups
 from ..lowering.surface.discretization import SurfaceDiscretization
@@ -34,7 +34,8 @@ def on_resolving_triangles(
 ) -> Found:
     """What is measured on triangles that resolve the curves: those of the mesh, or smaller ones for small curves.
 
-    Meshes that are too thin to be triangulated anew, and other surfaces, are taken as they are.
+    Meshes that are too thin to be triangulated anew, and other surfaces, are taken as they are. On loops inside single
+    triangles, which those cannot see, triangles are made that do.
 
     Parameters
     ----------
@@ -53,7 +54,12 @@ def on_resolving_triangles(
             return measure(for_zero_set(mesh, solver.diffusion, solver.progress))
         except GeometryError:
             pass
-    return measure(solver)
+    try:
+        return measure(solver)
+    except CancellingNormalsError:
+        if not isinstance(mesh, TriangleMesh):
+            raise
+        return measure(replace(solver, intrinsic=True))
 
 
 def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:

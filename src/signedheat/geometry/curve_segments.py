@@ -16,6 +16,7 @@ from .components import connected_components
 from .directions import unit
 from .face_pairs import face_pairs
 from .intrinsic_mesh import IntrinsicMesh
+from .polylines import assemble_polylines
 from .signed_graph import Links, signs_of
 from .surface_points import (
     EDGE,
@@ -118,6 +119,59 @@ class MergedSources:
         distinct, first = np.unique(nodes, return_index=True)
         ends = first[np.searchsorted(distinct, self.ends[mine])]
         return CurveSegments(self.nodes[nodes], ends, self.faces[mine], self.edges[mine], self.vectors[mine], oriented)
+
+
+def joined_end_to_end(
+    parts: Sequence[CurveSegments], may_go_on: NDArray[np.bool_]
+) -> tuple[list[CurveSegments], NDArray[np.int64]]:
+    """Lines in which one curve goes on in the next where they touch, and no third one ends there.
+
+    A curve that runs back along the one before it is a copy of that, and does not continue it.
+
+    Parameters
+    ----------
+    parts : sequence of CurveSegments
+        Curves, with their positive side to the left of their segments.
+    may_go_on : (k,) bool
+        Which of them may be part of a longer line.
+
+    Returns
+    -------
+    lines : list of CurveSegments
+        In order of the first curve of each.
+    which : (k,) int
+        The line that each curve is part of.
+    """
+    merged = MergedSources.of(parts)
+    bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
+    (tails, second), (last, heads) = merged.ends[bounds[:-1]].T, merged.ends[bounds[1:] - 1].T
+    arriving = np.zeros(len(merged.nodes), dtype=np.int64)
+    arriving[heads] = np.arange(len(parts))
+    turns_back = np.isin(tails, heads) & (last[arriving[tails]] == second)
+    apart = len(merged.nodes) * (1 + np.arange(len(parts)))  # nodes of its own for each
+    tails = tails + np.where(may_go_on & ~turns_back, 0, apart)
+    lines = assemble_polylines(tails, heads + np.where(may_go_on, 0, apart))
+    members = sorted((line for line, _, _ in lines), key=min)
+    which = np.empty(len(parts), dtype=np.int64)
+    joined = []
+    for number, line in enumerate(members):
+        which[line] = number
+        if len(line) == 1:
+            joined.append(parts[line[0]])
+            continue
+        own = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in line])
+        nodes = np.unique(np.concatenate([merged.samples[k] for k in line]))
+        joined.append(
+            CurveSegments(
+                merged.nodes[nodes],
+                np.searchsorted(nodes, merged.ends[own]),
+                merged.faces[own],
+                merged.edges[own],
+                merged.vectors[own],
+                parts[line[0]].oriented,
+            )
+        )
+    return joined, which
 
 
 def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> list[CurveSegments]:
