@@ -26,24 +26,11 @@ def segments_of(
     positions: Positions = None,
     number: int = 0,
 ) -> CurveSegments:
-    """Cut a source into segments.
+    """Cut a source, whose faces are those of the triangles, into segments; `CurveSegments` are returned as they are.
 
-    Parameters
-    ----------
-    source : Curve, SurfacePoints or CurveSegments
-        Face ids refer to `triangles`. Consecutive points of a curve that share no face are joined by a geodesic path.
-    triangles : IntrinsicMesh
-        The surface.
-    positions : (n_vertices, 3) or (m, 3, 3) float, optional
-        Positions in space of vertices, or of the corners of each face if every face lies in a plane of its own; needed
-        for curves with given normals.
-    number : int
-        Index of the source, for messages.
-
-    Returns
-    -------
-    CurveSegments
-        A `CurveSegments` is returned as it is.
+    Consecutive points of a curve that share no face are joined by a geodesic path. Curves with given normals need
+    `positions`: in space, of vertices or, if every face lies in a plane of its own, of corners. `number` is the index
+    of the source, for messages.
 
     Raises
     ------

@@ -10,14 +10,7 @@ from ..frozen import read_only
 
 
 def connected_components(n: int, one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[np.int64]:
-    """(n,) connected component of each node of a graph, numbered by first appearance.
-
-    Parameters
-    ----------
-    n : int
-        Number of nodes.
-    one, other : (k,) int
-        The ends of each edge.
+    """(n,) connected component of each node of a graph with edges from `one` to `other`, numbered by first appearance.
 
     Examples
     --------
@@ -28,12 +21,9 @@ def connected_components(n: int, one: NDArray[np.integer], other: NDArray[np.int
 
 
 def element_components(elements: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(m,) connected component of each element, numbered by first appearance.
+    """(m,) connected component of each element, numbered by first appearance: those that share a vertex are connected.
 
-    Parameters
-    ----------
-    elements : (m, k) int
-        The vertices of each element, or its edges, or its faces: elements that share one are connected.
+    The (m, k) elements may name their edges or faces instead of vertices.
 
     Examples
     --------

@@ -19,17 +19,10 @@ hardly inclined cut each other, rounding moves the ends of the cut that much."""
 def conforming(
     triangles: NDArray[np.float64], tolerance: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """A mesh of triangles of which edges meet whole edges.
+    """A mesh of (m, 3, 3) triangles of which edges meet whole edges.
 
     Corners within the tolerance of each other become one vertex. Edges that no other face runs along in the opposite
     direction are divided at the ends of other such edges that lie on them, and their faces with them.
-
-    Parameters
-    ----------
-    triangles : (m, 3, 3) float
-        Corners.
-    tolerance : float
-        Distance.
 
     Returns
     -------

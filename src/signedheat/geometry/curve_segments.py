@@ -286,16 +286,8 @@ def carried_left(
     """(k,) −1 where the face that decides a segment's left is turned against those of most of the curve, else 1.
 
     Faces are compared across the edges around the curve, so left stays on one side of it however faces are turned. On a
-    curve along which orientation is lost, left changes sides somewhere.
-
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        The surface.
-    faces, edges : (k,) int
-        Face of each segment, and the edge that it runs along or −1: there the first face at the edge decides.
-    lengths : (k,) float
-        Of the segments.
+    curve along which orientation is lost, left changes sides somewhere. On a segment along an edge (`edges`; else −1)
+    the first face at the edge decides.
     """
     first = triangles.first_halfedges
     first_faces = np.zeros(triangles.n_edges, dtype=np.int64)

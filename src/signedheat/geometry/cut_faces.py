@@ -18,14 +18,7 @@ def cut_faces(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
     """Cut triangles along the planes of others that they cross, and along the outlines of flat parts that they lie in.
 
-    Triangles that share an edge do not cut each other.
-
-    Parameters
-    ----------
-    triangles, ids : (m, 3, 3) float, (m, 3) int
-        What is cut, and the vertices.
-    knives, knife_ids : (k, 3, 3) float, (k, 3) int
-        What cuts.
+    Triangles are corners and vertex ids. Those that share an edge do not cut each other.
 
     Returns
     -------

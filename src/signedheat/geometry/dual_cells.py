@@ -101,16 +101,9 @@ def dual_cells(
     shape: tuple[int, ...],
     inside: Callable[[NDArray[np.float64]], NDArray[np.bool_]],
 ) -> DualCells:
-    """The pieces of a level set in the cells of a grid.
+    """The pieces of a level set in the cells of a grid with so many nodes along each axis.
 
-    Parameters
-    ----------
-    nodes, axes, rising : (e, 3) int, (e,) int, (e,) bool
-        First node of each edge that is crossed, what it runs along, and whether that node is inside.
-    shape : tuple of int
-        Nodes of the grid.
-    inside : callable
-        Whether (n, 3) places, in cells, are inside: for the middles of faces.
+    `inside` says of (n, 3) places, in cells, whether they are inside: it is asked about the middles of faces.
 
     Examples
     --------
@@ -206,18 +199,8 @@ def dual_triangles(
     """Triangles between the vertices of pieces, counter-clockwise as seen from outside.
 
     The four vertices around an edge make two triangles. Of the two diagonals between them, if both are possible, the
-    one is taken that passes nearer to the crossing of the edge; if they are equally near, the shorter one.
-
-    Parameters
-    ----------
-    cells : DualCells
-        Of e edges and v pieces.
-    nodes, axes, rising, shares : (e, 3) int, (e,) int, (e,) bool, (e,) float
-        First node of each edge, what it runs along, whether that node is inside, and how far from it the crossing is.
-    vertices : (v, 3) float
-        Positions in cells, each within its own.
-    fanned : (e,) bool
-        Edges whose crossing becomes a vertex anyway.
+    one is taken that passes nearer to the crossing of the edge; if they are equally near, the shorter one. `vertices`,
+    (v, 3), are in cells, each within its own; the crossings of `fanned` edges, (e,), become vertices anyway.
 
     Returns
     -------
@@ -264,15 +247,9 @@ def separate_triangles(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices and triangles as of `dual_triangles`; wherever possible none of them pass through each other.
 
-    Edges are flipped to run along creases. Vertices of triangles that pass through each other go from one choice to the
-    next, and edges around them are flipped no more.
-
-    Parameters
-    ----------
-    cells, nodes, axes, rising, shares
-        See `dual_triangles`.
-    choices : (3, v, 3) float
-        Positions in cells, the best first. The last ones are inside the cells, where nothing passes through.
+    Edges are flipped to run along creases. Vertices of triangles that pass through each other go from one of three
+    `choices`, (3, v, 3), to the next, and edges around them are flipped no more. The first choice is the best; the last
+    is inside the cells, where nothing passes through.
     """
     count = choices.shape[1]
     chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(shares), dtype=bool)

@@ -13,16 +13,8 @@ def cut_into_ears(
 ) -> NDArray[np.int64]:
     """Cut a simple polygon along diagonals, best-shaped ears first: (k − 2, 3) corners; empty if it runs out of ears.
 
-    Takes cubic time in the number of corners.
-
-    Parameters
-    ----------
-    polygon : (k, 3) float
-        Corners, counter-clockwise.
-    normal : (3,) float
-        Direction from which the polygon is looked at.
-    allowed : callable, optional
-        Whether a diagonal may be made, from one corner to another; by default each may.
+    It is counter-clockwise as seen from the normal. `allowed` says whether a diagonal may be made from one corner to
+    another; by default each may. Takes cubic time in the number of corners.
 
     Examples
     --------

@@ -31,14 +31,7 @@ def flipped_along_creases(
 ) -> NDArray[np.int64]:
     """(m, 3) faces on the same vertices, with edges flipped wherever that makes the surface bend less.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float
-        Positions.
-    faces : (m, 3) int
-        A surface of which no edge has more than two faces, which agree. It stays so.
-    held : (n,) bool, optional
-        Vertices around which nothing is flipped.
+    No edge has more than two faces, which agree; it stays so. Around vertices that are held, (n,), nothing is flipped.
 
     Examples
     --------

@@ -72,16 +72,7 @@ def following_corners(offsets: NDArray[np.int64]) -> NDArray[np.int32]:
 def pair_halfedges(
     tails: NDArray[np.int64], heads: NDArray[np.int64], n_vertices: int, used: NDArray[np.bool_] | None = None
 ) -> HalfedgePairs:
-    """Find the edges of polygons and the first two halfedges of each. Takes O(n) time, hubs included.
-
-    Parameters
-    ----------
-    tails, heads : (h,) int
-        Vertices at the ends of each halfedge.
-    n_vertices : int
-        One more than the largest vertex id.
-    used : (h,) bool, optional
-        Which halfedges count; all by default.
+    """Find the edges of polygons and the first two used halfedges of each. Takes O(n) time, hubs included.
 
     Examples
     --------
@@ -102,14 +93,7 @@ def orient_faces(
 ) -> FaceOrientation:
     """Make faces agree with their neighbours across edges of two faces, in each part with the majority by area.
 
-    Parameters
-    ----------
-    pairs : HalfedgePairs
-        Which halfedges meet.
-    tails, owners : (h,) int
-        Vertex at which each halfedge begins, and its face.
-    weights : (n_faces,) float
-        How much each face is to stay as it is: its area; negative where it is rather to turn.
+    The weights, (n_faces,), say how much each face is to stay as it is: its area; negative where it is rather to turn.
 
     Examples
     --------
@@ -140,12 +124,7 @@ def orient_faces(
 def may_coincide(pairs: HalfedgePairs, tails: NDArray[np.int64], following: NDArray[np.integer]) -> bool:
     """Whether any two faces may be on the same corners: they would share an edge, and a corner next to it.
 
-    Parameters
-    ----------
-    pairs : HalfedgePairs
-        Which halfedges meet.
-    tails, following : (h,) int
-        Vertex at which each halfedge begins, and the halfedge that follows it around the face.
+    `following` is the halfedge that follows each around its face.
 
     Examples
     --------

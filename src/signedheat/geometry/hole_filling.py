@@ -18,14 +18,8 @@ def hole_fillings(
     """Triangles that fill holes of at most `MOST_SIDES` sides.
 
     A boundary loop is a hole if the faces lie outside it: an outer boundary, however short, is left open. An ear that
-    would make an edge that exists already is not cut off.
-
-    Parameters
-    ----------
-    points, normals : (n, 3) float
-        Positions; unit normals on the side from which faces run counter-clockwise.
-    faces : (m, 3) int
-        At most two faces to an edge, oriented alike except across a few edges.
+    would make an edge that exists already is not cut off. Faces run counter-clockwise as seen from their normals,
+    except across a few edges, and an edge has two of them at most.
 
     Examples
     --------

@@ -179,14 +179,8 @@ class IntrinsicMesh(Frozen):
     ) -> NDArray[np.complex128]:
         """Vectors in the layouts of some faces, as the frames of some of their edges see them.
 
-        Parameters
-        ----------
-        vectors : (k, 3), (k, 1) or (k,) complex
-            For all sides of the faces; or, where sides are given, for one of each.
-        faces : (k,) int, optional
-            All of them by default.
-        sides : (k,) int, optional
-            Which side of each face; all three by default.
+        Without `sides` there is a vector for each side of the faces, (k, 3), or one for all three, (k, 1); with them
+        one for that side of each.
         """
         turned = np.conj(self.edge_directions[faces, sides]) * vectors
         return np.where(self.reflected[faces, sides], np.conj(turned), turned)
@@ -222,21 +216,10 @@ MARGIN = 1e-14
 
 
 def mollify(lengths: NDArray[np.float64], margin: float) -> tuple[NDArray[np.float64], float]:
-    """Add one length δ to all edges, the smallest for which every triangle inequality holds with a margin.
+    """Add one length δ to all edges, (m, 3), the smallest for which every triangle inequality holds with a margin.
 
-    Parameters
-    ----------
-    lengths : (m, 3) float
-        Edge lengths of every face.
-    margin : float
-        Least ``a + b − c`` in every triangle, as a fraction of the mean length.
-
-    Returns
-    -------
-    (m, 3) float
-        The new lengths; the given array itself if δ is zero.
-    float
-        δ.
+    The margin is the least ``a + b − c`` in every triangle, as a fraction of the mean length. Returns the new lengths,
+    the given array itself if δ is zero, and δ.
 
     Examples
     --------

@@ -27,23 +27,8 @@ def closed_surface(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Marching cubes (Lewiner et al. 2003), with closed, manifold, outward-oriented output for every input.
 
-    Parameters
-    ----------
-    values : (nx, ny, nz) float
-        At ``origin + (i, j, k) * spacing``.
-    origin, spacing : (3,) float
-        Of the grid.
-    level : float
-        The level.
-    refine : callable, optional
-        Moves (n, 3) points of the level set along the edges of the grid that they lie on.
-
-    Returns
-    -------
-    vertices : (n, 3) float
-        Positions.
-    faces : (m, 3) int
-        Vertex ids, counter-clockwise as seen from the side of greater values.
+    Values are those at ``origin + (i, j, k) * spacing``. `refine` moves (n, 3) points of the level set along the edges
+    of the grid that they lie on. Faces are counter-clockwise as seen from the side of greater values.
     """
     if values.ndim != 3:
         raise GeometryError(

@@ -49,14 +49,8 @@ class CutGraph:
     ) -> NDArray[np.float64]:
         """(n,) signs s = ±1 of nodes with the least cost of edges that are cut, less Σ pull s.
 
-        Of several such signs, those with the fewest positive.
-
-        Parameters
-        ----------
-        falling, rising : (e,) float
-            Cost of an edge whose first node is positive and whose second is negative; and of the reverse.
-        pull : (n,) float
-            How much each node gains by being positive rather than neither.
+        Of several such signs, those with the fewest positive. An edge whose first node is positive and whose second is
+        negative costs `falling`, (e,), the reverse `rising`.
 
         Examples
         --------

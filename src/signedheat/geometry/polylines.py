@@ -11,12 +11,7 @@ def assemble_polylines(
 ) -> list[tuple[NDArray[np.int64], NDArray[np.bool_], bool]]:
     """Join segments end to end into polylines, which end where not exactly two segments meet.
 
-    Parameters
-    ----------
-    tails, heads : (k,) int
-        The nodes that each segment joins.
-    directed : bool
-        Whether segments keep their direction; if not, they are reversed where needed.
+    Segments join nodes. Unless they are directed they are reversed where needed.
 
     Returns
     -------

@@ -56,17 +56,10 @@ class Quadrics:
 def minimizers(
     quadrics: Quadrics, lower: NDArray[np.float64], upper: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
-    """The points of least error within boxes.
+    """The points of least error of n quadrics within boxes, whose (n, 3) corners are relative to the centres.
 
     A minimum outside of its box moves along the direction in which the error grows the least, that of a crease, until
     it is in the box; or else it is looked for again on the wall that it is beyond the farthest, up to three times.
-
-    Parameters
-    ----------
-    quadrics : Quadrics
-        n of them.
-    lower, upper : (n, 3) float
-        Corners of the boxes, relative to the centres.
 
     Returns
     -------

@@ -96,14 +96,8 @@ def best_signs(weights: NDArray[np.float64], first: NDArray[np.float64]) -> NDAr
     """(n,) signs s that make ``sᵀ W s`` large, of a dense symmetric matrix: more thorough than `signs_of`.
 
     From several starts, the groups in which signs synchronise, on all levels, are turned as long as that gains; the
-    best is taken.
-
-    Parameters
-    ----------
-    weights : (n, n) float
-        W; its diagonal does not matter.
-    first : (n,) float
-        Signs ±1 to start from, in addition to those that `signs_of` finds and those of the first two eigenvectors.
+    best is taken. It starts from `first`, from what `signs_of` finds, and from the first two eigenvectors. The diagonal
+    of W does not matter.
 
     Examples
     --------

@@ -201,10 +201,7 @@ def barycentric_on_sides(sides: NDArray[np.int64], shares: NDArray[np.float64]) 
 def crossed_sides(above: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Faces that a level set crosses, and the (k, 2) sides at which it enters and leaves: what is above is to its left.
 
-    Parameters
-    ----------
-    above, chosen : (m, 3) bool, (m,) bool
-        Whether each corner of each face is above the level; faces that are looked at.
+    Each corner of each face is above the level, (m, 3), or not; only chosen faces, (m,), are looked at.
 
     Examples
     --------

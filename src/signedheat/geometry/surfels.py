@@ -141,14 +141,8 @@ def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:
     """The edges of the triangles of surfels, with two edges in place of one where two voxels touch along it.
 
     Four surfels meet there. Surfels that face the same voxel outside share an edge, so that the surface connects the
-    two voxels inside: voxels that touch along an edge are connected.
-
-    Parameters
-    ----------
-    edges : EdgeTable
-        Of the triangles, four per surfel; edge 0 of each triangle is a side of the surfel.
-    surfels : Surfels
-        The surfels.
+    two voxels inside: voxels that touch along an edge are connected. There are four triangles per surfel; edge 0 of
+    each is a side of the surfel.
     """
     triangles = np.flatnonzero(edges.face_counts[edges.face_edges[:, 0]] > 2)
     surfel = triangles // 4

@@ -43,18 +43,11 @@ class VirtualRefinement:
 def virtual_refinement(
     vertices: NDArray[np.float64], corners: NDArray[np.int64], offsets: NDArray[np.int64]
 ) -> VirtualRefinement:
-    """Subdivide polygons into triangles.
+    """Subdivide polygons into triangles; polygon k has the vertices ``corners[offsets[k]:offsets[k + 1]]``.
 
     Triangles are not subdivided, so that results on triangle meshes are those of the triangles. A polygon so far from
-    convex that a triangle of its fan would turn over is cut along diagonals instead.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float
-        Positions.
-    corners, offsets : (c,) int, (p + 1,) int
-        Polygon k has the vertices ``corners[offsets[k]:offsets[k + 1]]``; a corner that equals the one before it is
-        skipped.
+    convex that a triangle of its fan would turn over is cut along diagonals instead. A corner that equals the one
+    before it is skipped.
 
     Examples
     --------

@@ -86,11 +86,6 @@ def coincident_faces(
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """First face on the same corners as each, and whether it runs the other way round.
 
-    Parameters
-    ----------
-    corners, offsets : int arrays
-        Vertex ids of all faces, and where those of each begin; one more offset than faces.
-
     Returns
     -------
     first : (p,) int

@@ -37,21 +37,9 @@ class Stage(NamedTuple):
 def solve_with_restarts(solve: Solve, border_forces: Forces, loads: NDArray[Any], size: float = 1.0) -> list[Stage]:
     """Solve ``A x = loads`` for columns that decay exponentially away from where the loads are.
 
-    Parameters
-    ----------
-    solve : callable
-        Solves for right-hand sides of the loads' shape.
-    border_forces : callable
-        What couples the faint rows to the others: `matrix_forces` makes it from A.
-    loads : (n, k) or (n,) float or complex
-        Right-hand sides.
-    size : float
-        About the size of A's diagonal; loads are scaled to it, so that the largest x is about one.
-
-    Returns
-    -------
-    list of Stage
-        Each covers what the ones before it are too small on.
+    `border_forces` is what couples the faint rows to the others: `matrix_forces` makes it from A. Loads are scaled to
+    `size`, about that of A's diagonal, so that the largest x is about one. Each stage covers what the ones before it
+    are too small on.
 
     Examples
     --------

@@ -60,22 +60,12 @@ def bend_around_corners(
 ) -> NDArray[np.float64]:
     """X, turned where it has come round a corner.
 
-    In flat space diffusion carries vectors along without turning them. Where the straight line to the source leaves
-    the domain, the shortest way to it is bent, and its direction is that in which undirected heat falls
-    (Crane et al. 2013). The side it is on is the one from which that heat has come.
+    In flat space diffusion carries vectors along without turning them. Where the straight line to the source leaves the
+    domain, the shortest way to it is bent, and its direction is that in which undirected heat falls (Crane et al.
+    2013). The side it is on is the one from which that heat has come.
 
-    Parameters
-    ----------
-    vectors : (n, d) float
-        X, as it has been diffused.
-    falling : (n, d) float
-        The direction in which undirected heat falls, of any length.
-    heights : (n,) float
-        Logarithm of that heat.
-    neighbors : (n, k) int
-        Cells or nodes next to each; −1 where there is none.
-    straight : (n,) bool
-        What the source reaches along a straight line: there X stays.
+    That heat falls along `falling`, of any length; `heights` are its logarithms, `neighbors`, (n, k), the cells or
+    nodes next to each or −1. What the source reaches along a straight line keeps its X.
     """
     roots = uphill_roots(heights, neighbors, straight)
     side = np.sign(np.einsum("ij,ij->i", unit(vectors), falling))[roots]

@@ -47,16 +47,7 @@ def assemble(
 ) -> sparse.csr_matrix:
     """Upper triangle of the Hermitian matrix that element matrices add up to, with its whole diagonal stored.
 
-    Parameters
-    ----------
-    unknowns : (m, 3) int
-        The three unknowns of each triangle.
-    diagonal : (m, 3) float
-        Diagonal entries of each element matrix.
-    coupling : (m, 3) float or complex
-        Entry of each element matrix in row k and column k + 1 (cyclically).
-    n : int
-        Number of unknowns.
+    `coupling`, (m, 3), is the entry of each element matrix in row k and column k + 1 (cyclically).
 
     Examples
     --------

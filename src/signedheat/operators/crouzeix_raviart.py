@@ -15,17 +15,11 @@ def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matr
 
     L is the connection Laplacian of Eq. 9, positive semidefinite here: ``2 (cot α + cot β)`` on the diagonal, α and β
     the corners of a face at the two ends of the edge, and ``−2 cot θ conj(z_fe) z_fg`` between edges e and g that meet
-    in the corner θ; ``conj(z_fe) z_fg`` is the rotation of Eq. 8. M is diagonal: a third of the area of each face.
+    in the corner θ; ``conj(z_fe) z_fg`` is the rotation of Eq. 8. M is diagonal: a third of the area of each face. No
+    face may be degenerate.
 
     Complex Hermitian (e, e) where all frames agree with their faces; otherwise, since a reflection is not a complex
     number, the real form (2e, 2e) with the real and imaginary part of each unknown in turn.
-
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        Without degenerate faces.
-    time : float
-        t, in squared units of length.
     """
     edge, z = triangles.edges.face_edges, triangles.edge_directions
     diagonal, factor = _local_entries(triangles, time, slice(None))

@@ -30,22 +30,11 @@ MOVED = 1e-4
 
 
 def surface_net(volume: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices and triangles of a smooth surface between the voxels of a set and all others, outward.
+    """Vertices and triangles, outward, of a smooth surface between the voxels of a set and all others.
 
     It is closed and manifold, and passes between the centres of any two neighbours of which one is in the set. Voxels
-    that touch along an edge are connected.
-
-    Parameters
-    ----------
-    volume : (nx, ny, nz) bool
-        True inside. Everything beyond the array is outside.
-
-    Returns
-    -------
-    vertices : (n, 3) float
-        In voxels; the centre of the first one is at 0.
-    faces : (m, 3) int
-        Counter-clockwise as seen from outside.
+    that touch along an edge are connected. Everything beyond the array is outside. Vertices are in voxels; the centre
+    of the first one is at 0.
 
     Examples
     --------

@@ -21,15 +21,6 @@ def smoothed_corners(
     Lachaud & Gueth, *Digital surface regularization with guarantees* (2021). The squares then have the lengths of the
     surface that was digitised, and neighbours agree on them; projected one by one they do not.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float
-        Corners of voxels.
-    corners : (m, 4) int
-        Vertices of each square, in order.
-    normals : (m, 3) float
-        Unit normal of each.
-
     Examples
     --------
     A step of one voxel in a slope of 45° becomes straight.

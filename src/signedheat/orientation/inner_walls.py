@@ -37,18 +37,8 @@ def inner_walls(
     is then the boundary of a solid as it is; and if the outside of the complex faces outwards and the walls of one of
     the two cells face into it, since that cell is then a cavity.
 
-    Parameters
-    ----------
-    positions : (n, 3) float
-        Of vertices.
-    pairs : HalfedgePairs
-        Which halfedges meet.
-    tails, heads, owners : (h,) int
-        Vertices at which each halfedge begins and ends, and its face.
-    normals : (p, 3) float
-        Unit normals; zero without area.
-    areas, volumes : (p,) float
-        Areas, and signed volumes of cones from the faces to one point.
+    Halfedges have tails, heads and owners, faces unit normals (zero without area), areas, and signed volumes of cones
+    to one point.
     """
     # halfedges in order of angle around their edges, and the next one after each
     n = len(normals)

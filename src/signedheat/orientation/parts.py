@@ -81,24 +81,15 @@ class PartOrientation:
 
 
 def orient_parts(parts: Parts, lines: LineCrossings, crossed: NDArray[np.int64]) -> PartOrientation:
-    """Let each part face out of the solid.
+    """Let each part face out of the solid, after the lines through them.
 
     Closed parts first face out of themselves, by the sign of their volume; so do open ones that few lines cross and
-    that are at least half of a body, by their own winding numbers. Parts that are seen from outside, closed or
-    open, then face to where they are seen from: lines enter a solid where they first meet it. A part hidden in another
-    is a body inside a body if both were given the same way round, and the wall of a cavity if not, or if a part was
-    given without a clear majority; whatever lies in a cavity is a body. Open parts that cannot be seen face so that
-    lines enter and leave in turn. The orientation that was given is a hint as far as it is right for the other parts,
-    or wrong for all of them; what bounds nothing follows it alone.
-
-    Parameters
-    ----------
-    parts : Parts
-        The parts.
-    lines : LineCrossings
-        Lines through them.
-    crossed : (k,) int
-        Part of each crossing.
+    that are at least half of a body, by their own winding numbers. Parts that are seen from outside, closed or open,
+    then face to where they are seen from: lines enter a solid where they first meet it. A part hidden in another is a
+    body inside a body if both were given the same way round, and the wall of a cavity if not, or if a part was given
+    without a clear majority; whatever lies in a cavity is a body. Open parts that cannot be seen face so that lines
+    enter and leave in turn. The orientation that was given is a hint as far as it is right for the other parts, or
+    wrong for all of them; what bounds nothing follows it alone.
     """
     found = votes(lines.starts, crossed, lines.entering, len(parts.areas))
     outward, is_clear = _outward(parts, found)

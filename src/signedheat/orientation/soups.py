@@ -90,23 +90,10 @@ def odds_at_corners(
     odds: NDArray[np.float64],
     small: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
-    """Odds that small parts face the right way, given what they touch at corners: neighbours mostly face alike.
+    """Logarithms of the odds that parts face the right way, given what small ones touch at corners: most face alike.
 
-    Parameters
-    ----------
-    corners, parts : (c,) int
-        Place of each corner of each face, and the face's part.
-    normals : (c, 3) float
-        Unit normal of the face, or zero.
-    odds : (n_parts,) float
-        Logarithms of the odds that parts face the right way.
-    small : (n_parts,) bool
-        Parts that follow others: those that do not, or that have followed some already.
-
-    Returns
-    -------
-    (n_parts,) float
-        Logarithms of the odds, those of small parts with those of what they touch.
+    Corners of faces have a place, a part and a unit normal or zero. Small parts follow others: those that do not, or
+    that have followed some already.
     """
     odds = odds.copy()
     undecided = small.copy()
@@ -143,23 +130,11 @@ def agreement(centroids: NDArray[np.float64], vectors: NDArray[np.float64]) -> f
 def disagreeing_with_neighbors(
     centroids: NDArray[np.float64], normals: NDArray[np.float64], chosen: NDArray[np.bool_], rounds: int = 4
 ) -> NDArray[np.bool_]:
-    """Which of the chosen pieces to turn so that they face as their neighbours do.
+    """(n,) which of the chosen pieces to turn so that they face as their neighbours do.
 
-    Neighbours count the less the farther they are off the piece's plane, so that the other side of a thin wall does
-    not count. Where normals scatter they are no evidence: noise turns as many one way as the other, and turning these
-    back would be a bias.
-
-    Parameters
-    ----------
-    centroids, normals : (n, 3) float
-        Where the pieces are, and unit normals; zero normals have no say.
-    chosen : (n,) bool
-        Pieces that may turn.
-
-    Returns
-    -------
-    (n,) bool
-        Pieces to turn.
+    Neighbours count the less the farther they are off the piece's plane, so that the other side of a thin wall does not
+    count. Where normals scatter they are no evidence: noise turns as many one way as the other, and turning these back
+    would be a bias. Zero normals have no say.
     """
     here = np.flatnonzero(chosen)
     if len(centroids) < 3:

@@ -51,20 +51,10 @@ def stabbing_lines(
     n_lines: int,
     n_directions: int = 16,
 ) -> LineCrossings:
-    """Cross a shape by about `n_lines` lines. The same lines every time.
+    """Cross a shape by about so many lines, through its shadows along some directions. The same lines every time.
 
-    Lines that pass between triangles which share an edge by vertex ids cross exactly one of them.
-
-    Parameters
-    ----------
-    vertices, triangles : (n, 3) float, (m, 3) int
-        The shape.
-    bounds : (2, 3) float
-        Lower and upper corner of a box around the triangles.
-    n_lines : int
-        How many lines to lay through the shape's shadows, about; many of them may miss it.
-    n_directions : int
-        How many directions the lines have.
+    Lines that pass between triangles which share an edge by vertex ids cross exactly one of them. Many may miss the
+    shape. `bounds`, (2, 3), is a box around it.
 
     Examples
     --------
@@ -97,14 +87,9 @@ def aimed_lines(
     points: NDArray[np.float64],
     n_directions: int = 4,
 ) -> LineCrossings:
-    """Cross a shape by lines through some points, along a few directions: for parts that evenly spread lines miss.
+    """Cross a shape by lines through some points, along `N_WAYS` directions: for parts that evenly spread lines miss.
 
-    Parameters
-    ----------
-    vertices, triangles, bounds
-        As for `stabbing_lines`.
-    points : (p, 3) float
-        Where lines are to pass; all along the first direction come first.
+    All lines along the first direction come first.
 
     Examples
     --------

@@ -40,16 +40,7 @@ class Votes:
 
 
 def votes(starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], n_parts: int) -> Votes:
-    """Count the votes of all crossings.
-
-    Parameters
-    ----------
-    starts : (n_lines + 1,) int
-        Where the crossings of each line begin.
-    parts, entering : (k,) int, (k,) bool
-        Part that is crossed, and whether its normal points to where the line comes from.
-    n_parts : int
-        Number of parts.
+    """Count the votes of all crossings: the parts crossed along lines, and whether lines come from where normals point.
 
     Examples
     --------
@@ -68,12 +59,8 @@ def containers(
 ) -> NDArray[np.int64]:
     """(k,) part within which each crossing lies: of those that the line is in, the one it entered last; −1 for none.
 
-    Parameters
-    ----------
-    starts, parts, entering
-        As for `votes`, each part facing out of itself.
-    bounding : (n_parts,) bool
-        Parts that have an inside. They count on lines that enter them as often as they leave them.
+    Each part faces out of itself. Only `bounding` parts, (n_parts,), have an inside. They count on lines that enter
+    them as often as they leave them.
 
     Examples
     --------
@@ -168,13 +155,6 @@ def _containers(
 
 def imbalance(starts: NDArray[np.int64], entering: NDArray[np.bool_]) -> float:
     """Share of the crossings of lines that enter a shape without leaving it, or the other way round; 0 if it is closed.
-
-    Parameters
-    ----------
-    starts : (n_lines + 1,) int
-        Where the crossings of each line begin.
-    entering : (k,) bool
-        Whether the line comes from the side to which the normal points.
 
     Examples
     --------

@@ -107,17 +107,7 @@ def continuation(
 
     Across an opening of width W a surface that meets the flat lid at angle β must turn by 2 sin β, the chord of a
     circle; if its curvature towards the rim is k, it would turn by k W. On a ball both are the same, on a box k is 0.
-
-    Parameters
-    ----------
-    lid : Lid
-        The flat one.
-    samples : Samples
-        Of the surface behind it.
-    patches : (n,) int
-        Smooth patch that ends at each place of the rim.
-    width : float
-        Of the opening.
+    The samples are of the surface behind the flat lid; at each place of the rim the smooth patch `patches` ends.
 
     Returns
     -------

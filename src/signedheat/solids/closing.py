@@ -18,15 +18,7 @@ from .rims import loops, meeting_edges, open_edges
 def lids_of(
     triangles: NDArray[np.float64], ids: NDArray[np.int64], parts: NDArray[np.int64], vertices: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:
-    """(k, 3, 3) corners of the triangles of each lid that closes a rim of oriented parts.
-
-    Parameters
-    ----------
-    triangles, ids, parts : (m, 3, 3) float, (m, 3) int, (m,) int
-        Corners of the faces, their vertices, and the part that each is of.
-    vertices : (n, 3) float
-        Positions.
-    """
+    """(k, 3, 3) corners of the triangles of each lid that closes a rim of oriented parts."""
     edges, owners = open_edges(ids, parts)
     order = np.argsort(parts, kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(parts))])

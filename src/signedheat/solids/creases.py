@@ -40,14 +40,8 @@ def creased(loop: NDArray[np.float64], normals: NDArray[np.float64]) -> Lid | No
 
     Sides of the rim that lie in a plane are closed in that plane: by a straight crease, if what comes before them and
     after them lies in one plane with their ends; three such runs by creases to the place where their planes meet. So
-    sides of a box come back with the edge or the corner where they met. No face is folded back over the surface.
-
-    Parameters
-    ----------
-    loop : (n, 3) float
-        Points around the opening.
-    normals : (n, 3) float
-        Unit normals of the surface at the edges that begin there; 0 where they are not clear.
+    sides of a box come back with the edge or the corner where they met. No face is folded back over the surface. The
+    unit normals are those of the surface at the edges that begin at each point; 0 where they are not clear.
     """
     sides = _sides(loop, normals)
     polygons: list[NDArray[np.float64]] = []

@@ -44,18 +44,8 @@ AHEAD = 0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5
 def placed(offset: Offset, grid: Grid, cells: DualCells, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3, v, 3) where the vertex of each piece of a level may be, in cells: at best; within its cell; at its middle.
 
-    At best it is on a crease or corner, even where the level goes beyond the cell without crossing its edges.
-
-    Parameters
-    ----------
-    offset : Offset
-        What.
-    grid : Grid
-        Where.
-    cells : DualCells
-        Its cells.
-    points : (e, 3) float
-        Where the crossed edges are crossed.
+    At best it is on a crease or corner, even where the level goes beyond the cell without crossing its edges. The (e,
+    3) points are where the level crosses edges of the grid.
     """
     count = len(cells.owners)
     vertices, middles, wider = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))

@@ -64,23 +64,8 @@ def given_surface(
 ) -> tuple[TriangleMesh, NDArray[np.float64]]:
     """Triangles of a solid with the inside on one side, turned to have it behind them, joined into a closed mesh.
 
-    Of faces that lie in each other, where bodies overlap, one is taken.
-
-    Parameters
-    ----------
-    solid : Solid
-        What.
-    contour : callable
-        Makes the surface that is taken where triangles do not join.
-    cell : float
-        Size of its cells.
-
-    Returns
-    -------
-    surface : TriangleMesh
-        Closed.
-    contoured : (k, 3) float
-        Middles of the places where the contour was taken.
+    Of faces that lie in each other, where bodies overlap, one is taken. Where triangles do not join, the surface of
+    `contour`, with cells of this size, takes their place; the middles of such places, (k, 3), are returned, too.
 
     Raises
     ------

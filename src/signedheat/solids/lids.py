@@ -228,25 +228,12 @@ def plate(
     """A lid bent as a thin plate whose shape at rest is as curved as the surface behind its rim (Helfrich 1973).
 
     ``min Σ c_v |(L x)_v − m_v κ_v n_v − Σ_e ½ |e| g_e|² / m_v``, with c = 1 but at hinges of the rim. L is the
-    cotangent Laplacian, m the areas of vertices, κ twice the mean curvature at the rim and harmonic inside, and g_e =
-    e × n / |e × n| the direction across the edge e of the rim in the plane with the normal n: where the surface goes
-    on smoothly, ∂x/∂g = g there. Spheres and cylinders go on as they are. Each round takes m, L and n from the last.
+    cotangent Laplacian, m the areas of vertices, κ twice the mean curvature at the rim and harmonic inside, and g_e = e
+    × n / |e × n| the direction across the edge e of the rim in the plane with the normal n: where the surface goes on
+    smoothly, ∂x/∂g = g there. Spheres and cylinders go on as they are. Each round takes m, L and n from the last.
+    Normals, curvatures and held, which is c at the rim, are those of `continuation`.
 
-    Parameters
-    ----------
-    lid : Film
-        To begin with.
-    normals : (n, 3) float
-        Unit normals of the surface at the rim.
-    curvatures : (n,) float
-        Sums of its principal curvatures there, positive on a ball.
-    held : (n,) float
-        c at the rim: 0 at a hinge, 1 where it is clamped.
-
-    Returns
-    -------
-    Film or None
-        None where it does not come to rest, as on rims in tatters, where nothing is smooth.
+    None where it does not come to rest, as on rims in tatters, where nothing is smooth.
     """
     n = lid.n_rim
     if n == len(lid.vertices):

@@ -94,12 +94,7 @@ def fragments(
 ) -> list[NDArray[np.int64]]:
     """Triangles of each cluster of loose pieces, with the open parts that these were torn from.
 
-    Parameters
-    ----------
-    triangles, labels : (m, 3, 3) float, (m,) int
-        Corners, and the part that each is of.
-    loose, opened : (p,) bool
-        Parts that bound nothing by themselves; and those that do, and have rims.
+    Loose parts bound nothing by themselves; opened ones do, and have rims.
     """
     pieces, some = loose.copy(), np.flatnonzero((loose | opened)[labels])
     for cluster in clusters_of(triangles[some], labels[some]) if opened.any() else []:

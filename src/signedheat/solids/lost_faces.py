@@ -31,18 +31,8 @@ TOGETHER = 4096
 def lost_faces(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """(k, 3) triangles that close the small holes of a surface whose faces agree with their neighbours.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float
-        Positions, each there once.
-    faces : (m, 3) int
-        Triangles on three vertices each.
-
-    Returns
-    -------
-    (k, 3) int
-        Triangles between the same vertices, oriented as the others. They close holes of at most `MOST_SIDES` sides
-        across which the surface goes on.
+    They are between the same vertices and oriented as the others, and close holes of at most `MOST_SIDES` sides across
+    which the surface goes on.
 
     Examples
     --------

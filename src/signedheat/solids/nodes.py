@@ -53,20 +53,9 @@ class Tile:
 def distances_in(
     tree: FaceTree, windings: Windings, grid: Grid, first: NDArray[np.int64], places: NDArray[np.int64]
 ) -> Tile:
-    """Signed distances at the nodes of blocks, all within `TILE` nodes of each other.
+    """Signed distances at the nodes of blocks of a grid, all within `TILE` nodes of each other.
 
-    Parameters
-    ----------
-    tree : FaceTree
-        What to measure to.
-    windings : Windings
-        Decides what is inside.
-    grid : Grid
-        Whose nodes.
-    first : (3,) int
-        First node of the box.
-    places : (n, 3) int
-        First nodes of the blocks, divided by `SIDE`.
+    `first` is the first node of the box around them; `places` are the first nodes of the blocks, divided by `SIDE`.
     """
     shape = np.minimum((places.max(axis=0) + 1) * SIDE, grid.shape) - first
     squares, faces = np.full(tuple(shape), np.nan), np.full(tuple(shape), -1, dtype=np.int32)

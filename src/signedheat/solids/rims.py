@@ -23,13 +23,6 @@ def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDAr
     Two faces that run along an edge in opposite directions cancel. If k more faces run along it in one direction than
     in the other, the edge is listed k times. As many of these edges begin at each vertex as end there.
 
-    Parameters
-    ----------
-    faces : (m, 3) int
-        Vertices, one number for each position.
-    parts : (m,) int
-        The part that each face is of.
-
     Returns
     -------
     edges : (k, 2) int
@@ -60,11 +53,6 @@ def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray
 
     Edges with the same ends are no pairs: if there are three or more faces, it is unclear which belong together.
 
-    Parameters
-    ----------
-    ends : (n, 2, 3) float
-        Tails and heads.
-
     Examples
     --------
     >>> one, other = [[0, 0, 0], [1, 0, 0]], [[0.8, 0.01, 0], [0.3, 0.02, 0]]
@@ -88,12 +76,9 @@ def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray
 
 
 def loops(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Closed loops of vertices, none of which passes a vertex twice, that run along all directed edges.
+    """Closed loops of vertices, none of which passes a vertex twice, that run along all of the directed edges.
 
-    Parameters
-    ----------
-    edges : (k, 2) int
-        Tail and head; as many leave each vertex as arrive there.
+    As many edges leave each vertex as arrive there.
 
     Examples
     --------

@@ -18,18 +18,9 @@ SHARP = np.deg2rad(30.0)
 def training_points(
     surface: TriangleMesh, n: int, normalize: bool = False, seed: int = 0
 ) -> tuple[dict[str, NDArray[np.float32]], dict[str, NDArray[np.float32]]]:
-    """Points of each kind, in single precision: those on the surface, and those around it with signed distances.
+    """n points of each kind, in single precision: those on a closed surface, and those around it with signed distances.
 
-    Parameters
-    ----------
-    surface : TriangleMesh
-        Closed.
-    n : int
-        Points of each kind.
-    normalize : bool
-        Move and scale the shape into the unit sphere.
-    seed : int
-        Of the random numbers.
+    To normalize is to move and scale the shape into the unit sphere.
 
     Returns
     -------

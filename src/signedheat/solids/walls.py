@@ -26,11 +26,6 @@ opening: holes two fifths as wide as a hollow ball have .04, a cup .2, a bowl .5
 def wall_ends(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """(k, 3) vertices of triangles between rims that run opposite ways, near each other all around.
 
-    Parameters
-    ----------
-    vertices, faces : (n, 3) float, (m, 3) int
-        Positions, and oriented faces, with one number for each position.
-
     Examples
     --------
     >>> outside = np.array([[0, 0, 0], [9, 0, 0], [9, 9, 0], [0, 9, 0]])

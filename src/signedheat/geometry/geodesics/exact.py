@@ -44,24 +44,13 @@ def distance_to_zero_line(
 ) -> tuple[NDArray[np.float64], int]:
     """Distance of every vertex to the zero set of a function that is linear in every face; and the number of windows.
 
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        Any surface, nonmanifold and nonorientable ones too.
-    values : (n,) float
-        The function at the vertices; faces with a NaN corner contain no part of the zero set.
-    tolerance : float
-        Windows are merged where that changes distances by less than this fraction of the edge; 0 is exact.
-    report : callable, optional
-        Called between short stretches of work; an exception that it raises ends the search.
+    Any surface will do, nonmanifold and nonorientable ones too. Faces with a NaN corner contain no part of the zero
+    set. Windows are merged where that changes distances by less than `tolerance` of the edge; 0 is exact. `report` is
+    called between short stretches of work; an exception that it raises ends the search.
 
-    Returns
-    -------
-    (n,) float
-        inf where the zero set is not connected to the vertex.
-    int
-        Number of windows, a measure of the work. If it is as large as `window_limit`, the search was cut short, and
-        some distances are lengths of paths that run along edges from where it ended.
+    Distances are inf where the zero set is not connected to the vertex. The number of windows is a measure of the work:
+    if it is as large as `window_limit`, the search was cut short, and some distances are lengths of paths that run
+    along edges from where it ended.
     """
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
     return distance_to_segments(triangles, [zero_line(triangles, values)], tolerance, report)

@@ -27,18 +27,9 @@ from .path_kernels import shortest_lines
 def join(
     triangles: IntrinsicMesh, located: LocatedPoints, start: NDArray[np.int64], end: NDArray[np.int64], name: str
 ) -> tuple[LocatedPoints, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Join starts to ends, by geodesic paths where the two share no face, as segments that lie in one face each.
+    """Join pairs of points, by geodesic paths where the two share no face, as segments that lie in one face each.
 
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        The surface.
-    located : LocatedPoints
-        (n,) points.
-    start, end : (k,) int
-        Pairs of them to join.
-    name : str
-        What the points belong to, for messages.
+    `name` is what the points belong to, for messages.
 
     Returns
     -------
@@ -71,20 +62,12 @@ def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> NDAr
 def geodesic_paths(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
 ) -> tuple[LocatedPoints, NDArray[np.int64]]:
-    """Points at which the shortest paths between starts and ends cross edges or pass vertices.
+    """Points at which the shortest paths between k starts and ends cross edges or pass vertices.
 
     Paths are locally shortest: none becomes shorter by passing a vertex on its other side. The first guess is the
     shortest path through midpoints of edges; its faces are unfolded, the shortest path inside them is found (funnel
-    algorithm), and wherever it bends around a vertex the other side is tried.
-
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        The surface.
-    start, end : LocatedPoints
-        (k,) the points to join.
-    name : str
-        What the points belong to, for messages.
+    algorithm), and wherever it bends around a vertex the other side is tried. `name` is what the points belong to, for
+    messages.
 
     Returns
     -------

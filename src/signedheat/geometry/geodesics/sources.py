@@ -216,17 +216,7 @@ class PlacedSegments:
 
 
 def zero_line(triangles: IntrinsicMesh, values: NDArray[np.float64], among: Mask | None = None) -> PlacedSegments:
-    """The zero set of a function that is linear in every face, zero at no vertex; NaN where it is not known.
-
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        Any surface.
-    values : (n,) float
-        The function at the vertices.
-    among : (m,) bool, optional
-        Faces whose part of the zero set is wanted.
-    """
+    """Zero set, within faces `among`, of a function linear in faces: zero at no vertex, NaN where it is not known."""
     here = values[triangles.corner_vertices]
     faces, sides = crossed_sides(here > 0, ~np.isnan(here).any(axis=1) & (True if among is None else among))
     edges = triangles.edges.face_edges[faces[:, None], sides]

@@ -28,29 +28,11 @@ def coinciding(
     order: NDArray[np.int64],
     n_vertices: int,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Group vertices that nearly coincide.
+    """Group vertices that nearly coincide: the first vertex of the group of each, or −1.
 
-    Edges join vertices into ever larger groups, shortest first (Kruskal). A group is kept if the lengths of the edges
-    that made it sum to less than `NEARNESS` times the length of the next edge that leaves it; of nested groups the
-    largest is kept.
-
-    Parameters
-    ----------
-    tail, head : (e,) int
-        Vertices of the edges.
-    length : (e,) float
-        Their lengths.
-    order : (e,) int
-        The edges, short ones first.
-    n_vertices : int
-        Number of vertices.
-
-    Returns
-    -------
-    (n,) int
-        The first vertex of the group, or −1.
-    (n,) float
-        At that vertex, the total length of the edges that made the group, a bound on its diameter.
+    Edges join vertices into ever larger groups, in an order from short to long ones (Kruskal). A group is kept if the
+    lengths of the edges that made it sum to less than `NEARNESS` times the length of the next edge that leaves it; of
+    nested groups the largest is kept. This sum, a bound on the diameter, is returned at its first vertex.
     """
     parent, node = np.arange(n_vertices), np.arange(n_vertices)
     first, second = np.full(2 * n_vertices, -1), np.full(2 * n_vertices, -1)

@@ -32,24 +32,11 @@ from .delaunay import flip_all, glue, lay_out
 def refine_to_conform(
     triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
 ) -> tuple[IntrinsicMesh, list[list[CurveSegments]]]:
-    """Cut faces wherever an unoriented curve crosses them, and put vertices at isolated points.
+    """Cut faces wherever an unoriented curve crosses them, and put vertices at isolated points; sources on the result.
 
     All other segments in a face that is cut, or on an edge that is split, become edges too; other faces and segments
     stay as they are. Edges of the cut faces that no segment uses are then flipped to Delaunay, which removes slivers.
-
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        The surface.
-    groups : sequence of sequences of CurveSegments
-        The sources, as segments.
-
-    Returns
-    -------
-    triangles : IntrinsicMesh
-        The old vertices first, then new ones; the very same object if nothing had to be cut.
-    groups : list of lists of CurveSegments
-        The sources on these triangles.
+    The old vertices come first; nothing to cut gives the very same triangles.
     """
     parts = [part for group in groups for part in group]
     if all(part.is_conforming for part in parts):

@@ -222,18 +222,9 @@ def memory_estimate(n_triangles: int) -> float:
 
 
 def refuse_too_many(triangles: int, count: int, elements: str, more: float = 0.0) -> None:
-    """Raise `MemoryLimitError` if distance on so many triangles does not fit into memory.
+    """Raise `MemoryLimitError` if distance on so many triangles, and `more` bytes, do not fit into memory.
 
-    Parameters
-    ----------
-    triangles : int
-        Their number.
-    count : int
-        The number of elements of the domain that they stand for: triangles, polygons, points, faces of voxels.
-    elements : str
-        What these are called.
-    more : float
-        Bytes that are needed besides.
+    They stand for a `count` of elements of the domain: triangles, polygons, points, faces of voxels.
     """
     each = triangles / max(count, 1)
     refuse_beyond_memory(

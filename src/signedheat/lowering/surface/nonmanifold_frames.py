@@ -21,21 +21,7 @@ def nonmanifold_frames(
     Heat that leaves one face through such an edge enters all the others. The frame of the edge distinguishes its first
     face from the others, so the first must be the face that heat comes from: vectors that pass between two of the
     others would be reflected. Edges whose ends are nearer than every opposite corner, which heat passes or runs along,
-    keep their first face.
-
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        The surface.
-    groups : sequence of sequences of CurveSegments
-        The sources on it.
-
-    Returns
-    -------
-    IntrinsicMesh
-        The triangles with the new first faces; the same object if none changes.
-    sequence of sequences of CurveSegments
-        The sources in the new frames.
+    keep their first face. Where none changes, the same triangles are returned.
 
     Examples
     --------

@@ -294,15 +294,8 @@ def free_end_arcs(
     Directions are given by their angle from the curve, measured the shortest way around the vertex. Behind the end are
     those at a quarter of the total angle or more; at boundary and nonmanifold vertices, at a right angle or more.
 
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        The surface.
-    edges, vertices : (k,) int
-        Last edge of each curve, and the vertex at which it ends.
-    least : float
-        The weight of an end is the length of its last edge, but at least this: subdividing a curve into short edges
-        must not make its ends vanish. (The published code has no least weight.)
+    Curves end with an edge at a vertex. The weight of an end is the length of that edge, but at least `least`:
+    subdividing a curve into short edges must not make its ends vanish. (The published code has no least weight.)
 
     Returns
     -------

@@ -108,16 +108,11 @@ class VectorHeat:
 
 
 def extrapolated(columns: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """(m,) directions without the errors of Y that go like the `EXPONENTS` of t, from X and its change with t.
+    """(m,) directions without the errors of Y that go like the `EXPONENTS` of t, from (m, 3) columns X, R X and R² X.
 
     With ``D = t d/dt``, Richardson's extrapolation in the limit of equal times is ``Π (1 − D/e) Y`` over the exponents
     e: it keeps what does not depend on t, and takes ``t^e`` to zero. For ``R = (M + tL)⁻¹ M``, since ``tL = (M + tL) −
     M``, ``D X = R X − X`` and ``D² X = X − 3 R X + 2 R² X``; those of Y follow from the angle θ of X = exp(ρ + iθ).
-
-    Parameters
-    ----------
-    columns : (m, 3) complex
-        X, R X and R² X on each cell.
 
     Examples
     --------

@@ -30,26 +30,10 @@ def block_contour(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Marching cubes (Lewiner et al. 2003) in the cells whose nodes all have a value: closed where those around do.
 
-    Neighbouring windows share nodes, and so find the same points on the edges between them; these become one. Where
-    the level set leaves the grid it is closed along the walls, `CAP` cells outside.
-
-    Parameters
-    ----------
-    values : BlockValues
-        Values at the nodes of a sparse grid.
-    spacing : (3,) float
-        Distance between nodes.
-    level : float
-        Which.
-    refine : callable, optional
-        Moves (n, 3) points, in cells, along the edges of the grid that they lie on.
-
-    Returns
-    -------
-    vertices : (n, 3) float
-        In cells from the first node.
-    faces : (m, 3) int
-        Counter-clockwise as seen from the side of greater values.
+    Neighbouring windows share nodes, and so find the same points on the edges between them; these become one. Where the
+    level set leaves the grid it is closed along the walls, `CAP` cells outside. `refine` moves (n, 3) points, in cells,
+    along the edges of the grid that they lie on. Vertices are in cells from the first node on, faces counter-clockwise
+    as seen from the side of greater values.
 
     Raises
     ------

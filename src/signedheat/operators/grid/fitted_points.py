@@ -28,16 +28,7 @@ def fitted_to_points(
     Near the zero set φ becomes the weighted mean of ``½ (n_i + n) · (x − p_i)`` over the nearest points, n the weighted
     mean of their normals. The plane of a point lies on one side of a curved surface, and the plane through it with the
     normal at x on the other: half the sum of both has no error of second order. Points that face against ∇φ do not
-    count, so that the two sides of a thin wall stay apart.
-
-    Parameters
-    ----------
-    phi : (nx, ny, nz) float
-        Values at the nodes.
-    steps : (3,) float
-        Distance between nodes.
-    points, normals : (n, 3) float
-        Positions from the first node on, and unit normals.
+    count, so that the two sides of a thin wall stay apart. Positions are from the first node on.
 
     Examples
     --------

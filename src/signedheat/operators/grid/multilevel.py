@@ -85,21 +85,8 @@ def diffuse_multilevel(
 ) -> list[Level]:
     """Solve ``(1 − tΔ) X = B``, Eq. 12 on a grid, on every level from `finest` (0: the sources' grid) to the coarsest.
 
-    Parameters
-    ----------
-    sources : NodeSources
-        B.
-    time : callable
-        Diffusion time t on a grid of a given mean spacing.
-    finest : int
-        Number of levels to skip, where a coarser solution suffices.
-    rounds : int
-        How often each combination of sweep directions is used within a band.
-
-    Returns
-    -------
-    list of Level
-        One for each grid of the hierarchy, finest first.
+    `time` is the diffusion time t on a grid of a given mean spacing. Where a coarser solution suffices, some of the
+    finest levels are skipped. Each combination of sweep directions is used so many rounds within a band.
     """
     levels: list[Level] = []
     guess = None

@@ -95,14 +95,7 @@ def zero_contour(
 ) -> Contour:
     """The zero set of an array with one to four axes; zero counts as positive. On four it is smooth, without triangles.
 
-    Parameters
-    ----------
-    values : array
-        At least two nodes along each axis.
-    steps : (4,) float
-        Distance between nodes; 1 along unused axes.
-    solid : (*values.shape) bool, optional
-        Nodes without a value: only crossings between two others count.
+    Steps along unused axes are 1. Solid nodes have no value: only crossings between two others count.
     """
     unused = 4 - values.ndim
     field = np.ascontiguousarray(values).reshape(padded_shape(values.shape))
