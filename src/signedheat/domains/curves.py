@@ -74,10 +74,8 @@ class Curve(Frozen):
                 f"a curve needs at least two points, not {len(ids)}",
                 remedy="use SurfacePoints for isolated points",
             )
-        object.__setattr__(self, "faces", ids)
-        object.__setattr__(self, "barycentric", weights)
-        object.__setattr__(self, "closed", flag(closed, "closed"))
-        object.__setattr__(self, "oriented", flag(oriented, "oriented"))
+        closed, oriented = flag(closed, "closed"), flag(oriented, "oriented")
+        vars(self).update(faces=ids, barycentric=weights, closed=closed, oriented=oriented)
         if normals is not None:
             normals = finite_rows(normals, "curve normals", 3, SourceError)
             if len(normals) != self.n_segments:
@@ -86,7 +84,7 @@ class Curve(Frozen):
                     "they belong to segments, not to points",
                     element="normals",
                 )
-        object.__setattr__(self, "normals", normals)
+        vars(self).update(normals=normals)
 
     @property
     def n_points(self) -> int:
@@ -145,12 +143,8 @@ class SurfacePoints(Frozen):
     def __init__(self, faces: ArrayLike, barycentric: ArrayLike) -> None:
         ids, weights = surface_points(faces, barycentric, "point source")
         if not len(ids):
-            raise SourceError(
-                "there is no point",
-                remedy="pass at least one",
-            )
-        object.__setattr__(self, "faces", ids)
-        object.__setattr__(self, "barycentric", weights)
+            raise SourceError("there is no point", remedy="pass at least one")
+        vars(self).update(faces=ids, barycentric=weights)
 
     @property
     def n_points(self) -> int:

@@ -83,7 +83,7 @@ class DigitalSurface(Displayed, Surface):
         solid = array.astype(bool)
         if not solid.any():
             raise GeometryError("the volume holds no voxel: every entry is False", element="volume")
-        steps = positive_steps(spacing, "spacing", 3)
+        steps = positive_steps(spacing, 3)
         start = numbers(origin, "origin")
         if start.shape != (3,) or not np.isfinite(start).all():
             raise GeometryError(
@@ -96,10 +96,7 @@ class DigitalSurface(Displayed, Surface):
             extent = max(step * (span[-1] - span[0] + 1) for step, span in zip(steps, spans, strict=True))
             radius = 0.4 * float(np.sqrt(steps.max() * extent))
         radius = finite_number(radius, "radius", 0, GeometryError)
-        object.__setattr__(self, "volume", frozen(solid))
-        object.__setattr__(self, "spacing", steps)
-        object.__setattr__(self, "origin", frozen(start))
-        object.__setattr__(self, "radius", radius)
+        vars(self).update(volume=frozen(solid), spacing=steps, origin=frozen(start), radius=radius)
 
     @cached_property
     def surfels(self) -> Surfels:

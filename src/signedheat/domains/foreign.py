@@ -29,48 +29,36 @@ class HasVertices(Protocol):
     """A `trimesh.Trimesh` or `trimesh.PointCloud`, seen by a type checker."""
 
     @property
-    def vertices(self) -> object:
-        """Positions."""
-
+    def vertices(self) -> object: ...
     @property
-    def metadata(self) -> object:
-        """Whatever belongs to it."""
+    def metadata(self) -> object: ...
 
 
 class HasGeometry(Protocol):
     """A `trimesh.Scene`, seen by a type checker."""
 
     @property
-    def geometry(self) -> object:
-        """Its meshes, by name."""
-
+    def geometry(self) -> object: ...
     @property
-    def graph(self) -> object:
-        """Where they are."""
+    def graph(self) -> object: ...
 
 
 class HasPointData(Protocol):
     """A `meshio.Mesh` or an object of PyVista, seen by a type checker."""
 
     @property
-    def points(self) -> object:
-        """Positions."""
-
+    def points(self) -> object: ...
     @property
-    def point_data(self) -> object:
-        """Arrays at the points, by name."""
+    def point_data(self) -> object: ...
 
 
 class HasTriangles(Protocol):
     """An `open3d.geometry.TriangleMesh`, seen by a type checker."""
 
     @property
-    def vertices(self) -> object:
-        """Positions."""
-
+    def vertices(self) -> object: ...
     @property
-    def triangles(self) -> object:
-        """Vertex ids."""
+    def triangles(self) -> object: ...
 
 
 SurfaceShape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud

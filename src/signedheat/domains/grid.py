@@ -115,14 +115,13 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
             raise GeometryError(
                 f"a grid needs at least 2 nodes along every axis, not {counts.tolist()}", element="shape"
             )
-        steps = positive_steps(spacing, "spacing", len(corner))
+        steps = positive_steps(spacing, len(corner))
         last = corner + steps * (counts.astype(np.float64) - 1)
         refuse_extreme(np.minimum(corner, last), last, "nodes")
         refuse_lost_spacing(steps, corner, last)
-        object.__setattr__(self, "origin", frozen(corner))
-        object.__setattr__(self, "spacing", steps)
-        object.__setattr__(self, "shape", tuple(int(n) for n in counts))
-        object.__setattr__(self, "mask", None if mask is None else _solid_nodes(mask, self.shape))
+        nodes = tuple(int(n) for n in counts)
+        solid = None if mask is None else _solid_nodes(mask, nodes)
+        vars(self).update(origin=frozen(corner), spacing=steps, shape=nodes, mask=solid)
 
     @classmethod
     def around(
@@ -167,13 +166,10 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
             padding = finite_number(padding, "padding", 0, GeometryError)
         room = room_around(box) if padding is None else float(padding)
         if not longest + 2 * room > 0:
-            raise GeometryError(
-                "the shape is a single point",
-                remedy="give a padding or a grid",
-            )
+            raise GeometryError("the shape is a single point", remedy="give a padding or a grid")
         if spacing is None:
             spacing = (longest + 2 * room) / (whole_number(resolution, "resolution", 2) - 1)
-        steps = positive_steps(spacing, "spacing", len(lower))
+        steps = positive_steps(spacing, len(lower))
         cells = np.maximum(1, np.ceil((upper - lower + 2 * room) / steps - 1e-9))
         if not (cells < 2**62).all():
             raise MemoryLimitError(

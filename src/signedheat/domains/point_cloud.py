@@ -101,10 +101,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
             sizes = frozen(sizes)
         if whole_number(n_neighbors, "n_neighbors", 0) < 3:
             raise GeometryError(f"neighbourhoods need at least 3 points, not {n_neighbors}", element="n_neighbors")
-        object.__setattr__(self, "points", positions)
-        object.__setattr__(self, "normals", directions)
-        object.__setattr__(self, "areas", sizes)
-        object.__setattr__(self, "n_neighbors", int(n_neighbors))
+        vars(self).update(points=positions, normals=directions, areas=sizes, n_neighbors=int(n_neighbors))
 
     @classmethod
     def _of(cls, elements: Elements) -> PointCloud:

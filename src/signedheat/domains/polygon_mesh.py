@@ -81,9 +81,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
                 f"polygon {first} names vertex {corners[outside[0]]}, but vertex ids go from 0 to {len(positions) - 1}",
                 element=f"polygon {first}",
             )
-        object.__setattr__(self, "vertices", positions)
-        object.__setattr__(self, "corners", frozen(corners))
-        object.__setattr__(self, "offsets", frozen(offsets))
+        vars(self).update(vertices=positions, corners=frozen(corners), offsets=frozen(offsets))
 
     @classmethod
     def _of(cls, elements: Elements) -> PolygonMesh:

@@ -60,8 +60,7 @@ class Polyline(Displayed, Frozen):
             raise GeometryError(
                 f"the polyline has no length: its {len(positions)} points are the same", element="points"
             )
-        object.__setattr__(self, "points", positions)
-        object.__setattr__(self, "closed", closed)
+        vars(self).update(points=positions, closed=closed)
 
     @classmethod
     def from_mask(cls, mask: ArrayLike, origin: ArrayLike = (0.0, 0.0), spacing: ArrayLike = 1.0) -> list[Polyline]:
@@ -94,7 +93,7 @@ class Polyline(Displayed, Frozen):
                 f"a mask is a boolean image with something True in it, not {inside.dtype} of shape {inside.shape}",
                 remedy="compare the image with a threshold first",
             )
-        steps = positive_steps(spacing, "spacing", 2)
+        steps = positive_steps(spacing, 2)
         start = coordinates(np.atleast_2d(numbers(origin, "origin")), "origin", 2)[0]
         padded = np.pad(inside, 1)
         lines = level_lines(np.float64(0.5) - padded.astype(np.float64), start - steps, steps, 0.0)

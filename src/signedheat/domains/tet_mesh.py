@@ -78,9 +78,7 @@ class TetMesh(Displayed, Frozen):
         if len(inside_out):
             ids = ids.copy()
             ids[inside_out] = ids[inside_out][:, [0, 1, 3, 2]]
-        object.__setattr__(self, "vertices", positions)
-        object.__setattr__(self, "tets", frozen(ids))
-        object.__setattr__(self, "reoriented", frozen(inside_out))
+        vars(self).update(vertices=positions, tets=frozen(ids), reoriented=frozen(inside_out))
 
     @property
     def n_vertices(self) -> int:

@@ -51,11 +51,11 @@ def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryEr
         raise error(f"{name} must be real numbers, not {_described(array)}", element=name) from None
 
 
-def contiguous(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.float64]:
+def contiguous(values: object, name: str) -> NDArray[np.float64]:
     """`values` as a float64 array of any shape, copied only if it is none yet."""
     if isinstance(values, np.ndarray) and values.dtype == np.float64 and not np.ma.isMaskedArray(values):
         return np.ascontiguousarray(values)
-    return numbers(values, name, error)
+    return numbers(values, name)
 
 
 def whole_numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.int64]:
@@ -171,18 +171,14 @@ def finite_number(
     if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:  # type: ignore[arg-type]
         described = _described(value) if isinstance(value, np.ndarray) else " ".join(f"{value!r:.60}".split())
         raise error(f"{name} must be a number, not {described}", element=name)
-    number = _float(value)
+    try:
+        number = float(value)
+    except (OverflowError, TypeError, ValueError):
+        number = math.nan
     if not (np.isfinite(number) and number >= least):
         wanted = "finite" if least == -np.inf else "finite and not negative" if least == 0 else f"at least {least:g}"
         raise error(f"{name} must be {wanted}, not {number:g}", element=name)
     return number
-
-
-def _float(value: Real | NDArray[Any]) -> float:
-    try:
-        return float(value)
-    except (OverflowError, TypeError, ValueError):
-        return math.nan
 
 
 def positive_number(value: object, name: str, error: type[SignedHeatError] = SignedHeatError) -> float:
@@ -218,14 +214,14 @@ def flag(value: object, name: str) -> bool:
     return bool(value)
 
 
-def positive_steps(values: object, name: str, count: int) -> NDArray[np.float64]:
-    """`values`, one positive number for all axes or one for each, as one for each."""
-    steps = numbers(values, name)
+def positive_steps(values: object, count: int) -> NDArray[np.float64]:
+    """A spacing, one positive number for all axes or one for each, as one for each."""
+    steps = numbers(values, "spacing")
     if steps.shape not in ((), (count,)) or not (np.isfinite(steps).all() and (steps > 0).all()):
         raise GeometryError(
-            f"{name} must be positive and finite, one number or {count}, not {steps.tolist()}", element=name
+            f"spacing must be positive and finite, one number or {count}, not {steps.tolist()}", element="spacing"
         )
-    refuse_extreme(0 * steps, steps, name)
+    refuse_extreme(0 * steps, steps, "spacing")
     return frozen(np.broadcast_to(steps, count).copy())
 
 

@@ -68,7 +68,7 @@ def redistance(
     if np.asanyarray(values).dtype == np.bool_:
         raise GeometryError("booleans have no sign", remedy="pass numpy.where(inside, -1.0, 1.0)", element="values")
     walls = np.isnan(given) | (np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else False)
-    steps, again = positive_steps(spacing, "spacing", given.ndim), _axes(periodic, given.ndim)
+    steps, again = positive_steps(spacing, given.ndim), _axes(periodic, given.ndim)
     if walls.all() or np.isinf(given[~walls]).any():
         raise GeometryError(
             "values must be numbers somewhere, and finite there", remedy="mask others", element="values"
