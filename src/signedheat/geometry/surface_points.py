@@ -88,9 +88,9 @@ def locate_points(
     return LocatedPoints(faces, inside, kinds, elements, along)
 
 
-def points_at_vertices(triangles: IntrinsicMesh, vertices: NDArray[np.int64], name: str = "point") -> LocatedPoints:
+def points_at_vertices(triangles: IntrinsicMesh, vertices: NDArray[np.int64]) -> LocatedPoints:
     """Vertices as located points, each through its first face."""
-    corners = corners_at(triangles.corner_vertices, vertices, triangles.n_vertices, name)
+    corners = corners_at(triangles.corner_vertices, vertices, triangles.n_vertices)
     kinds = np.full(len(vertices), VERTEX)
     return LocatedPoints(corners // 3, np.eye(3)[corners % 3], kinds, vertices, np.zeros(len(vertices)))
 

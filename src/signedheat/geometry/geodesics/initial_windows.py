@@ -15,6 +15,8 @@ from .heap_kernels import Queue, push
 from .sources import GeodesicSources
 from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, clip, outrun, put
 
+BYTES_PER_WINDOW = 56.0
+
 
 class Faces(NamedTuple):
     """An intrinsic mesh as plain arrays, with the halfedges of each edge and the corners at each vertex in lists."""
@@ -77,18 +79,15 @@ class Search(NamedTuple):
     def larger(self) -> Search:
         """The same with at least the room that was wanted, in place: a copy would need twice the memory."""
         room = len(self.windows) + max(len(self.windows) // 2, int(self.counts[WANTED]))
-        refuse_beyond_memory("exact distance along the surface", room - len(self.windows), _bytes_of_windows, _remedy)
+        refuse_beyond_memory(
+            "exact distance along the surface",
+            room - len(self.windows),
+            lambda number: BYTES_PER_WINDOW * number,
+            lambda _: "use a coarser mesh, and merge faces that lie on each other",
+        )
         for array in (self.windows, self.following):
             array.resize((room, *array.shape[1:]), refcheck=False)
         return self
-
-
-def _bytes_of_windows(number: int) -> float:
-    return 56.0 * number
-
-
-def _remedy(_: int) -> str:
-    return "use a coarser mesh, and merge faces that lie on each other"
 
 
 USED, FREE, MADE, WANTED = range(4)
@@ -210,9 +209,7 @@ def _first_beam(faces: Faces, search: Search, face: int, start: complex, end: co
         t0, t1 = clip(t0, t1, foot - abs(end - start), rate)
         t0, t1 = clip(t0, t1, -height, -climb)
         if t1 > t0:
-            propagate_across(
-                faces, search, face, side, BEAM, t0, t1, start, normal, 0.0, slack
-            )  # fmt: skip
+            propagate_across(faces, search, face, side, BEAM, t0, t1, start, normal, 0.0, slack)
 
 
 @compiled
@@ -227,9 +224,7 @@ def _first_fan(
         t0, t1 = clip(0.0, 1.0, ((a - point) * first.conjugate()).real, ((b - a) * first.conjugate()).real)
         t0, t1 = clip(t0, t1, ((a - point) * second.conjugate()).real, ((b - a) * second.conjugate()).real)
         if t1 > t0:
-            propagate_across(
-                faces, search, face, side, POINT, t0, t1, point, 0j, 0.0, slack
-            )  # fmt: skip
+            propagate_across(faces, search, face, side, POINT, t0, t1, point, 0j, 0.0, slack)
 
 
 @compiled
@@ -242,12 +237,7 @@ def initial_windows(faces: Faces, sources: GeodesicSources, search: Search, slac
     for i in range(len(sources.fan_faces)):
         _reach_corners(faces, search.distance, sources.fan_faces[i], sources.fan_points[i], sources.fan_points[i])
     for i in range(len(sources.beam_faces)):
-        _first_beam(
-            faces, search, sources.beam_faces[i], sources.beam_starts[i], sources.beam_stops[i],
-            slack,
-        )  # fmt: skip
+        _first_beam(faces, search, sources.beam_faces[i], sources.beam_starts[i], sources.beam_stops[i], slack)
     for i in range(len(sources.fan_faces)):
-        _first_fan(
-            faces, search, sources.fan_faces[i], sources.fan_points[i], sources.fan_firsts[i],
-            sources.fan_seconds[i], slack,
-        )  # fmt: skip
+        point, first, second = sources.fan_points[i], sources.fan_firsts[i], sources.fan_seconds[i]
+        _first_fan(faces, search, sources.fan_faces[i], point, first, second, slack)

@@ -209,9 +209,8 @@ def continue_search(faces: Faces, search: Search, slack: float, tolerance: float
             d1x, d1y = ray(w, s1)
             left = d0x * cy - d0y * (cx - s0)  # negative: the ray leaves the apex to its right
             right = d1x * cy - d1y * (cx - s1)
-            if (
-                left > 0.0
-            ):  # the apex lies outside the visible sector, perhaps in a gap between windows: by way of a window's end
+            # an apex outside the visible sector, perhaps in a gap between windows, is reached by way of a window's end
+            if left > 0.0:
                 to_apex = arrival(w, s0, 0.0) + np.hypot(cx - s0, cy)
             elif right < 0.0:
                 to_apex = arrival(w, s1, 0.0) + np.hypot(cx - s1, cy)
@@ -224,15 +223,9 @@ def continue_search(faces: Faces, search: Search, slack: float, tolerance: float
                 t0 = hit(s0, d0x, d0y, 0.0, 0.0, cx, cy)
                 t1 = hit(s1, d1x, d1y, 0.0, 0.0, cx, cy) if right < 0.0 else 1.0
                 t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)
-                propagate_across(
-                    faces, search, face, tail_side, w[KIND], t0, t1, source, normal, w[SIGMA],
-                    slack,
-                )  # fmt: skip
+                propagate_across(faces, search, face, tail_side, w[KIND], t0, t1, source, normal, w[SIGMA], slack)
             if right > 0.0:  # visible on the side from apex to head
                 t0 = hit(s0, d0x, d0y, cx, cy, length, 0.0) if left > 0.0 else 0.0
                 t1 = hit(s1, d1x, d1y, cx, cy, length, 0.0)
                 t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)
-                propagate_across(
-                    faces, search, face, head_side, w[KIND], t0, t1, source, normal, w[SIGMA],
-                    slack,
-                )  # fmt: skip
+                propagate_across(faces, search, face, head_side, w[KIND], t0, t1, source, normal, w[SIGMA], slack)

@@ -94,23 +94,16 @@ class PlacedSegments:
     def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> PlacedSegments:
         """Place the segments of curves that run as they like: across faces, along edges and through vertices."""
         merged = MergedSources.of(parts)
-        nodes, ends, faces, edges, vectors = merged.nodes, merged.ends, merged.faces, merged.edges, merged.vectors
         oriented = np.array([part.oriented for part in parts])[merged.owners]
-        placed = cls._inside(triangles, nodes, ends, faces, vectors, oriented, np.flatnonzero(edges < 0))
-        adjacent = cls._adjacent(triangles, nodes, ends, edges, vectors, oriented, np.flatnonzero(edges >= 0))
-        return cls(nodes, *(np.concatenate(both) for both in zip(placed, adjacent, strict=True)))
+        both = cls._inside(triangles, merged, oriented), cls._adjacent(triangles, merged, oriented)
+        return cls(merged.nodes, *(np.concatenate(each) for each in zip(*both, strict=True)))
 
     @staticmethod
     def _inside(
-        triangles: IntrinsicMesh,
-        nodes: LocatedPoints,
-        ends: Ids,
-        faces: Ids,
-        vectors: Points,
-        oriented: Mask,
-        rows: Ids,
+        triangles: IntrinsicMesh, merged: MergedSources, oriented: Mask
     ) -> tuple[Ids, Ids, Points, Mask, Ids, Ids]:
-        ends, faces, vectors = ends[rows], faces[rows], vectors[rows]
+        nodes, rows = merged.nodes, np.flatnonzero(merged.edges < 0)
+        ends, faces, vectors = merged.ends[rows], merged.faces[rows], merged.vectors[rows]
         corners = triangles.corner_positions[faces]
         positions = np.stack(
             [(barycentric_in(triangles, faces, nodes[ends[:, k]]) * corners).sum(axis=1) for k in range(2)], axis=1
@@ -124,15 +117,10 @@ class PlacedSegments:
 
     @staticmethod
     def _adjacent(
-        triangles: IntrinsicMesh,
-        nodes: LocatedPoints,
-        ends: Ids,
-        edges: Ids,
-        vectors: Points,
-        oriented: Mask,
-        rows: Ids,
+        triangles: IntrinsicMesh, merged: MergedSources, oriented: Mask
     ) -> tuple[Ids, Ids, Points, Mask, Ids, Ids]:
-        ends, edges, vectors = ends[rows], edges[rows], vectors[rows]
+        nodes, rows = merged.nodes, np.flatnonzero(merged.edges >= 0)
+        ends, edges, vectors = merged.ends[rows], merged.edges[rows], merged.vectors[rows]
         along = np.stack([fractions_along_edges(triangles, nodes[ends[:, k]], edges) for k in range(2)], axis=1)
         loops = triangles.edges.vertices[edges, 0] == triangles.edges.vertices[edges, 1]
         vertex = nodes.kinds[ends] == VERTEX

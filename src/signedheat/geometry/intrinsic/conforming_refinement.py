@@ -262,9 +262,7 @@ class FaceCutter:
         triangles, merged = self.triangles, self.merged
         kept = np.setdiff1d(np.arange(triangles.n_faces), self.cut_faces)
         parents = np.concatenate([kept, [f.parent for f in self.faces]]).astype(np.int64)
-        order = np.argsort(
-            parents, kind="stable"
-        )  # the first face of an edge remains, or one of its parts takes its place
+        order = np.argsort(parents, kind="stable")  # the first face of an edge, or a part of it, stays the first
 
         def with_new(old: NDArray[Any], name: str) -> NDArray[Any]:
             return np.concatenate([old[kept], [getattr(f, name) for f in self.faces]])[order]

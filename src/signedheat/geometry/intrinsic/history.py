@@ -39,8 +39,7 @@ class Lines(NamedTuple):
 
     def chosen(self, rows: NDArray[np.int64]) -> Lines:
         """Some of the rows, in this order."""
-        owners, faces, starts, ends, vectors = self
-        return Lines(owners[rows], faces[rows], starts[rows], ends[rows], vectors[rows])
+        return Lines(self.owners[rows], self.faces[rows], self.starts[rows], self.ends[rows], self.vectors[rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,14 +144,8 @@ def straight_lines(
     halves[:, 0] *= 0.5
     room = 4 * len(faces) + 16
     while True:
-        shape = (room, vectors.shape[1], 3)
-        lines = Lines(
-            np.empty(room, np.int64),
-            np.empty(room, np.int64),
-            np.empty((room, 3)),
-            np.empty((room, 3)),
-            np.empty(shape),
-        )
+        (owners, crossed), (starts, ends) = np.empty((2, room), np.int64), np.empty((2, room, 3))
+        lines = Lines(owners, crossed, starts, ends, np.empty((room, vectors.shape[1], 3)))
         count = trace_both_ways(gluing, faces, barycentric, halves, *lines[1:], lines.owners)
         if count <= room:
             break

@@ -77,9 +77,7 @@ def refined(
 ) -> tuple[Gluing, Agenda, int]:
     """Refine until the goal is met or no vertex is left; the arrays, longer where they were full, and why it ended."""
     list_all(gluing, agenda, goal)
-    listed = np.flatnonzero(
-        agenda.bins >= 0
-    )  # faces to refine, by size: the largest come first, so that their list says how far it is
+    listed = np.flatnonzero(agenda.bins >= 0)  # by size: the largest come first, so that their list says how far it is
     done = 0.0
     while True:
         status = refine(gluing, agenda, goal, PATIENCE)
