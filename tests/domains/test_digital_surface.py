@@ -12,9 +12,9 @@ from shapes import domain_cases as cases
 from shapes.grid_cases import assert_closed_manifold
 from signedheat.discretization import discretize
 from signedheat.geometry.directions import unit
+from signedheat.geometry.meshes import area_vectors
 from signedheat.geometry.self_intersections import self_intersections
 from signedheat.geometry.surfels import boundary_surfels
-from signedheat.geometry.virtual_refinement import area_vectors
 from signedheat.solids.complete import complete
 
 AXIS = np.array([0.3, 0.2, 0.9]) / np.linalg.norm([0.3, 0.2, 0.9])
@@ -264,7 +264,7 @@ def test_smooth_surfaces_have_the_normals_of_what_was_digitised(kind, most):
 
     surface = sh.DigitalSurface((height(places) < 0).reshape(48, 48, 48), origin=places[0]).smooth_surface
     corners = surface.vertices[surface.faces]
-    middles, normals = corners.mean(axis=1), area_vectors(*corners.swapaxes(0, 1))
+    middles, normals = corners.mean(axis=1), area_vectors(corners)
     step = 1e-4 * np.eye(3)
     slopes = np.stack([height(middles + each) - height(middles - each) for each in step], axis=1)
     cosines = (unit(normals) * unit(slopes)).sum(axis=1)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..geometry.edges import EdgeTable, edge_table
 from ..geometry.intrinsic_mesh import MARGIN, IntrinsicMesh, laid_out
+from ..geometry.meshes import area_vectors
 from ..geometry.nearest import TriangleTree
 from .exchange import Elements, Exchangeable
 from .surface import Surface
@@ -48,8 +49,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         positions = coordinates(vertices, "vertices", 3)
-        object.__setattr__(self, "vertices", positions)
-        object.__setattr__(self, "faces", element_ids(faces, "faces", 3, len(positions)))
+        vars(self).update(vertices=positions, faces=element_ids(faces, "faces", 3, len(positions)))
 
     @classmethod
     def _of(cls, elements: Elements) -> TriangleMesh:
@@ -82,8 +82,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     @cached_property
     def face_area_vectors(self) -> NDArray[np.float64]:
         """(m, 3) area times unit normal."""
-        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
-        return 0.5 * np.cross(b - a, c - a)
+        return area_vectors(self.vertices[self.faces])
 
     @cached_property
     def face_areas(self) -> NDArray[np.float64]:

@@ -102,7 +102,7 @@ def members_of(
     return which, members[np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(which))]
 
 
-def sums_of(values: NDArray[np.float64], groups: NDArray[np.integer], n: int) -> NDArray[np.float64]:
+def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -> NDArray[np.float64]:
     """(n, ...) sums of the rows of (k, ...) values in each of n groups.
 
     Examples

@@ -7,6 +7,7 @@ import scipy
 from numpy.typing import NDArray
 
 from .edges import edge_table
+from .meshes import divided_at, face_areas
 from .welding import coincident_faces, welded
 
 MOST_ROUNDS = 64
@@ -50,9 +51,7 @@ def conforming(
             rows, corners, points = _points_on_edges(vertices, faces, sides, tolerance, slit * tolerance)
             if not len(rows):
                 break
-            a, b, c = (faces[rows, (corners + k) % 3] for k in range(3))
-            halves = np.concatenate([np.stack([a, points, c], axis=1), np.stack([points, b, c], axis=1)])
-            faces = np.concatenate([np.delete(faces, rows, axis=0), halves])
+            faces = divided_at(faces, rows, corners, points)
     sides = _open_sides(faces)
     alone, counts = np.unique(sides // 3, return_counts=True)  # flat ones, which came of dividing, between closed edges
     idle = alone[(counts == 3) & (_heights(vertices[faces[alone]]) <= SLITS[-1] * tolerance)]
@@ -82,8 +81,7 @@ def _without_doubles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
 def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """(m,) of triangles above their longest sides."""
     sides = np.roll(corners, -1, axis=1) - corners
-    areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    return areas / np.linalg.norm(sides, axis=2).max(axis=1)
+    return 2.0 * face_areas(corners) / np.linalg.norm(sides, axis=2).max(axis=1)
 
 
 def _open_sides(faces: NDArray[np.int64]) -> NDArray[np.int64]:

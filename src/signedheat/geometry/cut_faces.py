@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from .box_tree import BoxTree
+from .directions import unit
 from .edges import edge_table
+from .meshes import area_vectors
 
 TOUCHING = 1e-8
 """Depth, over the size of the shape, up to which triangles that overlap only touch: what coordinates are rounded to."""
@@ -56,9 +58,7 @@ def _outlines(triangles: NDArray[np.float64], ids: NDArray[np.int64], slack: flo
     table = edge_table(ids)
     mates = np.where((table.balance == 0)[table.face_edges].ravel(), table.mates, -1)
     edges = np.flatnonzero(mates >= 0)
-    a, b, c = triangles.transpose(1, 0, 2)
-    normals = np.cross(b - a, c - a)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    normals = unit(area_vectors(triangles))
     own, other = edges // 3, mates[edges] // 3
     apex = triangles[other, (mates[edges] + 2) % 3]
     height = np.abs(((apex - triangles[own, 0]) * normals[own]).sum(axis=1))

@@ -1,4 +1,4 @@
-"""Unit vectors, without underflow or overflow."""
+"""Unit vectors, without underflow or overflow, and axes across vectors."""
 
 from __future__ import annotations
 
@@ -45,6 +45,12 @@ def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
         with ThreadPoolExecutor(n_threads()) as pool:
             list(pool.map(scale, blocks))
     return result
+
+
+def axes_across(vectors: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(n, 3) unit vectors at right angles to (n, 3) vectors, and to both: right-handed in this order after them."""
+    first = unit(np.cross(vectors, np.eye(3)[np.abs(vectors).argmin(axis=1)]))
+    return first, unit(np.cross(vectors, first))
 
 
 def _blocks(shape: tuple[int, ...], size: int = 2**16) -> list[Any]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .directions import unit
 from .edges import EdgeTable, edge_keys, edge_table
-from .virtual_refinement import area_vectors
+from .meshes import area_vectors
 
 SHARP = np.deg2rad(25.0)
 """Angle between two faces from which on the edge between them is looked at."""
@@ -85,11 +85,9 @@ class _Creases:
     @classmethod
     def of(cls, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Creases:
         table = edge_table(faces)
-        normals = _unit_normals(vertices, *faces.T)
-        one = np.flatnonzero(table.mates > np.arange(faces.size))
-        other = table.mates[one]
-        sharp = np.einsum("ij,ij->i", normals[one // 3], normals[other // 3]) < np.cos(SHARP)
-        return cls(faces, table, normals, np.stack([one, other], axis=1)[sharp])
+        normals = unit(area_vectors(vertices[faces]))
+        one, other = normals[table.pairs // 3].swapaxes(0, 1)
+        return cls(faces, table, normals, table.pairs[np.einsum("ij,ij->i", one, other) < np.cos(SHARP)])
 
 
 def _flips(
@@ -110,18 +108,19 @@ def _flips(
         (a, d, (j + 1) % 3, second, 0),
         (d, b, (j + 2) % 3, second, 1),
     )
-    made = np.stack([_unit_normals(vertices, a, d, c), _unit_normals(vertices, d, b, c)])
+    new = np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)
+    made = [unit(area_vectors(vertices[each])) for each in new]
     normals = creases.normals
     gain = _bend(vertices, a, b, normals[first], normals[second]) - _bend(vertices, c, d, *made)
     reach = np.linalg.norm(vertices[c] - vertices[d], axis=1)
     faces_around = [first, second]
-    for tail, head, side, owner, new in rim:
+    for tail, head, side, owner, which in rim:
         beyond = mates[3 * owner + side]
         there = beyond >= 0
         other = np.where(there, beyond // 3, owner)
         faces_around.append(other)
         before = _bend(vertices, tail, head, normals[owner], normals[other])
-        gain += np.where(there, before - _bend(vertices, tail, head, made[new], normals[other]), 0.0)
+        gain += np.where(there, before - _bend(vertices, tail, head, made[which], normals[other]), 0.0)
     keys = edge_keys(c, d)
     present = np.isin(keys, edge_keys(*creases.table.vertices.T))
     gain[present | ~(whole[c] | whole[d]) | (c == d)] = 0.0
@@ -136,7 +135,7 @@ def _flips(
         np.maximum.at(best, face, rank)
     won = np.flatnonzero((rank > 0) & np.all([best[face] == rank for face in faces_around], axis=0))
     won = won[np.unique(keys[won], return_index=True)[1]]  # two of them may want the same edge
-    return first[won], second[won], np.stack([a, d, c], axis=1)[won], np.stack([d, b, c], axis=1)[won]
+    return first[won], second[won], new[0][won], new[1][won]
 
 
 def _bend(
@@ -149,10 +148,3 @@ def _bend(
     """(k,) length times the angle between the unit normals on both sides of edges."""
     lengths = np.linalg.norm(vertices[heads] - vertices[tails], axis=1)
     return lengths * np.arccos(np.clip(np.einsum("ij,ij->i", one, other), -1.0, 1.0))
-
-
-def _unit_normals(
-    vertices: NDArray[np.float64], a: NDArray[np.int64], b: NDArray[np.int64], c: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """(m, 3) of triangles; 0 where they are flat."""
-    return unit(area_vectors(vertices[a], vertices[b], vertices[c]))

@@ -185,6 +185,12 @@ class EdgeTable(Frozen):
         mates[members[first]], mates[members[first + 1]] = members[first + 1], members[first]
         return read_only(mates)
 
+    @cached_property
+    def pairs(self) -> NDArray[np.int64]:
+        """(k, 2) both halfedges of each edge that has exactly two."""
+        one = np.flatnonzero(self.mates > np.arange(len(self.mates)))
+        return read_only(np.stack([one, self.mates[one]], axis=1))
+
     def per_edge(self, values: NDArray[Any]) -> NDArray[Any]:
         """(e,) what (m, 3) values at the sides of faces say of each edge: the last of its faces; zero where none is."""
         result = np.zeros(len(self.vertices), dtype=values.dtype)

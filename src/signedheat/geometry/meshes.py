@@ -38,6 +38,26 @@ class Triangles(Protocol):
         """(2, 3) lower and upper corner of the box around the faces."""
 
 
+def area_vectors(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, 3) of (m, 3, 3) triangles: their normals, as long as their areas."""
+    vectors: NDArray[np.float64] = 0.5 * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return vectors
+
+
+def face_areas(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m,) areas of (m, 3, 3) triangles."""
+    return np.linalg.norm(area_vectors(triangles), axis=1)
+
+
+def divided_at(
+    faces: NDArray[np.int64], rows: NDArray[np.int64], corners: NDArray[np.int64], points: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Faces, some of which are divided by a point on the side that begins at a corner; their halves are at the end."""
+    a, b, c = (faces[rows, (corners + k) % 3] for k in range(3))
+    halves = np.concatenate([np.stack([a, points, c], axis=1), np.stack([points, b, c], axis=1)])
+    return np.concatenate([np.delete(faces, rows, axis=0), halves])
+
+
 def gradients_along(sides: NDArray[np.float64], rises: NDArray[np.float64]) -> NDArray[np.float64]:
     """(p, 3) gradients in the planes of two sides (p, 2, 3), along which a function rises by (p, 2); 0 if they are one.
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
+from .meshes import face_areas
 from .winding_tree import WindingTree, solid_angle
 
 PLACES = 4096
@@ -44,13 +45,6 @@ def level(triangles: NDArray[np.float64], faces: NDArray[np.int64] | None = None
         return 0.0
     behind = WindingTree.of(triangles).behind(some, triangles[some].mean(axis=1))
     return float(np.average(behind, weights=areas)) - 0.5
-
-
-def face_areas(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m,) areas."""
-    a, b, c = triangles.transpose(1, 0, 2)
-    areas: NDArray[np.float64] = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return areas
 
 
 @compiled

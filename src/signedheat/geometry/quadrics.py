@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .components import sums_of
+
 FLAT = 0.05
 """Tangent of half the angle between planes up to which they are one: a crease of 5.7° is cut off by a hundredth of a
 cell at most. At .2, creases of 20° are lost; at .01, the facets of smooth surfaces are creases."""
@@ -37,14 +39,9 @@ class Quadrics:
         cls, owners: NDArray[np.int64], places: NDArray[np.float64], normals: NDArray[np.float64], count: int
     ) -> Quadrics:
         """Sums of planes, each through a place, relative to the centre of its owner, with a normal of length 1."""
-        along = (normals * places).sum(axis=1)
-        products = np.empty((count, 3, 3))
-        sides = np.empty((count, 3))
-        for i in range(3):
-            sides[:, i] = np.bincount(owners, normals[:, i] * along, count)
-            for j in range(i, 3):
-                products[:, i, j] = products[:, j, i] = np.bincount(owners, normals[:, i] * normals[:, j], count)
-        return cls(products, sides)
+        along = (normals * places).sum(axis=1)[:, None]
+        products = sums_of(normals[:, :, None] * normals[:, None, :], owners, count)
+        return cls(products, sums_of(normals * along, owners, count))
 
     def __add__(self, other: Quadrics) -> Quadrics:
         return Quadrics(self.products + other.products, self.sides + other.sides)

@@ -14,6 +14,7 @@ from scipy import sparse
 
 from .components import sums_of
 from .ear_clipping import cut_into_ears
+from .meshes import area_vectors
 
 _SLIVER = 1e-6  # a fan triangle whose area is less than this fraction of its polygon's counts as turned over
 
@@ -71,7 +72,7 @@ def virtual_refinement(
     tails, heads = corners[in_fan], corners[following[in_fan]]
     centers, weights = virtual_vertices(vertices, tails, heads, fan_of, len(fans))
 
-    whole = area_vectors(vertices[tails], vertices[heads], centers[fan_of])
+    whole = area_vectors(np.stack([vertices[tails], vertices[heads], centers[fan_of]], axis=1))
     total = sums_of(whole, fan_of, len(fans))
     part = (whole * total[fan_of]).sum(axis=1)
     turned = np.zeros(len(fans), dtype=bool)
@@ -131,14 +132,10 @@ def virtual_vertices(
     return mean + sums_of(weights[:, None] * a, polygons, n_polygons), weights
 
 
-def area_vectors(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, 3) area vectors of triangles."""
-    return 0.5 * np.cross(b - a, c - a)
-
-
 def _cut(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
     """(k − 2, 3) corners of the triangles of a polygon cut along diagonals."""
-    normal = area_vectors(polygon, np.roll(polygon, -1, axis=0), polygon.mean(axis=0)).sum(axis=0)
+    center = np.broadcast_to(polygon.mean(axis=0), polygon.shape)
+    normal = area_vectors(np.stack([polygon, np.roll(polygon, -1, axis=0), center], axis=1)).sum(axis=0)
     return np.sort(cut_into_ears(polygon, normal), axis=1)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +9,11 @@ import scipy
 from numpy.typing import NDArray
 
 from ..geometry.box_tree import BoxTree
-from ..geometry.components import connected_components
+from ..geometry.components import connected_components, sums_of
+from ..geometry.directions import unit
 from ..geometry.edges import edge_table
-from .lids import Lid, lid_area, running_mean, vertex_normals
+from ..geometry.meshes import area_vectors, face_areas
+from .lids import Lid, running_mean, vertex_normals
 
 REACH = 0.25
 """Share of an opening's width in which the surface behind its rim is looked at."""
@@ -46,19 +47,17 @@ class Samples:
 def width_of(lid: Lid) -> float:
     """Four areas over the length of the rim, the diameter of a circle."""
     rim = lid.vertices[: lid.n_rim]
-    return 4.0 * lid_area(lid) / float(np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1).sum())
+    return (
+        4.0
+        * float(face_areas(lid.vertices[lid.faces]).sum())
+        / float(np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1).sum())
+    )
 
 
 def smooth_patches(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> NDArray[np.int64]:
     """(m,) which faces hang together across edges that are not sharp."""
     table = edge_table(ids)
-    a, b, c = triangles.transpose(1, 0, 2)
-    normals = np.cross(b - a, c - a)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
-    order = np.argsort(table.face_edges.ravel(), kind="stable")
-    edges, faces = table.face_edges.ravel()[order], order // 3
-    pairs = np.flatnonzero((edges[1:] == edges[:-1]) & (table.face_counts[edges[1:]] == 2))
-    one, other = faces[pairs], faces[pairs + 1]
+    normals, (one, other) = unit(area_vectors(triangles)), table.pairs.T // 3
     smooth = (normals[one] * normals[other]).sum(axis=1) > SHARP
     return connected_components(len(ids), one[smooth], other[smooth])
 
@@ -91,13 +90,11 @@ def samples_near(
         triangles = np.concatenate([np.stack(t, axis=1) for t in ((a, d, f), (d, b, e), (f, e, c), (d, e, f))])
         patches = np.tile(patches[~fine], 4)
     found = np.concatenate(near)
-    a, b, c = found.transpose(1, 0, 2)
-    normals = np.cross(b - a, c - a)
-    doubled = np.linalg.norm(normals, axis=1)
-    proper = np.flatnonzero(doubled > 0)
+    vectors, areas = area_vectors(found), face_areas(found)
+    proper = np.flatnonzero(areas > 0)
     proper = proper[:: max(1, len(proper) // MOST)]
-    normals = normals[proper] / doubled[proper, None]
-    return Samples(found.mean(axis=1)[proper], normals, doubled[proper] / 2, np.concatenate(labels)[proper])
+    normals = vectors[proper] / areas[proper, None]
+    return Samples(found.mean(axis=1)[proper], normals, areas[proper], np.concatenate(labels)[proper])
 
 
 def continuation(
@@ -122,31 +119,28 @@ def continuation(
     reach = REACH * width
     steps = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
     m = max(1, min(n // 4, round(reach / steps.mean())))
-    along = _units(np.roll(loop, -m, axis=0) - np.roll(loop, m, axis=0))
+    along = unit(np.roll(loop, -m, axis=0) - np.roll(loop, m, axis=0))
     rows, near = _within(samples, loop, patches, reach)
 
-    def sums(weights: NDArray[np.float64], *factors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sums over the samples near each place, of products."""
-        columns = np.einsum("k,k...->k...", weights, np.prod(np.broadcast_arrays(*factors), axis=0))
-        flat = columns.reshape(len(rows), math.prod(columns.shape[1:]))
-        totals = np.stack([np.bincount(rows, column, n) for column in flat.T], axis=1)
-        return np.asarray(totals.reshape(n, *columns.shape[1:]))
+    def means(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Over the samples near each place."""
+        return sums_of(np.einsum("k,k...->k...", weights, values), rows, n)
 
     x, normals, areas = samples.positions[near] - loop[rows], samples.normals[near], samples.areas[near]
     weights = areas * (1.0 - (x * x).sum(axis=1) / reach**2)  # what comes into reach weighs nothing yet
     weights /= np.maximum(np.bincount(rows, weights, n), 1e-300)[rows]
-    middle = sums(weights, normals)
+    middle = means(normals)
     way = np.cross(middle, along)
     enough = (np.bincount(rows, minlength=n) >= 3) & (np.linalg.norm(way, axis=1) > 1e-6)
-    way = _units(way)
-    frame = np.stack([way, _units(np.cross(middle, way))], axis=1)
+    way = unit(way)
+    frame = np.stack([way, unit(np.cross(middle, way))], axis=1)
     at = np.einsum("kij,kj->ki", frame[rows], x)
-    mean = sums(weights, at)
+    mean = means(at)
     at = at - mean[rows]
-    spread = sums(weights, at[:, :, None], at[:, None, :]) + (STIFF * reach) ** 2 * np.eye(2)
-    slopes = np.linalg.solve(spread, sums(weights, at[:, :, None], (normals - middle[rows])[:, None, :]))
-    at_rim = _units(middle - np.einsum("ni,nij->nj", mean, slopes)) * enough[:, None]
-    outwards = _units(np.cross(at_rim, along))
+    spread = means(at[:, :, None] * at[:, None, :]) + (STIFF * reach) ** 2 * np.eye(2)
+    slopes = np.linalg.solve(spread, means(at[:, :, None] * (normals - middle[rows])[:, None, :]))
+    at_rim = unit(middle - np.einsum("ni,nij->nj", mean, slopes)) * enough[:, None]
+    outwards = unit(np.cross(at_rim, along))
     bends, must = width * (slopes[:, 0] * outwards).sum(axis=1), 2.0 * (outwards * vertex_normals(lid)[:n]).sum(axis=1)
     curvatures = np.where(enough, (slopes * frame).sum(axis=(1, 2)), 0.0)
     held = np.where(enough, _agreement(bends, must), 0.0)
@@ -164,10 +158,6 @@ def _within(
     near = np.concatenate([np.asarray(each, dtype=np.int64) for each in found])
     own = samples.patches[near] == patches[rows]
     return rows[own], near[own]
-
-
-def _units(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None])
 
 
 def _agreement(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:

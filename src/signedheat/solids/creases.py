@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..geometry.directions import unit
 from .lids import Lid, area_vector, least_triangles
 
 FLAT = 0.01
@@ -63,7 +64,7 @@ def _sides(loop: NDArray[np.float64], normals: NDArray[np.float64]) -> list[_Sid
     """Straight parts of a loop."""
     ways = np.roll(loop, -1, axis=0) - loop
     weighted = np.linalg.norm(ways, axis=1)[:, None] * normals
-    ways /= np.maximum(np.linalg.norm(ways, axis=1), 1e-300)[:, None]
+    ways = unit(ways)
     corners = np.flatnonzero(np.linalg.norm(ways - np.roll(ways, 1, axis=0), axis=1) > FLAT)
     if not len(corners):
         return []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -19,6 +18,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..frozen import Frozen
 from ..packages import lazy_module
+from ..progress import Progress
 from .complete import complete
 from .solid import Solid
 
@@ -30,8 +30,6 @@ EXTREME = 99.0
 """Percentile of absolute deviations at which colours are full and histograms end: few outliers do not wash them out."""
 BINS = 40
 """Of histograms."""
-
-Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,14 +7,15 @@ import scipy
 from numpy.typing import NDArray
 
 from ..domains.grid import Grid
+from ..geometry.components import sums_of
 from ..geometry.directions import unit
 from ..geometry.dual_cells import DualCells
 from ..geometry.edge_flips import MOST
 from ..geometry.edges import edge_table
 from ..geometry.marching import CLEARANCE
+from ..geometry.meshes import area_vectors, divided_at
 from ..geometry.quadrics import Quadrics, minimizers
 from ..geometry.self_intersections import self_intersections
-from ..geometry.virtual_refinement import area_vectors
 from .offsets import Offset
 
 MANY = 1 << 17
@@ -102,10 +103,9 @@ def _vertices(
     count = len(places)
     step = float(grid.spacing.max())
     corners = grid.origin + places * grid.spacing
-    sums = np.stack([np.bincount(owners, points[:, k], count) for k in range(3)], axis=1)
     room = CLEARANCE * grid.spacing
     lower, upper = corners + room, corners + grid.spacing - room
-    middles = np.clip(sums / np.bincount(owners, minlength=count)[:, None], lower, upper)
+    middles = np.clip(sums_of(points, owners, count) / np.bincount(owners, minlength=count)[:, None], lower, upper)
     lower, upper = lower - middles, upper - middles
     on, normals = offset.planes(points)
     quadrics = Quadrics.of(owners, on - middles[owners], normals, count)
@@ -182,11 +182,8 @@ def _creases_off(
     The places are on creases, or else the nearest ones.
     """
     step = float(spacing.max())
-    mates = edge_table(faces).mates
-    normals = unit(area_vectors(*(vertices[column] for column in faces.T)))
-    one = np.flatnonzero(mates > np.arange(faces.size))
-    one = one[(normals[one // 3] * normals[mates[one] // 3]).sum(axis=1) < np.cos(BENT)]
-    edges = np.stack([one, mates[one]], axis=1)
+    normals, edges = unit(area_vectors(vertices[faces])), edge_table(faces).pairs
+    edges = edges[normals[edges // 3].prod(axis=1).sum(axis=1) < np.cos(BENT)]
     tails, heads = faces.ravel()[edges[:, 0]], faces.ravel()[edges[:, 1]]
     middles = 0.5 * (vertices[tails] + vertices[heads])
     off = np.abs(offset.distance(middles))
@@ -214,6 +211,4 @@ def _divided(
     """With a point on each of some edges, (k, 2) halfedges, and the faces on both of their sides divided."""
     rows, corners = edges.ravel() // 3, edges.ravel() % 3
     new = np.repeat(len(vertices) + np.arange(len(edges)), 2)
-    a, b, c = (faces[rows, (corners + k) % 3] for k in range(3))
-    halves = np.concatenate([np.stack([a, new, c], axis=1), np.stack([new, b, c], axis=1)])
-    return np.concatenate([vertices, points]), np.concatenate([np.delete(faces, rows, axis=0), halves])
+    return np.concatenate([vertices, points]), divided_at(faces, rows, corners, new)

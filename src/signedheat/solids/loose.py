@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from ..geometry.components import connected_components
 from ..geometry.face_tree import FaceTree
-from ..geometry.part_levels import face_areas, level, own_levels
+from ..geometry.meshes import face_areas
+from ..geometry.part_levels import level, own_levels
 from ..geometry.welding import same_positions
 from ..geometry.winding_tree import WindingTree
 from .heat import FRAGMENTS

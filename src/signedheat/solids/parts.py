@@ -8,9 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.components import connected_components, element_components
+from ..geometry.components import connected_components, element_components, sums_of
 from ..geometry.directions import unit
 from ..geometry.edges import edge_table
+from ..geometry.meshes import area_vectors
 from ..geometry.part_levels import own_levels
 from .rims import meeting_edges, open_edges
 
@@ -82,16 +83,11 @@ def uprightness(
     alone[order[1:][same]] = alone[order[:-1][same]] = False
     corners = triangles.reshape(-1, 3)
     start, stop = corners[alone], np.roll(triangles, -1, axis=1).reshape(-1, 3)[alone]
-    a, b, c = triangles.transpose(1, 0, 2)
-    normals = np.repeat(np.cross(b - a, c - a), 3, axis=0)[alone]
+    normals = np.repeat(area_vectors(triangles), 3, axis=0)[alone]
     across = unit(np.cross(stop - start, normals)) * np.linalg.norm(stop - start, axis=1)[:, None]
     owners = owners[alone]
-    opening = _sums(owners, -0.5 * np.cross(start, stop), n_parts)  # lids run along rims the other way
+    opening = sums_of(-0.5 * np.cross(start, stop), owners, n_parts)  # lids run along rims the other way
     length = np.linalg.norm(opening, axis=1)
     around = np.bincount(owners, np.linalg.norm(stop - start, axis=1), n_parts)
-    flux = (_sums(owners, across, n_parts) * opening).sum(axis=1)
+    flux = (sums_of(across, owners, n_parts) * opening).sum(axis=1)
     return np.asarray(flux / np.maximum(length * around, 1e-300))
-
-
-def _sums(owners: NDArray[np.int64], vectors: NDArray[np.float64], n: int) -> NDArray[np.float64]:
-    return np.stack([np.bincount(owners, column, n) for column in vectors.T], axis=1)

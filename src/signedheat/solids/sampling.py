@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..domains.validation import finite_number, whole_number
 from ..errors import OutsideError, SignedHeatError, SourceError
 from ..fields.grid_field import GridField
+from ..geometry.meshes import face_areas
 from ..memory import refuse_beyond_memory
 from ..packages import lazy_module
 
@@ -202,7 +203,7 @@ def evenly_on(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """(n, 3) points on triangles, evenly by area, one in each nth of it; and the triangle of each."""
     a, b, c = triangles.transpose(1, 0, 2)
-    areas = np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    areas = np.cumsum(face_areas(triangles))
     marks = (np.arange(n) + random.random(n)) / max(n, 1) * areas[-1]
     faces = np.minimum(np.searchsorted(areas, marks, side="right"), len(triangles) - 1)
     u, v = random.random((2, n))

@@ -41,7 +41,7 @@ def training_points(
         center, radius = np.zeros(3), 1.0
     solid = complete(surface, as_oriented=True)
     places, faces = evenly_on(surface.vertices[surface.faces], n, random)
-    normals = _normals(surface)
+    normals = unit(surface.face_area_vectors)
     on = {"random_surface": (places, normals[faces]), "sharp_surface": _on_sharp_edges(surface, normals, n, random)}
     around = {"vol": center + radius * random.uniform(-1.0, 1.0, (n, 3))}
     for name, (middles, _) in zip(("random_near", "sharp_near"), on.values(), strict=True):
@@ -54,25 +54,17 @@ def training_points(
     return kept, {name: values.astype(np.float32) for name, values in labelled.items()}
 
 
-def _normals(surface: TriangleMesh) -> NDArray[np.float64]:
-    a, b, c = surface.vertices[surface.faces].transpose(1, 0, 2)
-    return unit(np.cross(b - a, c - a))
-
-
 def _on_sharp_edges(
     surface: TriangleMesh, normals: NDArray[np.float64], n: int, random: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(n, 3) places evenly along sharp edges, and the means of the normals on both sides."""
-    mates = edge_table(surface.faces).mates
-    one = np.flatnonzero(mates > np.arange(surface.faces.size))
-    sides = normals[one // 3], normals[mates[one] // 3]
-    sharp = (sides[0] * sides[1]).sum(axis=1) < np.cos(SHARP)
-    if not sharp.any():
+    pairs = edge_table(surface.faces).pairs
+    pairs = pairs[normals[pairs // 3].prod(axis=1).sum(axis=1) < np.cos(SHARP)]
+    if not len(pairs):
         return np.zeros((0, 3)), np.zeros((0, 3))
-    tails = surface.vertices[surface.faces.ravel()[one[sharp]]]
-    heads = surface.vertices[np.roll(surface.faces, -1, axis=1).ravel()[one[sharp]]]
+    tails, heads = surface.vertices[surface.faces.ravel()[pairs]].swapaxes(0, 1)  # halfedges run opposite ways
     ends = np.cumsum(np.linalg.norm(heads - tails, axis=1))
     marks = (np.arange(n) + random.random(n)) / n * ends[-1]
     edges = np.minimum(np.searchsorted(ends, marks, side="right"), len(ends) - 1)
     places = tails[edges] + random.random((n, 1)) * (heads - tails)[edges]
-    return places, unit(sides[0][sharp] + sides[1][sharp])[edges]
+    return places, unit(normals[pairs // 3].sum(axis=1))[edges]

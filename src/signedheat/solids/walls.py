@@ -8,7 +8,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..geometry.part_levels import face_areas
+from ..geometry.directions import unit
+from ..geometry.meshes import face_areas
 from .lids import area_vector, cut_to_pieces
 from .parts import parts_of
 from .rims import loops, open_edges
@@ -84,10 +85,9 @@ class _Rim:
         along = np.roll(corners, -1, axis=0) - corners
         away = corners - behind
         away -= ((away * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-300))[:, None] * along
-        away /= np.maximum(np.linalg.norm(away, axis=1), 1e-300)[:, None]
         centre = corners.mean(axis=0)
         radius = float(np.linalg.norm(corners - centre, axis=1).max())
-        return cls(ids, corners, away, part, centre, radius, area_vector(corners))
+        return cls(ids, corners, unit(away), part, centre, radius, area_vector(corners))
 
 
 def facing(rims: list[_Rim], areas: NDArray[np.float64]) -> list[tuple[int, int]]:

@@ -10,7 +10,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, SourceError
 from ..geometry.components import element_components
 from ..geometry.face_tree import FaceTree
-from ..geometry.part_levels import face_areas
+from ..geometry.meshes import face_areas
 from ..geometry.self_intersections import self_intersections
 from .keeping import given_surface, unjoined
 from .simplification import simplified

@@ -10,7 +10,9 @@ import scipy
 from numpy.typing import NDArray
 
 from ..frozen import Frozen
+from ..geometry.directions import axes_across
 from ..geometry.edges import edge_table
+from ..geometry.meshes import area_vectors
 from ..geometry.welding import same_positions
 from ..geometry.winding_tree import WindingTree
 
@@ -23,6 +25,8 @@ TUBES = 1e-4 * 2.0 ** np.arange(11)
 is enough where a lid has more vertices than the face next to it; seams of what φ completes need one of .003 to .02."""
 SIDED = 0.4
 """How far winding numbers there may be from integers: a half, less twice the largest error of the tree."""
+SPOTS = np.array([0.1, 0.5, 0.9])
+"""Places along each edge; not its ends, where it may meet a face at a right angle."""
 AT_ONCE = 256
 """Open edges that are dealt with together."""
 
@@ -58,7 +62,7 @@ class Windings(Frozen):
             return 0.0
         ends = _open_edges(self.triangles)
         size = float(np.ptp(self.triangles.reshape(-1, 3), axis=0).max())
-        spots = _spots(ends)
+        spots = ends[:, :1] + SPOTS[:, None] * (ends[:, 1:] - ends[:, :1])
         others = scipy.spatial.cKDTree(spots.reshape(-1, 3)) if len(ends) else None
         rung = 0
         for begin in range(0, len(ends), AT_ONCE):
@@ -87,9 +91,9 @@ class Windings(Frozen):
 
     def sides(self, triangles: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """(n,) whether places just behind (n, 3, 3) triangles are inside; and the same just in front of them."""
-        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        areas = np.linalg.norm(normals, axis=1)
-        step = DEPTH * normals * (np.sqrt(areas) / np.where(areas > 0, areas, 1.0))[:, None]
+        vectors = 2.0 * area_vectors(triangles)
+        areas = np.linalg.norm(vectors, axis=1)
+        step = DEPTH * vectors * (np.sqrt(areas) / np.where(areas > 0, areas, 1.0))[:, None]
         centres = triangles.mean(axis=1)
         return self.inside(centres - step), self.inside(centres + step)
 
@@ -104,18 +108,9 @@ def _open_edges(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     return ends
 
 
-def _spots(ends: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3, 3) three places on each edge; not its ends, where it may meet a face at a right angle."""
-    return np.asarray(ends[:, :1] + np.array([0.1, 0.5, 0.9])[:, None] * (ends[:, 1:] - ends[:, :1]))
-
-
 def _around(ends: NDArray[np.float64], spots: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
     """(k, 3) places at a distance from edges, on six sides of each spot."""
-    along = ends[:, 1] - ends[:, 0]
-    first = np.cross(along, np.eye(3)[np.abs(along).argmin(axis=1)])
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    second = np.cross(along, first)
-    second /= np.linalg.norm(second, axis=1)[:, None]
+    first, second = axes_across(ends[:, 1] - ends[:, 0])
     angles = 0.3 + np.pi / 3 * np.arange(6)[:, None, None, None]
     ring = radius * (np.cos(angles) * first[:, None] + np.sin(angles) * second[:, None])
     return np.asarray((spots + ring).reshape(-1, 3))
