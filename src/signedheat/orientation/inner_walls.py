@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.components import connected_components
+from ..geometry.directions import axes_across, unit
 from ..geometry.edges import HalfedgePairs
 
 SAME_ANGLE = 1e-6
@@ -82,13 +83,9 @@ def _angles(
     normals: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Angles of faces around their edges, right-handed about the direction from the lower vertex to the higher."""
-    along = positions[heads] - positions[tails]
-    along /= np.maximum(np.linalg.norm(along, axis=1), np.finfo(float).tiny)[:, None]
+    along = unit(positions[heads] - positions[tails])
     into = np.cross(normals, along)
-    along *= np.where(forward, 1.0, -1.0)[:, None]
-    least = np.eye(3)[np.abs(along).argmin(axis=1)]
-    aside = np.cross(along, least)
-    across = np.cross(along, aside)
+    aside, across = axes_across(along * np.where(forward, 1.0, -1.0)[:, None])
     x, y = (into * aside).sum(axis=1), (into * across).sum(axis=1)
     return np.where((x != 0) | (y != 0), np.arctan2(y, x), np.nan)
 

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..geometry.components import sums_of
+from ..geometry.directions import unit
+from ..geometry.meshes import area_vectors
 from ..geometry.triangle_kernels import areas_and_volumes
 from .surface_parts import SurfaceParts
 
@@ -68,12 +70,10 @@ class MeshFaces:
 
     def normals(self, turned: NDArray[np.bool_]) -> NDArray[np.float64]:
         """(p, 3) unit normals of the faces, some of them turned; zero without area."""
-        a, b, c = (self.positions[self.triangles[:, k]] for k in range(3))
-        vectors = np.cross(b - a, c - a)
+        vectors = area_vectors(self.positions[self.triangles])
         if len(vectors) != len(turned):
             vectors = sums_of(vectors, self.triangle_faces, len(turned))
-        lengths = np.linalg.norm(vectors, axis=1)
-        return vectors * (np.where(turned, -1, 1) / np.where(lengths > 0, lengths, 1))[:, None]
+        return unit(vectors) * np.where(turned, -1, 1)[:, None]
 
     @property
     def centroids(self) -> NDArray[np.float64]:

@@ -181,34 +181,27 @@ def orientation(shape: Mesh | ForeignShape) -> Orientation:
     n_nonmanifold = int((faces.surface.pairs.counts > 2).sum())
     if n_nonmanifold:
         faces = _without_inner_walls(faces)
-    lines, crossed = _lines(faces)
-    faces = _bodies_apart(faces, lines, crossed)
-    surface = faces.surface
-    lines, crossed = _crossings(faces, lines, crossed)
-    walls = _doubled_walls(surface, lines, surface.orientation.parts[crossed])
-    parts = _table(faces, walls, crossed)
+    lines = _lines(faces)
+    faces = _bodies_apart(faces, lines)
+    surface, part_of = faces.surface, faces.surface.orientation.parts
+    lines = _with_aimed(faces, lines)
+    walls = _doubled_walls(surface, lines)
+    parts = _table(faces, walls, lines)
     if walls.any():
-        lines, crossed = _without(lines, crossed, walls[surface.orientation.parts[crossed]])
-    found = orient_parts(parts, lines, surface.orientation.parts[crossed])
+        lines = lines.chosen(~walls[part_of[lines.crossed]])
+    found = orient_parts(parts, lines, part_of[lines.crossed])
     undecided = surface.is_part & ~found.decided & ~parts.fixed
-    small = (
-        surface.is_part & ~parts.closed & ~parts.fixed & (found.nested < 0) & (parts.areas <= SMALL * parts.areas.sum())
-    )
+    few = parts.areas <= SMALL * parts.areas.sum()
+    small = surface.is_part & ~parts.closed & ~parts.fixed & (found.nested < 0) & few
     odds, undecided = _ask_neighbors(faces, found.odds, undecided, small)
     wrong = odds < np.where(undecided, -FEW, 0.0)
-    turned = surface.orientation.turned != wrong[surface.orientation.parts]
-    alone = (
-        surface.is_first
-        & undecided[surface.orientation.parts]
-        & (parts.areas <= SMALL * parts.areas.sum())[surface.orientation.parts]
-    )
+    turned = surface.orientation.turned != wrong[part_of]
+    alone = surface.is_first & (undecided & few)[part_of]
     if alone.any():
-        wrong_here = disagreeing_with_neighbors(
-            faces.centroids, faces.normals(turned) * surface.is_first[:, None], alone
-        )
-        turned = turned != wrong_here
+        normals = faces.normals(turned) * surface.is_first[:, None]
+        turned = turned != disagreeing_with_neighbors(faces.centroids, normals, alone)
     if 0 < small.sum() <= MOST and parts.areas[small].sum() > SOUP * parts.areas.sum():
-        together = _turned_together(faces, turned, small, lines, crossed)
+        together = _turned_together(faces, turned, small, lines)
         if together is not None:
             turned, undecided = together, undecided & ~small
     return _oriented(shape, surface, found, turned, wrong, walls, undecided, n_nonmanifold)
@@ -224,7 +217,7 @@ def _without_inner_walls(faces: MeshFaces) -> MeshFaces:
     return replace(faces, inner=inner) if inner.any() else faces
 
 
-def _bodies_apart(faces: MeshFaces, lines: LineCrossings, crossed: NDArray[np.int64]) -> MeshFaces:
+def _bodies_apart(faces: MeshFaces, lines: LineCrossings) -> MeshFaces:
     """Faces in parts. Where a body that bounds something as given would have to turn, such bodies are parts.
 
     Two that touch along an edge, where each lacks a side, look like neighbours that disagree; if they are made to
@@ -234,7 +227,7 @@ def _bodies_apart(faces: MeshFaces, lines: LineCrossings, crossed: NDArray[np.in
     if not surface.orientation.disagreeing:
         return faces
     pieces, part = surface.given.parts, surface.orientation.parts
-    found = votes(lines.starts, pieces[crossed], lines.entering, len(surface.given.orientable))
+    found = votes(lines.starts, pieces[lines.crossed], lines.entering, len(surface.given.orientable))
     bodies = clear(found.own_votes, found.own, LEAST_CLOSED)
     facing = np.where(surface.orientation.turned, -1, 1) * np.sign(found.own_votes)[pieces] * bodies[pieces]
     areas = surface.areas * surface.is_first
@@ -244,12 +237,12 @@ def _bodies_apart(faces: MeshFaces, lines: LineCrossings, crossed: NDArray[np.in
     return replace(faces, apart=apart) if apart.any() else faces
 
 
-def _lines(faces: MeshFaces) -> tuple[LineCrossings, NDArray[np.int64]]:
-    """Lines through first faces as they were given, and the faces that they cross."""
+def _lines(faces: MeshFaces) -> LineCrossings:
+    """Lines through first faces as they were given."""
     drawn = _drawn(faces)
     count = 16 if len(drawn) < MANY else 8
     lines = stabbing_lines(faces.positions, faces.triangles[drawn], faces.bounds, N_LINES, count)
-    return lines, faces.triangle_faces[drawn][lines.triangles]
+    return replace(lines, crossed=faces.triangle_faces[drawn][lines.crossed])
 
 
 def _drawn(faces: MeshFaces) -> NDArray[np.int64]:
@@ -257,20 +250,17 @@ def _drawn(faces: MeshFaces) -> NDArray[np.int64]:
     return np.flatnonzero(faces.surface.is_first[faces.triangle_faces])
 
 
-def _crossings(
-    faces: MeshFaces, lines: LineCrossings, crossed: NDArray[np.int64]
-) -> tuple[LineCrossings, NDArray[np.int64]]:
-    """Lines through first faces as they agree with their neighbours, and the faces they cross."""
+def _with_aimed(faces: MeshFaces, lines: LineCrossings) -> LineCrossings:
+    """Lines through first faces as they agree with their neighbours, and more through closed parts that few cross."""
     surface = faces.surface
-    parts, turned = surface.orientation.parts, surface.orientation.turned
-    counts = np.bincount(parts[crossed], minlength=surface.n_parts)
+    counts = np.bincount(surface.orientation.parts[lines.crossed], minlength=surface.n_parts)
     missed = np.flatnonzero(surface.orientation.closed & surface.is_part & (counts < N_AIMED))
     if len(missed):
         aims = _middles_of_largest(faces, missed)
         drawn = _drawn(faces)
         aimed = aimed_lines(faces.positions, faces.triangles[drawn], faces.bounds, aims)
-        lines, crossed = joined(lines, aimed), np.concatenate([crossed, faces.triangle_faces[drawn][aimed.triangles]])
-    return replace(lines, entering=lines.entering != turned[crossed]), crossed
+        lines = joined(lines, replace(aimed, crossed=faces.triangle_faces[drawn][aimed.crossed]))
+    return replace(lines, entering=lines.entering != surface.orientation.turned[lines.crossed])
 
 
 def _middles_of_largest(faces: MeshFaces, parts: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -285,26 +275,26 @@ def _middles_of_largest(faces: MeshFaces, parts: NDArray[np.int64]) -> NDArray[n
     return faces.positions[faces.triangles[of_face[largest[parts]]]].mean(axis=1)
 
 
-def _doubled_walls(surface: SurfaceParts, lines: LineCrossings, crossed: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _doubled_walls(surface: SurfaceParts, lines: LineCrossings) -> NDArray[np.bool_]:
     """(n_parts,) parts that are there twice, once facing each way, and are far from closed."""
     alike, opposite = surface.copies
     doubled = (alike > 0) & (opposite > 0)
     if not doubled.any():
         return np.zeros(surface.n_parts, dtype=bool)
     mostly = surface.part_sums(surface.areas * doubled) > 0.5 * surface.part_sums(surface.areas)
-    found = votes(lines.starts, crossed, lines.entering, surface.n_parts)
+    found = votes(lines.starts, surface.orientation.parts[lines.crossed], lines.entering, surface.n_parts)
     encloses = surface.orientation.closed | (np.abs(found.own_votes) > NEARLY_CLOSED * np.maximum(found.own, 1))
     return mostly & ~encloses
 
 
-def _table(faces: MeshFaces, walls: NDArray[np.bool_], crossed: NDArray[np.int64]) -> Parts:
+def _table(faces: MeshFaces, walls: NDArray[np.bool_], lines: LineCrossings) -> Parts:
     """What is known of parts without lines; levels of the open ones that few lines cross."""
     surface, (areas, volumes) = faces.surface, faces.measures
     turned = surface.orientation.turned
     alike, opposite = surface.copies
     totals = surface.part_sums(areas * (alike + opposite))
     as_given = surface.part_sums(areas * np.where(turned, opposite, alike))
-    counts = np.bincount(surface.orientation.parts[crossed], minlength=surface.n_parts)
+    counts = np.bincount(surface.orientation.parts[lines.crossed], minlength=surface.n_parts)
     scarce = surface.is_part & ~surface.orientation.closed & (counts < N_CLEAR)
     return Parts(
         areas=surface.part_sums(areas),
@@ -322,28 +312,17 @@ def _levels(faces: MeshFaces, chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
     owners = surface.orientation.parts[faces.triangle_faces]
     some = np.flatnonzero(chosen[owners] & surface.is_first[faces.triangle_faces])
     if len(some):
-        corners = faces.positions[faces.triangles[some]]
-        backwards = surface.orientation.turned[faces.triangle_faces[some]]
-        corners[backwards] = corners[backwards, ::-1]
         names, labels = np.unique(owners[some], return_inverse=True)
-        levels[names] = own_levels(corners, labels)
+        levels[names] = own_levels(_agreeing(faces, some), labels)
     return levels
 
 
-def _without(
-    lines: LineCrossings, crossed: NDArray[np.int64], chosen: NDArray[np.bool_]
-) -> tuple[LineCrossings, NDArray[np.int64]]:
-    """Lines, and the faces they cross, without some crossings."""
-    kept = ~chosen
-    counts = np.concatenate([[0], np.cumsum(kept)])
-    return replace(
-        lines,
-        starts=counts[lines.starts],
-        triangles=lines.triangles[kept],
-        entering=lines.entering[kept],
-        depths=lines.depths[kept],
-        cosines=lines.cosines[kept],
-    ), crossed[kept]
+def _agreeing(faces: MeshFaces, triangles: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(k, 3, 3) corners of some triangles, whose faces agree with their neighbours."""
+    corners: NDArray[np.float64] = faces.positions[faces.triangles[triangles]]
+    backwards = faces.surface.orientation.turned[faces.triangle_faces[triangles]]
+    corners[backwards] = corners[backwards, ::-1]
+    return corners
 
 
 def _ask_neighbors(
@@ -359,28 +338,21 @@ def _ask_neighbors(
 
 
 def _turned_together(
-    faces: MeshFaces,
-    turned: NDArray[np.bool_],
-    loose: NDArray[np.bool_],
-    lines: LineCrossings,
-    crossed: NDArray[np.int64],
+    faces: MeshFaces, turned: NDArray[np.bool_], loose: NDArray[np.bool_], lines: LineCrossings
 ) -> NDArray[np.bool_] | None:
     """Turn loose parts all together, by points on them; None if lines then find no fewer contradictions."""
     surface, agreeing = faces.surface, faces.surface.orientation.turned
 
     def unevenness(turned: NDArray[np.bool_]) -> float:
-        return imbalance(lines.starts, lines.entering != (turned != agreeing)[crossed])
+        return imbalance(lines.starts, lines.entering != (turned != agreeing)[lines.crossed])
 
     before = unevenness(turned)
     if before < UNEVEN:
         return None
     of_triangle = surface.orientation.parts[faces.triangle_faces]
     chosen = np.flatnonzero(loose[of_triangle] & surface.is_first[faces.triangle_faces])
-    corners = faces.positions[faces.triangles[chosen]]
-    backwards = agreeing[faces.triangle_faces[chosen]]
-    corners[backwards] = corners[backwards, ::-1]
     flipped = np.zeros(surface.n_parts, dtype=bool)
-    flipped[of_triangle[chosen]] = orient_triangles(corners, of_triangle[chosen]) < 0
+    flipped[of_triangle[chosen]] = orient_triangles(_agreeing(faces, chosen), of_triangle[chosen]) < 0
     together = np.where(loose[surface.orientation.parts], agreeing != flipped[surface.orientation.parts], turned)
     after = unevenness(together)
     if MENDED * before <= after <= before:

@@ -7,9 +7,12 @@ import scipy
 from numpy.typing import NDArray
 
 from ..geometry.components import sums_of
+from ..geometry.meshes import area_vectors
 from ..geometry.outward_signs import outward_signs
 from ..geometry.plane_fits import fit_planes, noise_scale
 
+N_SAMPLES = 20_000
+"""Points on loose triangles: at least one on each, and as many more as its share of the area is."""
 N_NEIGHBORS = 12
 """Neighbours that a piece is compared with."""
 N_AROUND = 24
@@ -18,13 +21,13 @@ SMOOTH = 0.7
 """Mean square of the cosines between normals of neighbours from which they are evidence; ⅓ if normals are random."""
 LEAST_AGREEMENT = 0.6
 """How clearly neighbours must agree (1: all their normals along one line, the same way) to turn a piece."""
+ROUNDS = 4
+"""Times that pieces turn which clearly disagree with their neighbours."""
 AT_CORNERS = 5.0
 """Logarithm of the odds that a small part faces as those do that it touches, all of them parallel to it."""
 
 
-def orient_triangles(
-    corners: NDArray[np.float64], groups: NDArray[np.int64] | None = None, n_samples: int = 20_000
-) -> NDArray[np.float64]:
+def orient_triangles(corners: NDArray[np.float64], groups: NDArray[np.int64] | None = None) -> NDArray[np.float64]:
     """(m,) signs, −1 for triangles to turn round so that loose triangles, taken together, face outwards.
 
     Parameters
@@ -34,8 +37,6 @@ def orient_triangles(
         most are inverted, that is found out.
     groups : (m,) int, optional
         Triangles of the same group, which agree with each other, share one sign.
-    n_samples : int
-        Points on the triangles: at least one on each, and as many more as its share of the area is.
 
     Notes
     -----
@@ -51,12 +52,12 @@ def orient_triangles(
     >>> bool((signs[::2] == -1).all() and (signs[1::2] == 1).all())
     True
     """
-    vectors = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    vectors = area_vectors(corners)
     areas = np.linalg.norm(vectors, axis=1)
     members = np.arange(len(corners)) if groups is None else groups
     signs = np.ones(int(members.max(initial=-1)) + 1)
     solid = np.flatnonzero(areas > 0)
-    counts = np.maximum(1, np.rint(areas[solid] / max(areas.sum(), np.finfo(float).tiny) * n_samples)).astype(np.int64)
+    counts = np.maximum(1, np.rint(areas[solid] / max(areas.sum(), np.finfo(float).tiny) * N_SAMPLES)).astype(np.int64)
     owners = np.repeat(np.arange(len(solid)), counts)
     order = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
     points = _spread(corners[solid][owners], order, counts[owners])
@@ -128,7 +129,7 @@ def agreement(centroids: NDArray[np.float64], vectors: NDArray[np.float64]) -> f
 
 
 def disagreeing_with_neighbors(
-    centroids: NDArray[np.float64], normals: NDArray[np.float64], chosen: NDArray[np.bool_], rounds: int = 4
+    centroids: NDArray[np.float64], normals: NDArray[np.float64], chosen: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """(n,) which of the chosen pieces to turn so that they face as their neighbours do.
 
@@ -148,7 +149,7 @@ def disagreeing_with_neighbors(
     smooth = (weights * along**2).sum(axis=1) > SMOOTH * np.maximum(total, 1.0)
     along *= weights
     signs = np.ones(len(centroids))
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         balance = (along * signs[near]).sum(axis=1) * signs[here]
         wrong = smooth & (balance < -LEAST_AGREEMENT * total)
         if not wrong.any():

@@ -18,6 +18,9 @@ from ..compiled import compiled
 from ..frozen import read_only
 from ..geometry.components import grouped
 
+N_WAYS = 4
+"""Directions of lines through points."""
+
 
 @dataclass(frozen=True, eq=False)
 class LineCrossings:
@@ -27,8 +30,8 @@ class LineCrossings:
     ----------
     starts : (n_lines + 1,) int
         Where the crossings of each line begin.
-    triangles : (k,) int32
-        Triangle of each crossing.
+    crossed : (k,) int
+        Triangle of each crossing, or the face that it is part of.
     entering : (k,) bool
         Whether the line comes from the side to which the triangle's normal points.
     depths : (k,) float
@@ -38,10 +41,15 @@ class LineCrossings:
     """
 
     starts: NDArray[np.int64]
-    triangles: NDArray[np.int32]
+    crossed: NDArray[np.integer]
     entering: NDArray[np.bool_]
     depths: NDArray[np.float64]
     cosines: NDArray[np.float64]
+
+    def chosen(self, kept: NDArray[np.bool_]) -> LineCrossings:
+        """Some of the crossings, of as many lines."""
+        starts = np.concatenate([[0], np.cumsum(kept)])[self.starts]
+        return LineCrossings(starts, self.crossed[kept], self.entering[kept], self.depths[kept], self.cosines[kept])
 
 
 def stabbing_lines(
@@ -85,7 +93,6 @@ def aimed_lines(
     triangles: NDArray[np.int64],
     bounds: NDArray[np.float64],
     points: NDArray[np.float64],
-    n_directions: int = 4,
 ) -> LineCrossings:
     """Cross a shape by lines through some points, along `N_WAYS` directions: for parts that evenly spread lines miss.
 
@@ -99,7 +106,7 @@ def aimed_lines(
     >>> np.diff(lines.starts).tolist()
     [2, 2, 2, 2]
     """
-    frames = line_frames(n_directions)
+    frames = line_frames(N_WAYS)
     center = 0.5 * (bounds[0] + bounds[1])
     size = max(float(np.linalg.norm(bounds[1] - bounds[0])), np.finfo(float).tiny)
     n_cells = int(np.clip(np.sqrt(len(points)), 1, 512))
@@ -112,7 +119,7 @@ def aimed_lines(
         found.append(
             _aim(vertices, triangles, frame, center, at, order, starts, n_cells / size, n_cells, k * len(points))
         )
-    return _in_order(found, n_directions * len(points))
+    return _in_order(found, N_WAYS * len(points))
 
 
 def _in_order(found: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]], n_lines: int) -> LineCrossings:
@@ -128,7 +135,7 @@ def joined(one: LineCrossings, other: LineCrossings) -> LineCrossings:
     """The crossings of one set of lines, then those of another."""
     return LineCrossings(
         np.concatenate([one.starts, one.starts[-1] + other.starts[1:]]),
-        np.concatenate([one.triangles, other.triangles]),
+        np.concatenate([one.crossed, other.crossed]),
         np.concatenate([one.entering, other.entering]),
         np.concatenate([one.depths, other.depths]),
         np.concatenate([one.cosines, other.cosines]),

@@ -51,6 +51,7 @@ def votes(starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray
     return Votes(*_votes(starts, parts, entering, n_parts))
 
 
+@compiled
 def containers(
     starts: NDArray[np.int64],
     parts: NDArray[np.int64],
@@ -68,53 +69,6 @@ def containers(
     >>> containers(np.array([0, 4]), np.array([0, 1, 1, 0]), entering, bounding).tolist()
     [-1, 0, 0, -1]
     """
-    return _containers(starts, parts, entering, bounding)
-
-
-@compiled
-def _votes(
-    starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], n_parts: int
-) -> tuple[
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-]:
-    crossings, seen, seen_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
-    own, own_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
-    even, even_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
-    latest = np.full(n_parts, -1, np.int64)
-    for line in range(len(starts) - 1):
-        begin, end = starts[line], starts[line + 1]
-        for k in range(begin, end):
-            part, vote = parts[k], 1 if entering[k] else -1
-            crossings[part] += 1
-            if (end - begin) % 2 == 0:
-                even[part] += 1
-                even_votes[part] += vote if (k - begin) % 2 == 0 else -vote
-                if k == begin or k == end - 1:
-                    seen[part] += 1
-                    seen_votes[part] += vote if k == begin else -vote
-            elif end - begin == 1:
-                seen[part] += 2
-            if latest[part] < begin:  # the first of the part on this line
-                own[part] += 2
-                own_votes[part] += vote
-            latest[part] = k
-        for k in range(begin, end):
-            part = parts[k]
-            if latest[part] == k:
-                own_votes[part] -= 1 if entering[k] else -1
-    return crossings, seen, seen_votes, own, own_votes, even, even_votes
-
-
-@compiled
-def _containers(
-    starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], bounding: NDArray[np.bool_]
-) -> NDArray[np.int64]:
     n_parts = len(bounding)
     found = np.full(len(parts), -1, dtype=np.int64)
     sums, latest = np.zeros(n_parts, np.int64), np.full(n_parts, -1, np.int64)
@@ -151,6 +105,38 @@ def _containers(
                 stack[depth] = part
                 depth += 1
     return found
+
+
+@compiled
+def _votes(
+    starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], n_parts: int
+) -> tuple[NDArray[np.int64], ...]:
+    crossings, seen, seen_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
+    own, own_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
+    even, even_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
+    latest = np.full(n_parts, -1, np.int64)
+    for line in range(len(starts) - 1):
+        begin, end = starts[line], starts[line + 1]
+        for k in range(begin, end):
+            part, vote = parts[k], 1 if entering[k] else -1
+            crossings[part] += 1
+            if (end - begin) % 2 == 0:
+                even[part] += 1
+                even_votes[part] += vote if (k - begin) % 2 == 0 else -vote
+                if k == begin or k == end - 1:
+                    seen[part] += 1
+                    seen_votes[part] += vote if k == begin else -vote
+            elif end - begin == 1:
+                seen[part] += 2
+            if latest[part] < begin:  # the first of the part on this line
+                own[part] += 2
+                own_votes[part] += vote
+            latest[part] = k
+        for k in range(begin, end):
+            part = parts[k]
+            if latest[part] == k:
+                own_votes[part] -= 1 if entering[k] else -1
+    return crossings, seen, seen_votes, own, own_votes, even, even_votes
 
 
 def imbalance(starts: NDArray[np.int64], entering: NDArray[np.bool_]) -> float:

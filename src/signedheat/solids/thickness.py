@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..geometry.directions import unit
+from ..geometry.meshes import area_vectors
 from ..orientation.mesh_faces import Mesh, MeshFaces
 from ..orientation.stabbing_lines import LineCrossings, stabbing_lines
 
@@ -81,22 +83,15 @@ def thickness(shape: Mesh) -> Thickness:
 
 def _widths(faces: MeshFaces, lines: LineCrossings, wall: bool) -> tuple[NDArray[np.float64], int]:
     """Widths along lines of walls, else of gaps, between opposite faces; and how many of either sort are crossed."""
-    last = np.zeros(len(lines.triangles), dtype=bool)
+    last = np.zeros(len(lines.crossed), dtype=bool)
     last[lines.starts[1:][np.diff(lines.starts) > 0] - 1] = True
     here = np.flatnonzero(~last[:-1] & (lines.entering[:-1] == wall) & (lines.entering[1:] != wall))
-    one, other = (_normals(faces, lines.triangles[here + step]) for step in (0, 1))
+    one, other = (unit(area_vectors(faces.positions[faces.triangles[lines.crossed[here + k]]])) for k in (0, 1))
     opposite = np.einsum("ij,ij->i", one, other) < OPPOSITE
     opposite &= np.minimum(lines.cosines[here], lines.cosines[here + 1]) > STEEP
     widths = (lines.depths[here + 1] - lines.depths[here]) * 0.5 * (lines.cosines[here] + lines.cosines[here + 1])
     size = float(np.abs(faces.bounds).max())
     return widths[opposite & (widths > 1e-9 * size)], len(here)
-
-
-def _normals(faces: MeshFaces, triangles: NDArray[np.int32]) -> NDArray[np.float64]:
-    a, b, c = (faces.positions[faces.triangles[triangles, k]] for k in range(3))
-    vectors = np.cross(b - a, c - a)
-    lengths = np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny)
-    return np.asarray(vectors / lengths, dtype=np.float64)
 
 
 def _quantile(widths: NDArray[np.float64], rank: float) -> float | None:
