@@ -21,9 +21,10 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import flag
 from ..errors import SignedHeatError, SourceError
-from ..geometry.face_features import FaceFeatures
+from ..geometry.cut_faces import cut_faces
+from ..geometry.directions import axes_across
 from ..geometry.face_tree import FaceTree
-from ..geometry.part_levels import face_areas
+from ..geometry.meshes import face_areas
 from ..geometry.welding import roundoff, same_positions, welded
 from ..memory import refuse_beyond_memory
 from ..operators.grid.fitted_points import mean_gap
@@ -31,7 +32,6 @@ from ..orientation.meshes import orientation
 from ..orientation.points import orient_points
 from ..progress import Progress, Stopwatch
 from . import parts
-from .bounding import pieces_of
 from .closing import lids_of
 from .heat import Heat, heat_surface
 from .loose import are_copies, bound_together, fragments, scatter_of
@@ -113,7 +113,13 @@ def complete(
         raise SignedHeatError(f'completion must be "lids" or "heat", not {completion!r}', element="completion")
     as_oriented, keep_overlaps = flag(as_oriented, "as_oriented"), flag(keep_overlaps, "keep_overlaps")
     joined = joined_shape(shape)
-    refuse_what_does_not_fit(joined)
+    count = joined.n_points if isinstance(joined, PointCloud) else joined.triangulation.n_faces
+    refuse_beyond_memory(
+        f"completing a shape of {count} faces",
+        count,
+        lambda n: bytes_to_complete(joined, n),
+        lambda n: f"simplify it to {n} faces, or free memory",
+    )
     method = Heat(constraint, diffusion)
     stopwatch = Stopwatch(progress, STEPS)
     with stopwatch("orient") as run:
@@ -128,22 +134,13 @@ def complete(
         else:
             inner = found.inner[_owners(turned)] if found else None
             solid = run(partial(completed, turned.triangulation, completion, keep_overlaps, method, inner))
-    names = None
-    if isinstance(turned, TriangleMesh | PolygonMesh):
+    origins = solid.origins
+    if isinstance(turned, TriangleMesh | PolygonMesh):  # as the shape that was given numbers its faces
         names = _owners(turned) if found is None else found.faces[_owners(turned)]
+        origins = np.where(origins >= 0, names[origins], -1)
     source = joined if isinstance(joined, TriangleMesh) else None
-    return _noting(solid, notes, stopwatch, names, source)
-
-
-def refuse_what_does_not_fit(shape: SurfaceShape) -> None:
-    """Raise `MemoryLimitError`, before anything is allocated, if completing a shape would not fit in memory."""
-    count = shape.n_points if isinstance(shape, PointCloud) else shape.triangulation.n_faces
-    refuse_beyond_memory(
-        f"completing a shape of {count} faces",
-        count,
-        lambda n: bytes_to_complete(shape, n),
-        lambda n: f"simplify it to {n} faces, or free memory",
-    )
+    diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
+    return replace(solid, origins=origins, source=source, diagnostics=diagnostics)
 
 
 def bytes_to_complete(shape: SurfaceShape, count: int) -> float:
@@ -170,19 +167,6 @@ def _owners(shape: TriangleMesh | PolygonMesh) -> NDArray[np.int64]:
     return shape.refinement.face_polygons if isinstance(shape, PolygonMesh) else np.arange(shape.n_faces)
 
 
-def _noting(
-    solid: Solid,
-    notes: Sequence[Note],
-    stopwatch: Stopwatch,
-    faces: NDArray[np.int64] | None,
-    source: TriangleMesh | None,
-) -> Solid:
-    """A solid that names faces as the shape that was given does, with the notes of all steps."""
-    origins = solid.origins if faces is None else np.where(solid.origins >= 0, faces[solid.origins], -1)
-    diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
-    return replace(solid, origins=origins, source=source, diagnostics=diagnostics)
-
-
 @dataclass(frozen=True, eq=False)
 class Surface:
     """Triangles of one kind.
@@ -203,6 +187,12 @@ class Surface:
     ids: NDArray[np.int64]
     origins: NDArray[np.int64]
     closing: bool
+
+    @classmethod
+    def made(cls, triangles: NDArray[np.float64], closing: bool = True) -> Surface:
+        """Triangles that were not given; their vertices have negative numbers."""
+        ids = -1 - same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)
+        return cls(triangles, ids, np.full(len(triangles), -1), closing)
 
 
 def completed(
@@ -261,8 +251,7 @@ def _by_lids(
             surfaces.append(_some(pieces, loose, False))
     bodies = _some(whole, lidded, True)
     lids = lids_of(bodies.triangles, bodies.ids, labels[lidded], vertices)
-    closing = (Surface(lid, _new_ids(lid), np.full(len(lid), -1), True) for lid in lids)
-    return [bodies, *closing, *surfaces], int(copies.sum())
+    return [bodies, *map(Surface.made, lids), *surfaces], int(copies.sum())
 
 
 def _scattered(pieces: Surface, labels: NDArray[np.int64], method: Heat) -> list[Surface]:
@@ -277,40 +266,31 @@ def _by_heat(given: Surface, method: Heat) -> list[Surface]:
     """Triangles, and the zero set of φ where they are not."""
     made = _heat_of(given, method)
     if made is None:
-        return [_some(given, np.ones(len(given.ids), dtype=bool), False)]
-    corners = given.triangles.reshape(-1, 3)
-    tree = FaceTree.of(FaceFeatures.of(corners, np.arange(len(corners)).reshape(-1, 3)))
+        return [replace(given, closing=False)]
+    tree = FaceTree.of_triangles(given.triangles)
     cell = float(np.median(np.linalg.norm(made.triangles[:, 1] - made.triangles[:, 0], axis=1)))
     away = tree.distances(made.triangles.mean(axis=1)) > SEAM * cell
-    return [_some(given, np.ones(len(given.ids), dtype=bool), True), _some(made, away, True)]
+    return [replace(given, closing=True), _some(made, away, True)]
 
 
 def _heat_of(pieces: Surface, method: Heat, cell: float = 0.0) -> Surface | None:
     names, faces = np.unique(pieces.triangles.reshape(-1, 3), axis=0, return_inverse=True)
     made = heat_surface(TriangleMesh(names, faces.reshape(-1, 3)), method, cell)
-    if made is None:
-        return None
-    triangles = made[0][made[1]]
-    return Surface(triangles, _new_ids(triangles), np.full(len(triangles), -1), True)
+    return None if made is None else Surface.made(made[0][made[1]])
 
 
 def _from_points(cloud: PointCloud, method: Heat) -> Solid:
     """The solid that oriented points are samples of; where they bound nothing, each is a small triangle."""
     if cloud.normals is None:
         raise SourceError("the point cloud has no normals, which say what is inside", remedy="give it normals")
-    made = heat_surface(cloud, method, mean_gap(np.asarray(cloud.points)) / CELLS)
+    gap = mean_gap(np.asarray(cloud.points))
+    made = heat_surface(cloud, method, gap / CELLS)
     if made is not None:
-        triangles = made[0][made[1]]
-        return united(
-            [Surface(triangles, _new_ids(triangles), np.full(len(triangles), -1), True)], True, (), cloud.points
-        )
-    size = 0.25 * mean_gap(np.asarray(cloud.points))
-    first = np.cross(cloud.normals, np.eye(3)[np.abs(cloud.normals).argmin(axis=1)])
-    first /= np.maximum(np.linalg.norm(first, axis=1), 1e-300)[:, None]
-    second = np.cross(cloud.normals, first)
+        return united([Surface.made(made[0][made[1]])], True, points=cloud.points)
+    first, second = axes_across(cloud.normals)
     turns = np.stack([np.cos(2 * np.pi * np.arange(3) / 3), np.sin(2 * np.pi * np.arange(3) / 3)], axis=1)
-    triangles = cloud.points[:, None] + size * (turns[:, :1] * first[:, None] + turns[:, 1:] * second[:, None])
-    return united([Surface(triangles, _new_ids(triangles), np.full(len(triangles), -1), False)], True, (), cloud.points)
+    ways = turns[:, :1] * first[:, None] + turns[:, 1:] * second[:, None]
+    return united([Surface.made(cloud.points[:, None] + 0.25 * gap * ways, False)], True, points=cloud.points)
 
 
 def united(
@@ -324,25 +304,42 @@ def united(
     whole = _joined(surfaces)
     closing = np.concatenate([np.full(len(each.triangles), each.closing) for each in surfaces])
     windings = Windings(whole.triangles[closing])
-    pieces = pieces_of(whole.triangles, whole.ids, closing, windings)
-    origins = whole.origins[pieces.origins]
+    triangles, parents, behind, ahead = _cut(whole, closing, windings)
+    origins = whole.origins[parents]
     given = origins >= 0
-    buried = pieces.behind & pieces.ahead
-    bounds = pieces.behind != pieces.ahead
-    kept = np.where(given, ~buried | keep_overlaps, bounds | ~closing[pieces.origins])
+    buried = behind & ahead
+    bounds = behind != ahead
+    kept = np.where(given, ~buried | keep_overlaps, bounds | ~closing[parents])
     if not kept.any():
         kept[:] = True
-    areas = face_areas(pieces.triangles)
-    confidence = _confidence(pieces.triangles[kept], given[kept], whole, points)
-    found = _notes(pieces.triangles, areas, origins, kept, buried & ~kept, bounds, copies)
-    diagnostics = Diagnostics(notes=(*notes, *found))
-    bounding = (pieces.behind & ~pieces.ahead)[kept]
-    return Solid(pieces.triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics)
+    confidence = _confidence(triangles[kept], given[kept], whole, points)
+    diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds, copies)))
+    bounding = (behind & ~ahead)[kept]
+    return Solid(triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics)
+
+
+def _cut(
+    whole: Surface, closing: NDArray[np.bool_], windings: Windings
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Triangles cut along those that close, the triangle each is a piece of, and whether it is inside behind and ahead.
+
+    Between cuts both sides are the same all over a part, which is looked at once.
+    """
+    pieces, parents, met = cut_faces(whole.triangles, whole.ids, whole.triangles[closing], whole.ids[closing])
+    regions = np.arange(len(pieces))
+    uncut = np.flatnonzero(~met[parents])
+    if len(uncut):
+        labels = parts.parts_of(whole.ids[parents[uncut]])
+        largest = np.lexsort((-face_areas(pieces[uncut]), labels))
+        _, first = np.unique(labels[largest], return_index=True)
+        regions[uncut] = uncut[largest[first]][labels]
+    some, where = np.unique(regions, return_inverse=True)
+    behind, ahead = windings.sides(pieces[some])
+    return pieces, parents, behind[where], ahead[where]
 
 
 def _notes(
     triangles: NDArray[np.float64],
-    areas: NDArray[np.float64],
     origins: NDArray[np.int64],
     kept: NDArray[np.bool_],
     buried: NDArray[np.bool_],
@@ -350,7 +347,7 @@ def _notes(
     copies: int,
 ) -> list[Note]:
     notes: list[Note] = []
-    given = origins >= 0
+    areas, given = face_areas(triangles), origins >= 0
     total = max(float(areas[given].sum()), np.finfo(float).tiny)
     covered = buried & given
     if covered.any() or copies:
@@ -359,13 +356,9 @@ def _notes(
         notes.append(LeftOut(len(faces), float(areas[covered].sum()) / total, cut, copies))
     made = kept & ~given
     if made.any():
-        area = float(areas[made].sum())
-        corners = triangles[made].reshape(-1, 3)
-        notes.append(
-            CompletedArea(
-                area, area / float(areas[kept].sum()), np.stack([corners.min(axis=0), corners.max(axis=0)])[None]
-            )
-        )
+        area, corners = float(areas[made].sum()), triangles[made].reshape(-1, 3)
+        box = np.stack([corners.min(axis=0), corners.max(axis=0)])
+        notes.append(CompletedArea(area, area / float(areas[kept].sum()), box[None]))
     idle = given & kept & ~bounds
     if float(areas[idle].sum()) > 1e-6 * total:
         notes.append(BoundsNothing(float(areas[idle].sum()) / total))
@@ -409,8 +402,3 @@ def _joined(surfaces: list[Surface]) -> Surface:
 
 def _some(surface: Surface, chosen: NDArray[np.bool_] | NDArray[np.int64], closing: bool) -> Surface:
     return Surface(surface.triangles[chosen], surface.ids[chosen], surface.origins[chosen], closing)
-
-
-def _new_ids(triangles: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(m, 3) negative numbers, one for each position."""
-    return -1 - same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)

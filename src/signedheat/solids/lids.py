@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..compiled import compiled
+from ..geometry.components import sums_of
+from ..geometry.directions import unit
+from ..geometry.meshes import area_vectors, face_areas
 
 PIECES = 128
 """Points of the loop that a lid spans. Half or twice as many change the volume under a lid by less than 1 %."""
@@ -128,11 +131,11 @@ def _last_before(starts: NDArray[np.float64], shares: NDArray[np.float64]) -> ND
     return np.minimum(np.searchsorted(starts, shares, side="right") - 1, len(starts) - 2)
 
 
-def cut_to_pieces(loop: NDArray[np.float64], pieces: int = PIECES) -> NDArray[np.float64]:
-    """(k, 3) the points of a closed loop, and more on its edges: none is longer than the whole over `pieces`."""
+def cut_to_pieces(loop: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k, 3) the points of a closed loop, and more on its edges: none is longer than the whole over `PIECES`."""
     ways = np.roll(loop, -1, axis=0) - loop
     lengths = np.linalg.norm(ways, axis=1)
-    counts = np.maximum(np.ceil(lengths * pieces / lengths.sum() - 1e-9), 1).astype(np.int64)
+    counts = np.maximum(np.ceil(lengths * PIECES / lengths.sum() - 1e-9), 1).astype(np.int64)
     starts = np.repeat(np.arange(len(loop)), counts)
     along = (np.arange(len(starts)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[starts]
     cut: NDArray[np.float64] = loop[starts] + along[:, None] * ways[starts]
@@ -147,9 +150,18 @@ def area_vector(loop: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def frame_of(rim: NDArray[np.float64]) -> Frame | None:
-    """The plane of a loop's area; None if it has none."""
-    axes = _axes(rim)
-    return None if axes is None else (rim[0], axes)
+    """The plane of a loop's area, in which it runs counterclockwise; None if it has none."""
+    normal = area_vector(rim)
+    length = np.linalg.norm(normal)
+    if not length > 1e-6 * np.linalg.norm(np.ptp(rim, axis=0)) ** 2:
+        return None
+    normal /= length
+    around = rim - rim.mean(axis=0)
+    around -= np.outer(around @ normal, normal)
+    reach = np.linalg.norm(around, axis=1)
+    first = around[np.argmax(reach > (1 - 1e-9) * reach.max())]  # turns with the rim
+    first = first / np.linalg.norm(first)
+    return rim[0], np.stack([first, np.cross(normal, first)], axis=1)
 
 
 def pattern(rim: NDArray[np.float64], frame: Frame | None, begin: float = 0.0) -> Film | None:
@@ -213,8 +225,7 @@ def _membrane(
     rows = np.concatenate([np.arange(size), here[inner] - n])
     columns = np.concatenate([np.arange(size), there[inner] - n])
     entries = np.concatenate([np.bincount(here, both, len(vertices))[n:], -both[inner]])
-    pulled = both[fixed, None] * vertices[there[fixed]]
-    sums = np.stack([np.bincount(here[fixed] - n, column, size) for column in pulled.T], axis=1)
+    sums = sums_of(both[fixed, None] * vertices[there[fixed]], here[fixed] - n, size)
     matrix = sparse.csc_array((entries, (rows, columns)), shape=(size, size))
     return np.concatenate([vertices[:n], sparse.linalg.splu(matrix).solve(sums)])
 
@@ -243,8 +254,8 @@ def plate(
     size = float(np.linalg.norm(np.ptp(rim, axis=0)))
     for _ in range(MOVES):
         up = vertex_normals(lid)
-        matrix = stiffness(lid.vertices, lid.faces)
-        areas = vertex_areas(lid.vertices, lid.faces)
+        matrix = stiffness(lid)
+        areas = np.bincount(lid.faces.ravel(), np.repeat(face_areas(lid.vertices[lid.faces]) / 3, 3))
         weights = 1.0 / np.maximum(areas, 1e-3 * np.median(areas[n:]))
         weights[:n] *= held
         given = matrix[:, :n] @ rim - (areas * rest)[:, None] * up
@@ -277,24 +288,9 @@ def _load(rim: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.
 
 def _harmonic(lid: Lid, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Values at the rim, one or several for each point, and between them harmonic on the lid."""
-    n, matrix = lid.n_rim, stiffness(lid.vertices, lid.faces)
+    n, matrix = lid.n_rim, stiffness(lid)
     inner = sparse.linalg.splu(matrix[n:, n:].tocsc()).solve(-(matrix[n:, :n] @ values))
     return np.concatenate([values, inner])
-
-
-def _axes(rim: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """(3, 2) axes of the plane of a loop's area, in which it runs counterclockwise; None if it has none."""
-    normal = area_vector(rim)
-    length = np.linalg.norm(normal)
-    if not length > 1e-6 * np.linalg.norm(np.ptp(rim, axis=0)) ** 2:
-        return None
-    normal /= length
-    around = rim - rim.mean(axis=0)
-    around -= np.outer(around @ normal, normal)
-    reach = np.linalg.norm(around, axis=1)
-    first = around[np.argmax(reach > (1 - 1e-9) * reach.max())]  # turns with the rim
-    first = first / np.linalg.norm(first)
-    return np.stack([first, np.cross(normal, first)], axis=1)
 
 
 def _in_polygon(
@@ -308,11 +304,8 @@ def _in_polygon(
     for _ in range(SPLITS):
         n = len(plane)
         points = np.concatenate([plane, inner])
-        faces = _delaunay(points).simplices.astype(np.int64)
-        a, b, c = points[faces].transpose(1, 0, 2)
-        area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-        faces[area < 0] = faces[area < 0][:, ::-1]
-        faces = faces[np.abs(area) > 1e-12 * np.abs(area).max()]
+        faces, areas = _counterclockwise(points)
+        faces = faces[areas > 1e-12 * areas.max()]
         there = _directed(faces, len(points))
         ahead = np.arange(n), (np.arange(n) + 1) % n
         missing = ~(
@@ -341,6 +334,15 @@ def _delaunay(points: NDArray[np.float64]) -> scipy.spatial.Delaunay:
     return scipy.spatial.Delaunay(points + MOVED * size * moves)
 
 
+def _counterclockwise(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Delaunay triangles of points, and twice their areas."""
+    faces = _delaunay(points).simplices.astype(np.int64)
+    a, b, c = points[faces].transpose(1, 0, 2)
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    faces[area < 0] = faces[area < 0][:, ::-1]
+    return faces, np.abs(area)
+
+
 def _sides(faces: NDArray[np.int64], n: int) -> NDArray[np.int64]:
     """(m, 3) numbers of the edges across from the corners of triangles."""
     one, other = np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)
@@ -365,14 +367,8 @@ def _points_inside(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
         end = begin + 2.0 * step
         rows = np.arange(low[1], high[1] + step, step * 0.75**0.5)
         columns = np.arange(low[0], high[0] + step, step)
-        grid = np.stack(
-            [
-                np.add.outer(0.5 * step * (np.arange(len(rows)) % 2), columns),
-                np.repeat(rows[:, None], len(columns), axis=1),
-            ],
-            axis=2,
-        )
-        points = grid.reshape(-1, 2)
+        shifted = np.add.outer(0.5 * step * (np.arange(len(rows)) % 2), columns)
+        points = np.stack([shifted.ravel(), np.repeat(rows, len(columns))], axis=1)
         away = tree.query(points)[0]
         points = points[(away >= begin) & (away < end)]
         found.append(points[_inside_polygon(points, polygon)])
@@ -411,11 +407,7 @@ def _in_disc(rim: NDArray[np.float64], begin: float) -> tuple[NDArray[np.float64
         rings.append(radius * np.stack([np.cos(ring), np.sin(ring)], axis=1))
         step *= 1 + GROWTH
     points = np.concatenate(rings)
-    faces = _delaunay(points).simplices.astype(np.int64)
-    a, b, c = points[faces].transpose(1, 0, 2)
-    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    faces[area < 0] = faces[area < 0][:, ::-1]
-    return points, faces
+    return points, _counterclockwise(points)[0]
 
 
 def _cotangents(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -427,41 +419,25 @@ def _cotangents(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDAr
     return halves
 
 
-def stiffness(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> sparse.csr_array:
+def stiffness(lid: Lid) -> sparse.csr_array:
     """(n, n) the positive semidefinite cotangent Laplacian; corners of flat triangles are bounded."""
-    weights = _cotangents(vertices, faces).ravel()
-    i, j, n = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, -2, axis=1).ravel(), len(vertices)
+    weights, n = _cotangents(lid.vertices, lid.faces).ravel(), len(lid.vertices)
+    i, j = np.roll(lid.faces, -1, axis=1).ravel(), np.roll(lid.faces, -2, axis=1).ravel()
     entries = np.concatenate([-weights, -weights, weights, weights])
     places = np.concatenate([i, j, i, j]), np.concatenate([j, i, i, j])
     return sparse.coo_array((entries, places), shape=(n, n)).tocsr()
 
 
-def vertex_areas(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(n,) a third of the area of the triangles around each vertex."""
-    a, b, c = vertices[faces].transpose(1, 0, 2)
-    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return np.bincount(faces.ravel(), np.repeat(areas / 6, 3), len(vertices)).astype(np.float64)
-
-
 def vertex_normals(lid: Lid) -> NDArray[np.float64]:
     """(n, 3) unit normals, means by area of those of the triangles around each vertex."""
-    a, b, c = lid.vertices[lid.faces].transpose(1, 0, 2)
-    areas, n = np.cross(b - a, c - a), len(lid.vertices)
-    sums = np.stack([np.bincount(lid.faces.ravel(), np.repeat(areas[:, k], 3), n) for k in range(3)], axis=1)
-    normals: NDArray[np.float64] = sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
-    return normals
+    vectors = np.repeat(area_vectors(lid.vertices[lid.faces]), 3, axis=0)
+    return unit(sums_of(vectors, lid.faces.ravel(), len(lid.vertices)))
 
 
 def running_mean(values: NDArray[np.float64], reach: int) -> NDArray[np.float64]:
     """(n,) values along a loop, each the mean of those up to so many places away."""
     window = np.ones(2 * reach + 1) / (2 * reach + 1)
     return np.convolve(np.concatenate([values[len(values) - reach :], values, values[:reach]]), window, mode="valid")
-
-
-def lid_area(lid: Lid) -> float:
-    """Its area."""
-    a, b, c = lid.vertices[lid.faces].transpose(1, 0, 2)
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
 @compiled

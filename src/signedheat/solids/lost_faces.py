@@ -8,16 +8,14 @@ Liepa 2003), each part of a loop keeping the triangle at its end.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
 
+from ..geometry.components import sums_of
 from ..geometry.directions import unit
 from ..geometry.edges import edge_keys, edge_table
 from ..geometry.hole_filling import next_around_gap
-from ..geometry.virtual_refinement import area_vectors
+from ..geometry.meshes import area_vectors
 
 MOST_SIDES = 16
 """Sides of a hole from which on vertices, too, may be lost."""
@@ -41,30 +39,25 @@ def lost_faces(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArr
     >>> sorted(lost_faces(ball.vertices, ball.faces[1:])[0]) == sorted(ball.faces[0])
     True
     """
-    return np.concatenate([np.empty((0, 3), dtype=np.int64), *map(_lids, _small_holes(vertices, faces))])
-
-
-def _small_holes(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> list[_Holes]:
-    """Holes of at most `MOST_SIDES` sides, by how many."""
     table = edge_table(faces)
     alone = (np.bincount(faces.ravel(), minlength=len(vertices)) == 1)[faces].all(axis=1)
     owners, sides = np.nonzero((table.face_counts[table.face_edges] == 1) & ~alone[:, None])
+    found = [np.empty((0, 3), dtype=np.int64)]
     if not len(owners):
-        return []
+        return found[0]
     tails, heads = faces[owners, sides], faces[owners, (sides + 1) % 3]
-    face_normals = unit(_area_vectors(vertices[faces]))
-    sums = [np.bincount(faces.ravel(), np.repeat(column, 3), len(vertices)) for column in face_normals.T]
-    following = next_around_gap(vertices, unit(np.stack(sums, axis=1)), tails, heads)
+    face_normals = unit(area_vectors(vertices[faces]))
+    normals = unit(sums_of(np.repeat(face_normals, 3, axis=0), faces.ravel(), len(vertices)))
+    following = next_around_gap(vertices, normals, tails, heads)
     touching = np.zeros(len(vertices), dtype=bool)
     touching[tails] = True
     existing = table.vertices[touching[table.vertices].all(axis=1)]
     taken = np.sort(edge_keys(existing[:, 0], existing[:, 1]))
-    found = []
     for loops in _simple_loops(tails.tolist(), following.tolist()):
         for begin in range(0, len(loops), TOGETHER):
             edges = loops[begin : begin + TOGETHER, ::-1]  # around the hole, against the faces
-            found.append(_Holes(vertices, heads[edges], face_normals[owners[edges]], taken))
-    return found
+            found.append(_lids(vertices, heads[edges], face_normals[owners[edges]], taken))
+    return np.concatenate(found)
 
 
 def _simple_loops(tails: list[int], following: list[int]) -> list[NDArray[np.int64]]:
@@ -93,79 +86,45 @@ def _simple_loops(tails: list[int], following: list[int]) -> list[NDArray[np.int
     return [np.array(loops[n]) for n in sorted(loops)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Holes:
-    """Holes of n sides.
+def _lids(
+    vertices: NDArray[np.float64], loops: NDArray[np.int64], rim_normals: NDArray[np.float64], taken: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """(k, 3) triangles that close holes of n sides across which the surface bends by an angle of at most `BENT`.
 
-    Attributes
-    ----------
-    vertices : (v, 3) float
-        Positions.
-    loops : (l, n) int
-        Vertices around each.
-    rim_normals : (l, n, 3) float
-        Unit normals of the faces at the edges of the rim, of which the k-th begins at the k-th vertex.
-    taken : (e,) int
-        Sorted keys of the edges that are there.
+    Of each hole there are the vertices around it, (l, n), and the unit normals of the faces at the edges that begin
+    there, (l, n, 3); edges with one of the sorted keys are there already. ``bends[i, j]`` is that of the best lid
+    between the i-th and the j-th vertex, but for the edge that joins the two, ``rims[i, j]`` the sum of lengths times
+    squared angles at the rim, and ``normals[i, j]`` that of its triangle there.
     """
-
-    vertices: NDArray[np.float64]
-    loops: NDArray[np.int64]
-    rim_normals: NDArray[np.float64]
-    taken: NDArray[np.int64]
-
-    @property
-    def sides(self) -> int:
-        """n."""
-        return int(self.loops.shape[1])
-
-    @cached_property
-    def lengths(self) -> NDArray[np.float64]:
-        """(n, n, l) distance between the vertices of each."""
-        corners = self.vertices[self.loops].transpose(1, 0, 2)
-        lengths: NDArray[np.float64] = np.linalg.norm(corners[:, None] - corners, axis=-1)
-        return lengths
-
-    def is_taken(self, i: int, k: int) -> NDArray[np.bool_]:
-        """(l,) whether the i-th and the k-th vertex have an edge already."""
-        keys = edge_keys(self.loops[:, i], self.loops[:, k])
-        at = np.minimum(np.searchsorted(self.taken, keys), len(self.taken) - 1)
-        found: NDArray[np.bool_] = self.taken[at] == keys
-        return found
-
-
-def _lids(holes: _Holes) -> NDArray[np.int64]:
-    """(k, 3) triangles that close holes across which the surface bends by an angle of at most `BENT`.
-
-    ``bends[i, j]`` is that of the best lid between the i-th and the j-th vertex, but for the edge that joins the two,
-    ``rims[i, j]`` the sum of lengths times squared angles at the rim, and ``normals[i, j]`` that of its triangle there.
-    """
-    count, n = holes.loops.shape
-    every = np.arange(count)
+    count, n = loops.shape
+    corners, every = vertices[loops].transpose(1, 0, 2), np.arange(count)
+    lengths = np.linalg.norm(corners[:, None] - corners, axis=-1)
     bends, rims = np.zeros((n, n, count)), np.zeros((n, n, count))
     normals, apexes = np.zeros((n, n, count, 3)), np.zeros((n, n, count), dtype=np.int64)
     for i in range(n - 1):
-        normals[i, i + 1] = holes.rim_normals[:, i]
+        normals[i, i + 1] = rim_normals[:, i]
     for span in range(2, n):
         for i in range(n - span):
             j = i + span
-            made = np.array([unit(_area_vectors(holes.vertices[holes.loops[:, [i, k, j]]])) for k in range(i + 1, j)])
+            made = np.array([unit(area_vectors(vertices[loops[:, [i, k, j]]])) for k in range(i + 1, j)])
             before, behind = _angles(made, normals[i, i + 1 : j]), _angles(made, normals[i + 1 : j, j])
-            sums = bends[i, i + 1 : j] + holes.lengths[i, i + 1 : j] * before
-            sums += bends[i + 1 : j, j] + holes.lengths[i + 1 : j, j] * behind
+            sums = bends[i, i + 1 : j] + lengths[i, i + 1 : j] * before
+            sums += bends[i + 1 : j, j] + lengths[i + 1 : j, j] * behind
             best = np.argmin(sums, axis=0)
             bends[i, j] = sums[best, every]
             if span < n - 1:
-                bends[i, j][holes.is_taken(i, j)] = np.inf
+                keys = edge_keys(loops[:, i], loops[:, j])
+                at = np.minimum(np.searchsorted(taken, keys), len(taken) - 1)
+                bends[i, j][taken[at] == keys] = np.inf
             at_rim = rims[i, i + 1 : j] + rims[i + 1 : j, j]
-            at_rim[0] += holes.lengths[i, i + 1] * before[0] ** 2
-            at_rim[-1] += holes.lengths[j - 1, j] * behind[-1] ** 2
+            at_rim[0] += lengths[i, i + 1] * before[0] ** 2
+            at_rim[-1] += lengths[j - 1, j] * behind[-1] ** 2
             rims[i, j], normals[i, j], apexes[i, j] = at_rim[best, every], made[best, every], best + i + 1
-    at_rim = rims[0, -1] + holes.lengths[-1, 0] * _angles(normals[0, -1], holes.rim_normals[:, -1]) ** 2
-    around = holes.lengths[np.arange(n), np.arange(n) - 1].sum(axis=0)
+    at_rim = rims[0, -1] + lengths[-1, 0] * _angles(normals[0, -1], rim_normals[:, -1]) ** 2
+    around = lengths[np.arange(n), np.arange(n) - 1].sum(axis=0)
     triangles, of_hole = _triangles(apexes, np.flatnonzero(np.isfinite(bends[0, -1])))
     closed = at_rim <= BENT**2 * around
-    result: NDArray[np.int64] = np.take_along_axis(holes.loops[of_hole], triangles, axis=1)[closed[of_hole]]
+    result: NDArray[np.int64] = np.take_along_axis(loops[of_hole], triangles, axis=1)[closed[of_hole]]
     return result
 
 
@@ -188,8 +147,3 @@ def _angles(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.
     flat = ~np.logical_and(one.any(axis=-1), other.any(axis=-1))
     angles: NDArray[np.float64] = np.arccos(np.clip(np.einsum("...j,...j->...", one, other), -1.0, 1.0))
     return np.where(flat, 0.0, angles)
-
-
-def _area_vectors(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3) area vectors of (n, 3, 3) triangles."""
-    return area_vectors(corners[:, 0], corners[:, 1], corners[:, 2])
