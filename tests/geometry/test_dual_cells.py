@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from signedheat.geometry.dual_cells import dual_cells
+from signedheat.geometry.dual_cells import Crossings, dual_cells
 
 
 @pytest.mark.parametrize("share", [0.1, 0.25, 0.5])
@@ -19,10 +19,8 @@ def test_manifold_whatever_the_signs(share):
             nodes.append(found)
             axes.append(np.full(len(found), axis))
         nodes = np.concatenate(nodes)
-        rising = below[tuple(nodes.T)]
-        cells = dual_cells(
-            nodes, np.concatenate(axes), rising, below.shape, lambda at, rng=rng: rng.random(len(at)) < 0.5
-        )
+        crossings = Crossings(nodes, np.concatenate(axes), below[tuple(nodes.T)], np.full(len(nodes), 0.5))
+        cells = dual_cells(crossings, below.shape, lambda at, rng=rng: rng.random(len(at)) < 0.5)
         tails, heads = cells.quads.ravel(), np.roll(cells.quads, -1, axis=1).ravel()
         sides = np.stack([np.minimum(tails, heads), np.maximum(tails, heads)], axis=1)
         assert (np.unique(sides, axis=0, return_counts=True)[1] == 2).all()

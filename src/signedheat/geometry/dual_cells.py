@@ -36,6 +36,26 @@ AFTER = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
 
 
 @dataclass(frozen=True, eq=False)
+class Crossings:
+    """Edges of a grid that a level set crosses.
+
+    Attributes
+    ----------
+    nodes, axes : (e, 3) int, (e,) int
+        First node of each, and what it runs along.
+    rising : (e,) bool
+        Whether the first node is inside.
+    shares : (e,) float
+        How far from the first node the crossing is, in cells.
+    """
+
+    nodes: NDArray[np.int64]
+    axes: NDArray[np.int64]
+    rising: NDArray[np.bool_]
+    shares: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
 class DualCells:
     """Cells that a level set passes through.
 
@@ -61,16 +81,9 @@ class DualCells:
 
 
 def cells_around(
-    nodes: NDArray[np.int64], axes: NDArray[np.int64], shape: tuple[int, ...]
+    crossings: Crossings, shape: tuple[int, ...]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """The cells around crossed edges, none of which is on a wall of the grid.
-
-    Parameters
-    ----------
-    nodes, axes : (e, 3) int, (e,) int
-        First node of each edge, and what it runs along.
-    shape : tuple of int
-        Nodes of the grid.
+    """The cells around crossed edges, none of which is on a wall of a grid with so many nodes along each axis.
 
     Returns
     -------
@@ -81,8 +94,8 @@ def cells_around(
     rows, sides : (e, 4) int
         The cells around each edge, as in `AROUND`, and which of their edges it is.
     """
-    around = np.repeat(nodes[:, None], 4, axis=1)
-    each = np.arange(len(nodes))[:, None]
+    axes, each = crossings.axes, np.arange(len(crossings.axes))[:, None]
+    around = np.repeat(crossings.nodes[:, None], 4, axis=1)
     around[each, np.arange(4), AFTER[axes, 1][:, None]] -= AROUND[:, 0]
     around[each, np.arange(4), AFTER[axes, 2][:, None]] -= AROUND[:, 1]
     flat = np.ravel_multi_index(tuple(around.reshape(-1, 3).T), shape)
@@ -95,11 +108,7 @@ def cells_around(
 
 
 def dual_cells(
-    nodes: NDArray[np.int64],
-    axes: NDArray[np.int64],
-    rising: NDArray[np.bool_],
-    shape: tuple[int, ...],
-    inside: Callable[[NDArray[np.float64]], NDArray[np.bool_]],
+    crossings: Crossings, shape: tuple[int, ...], inside: Callable[[NDArray[np.float64]], NDArray[np.bool_]]
 ) -> DualCells:
     """The pieces of a level set in the cells of a grid with so many nodes along each axis.
 
@@ -110,12 +119,12 @@ def dual_cells(
     A node that alone is inside has a cube around it.
 
     >>> nodes = np.array([[2, 2, 2]] * 3 + [[1, 2, 2], [2, 1, 2], [2, 2, 1]])
-    >>> axes, rising = np.array([0, 1, 2, 0, 1, 2]), np.array([True] * 3 + [False] * 3)
-    >>> cells = dual_cells(nodes, axes, rising, (5, 5, 5), lambda places: np.zeros(len(places), dtype=bool))
+    >>> crossings = Crossings(nodes, np.array([0, 1, 2, 0, 1, 2]), np.array([True] * 3 + [False] * 3), np.full(6, 0.5))
+    >>> cells = dual_cells(crossings, (5, 5, 5), lambda places: np.zeros(len(places), dtype=bool))
     >>> len(cells.owners), cells.quads.shape
     (8, (6, 4))
     """
-    places, edges, rows, sides = cells_around(nodes, axes, shape)
+    places, edges, rows, sides = cells_around(crossings, shape)
     ways = np.zeros((len(places), 6), dtype=np.bool_)
     pieces = _pieces(edges, ways)
     crossed = _crossed_faces(edges)
@@ -127,7 +136,9 @@ def dual_cells(
         keys = np.ravel_multi_index(tuple(first.T), shape) * 3 + across
         order = np.argsort(keys, kind="stable").reshape(-1, 2)  # the two cells at each face
         middles = first[order[:, 0]] + 0.5 * (np.arange(3) != across[order[:, 0], None])
-        corner = rising[edges[cells, 4 * AFTER[across, 1] + side]]  # whether the first corner of the face is inside
+        corner = crossings.rising[
+            edges[cells, 4 * AFTER[across, 1] + side]
+        ]  # whether the first corner of the face is inside
         way = inside(middles) == corner[order[:, 0]]
         while True:
             ways[cells[order], faces[order]] = way[:, None]
@@ -188,13 +199,7 @@ ROUNDS = 8
 
 
 def dual_triangles(
-    cells: DualCells,
-    nodes: NDArray[np.int64],
-    axes: NDArray[np.int64],
-    rising: NDArray[np.bool_],
-    shares: NDArray[np.float64],
-    vertices: NDArray[np.float64],
-    fanned: NDArray[np.bool_],
+    cells: DualCells, crossings: Crossings, vertices: NDArray[np.float64], fanned: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Triangles between the vertices of pieces, counter-clockwise as seen from outside.
 
@@ -211,8 +216,8 @@ def dual_triangles(
     centres : (k,) int
         The edges of those crossings.
     """
-    quads = cells.quads
-    around = vertices[quads] - nodes[:, None]
+    quads, axes, shares = cells.quads, crossings.axes, crossings.shares
+    around = vertices[quads] - crossings.nodes[:, None]
     rows, corners = np.arange(len(quads))[:, None], np.arange(4)
     height = around[rows, corners, axes[:, None]]
     flat = np.stack([around[rows, corners, AFTER[axes, 1 + k][:, None]] for k in range(2)], axis=2)
@@ -227,23 +232,18 @@ def dual_triangles(
     fan = fanned | ~safe.any(axis=0)
     plain, fans = np.flatnonzero(~fan), np.flatnonzero(fan)
     turned_quads = np.where(second[plain, None], np.roll(quads[plain], -1, axis=1), quads[plain])
-    added = nodes[fans].astype(np.float64)
+    added = crossings.nodes[fans].astype(np.float64)
     added[np.arange(len(fans)), axes[fans]] += shares[fans]
     tips = np.repeat(len(vertices) + np.arange(len(fans)), 4)
     ends = quads[fans].ravel(), np.roll(quads[fans], -1, axis=1).ravel()
     faces = np.concatenate([turned_quads[:, [0, 1, 2]], turned_quads[:, [0, 2, 3]], np.stack([tips, *ends], axis=1)])
-    falling = ~rising[np.concatenate([plain, plain, np.repeat(fans, 4)])]
+    falling = ~crossings.rising[np.concatenate([plain, plain, np.repeat(fans, 4)])]
     faces[falling] = faces[falling][:, ::-1]
     return np.concatenate([vertices, added]), faces, fans
 
 
 def separate_triangles(
-    cells: DualCells,
-    nodes: NDArray[np.int64],
-    axes: NDArray[np.int64],
-    rising: NDArray[np.bool_],
-    shares: NDArray[np.float64],
-    choices: NDArray[np.float64],
+    cells: DualCells, crossings: Crossings, choices: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices and triangles as of `dual_triangles`; wherever possible none of them pass through each other.
 
@@ -252,10 +252,10 @@ def separate_triangles(
     is inside the cells, where nothing passes through.
     """
     count = choices.shape[1]
-    chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(shares), dtype=bool)
+    chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(cells.quads), dtype=bool)
     for _ in range(ROUNDS):
         vertices = choices[np.minimum(chosen, 2), np.arange(count)]
-        found, faces, centres = dual_triangles(cells, nodes, axes, rising, shares, vertices, fanned)
+        found, faces, centres = dual_triangles(cells, crossings, vertices, fanned)
         held = np.concatenate([chosen > 0, np.zeros(len(centres), dtype=bool)])
         faces = flipped_along_creases(found, faces, held)
         meeting = np.unique(faces[self_intersections(found, faces)])

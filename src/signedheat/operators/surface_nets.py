@@ -8,12 +8,14 @@ made small is how the net bends, ``Σ |x − mean of neighbours|²``: Gibson's l
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from ..geometry.components import sums_of
-from ..geometry.dual_cells import DualCells, dual_cells, separate_triangles
+from ..geometry.dual_cells import Crossings, DualCells, dual_cells, separate_triangles
 
 STAY = 0.003
 """Weight of staying in the middle of a cell: stairs some four voxels long become slopes. Mean error of normals of a
@@ -50,27 +52,25 @@ def surface_net(volume: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray
         nodes.append(found)
         axes.append(np.full(len(found), axis))
     first, along = np.concatenate(nodes), np.concatenate(axes)
-    rising = padded[tuple(first.T)]
-    cells = dual_cells(first, along, rising, padded.shape, lambda places: np.ones(len(places), dtype=bool))
-    middles, room = _rooms(cells, first, along)
+    crossings = Crossings(first, along, padded[tuple(first.T)], np.full(len(first), 0.5))
+    cells = dual_cells(crossings, padded.shape, lambda places: np.ones(len(places), dtype=bool))
+    middles, room = _rooms(cells, crossings)
     relaxed = _relaxed(cells.quads, middles, room)
     rows = np.arange(len(first))
     shares = relaxed[cells.quads, along[:, None]].mean(axis=1) - first[rows, along]
     choices = np.stack([relaxed, 0.5 * (relaxed + middles), middles])
-    shares = np.clip(shares, 0.5 - REACH, 0.5 + REACH)
-    vertices, faces = separate_triangles(cells, first, along, rising, shares, choices)
+    crossings = replace(crossings, shares=np.clip(shares, 0.5 - REACH, 0.5 + REACH))
+    vertices, faces = separate_triangles(cells, crossings, choices)
     return vertices - 2, faces
 
 
-def _rooms(
-    cells: DualCells, nodes: NDArray[np.int64], axes: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rooms(cells: DualCells, crossings: Crossings) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(v, 3) middle of each piece of the surface in a cell, (v, 1) how far from it the vertex may go along each axis.
 
     Where several pieces share a cell they stay where they are.
     """
     count = len(cells.owners)
-    crossed = nodes + 0.5 * np.eye(3)[axes]
+    crossed = crossings.nodes + 0.5 * np.eye(3)[crossings.axes]
     degrees = np.bincount(cells.quads.ravel(), minlength=count)
     sums = sums_of(np.repeat(crossed, 4, axis=0), cells.quads.ravel(), count)
     alone = (np.bincount(cells.owners)[cells.owners] == 1)[:, None]

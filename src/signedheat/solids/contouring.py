@@ -7,7 +7,7 @@ each other (Ju & Udeshi 2006). Only blocks of the grid through which the level p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,12 @@ from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import OutsideError
 from ..fields.levels import on_level
-from ..geometry.dual_cells import DualCells, cells_around, dual_cells, open_cells, separate_triangles
+from ..geometry.dual_cells import Crossings, DualCells, cells_around, dual_cells, open_cells, separate_triangles
 from ..geometry.marching import CLEARANCE
 from ..operators.grid.blocks import SIDE, Blocks, BlockValues
 from ..progress import Progress
 from .features import divided_along_creases, placed
-from .fields import in_threads, prepared, tiles_of
+from .fields import blocks_where, in_threads, prepared, tiles_of
 from .nodes import solved
 from .offsets import Offset
 
@@ -33,26 +33,6 @@ STEEPEST = 2.0
 """Change of the height above a surface, over how far one goes, up to which blocks near it are found from coarse to
 fine: distance changes by 1 at most, and where one that varies does so by more, blocks are found as its surface goes on.
 """
-
-
-@dataclass(frozen=True, eq=False)
-class Crossings:
-    """Edges of a grid that a surface crosses.
-
-    Attributes
-    ----------
-    nodes, axes : (e, 3) int, (e,) int
-        First node of each, and what it runs along.
-    rising : (e,) bool
-        Whether the first node is inside.
-    shares : (e,) float
-        How far from the first node the surface is, by linear interpolation.
-    """
-
-    nodes: NDArray[np.int64]
-    axes: NDArray[np.int64]
-    rising: NDArray[np.bool_]
-    shares: NDArray[np.float64]
 
 
 def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
@@ -96,8 +76,8 @@ def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) 
     report(0.6, "vertices")
     choices = placed(offset, grid, cells, points)
     report(0.9, "faces")
-    shares = np.clip(shares, CLEARANCE, 1 - CLEARANCE)
-    vertices, faces = separate_triangles(cells, nodes, axes, crossings.rising, shares, choices)
+    crossings = replace(crossings, shares=np.clip(shares, CLEARANCE, 1 - CLEARANCE))
+    vertices, faces = separate_triangles(cells, crossings, choices)
     vertices, faces = divided_along_creases(offset, grid.spacing, grid.origin + vertices * grid.spacing, faces)
     report(1.0, "faces")
     return TriangleMesh(vertices, faces)
@@ -118,19 +98,13 @@ def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCe
             merged[both.rows(part.blocks.places)] = part.values
         done = BlockValues(both, merged)
         crossings = crossed_edges(done)
-        cells, edges, _, _ = cells_around(crossings.nodes, crossings.axes, grid.shape)
+        cells, edges, _, _ = cells_around(crossings, grid.shape)
         around = cells[open_cells(edges)][:, None] + np.array(list(np.ndindex(2, 2, 2)))
         places = np.unique(around.reshape(-1, 3) // SIDE, axis=0)
         places = places[both.rows(places) < 0]
         if not len(places):
             break
-    found = dual_cells(
-        crossings.nodes,
-        crossings.axes,
-        crossings.rising,
-        grid.shape,
-        lambda at: offset.distance(grid.origin + at * grid.spacing) < 0,
-    )
+    found = dual_cells(crossings, grid.shape, lambda at: offset.distance(grid.origin + at * grid.spacing) < 0)
     return done, crossings, found
 
 
@@ -144,25 +118,15 @@ def blocks_at(offset: Offset, grid: Grid) -> NDArray[np.int64]:
     OutsideError
         If there are none.
     """
-    n_blocks = -(-np.array(grid.shape) // SIDE)
-    side = 1 << max(0, int(np.ceil(np.log2(n_blocks.max()))))
-    places, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))
     diagonal = (1.0 if offset.level is not None else STEEPEST) * float(np.linalg.norm(grid.spacing))
-    while True:
-        size = side * SIDE
-        centres = grid.origin + (places * size + 0.5 * (size - 1)) * grid.spacing
-        places = places[np.abs(offset.distance(centres)) <= (0.5 * (size - 1) + 1.0) * diagonal]
-        if not len(places):
-            raise OutsideError(f"the distance takes {offset.named} nowhere on the grid", remedy="choose another level")
-        if side == 1:
-            return places
-        side //= 2
-        places = (2 * places[:, None] + halves).reshape(-1, 3)
-        places = places[(places * side < n_blocks).all(axis=1)]
+    found = blocks_where(grid, lambda centres, half: np.abs(offset.distance(centres)) <= (half + 1.0) * diagonal)
+    if not len(found):
+        raise OutsideError(f"the distance takes {offset.named} nowhere on the grid", remedy="choose another level")
+    return found
 
 
 def crossed_edges(band: BlockValues) -> Crossings:
-    """Edges whose ends lie on both sides of a surface.
+    """Edges whose ends lie on both sides of a surface, and where, by linear interpolation.
 
     Raises
     ------

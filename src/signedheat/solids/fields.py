@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..diagnostics import Diagnostics
 from ..domains.grid import Grid
+from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
 from ..errors import MemoryLimitError, OutsideError, UnsupportedTypeError
 from ..fields.grid_field import GridField
@@ -46,7 +47,19 @@ Result = TypeVar("Result")
 
 
 class Evaluated(SolidQueries, Protocol):
-    """A `Solid`, as far as fields need it."""
+    """A `Solid`, as those see it that it calls."""
+
+    @property
+    def origins(self) -> NDArray[np.int64]:
+        """(m,) face of the source that each triangle is part of; −1 for the completion."""
+
+    @property
+    def bounding(self) -> NDArray[np.bool_]:
+        """(m,) triangles that have the inside behind them only."""
+
+    @property
+    def source(self) -> TriangleMesh | None:
+        """The shape that was given."""
 
     @property
     def tree(self) -> FaceTree:
@@ -109,16 +122,14 @@ def band_field(
     refuse_walls(grid)
     width = positive_number(width, "band")
     tree, windings = prepared(solid)
-    coarse = dense_field(solid, coarse_grid(grid), None)
+    coarse = dense_field(solid, coarser(grid, 1 << max(0, math.ceil(math.log2(max(grid.shape) / COARSE)))), None)
     reach = width + float(np.linalg.norm(grid.spacing))  # so that cells around the ends of the band are whole
     limit = blocks_that_fit(store)
     places = blocks_near(tree, grid, reach, limit)
     if places is None:
-        fewer = Grid(grid.origin, 2 * grid.spacing, [max(2, 1 - (-(n - 1) // 2)) for n in grid.shape])
         factor = 2
-        while blocks_near(tree, fewer, reach, limit) is None:
+        while blocks_near(tree, coarser(grid, factor), reach, limit) is None:
             factor *= 2
-            fewer = Grid(grid.origin, factor * grid.spacing, [max(2, 1 - (-(n - 1) // factor)) for n in grid.shape])
         raise MemoryLimitError(
             f"the band has more than {limit:,} blocks of {NODES} nodes, {limit * NODES * BYTES_IN_BAND / 1e9:.2g} GB, "
             "for which there is room",
@@ -155,26 +166,32 @@ def tiles_of(blocks: Blocks) -> list[NDArray[np.int64]]:
     return np.split(order, np.flatnonzero(np.diff(owners.ravel()[order])) + 1)
 
 
-def coarse_grid(grid: Grid) -> Grid:
-    """Of some nodes of a grid, at most `COARSE` along each axis."""
-    factor = 1 << max(0, math.ceil(math.log2(max(grid.shape) / COARSE)))
+def coarser(grid: Grid, factor: int) -> Grid:
+    """A grid with fewer nodes, that many times as far apart."""
     return Grid(grid.origin, factor * grid.spacing, [max(2, 1 - (-(n - 1) // factor)) for n in grid.shape])
 
 
 def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> NDArray[np.int64] | None:
     """(n, 3) places of the blocks that may have a node within reach of a face; None if there are more than a limit."""
+    diagonal = float(np.linalg.norm(grid.spacing))
+    found = blocks_where(grid, lambda centres, half: tree.distances(centres) <= reach + half * diagonal, limit)
+    return found if len(found) <= limit else None
+
+
+def blocks_where(
+    grid: Grid, near: Callable[[NDArray[np.float64], float], NDArray[np.bool_]], limit: float = math.inf
+) -> NDArray[np.int64]:
+    """(n, 3) places of blocks, found from coarse to fine; no further once there are more than a limit.
+
+    `near` says of cubes of nodes, by their centres and half the nodes along their edges, which may be wanted.
+    """
     n_blocks = -(-np.array(grid.shape) // SIDE)
     side = 1 << max(0, int(np.ceil(np.log2(n_blocks.max()))))
-    places = np.zeros((1, 3), dtype=np.int64)
-    halves = np.array(list(np.ndindex(2, 2, 2)))
+    places, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))
     while True:
-        size = side * SIDE
-        centres = grid.origin + (places * size + 0.5 * (size - 1)) * grid.spacing
-        radius = 0.5 * (size - 1) * float(np.linalg.norm(grid.spacing))
-        places = places[tree.distances(centres) <= reach + radius]
-        if len(places) > limit:
-            return None
-        if side == 1:
+        half = 0.5 * (side * SIDE - 1)
+        places = places[near(grid.origin + (places * side * SIDE + half) * grid.spacing, half)]
+        if side == 1 or not 0 < len(places) <= limit:
             return places
         side //= 2
         places = (2 * places[:, None] + halves).reshape(-1, 3)

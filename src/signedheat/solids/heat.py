@@ -53,7 +53,7 @@ def heat_surface(
     side = float(np.ptp(bounds, axis=0).max())
     nodes = int(np.clip((1 + 2 * ROOM) * side / cell, *NODES)) if cell > 0 else NODES[1]
     grid = Grid.around(bounds, nodes, ROOM * side)
-    samples = sample_on_grid([shape], grid, 1.0)
+    samples = sample_on_grid([shape], grid)
     winding = winding_numbers(samples.nodes, grid.shape, samples.positions, samples.vectors)
     areas = np.linalg.norm(samples.vectors, axis=1)
     level = float(np.average(scipy.ndimage.map_coordinates(winding, samples.positions.T, order=1), weights=areas))

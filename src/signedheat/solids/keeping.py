@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +16,14 @@ from numpy.typing import NDArray
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
 from ..geometry.box_tree import BoxTree
-from ..geometry.components import element_components
+from ..geometry.components import element_components, sums_of
 from ..geometry.conforming import conforming
 from ..geometry.cut_faces import cut_faces
+from ..geometry.directions import unit
 from ..geometry.face_tree import FaceTree
+from ..geometry.meshes import area_vectors
 from ..geometry.self_intersections import self_intersections
+from .fields import Evaluated
 from .parts import parts_of
 from .winding import Windings
 
@@ -39,28 +41,8 @@ SQUARES = np.array([[[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0]], [[1, 0, 0], [1
 """Corners of the sides of a cell across the first axis, counter-clockwise as seen from outside."""
 
 
-class Bounded(Protocol):
-    """A `Solid`, as far as its boundary needs it."""
-
-    @property
-    def triangles(self) -> NDArray[np.float64]:
-        """(m, 3, 3) corners, cut where they cross each other, and along outlines of flat parts in each other."""
-
-    @property
-    def origins(self) -> NDArray[np.int64]:
-        """(m,) face of the source that each is part of; −1 for the completion."""
-
-    @property
-    def windings(self) -> Windings:
-        """What is inside."""
-
-    @property
-    def source(self) -> TriangleMesh | None:
-        """The shape that was given."""
-
-
 def given_surface(
-    solid: Bounded, contour: Callable[[], TriangleMesh], cell: float
+    solid: Evaluated, contour: Callable[[], TriangleMesh], cell: float
 ) -> tuple[TriangleMesh, NDArray[np.float64]]:
     """Triangles of a solid with the inside on one side, turned to have it behind them, joined into a closed mesh.
 
@@ -123,7 +105,7 @@ def _compact(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Triangl
     return TriangleMesh(vertices[used], renumbered.reshape(-1, 3))
 
 
-def _parts(solid: Bounded) -> NDArray[np.int64]:
+def _parts(solid: Evaluated) -> NDArray[np.int64]:
     """(m,) the part of the shape that each triangle is of; completion comes last."""
     if solid.source is None:
         return np.zeros(len(solid.triangles), dtype=np.int64)
@@ -134,8 +116,7 @@ def _parts(solid: Bounded) -> NDArray[np.int64]:
 def _covered(triangles: NDArray[np.float64], parts: NDArray[np.int64], tolerance: float) -> NDArray[np.bool_]:
     """(m,) which triangles lie in triangles of a part that comes before theirs, and face the same way."""
     a, b, c = triangles.transpose(1, 0, 2)
-    normals = np.cross(b - a, c - a)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    normals = unit(area_vectors(triangles))
     centres = triangles.mean(axis=1)
     tree = BoxTree.of(triangles.min(axis=1), triangles.max(axis=1))
     starts, near = tree.meeting(np.repeat(centres[:, None], 3, axis=1), tolerance)
@@ -249,8 +230,8 @@ class Boxes:
         corners = (self.places[:, None] + np.array(list(np.ndindex(2, 2, 2)))).reshape(-1, 3)
         _, ids = np.unique(corners, axis=0, return_inverse=True)
         parts = element_components(ids.reshape(-1, 8))
-        sums = [np.bincount(parts, column) / np.bincount(parts) for column in (self.places + 0.5).T]
-        return self.cell * (np.stack(sums, axis=1) + self.shift)
+        counts = np.bincount(parts)
+        return self.cell * (sums_of(self.places + 0.5, parts, len(counts)) / counts[:, None] + self.shift)
 
 
 def _among(places: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:

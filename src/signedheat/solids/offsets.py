@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +26,6 @@ STEP = 1e-6
 ALONG_AXES = np.concatenate([np.eye(3), -np.eye(3)])
 
 
-class Bounded(Evaluated, Protocol):
-    """A `Solid`, as far as offsets need it."""
-
-    @property
-    def bounding(self) -> NDArray[np.bool_]:
-        """Which triangles have the inside behind them only."""
-
-
 @dataclass(frozen=True, eq=False)
 class Offset:
     """The surface at a distance from a solid, as the zero set of a function that grows outwards.
@@ -49,7 +41,7 @@ class Offset:
         these meet farther out it is cut off by a ball. With 1 it is round: the level of the distance itself.
     """
 
-    solid: Bounded
+    solid: Evaluated
     reach: float | Reach
     limit: float = 1.0
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -142,8 +141,8 @@ class Solid(Frozen, ShortRepr):
         places = _checked(points)
         result = np.empty(len(places))
         for begin in range(0, len(places), MANY):
-            here = slice(begin, begin + MANY)
-            result[here] = self._in_order(places[here], self._distances)
+            order = begin + order_in_space(places[begin : begin + MANY])
+            (result[order],) = in_chunks(self._distances, places[order])
         return result
 
     def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
@@ -349,14 +348,6 @@ class Solid(Frozen, ShortRepr):
         array([ True])
         """
         files.save_solid(self, path)
-
-    def _in_order(
-        self, points: NDArray[np.float64], function: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64]]]
-    ) -> NDArray[np.float64]:
-        order = order_in_space(points)
-        result = np.empty(len(points))
-        (result[order],) = in_chunks(function, points[order])
-        return result
 
     def _distances(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
         found = self.tree.search(points)

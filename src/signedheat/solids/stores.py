@@ -6,7 +6,7 @@ tile whether it is done. Workers write rows of their own: a tile needs nothing o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -153,20 +153,23 @@ def _computed(folder: str, key: str, missing: list[int], scheduler: Scheduler) -
     if scheduler is None:
         _plan(folder, key)
         with ThreadPoolExecutor(n_threads()) as pool:
-            yield from _on_pool(folder, key, missing, pool)
-    elif isinstance(scheduler, Executor):
-        yield from _on_pool(folder, key, missing, scheduler)
+            yield from _computed(folder, key, missing, pool)
     elif isinstance(scheduler, str):
         with connected(scheduler) as client:
-            yield from _on_cluster(folder, key, missing, client)
-    else:
-        yield from _on_cluster(folder, key, missing, scheduler)
+            yield from _computed(folder, key, missing, client)
+    elif isinstance(scheduler, Executor):
+        jobs = [scheduler.submit(solve_into, folder, key, number) for number in missing]
+        yield from _finished(jobs, as_completed(jobs), folder)
+    else:  # they are not `pure`: their input is the same, but not what they write
+        options = {"pure": False, "retries": RETRIES}
+        jobs = [scheduler.submit(solve_into, folder, key, number, **options) for number in missing]
+        yield from _finished(jobs, distributed.as_completed(jobs), folder)
 
 
-def _on_pool(folder: str, key: str, missing: list[int], pool: Executor) -> Iterator[int]:
-    jobs = [pool.submit(solve_into, folder, key, number) for number in missing]
+def _finished(jobs: list[Future[int]], in_order: Iterable[Future[int]], folder: str) -> Iterator[int]:
+    """Results of jobs in the order in which they end; where one fails, or nobody wants more, the others are dropped."""
     try:
-        for job in as_completed(jobs):
+        for job in in_order:
             yield job.result()
     except BrokenProcessPool as error:
         raise SignedHeatError(
@@ -174,17 +177,6 @@ def _on_pool(folder: str, key: str, missing: list[int], pool: Executor) -> Itera
             remedy="give it more memory, or start it under if __name__ == '__main__'; run again: what is done stays",
             path=folder,
         ) from error
-    finally:
-        for job in jobs:
-            job.cancel()
-
-
-def _on_cluster(folder: str, key: str, missing: list[int], client: ClusterClient) -> Iterator[int]:
-    """Tiles as a cluster finishes them. They are not `pure`: their input is the same, but not what they write."""
-    jobs = [client.submit(solve_into, folder, key, number, pure=False, retries=RETRIES) for number in missing]
-    try:
-        for job in distributed.as_completed(jobs):
-            yield job.result()
     finally:
         for job in jobs:
             job.cancel()
