@@ -21,7 +21,7 @@ import numpy as np
 import signedheat as sh
 from signedheat import samples
 from signedheat.operators.grid.block_contours import block_contour
-from signedheat.operators.grid.blocks import SIDE, Blocks, block_points
+from signedheat.operators.grid.blocks import SIDE, Blocks
 
 CELLS = 4.0
 """Half width of the band, in cells."""
@@ -80,7 +80,8 @@ def libigl(mesh: sh.TriangleMesh, grid: sh.Grid) -> Surface:
     centres = grid.origin + (places * SIDE + 0.5 * (SIDE - 1)) * steps
     radius = 0.5 * float(np.linalg.norm((SIDE - 1) * steps)) + (CELLS + 2) * float(steps[0])
     blocks = Blocks.of(places[np.abs(np.linalg.norm(centres, axis=1) - 1) < radius], grid.shape)
-    points = grid.origin + block_points(blocks.places, steps)
+    inner = np.stack(np.meshgrid(*[np.arange(SIDE)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = grid.origin + (blocks.places[:, None] * SIDE + inner).reshape(-1, 3) * steps
     kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     values = np.concatenate(
         [igl.signed_distance(points[k : k + 500_000], vertices, faces, kind)[0] for k in range(0, len(points), 500_000)]

@@ -26,6 +26,8 @@ from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import CancellingNormalsError, SourceError
 from ..geometry.components import element_components
+from ..geometry.directions import unit
+from ..geometry.meshes import area_vectors
 from ..geometry.welding import same_positions
 from ..operators.grid.node_sources import NodeSources
 from ..operators.grid.wavefront import padded_shape
@@ -33,6 +35,8 @@ from .grid.binning import merge_in_cells
 
 NEIGHBOURS = 8
 """Neighbours from which the area of an oriented point is estimated."""
+SIZE = 1.0
+"""Longest edge, in cells, of the simplices into which the elements of shapes are bisected."""
 ROUNDING = 1e-9
 """Where normals cancel up to less than this fraction of the area, what is left is rounding error."""
 
@@ -133,11 +137,8 @@ def _(shape: PolygonMesh) -> AreaElements:
     polygon = shape.corner_polygons
     fans = np.stack([shape.corners, shape.next_corners], axis=1)
     corners = np.concatenate([shape.polygon_centroids[polygon][:, None], shape.vertices[fans]], axis=1)
-    vectors = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    total = shape.polygon_area_vectors
-    lengths = np.linalg.norm(total, axis=1, keepdims=True)
-    normals = total / np.where(lengths > 0, lengths, 1)
-    weights = np.einsum("ij,ij->i", vectors, normals[polygon])
+    vectors = area_vectors(corners)
+    weights = np.einsum("ij,ij->i", vectors, unit(shape.polygon_area_vectors)[polygon])
     return AreaElements(corners, vectors, weights, components_of(shape.vertices, fans))
 
 
@@ -164,14 +165,14 @@ def bounds_around(shapes: Sequence[Any]) -> NDArray[np.float64]:
     return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
 
 
-def point_areas(points: NDArray[np.float64], neighbours: int = NEIGHBOURS) -> NDArray[np.float64]:
+def point_areas(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n,) area that each point represents: that of the disk around it up to its k-th neighbour, divided by k.
 
     Points that coincide share the area of one. In d dimensions the disk is a ball of dimension d − 1.
     """
     places, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     dimension = points.shape[1] - 1
-    k = min(neighbours, len(places) - 1)
+    k = min(NEIGHBOURS, len(places) - 1)
     if dimension == 0 or k == 0:
         return np.ones(len(points)) / counts[which.ravel()]
     reach = scipy.spatial.cKDTree(places).query(places, k=[k + 1], workers=-1)[0][:, 0]
@@ -185,8 +186,8 @@ def components_of(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> ND
     return element_components(same_positions(vertices)[faces])
 
 
-def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSamples:
-    """Bisect the elements of shapes until no edge is longer than `size` cells; merge them per cell and component.
+def sample_on_grid(shapes: Sequence[Any], grid: Grid) -> AreaSamples:
+    """Bisect the elements of shapes until no edge is longer than `SIZE` cells; merge them per cell and component.
 
     Raises
     ------
@@ -210,17 +211,8 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
             )
         order = np.argsort(elements.components, kind="stable")
         corners = (elements.corners - grid.origin) / grid.spacing
-        samples, nodes = merge_in_cells(
-            corners,
-            elements.vectors,
-            elements.weights,
-            elements.components,
-            order,
-            np.array(grid.shape),
-            size,
-            nodes,
-            scale,
-        )
+        each = corners, elements.vectors, elements.weights, elements.components
+        samples, nodes = merge_in_cells(*each, order, np.array(grid.shape), SIZE, nodes, scale)
         positions, vectors, weights, components = samples
         total += float(elements.weights.sum())
         inside += float(weights.sum())

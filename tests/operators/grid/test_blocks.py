@@ -5,7 +5,7 @@ from signedheat.geometry.face_features import FaceFeatures
 from signedheat.geometry.face_tree import FaceTree
 from signedheat.geometry.marching import closed_surface
 from signedheat.operators.grid.block_contours import block_contour
-from signedheat.operators.grid.blocks import SIDE, Blocks, BlockValues, block_points
+from signedheat.operators.grid.blocks import NODES, SIDE, Blocks, BlockValues
 
 
 def scattered(shape, share, seed=0):
@@ -78,13 +78,11 @@ def test_contour_is_that_of_the_whole_grid():
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
 
 
-def test_distances_of_blocks_are_exact_and_know_nothing_of_each_other():
+def test_distances_are_exact_and_those_of_a_block_of_points_know_nothing_of_others():
     mesh = sphere(800)
     tree = FaceTree.of(FaceFeatures.of(mesh.vertices + 2.0, mesh.faces))
-    steps = np.array([0.05, 0.06, 0.07])
     rng = np.random.default_rng(3)
-    places = rng.integers(0, 8, (6, 3)).astype(np.int32)
-    points = block_points(places, steps)
+    points = rng.uniform(0, 4, (6 * NODES, 3))
     found = tree.search(points)
     a, b, c = (mesh.vertices[mesh.faces[:, k]] + 2.0 for k in range(3))
     some = rng.choice(len(points), 200)
@@ -96,7 +94,7 @@ def test_distances_of_blocks_are_exact_and_know_nothing_of_each_other():
         assert found.distances[p] <= nearest + 1e-12
         assert found.distances[p] >= nearest - 0.02
     np.testing.assert_allclose(np.linalg.norm(points - found.places, axis=1), found.distances, atol=1e-12)
-    alone = tree.search(block_points(places[3:4], steps))
-    np.testing.assert_array_equal(alone.distances, found.distances[3 * 512 : 4 * 512])
+    alone = tree.search(points[3 * NODES : 4 * NODES])
+    np.testing.assert_array_equal(alone.distances, found.distances[3 * NODES : 4 * NODES])
     np.testing.assert_array_equal(alone.faces, found.faces[3 * 512 : 4 * 512])
     np.testing.assert_allclose(tree.distances(points), found.distances, atol=1e-12)

@@ -9,7 +9,7 @@ from signedheat.operators.grid.winding import blocks_of_dipoles, winding_numbers
 
 
 def winding_on(shape, grid):
-    found = sample_on_grid([shape], grid, 1.0)
+    found = sample_on_grid([shape], grid)
     return winding_numbers(found.nodes, grid.shape, found.positions, found.vectors)
 
 

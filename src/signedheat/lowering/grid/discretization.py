@@ -22,8 +22,6 @@ from .integration import GridIntegration
 from .masked import MaskedGridDiscretization
 from .source import GridSource
 
-SAMPLE_SIZE = 1.0
-"""Longest edge, in cells, of the simplices into which faces are bisected."""
 BYTES_PER_NODE, BYTES_PER_AREA = {1: 42, 2: 42, 3: 25, 4: 42}, 930
 """Measured peak memory of a distance computation, by dimension; and what each square cell of surface adds in space."""
 MOST_PER_NODE = 22
@@ -63,23 +61,16 @@ def bytes_of_area(area: float, spacing: NDArray[np.float64], n_nodes: float) -> 
     return min(round(BYTES_PER_AREA * cells, 1), MOST_PER_NODE * n_nodes)
 
 
-def refuse_large_grid(
-    grid: Grid,
-    per_node: float | None = None,
-    extra: float = 0.0,
-    area: float = 0.0,
-    at_most: tuple[float, float, float] | None = None,
-) -> None:
+def refuse_large_grid(grid: Grid, per_node: float | None = None, extra: float = 0.0, area: float = 0.0) -> None:
     """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing.
 
-    For φ alone, the area of the surface makes the estimate better. The suggested spacing has room for `at_most`:
-    bytes for each node, bytes besides and area, where it may turn out that so much is needed.
+    For φ alone, the area of the surface makes the estimate better.
     """
     available, needed = available_memory(), memory_estimate(grid, per_node, extra)
     needed += int(bytes_of_area(area, grid.spacing, grid.n_nodes))
     if available is None or needed <= available:
         return
-    fitting = ROOM * fitting_spacing(grid, available, *(at_most or (per_node, extra, area)))
+    fitting = ROOM * fitting_spacing(grid, available, per_node, extra, area)
     spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting))
     coarser = f"choose a spacing of {spacing} or more, or a lower resolution"
     some_nodes = (fitting < grid.upper - grid.origin).all()
@@ -123,7 +114,7 @@ class GridDiscretization(DiffusesEach):
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> GridSource:
         """X₀ and the rows that interpolate φ on the source: Eq. 11 in space, area vectors spread to the nodes."""
-        samples = sample_on_grid(sources, self.grid, SAMPLE_SIZE)
+        samples = sample_on_grid(sources, self.grid)
         refuse_large_grid(self.grid, area=float(samples.weights.sum()))
         return GridSource(samples, self.grid, diffusion)
 

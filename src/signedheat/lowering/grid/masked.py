@@ -27,9 +27,6 @@ from ..heat_system import HeatSystem, bend_around_corners
 from .integration import STIFFNESS, deviation
 from .source import GridSource
 
-SAMPLE_SIZE = 1.0
-"""Longest edge, in cells, of the simplices into which sources are bisected."""
-
 DIRECT_NODES = {1: 10_000_000, 2: 1_000_000, 3: 40_000, 4: 5_000}
 """Up to this number of free nodes both systems are factorised, by dimension: factors fill more in higher ones."""
 
@@ -71,7 +68,7 @@ class MaskedGridDiscretization(DiffusesEach):
         return self, sources
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> MaskedSource:
-        whole = GridSource(sample_on_grid(sources, self.grid, SAMPLE_SIZE), self.grid, diffusion)
+        whole = GridSource(sample_on_grid(sources, self.grid), self.grid, diffusion)
         return MaskedSource.of(whole, self.nodes)
 
     def diffuse(self, source: MaskedSource) -> NDArray[np.float64]:
@@ -106,9 +103,8 @@ class MaskedGridDiscretization(DiffusesEach):
     def _straight(self, source: MaskedSource) -> NDArray[np.bool_]:
         """(n,) nodes that the source reaches along a straight line."""
         nodes, spacing = self.nodes, self.grid.spacing
-        nearest = scipy.spatial.cKDTree(source.samples.positions * spacing).query(nodes.indices * spacing, workers=-1)[
-            1
-        ]
+        tree = scipy.spatial.cKDTree(source.samples.positions * spacing)
+        nearest = tree.query(nodes.indices * spacing, workers=-1)[1]
         away = nodes.indices - source.samples.positions[nearest]
         normals = unit(source.samples.vectors * spacing)[nearest]
         along = away - np.einsum("ij,ij->i", away, normals)[:, None] * normals

@@ -121,12 +121,13 @@ class SurfaceDiscretization:
         """The same surface with other first faces at nonmanifold edges; shares all of step 3, which ignores them."""
         if triangles is self.triangles:
             return self
-        return self._turned(fingerprint(triangles.first_halfedges), lambda: self._turn_to(triangles))
 
-    def _turn_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
-        turned = replace(self, triangles=triangles)
-        turned.__dict__.update({name: getattr(self, name) for name in ("stiffness", "integration", "vertex_order")})
-        return turned
+        def turned() -> SurfaceDiscretization:
+            other = replace(self, triangles=triangles)
+            vars(other).update({name: getattr(self, name) for name in ("stiffness", "integration", "vertex_order")})
+            return other
+
+        return self._turned(fingerprint(triangles.first_halfedges), turned)
 
     def _cut_into(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
         """The same surface with refined triangles, whose first vertices are the present ones."""
@@ -149,12 +150,9 @@ class SurfaceDiscretization:
 
     def diffuse_many(self, sources: Sequence[Any]) -> list[list[NDArray[np.complex128]]]:
         """Solve Eq. 12 for several sources at once, of the same t, and all of them to be extrapolated or none."""
-        heat = self._heats(sources[0].time, lambda: self._vector_heat(sources[0].time))
+        time, order = sources[0].time, self.triangles.edges.elimination_order
+        heat = self._heats(time, lambda: VectorHeat(self.triangles, time, order(self.vertex_order)))
         return heat.solve([source.vectors for source in sources], changes=2 if sources[0].extrapolated else 0)
-
-    def _vector_heat(self, time: float) -> VectorHeat:
-        order = self.triangles.edges.elimination_order(self.vertex_order)
-        return VectorHeat(self.triangles, time, order)
 
     def to_cells(self, stages: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
         """(m,) three times the mean of X over the edges of each face (Sec. 6), in its layout; extrapolated if wanted.

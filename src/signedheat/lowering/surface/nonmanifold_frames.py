@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...geometry.curve_segments import CurveSegments
 from ...geometry.geodesics.exact import distances_along_edges
 from ...geometry.intrinsic_mesh import IntrinsicMesh
+from ...geometry.surface_points import concatenated
 
 
 def nonmanifold_frames(
@@ -38,7 +39,7 @@ def nonmanifold_frames(
     parts = [part for group in groups for part in group]
     if not parts:
         return triangles, groups
-    distance = from_sources(triangles, parts)
+    distance = _distances(triangles, parts)
     holds = np.zeros(triangles.n_faces, dtype=bool)
     holds[np.concatenate([part.faces[part.edges < 0] for part in parts])] = True
     side = np.flatnonzero(table.face_counts[table.face_edges].ravel() > 2)
@@ -66,14 +67,10 @@ def mirrored(part: CurveSegments, changed: NDArray[np.bool_]) -> CurveSegments:
     return replace(part, vectors=np.where(here, np.conj(part.vectors), part.vectors)) if here.any() else part
 
 
-def from_sources(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.float64]:
-    """(n_vertices,) distance of every vertex from the sources along edges."""
-    onto = [corner_distances(triangles, part) for part in parts]
-    return distances_along_edges(triangles, *(np.concatenate(a) for a in zip(*onto, strict=True)))
-
-
-def corner_distances(triangles: IntrinsicMesh, part: CurveSegments) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Vertices of the faces that a source passes, and their distances from its nodes in these faces."""
-    corners = triangles.corner_positions[part.nodes.faces]
-    at = np.einsum("nk,nk->n", part.nodes.barycentric, corners)
-    return triangles.corner_vertices[part.nodes.faces].ravel(), np.abs(corners - at[:, None]).ravel()
+def _distances(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.float64]:
+    """(n_vertices,) distance of every vertex from the sources along edges, from the corners of their faces on."""
+    nodes = concatenated([part.nodes for part in parts])
+    corners = triangles.corner_positions[nodes.faces]
+    at = np.einsum("nk,nk->n", nodes.barycentric, corners)
+    vertices = triangles.corner_vertices[nodes.faces].ravel()
+    return distances_along_edges(triangles, vertices, np.abs(corners - at[:, None]).ravel())

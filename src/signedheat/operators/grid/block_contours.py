@@ -139,10 +139,12 @@ def contour_parts(
     count = 0
     for window, points, triangles in window_surfaces(values, spacing, level):
         on_edge, keys = edges_of(points)
-        shared = np.flatnonzero(on_edge & _on_walls(points, window))
+        on_wall = (points % (WINDOW * SIDE) == 0).any(axis=1)
+        shared = np.flatnonzero(on_edge & on_wall)
         numbers = np.full(len(points), -1, dtype=np.int64)
-        for seam in _seams_around(seams, window):
-            numbers[shared] = np.maximum(numbers[shared], _looked_up(seam, keys[shared]))
+        for step in np.ndindex(3, 3, 3):
+            if seam := seams.get(tuple((window + step - 1).tolist())):
+                numbers[shared] = np.maximum(numbers[shared], _looked_up(seam, keys[shared]))
         new = numbers < 0
         numbers[new] = count + np.arange(int(new.sum()))
         count += int(new.sum())
@@ -155,18 +157,6 @@ def contour_parts(
         raise OutsideError(
             f"the values of the band do not take level {level:g}", remedy="choose another level or a wider band"
         )
-
-
-def _on_walls(points: NDArray[np.float64], window: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which points, in cells, lie on the walls of a window."""
-    size = WINDOW * SIDE
-    return ((points == window * size) | (points == (window + 1) * size)).any(axis=1)
-
-
-def _seams_around(seams: dict[tuple[int, ...], _Seam], window: NDArray[np.int64]) -> list[_Seam]:
-    """Those of the windows that touch one."""
-    around = (tuple((window + np.array(step) - 1).tolist()) for step in np.ndindex(3, 3, 3))
-    return [seams[place] for place in around if place in seams]
 
 
 def _looked_up(seam: _Seam, keys: NDArray[np.int64]) -> NDArray[np.int64]:

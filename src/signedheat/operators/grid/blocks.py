@@ -138,13 +138,6 @@ class BlockValues:
         return result
 
 
-def block_points(places: NDArray[np.int32], steps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n · 512, 3) positions of the nodes of blocks, in units of length from the first node of the grid."""
-    inner = np.stack(np.meshgrid(*(np.arange(SIDE),) * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    nodes = places.astype(np.int64)[:, None] * SIDE + inner
-    return nodes.reshape(-1, 3) * steps
-
-
 @compiled
 def row_of_node(cubes: NDArray[np.int32], rows: NDArray[np.int32], i: int, j: int, k: int) -> np.int32:
     """The block that holds a node; −1 if there is none. The node is on the grid."""

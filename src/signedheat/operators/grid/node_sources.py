@@ -51,7 +51,7 @@ class NodeSources:
         steps: NDArray[np.float64],
         nodes: NDArray[np.int64],
         weights: NDArray[np.float64],
-        values: NDArray[np.float64],
+        values: NDArray[np.floating],
     ) -> NodeSources:
         """Values (s, c ≤ 4) added to the `nodes` (s, k) of a grid with `weights` (s, k)."""
         used = weights > 0
@@ -71,10 +71,15 @@ class NodeSources:
 
     def restricted(self, factors: NDArray[np.int64], shape: tuple[int, ...], steps: NDArray[np.float64]) -> NodeSources:
         """The sources on a coarser grid, by the transpose of linear interpolation."""
-        lines = np.argwhere(self.places >= 0)
-        rows, at = np.nonzero(np.any(self.sums[self.places[self.places >= 0]], axis=2))
-        nodes = lines[rows]
-        nodes[:, 3] = STRETCH * nodes[:, 3] + at
+        nodes, values = self.nonzero()
         coarse = np.where(np.array(shape) > 1, nodes / factors, 0.0)
-        values = self.sums[self.places[tuple(lines[rows].T)], at]
         return NodeSources.scattered(shape, steps, *interpolation_stencil(coarse, shape), values)
+
+    def nonzero(self) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """(k, 4) nodes whose vectors are not zero, and (k, 4) these."""
+        taken = self.places >= 0
+        stretches, vectors = np.argwhere(taken), self.sums[self.places[taken]]
+        rows, at = np.nonzero(vectors.any(axis=2))
+        nodes = stretches[rows]
+        nodes[:, 3] = STRETCH * nodes[:, 3] + at
+        return nodes, vectors[rows, at]

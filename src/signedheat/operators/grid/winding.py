@@ -82,16 +82,10 @@ def winding_numbers(
 
 def _room(nodes: NodeSources, dimension: int) -> list[tuple[int, int]]:
     """Layers of nodes to add before and behind along each axis, so that no vectors are close to the walls."""
-    taken = np.argwhere(nodes.places >= 0)
-    touched = (nodes.sums[nodes.places[tuple(taken.T)]] != 0).any(axis=2)
-    rows, m = np.nonzero(touched)
-    taken = taken[rows]
-    taken[:, 3] = STRETCH * taken[:, 3] + m
-    result = []
-    for axis in range(4 - dimension, 4):
-        first, last = int(taken[:, axis].min()), int(taken[:, axis].max())
-        result.append((max(0, CLEARANCE - first), max(0, CLEARANCE - (nodes.shape[axis] - 1 - last))))
-    return result
+    taken = nodes.nonzero()[0][:, 4 - dimension :]
+    before, behind = taken.min(axis=0), np.array(nodes.shape[4 - dimension :]) - 1 - taken.max(axis=0)
+    rooms = np.maximum(0, CLEARANCE - np.stack([before, behind], axis=1))
+    return [(int(below), int(above)) for below, above in rooms]
 
 
 def blocks_of_dipoles(
