@@ -70,11 +70,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
     _has_faces = False
 
     def __init__(
-        self,
-        points: ArrayLike,
-        normals: ArrayLike | None = None,
-        areas: ArrayLike | None = None,
-        n_neighbors: int = 30,
+        self, points: ArrayLike, normals: ArrayLike | None = None, areas: ArrayLike | None = None, n_neighbors: int = 30
     ) -> None:
         positions = coordinates(points, "points")
         if len(positions) == 0:

@@ -21,10 +21,7 @@ Positions: TypeAlias = NDArray[np.float64] | None
 
 @singledispatch
 def segments_of(
-    source: CurveOrPoints | CurveSegments,
-    triangles: IntrinsicMesh,
-    positions: Positions = None,
-    number: int = 0,
+    source: CurveOrPoints | CurveSegments, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0
 ) -> CurveSegments:
     """Cut a source, whose faces are those of the triangles, into segments; `CurveSegments` are returned as they are.
 
@@ -45,9 +42,7 @@ def segments_of(
 
 
 def segments_of_each(
-    sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]],
-    triangles: IntrinsicMesh,
-    positions: Positions = None,
+    sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]], triangles: IntrinsicMesh, positions: Positions = None
 ) -> list[list[CurveSegments]]:
     """The segments of several sources; a sequence of curves and points among them counts as one source."""
     return [

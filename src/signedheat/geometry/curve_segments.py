@@ -311,10 +311,7 @@ def carried_left(
 
 
 def in_layout(
-    triangles: IntrinsicMesh,
-    positions: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    vectors: NDArray[np.float64],
+    triangles: IntrinsicMesh, positions: NDArray[np.float64], faces: NDArray[np.int64], vectors: NDArray[np.float64]
 ) -> NDArray[np.complex128]:
     """(k,) vectors in space projected into the planes of their faces, in layout coordinates."""
     of_faces = positions[faces] if positions.ndim == 3 else positions[triangles.corner_vertices[faces]]

@@ -86,10 +86,7 @@ def pair_halfedges(
 
 
 def orient_faces(
-    pairs: HalfedgePairs,
-    tails: NDArray[np.int64],
-    owners: NDArray[np.integer],
-    weights: NDArray[np.float64],
+    pairs: HalfedgePairs, tails: NDArray[np.int64], owners: NDArray[np.integer], weights: NDArray[np.float64]
 ) -> FaceOrientation:
     """Make faces agree with their neighbours across edges of two faces, in each part with the majority by area.
 

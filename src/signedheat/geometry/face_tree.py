@@ -179,11 +179,7 @@ class NearestFaces:
     regular: NDArray[np.bool_]
 
 
-def search_from(
-    features: FaceFeatures,
-    points: NDArray[np.float64],
-    candidates: NDArray[np.int32],
-) -> NearestFaces:
+def search_from(features: FaceFeatures, points: NDArray[np.float64], candidates: NDArray[np.int32]) -> NearestFaces:
     """The nearest of (n, c) candidate faces of each of (n, 3) points, or one that it leads on to; −1 is none.
 
     Where a point has no candidate, there is no face, and distance is infinite.

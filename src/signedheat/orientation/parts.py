@@ -151,11 +151,7 @@ def _hint(parts: Parts, found: Votes) -> NDArray[np.float64]:
 
 
 def _nested(
-    parts: Parts,
-    found: Votes,
-    bounding: NDArray[np.bool_],
-    crossed: NDArray[np.int64],
-    within: NDArray[np.int64],
+    parts: Parts, found: Votes, bounding: NDArray[np.bool_], crossed: NDArray[np.int64], within: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Part in which each lies that is hidden in another. Whole parts in whole parts must be hidden altogether."""
     n = len(parts.areas)

@@ -53,10 +53,7 @@ def votes(starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray
 
 @compiled
 def containers(
-    starts: NDArray[np.int64],
-    parts: NDArray[np.int64],
-    entering: NDArray[np.bool_],
-    bounding: NDArray[np.bool_],
+    starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], bounding: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """(k,) part within which each crossing lies: of those that the line is in, the one it entered last; −1 for none.
 

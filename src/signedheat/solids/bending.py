@@ -63,11 +63,7 @@ def smooth_patches(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> ND
 
 
 def samples_near(
-    triangles: NDArray[np.float64],
-    tree: BoxTree,
-    patches: NDArray[np.int64],
-    rim: scipy.spatial.cKDTree,
-    reach: float,
+    triangles: NDArray[np.float64], tree: BoxTree, patches: NDArray[np.int64], rim: scipy.spatial.cKDTree, reach: float
 ) -> Samples:
     """Samples of triangles in a tree within reach of a rim, at most reach / `SAMPLES` apart, unless too many are."""
     size = reach / SAMPLES

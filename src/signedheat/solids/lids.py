@@ -231,10 +231,7 @@ def _membrane(
 
 
 def plate(
-    lid: Film,
-    normals: NDArray[np.float64],
-    curvatures: NDArray[np.float64],
-    held: NDArray[np.float64],
+    lid: Film, normals: NDArray[np.float64], curvatures: NDArray[np.float64], held: NDArray[np.float64]
 ) -> Film | None:
     """A lid bent as a thin plate whose shape at rest is as curved as the surface behind its rim (Helfrich 1973).
 

@@ -120,12 +120,7 @@ class Samples:
 
 
 def sample(
-    field: GridField,
-    n: int = 250_000,
-    *,
-    near: float = 0.8,
-    widths: Sequence[float] = WIDTHS,
-    seed: int = 0,
+    field: GridField, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = WIDTHS, seed: int = 0
 ) -> Samples:
     """Points with distances and gradients, near the surface of a shape and all around it.
 

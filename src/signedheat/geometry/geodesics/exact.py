@@ -57,10 +57,7 @@ def distance_to_zero_line(
 
 
 def distance_to_segments(
-    triangles: IntrinsicMesh,
-    placed: Sequence[PlacedSegments],
-    tolerance: float = 1e-4,
-    report: Report | None = None,
+    triangles: IntrinsicMesh, placed: Sequence[PlacedSegments], tolerance: float = 1e-4, report: Report | None = None
 ) -> tuple[NDArray[np.float64], int]:
     """Distance of every vertex to segments and points: inside faces, along edges, at vertices; for the rest see above.
 

@@ -134,10 +134,7 @@ def for_tracing(triangles: IntrinsicMesh) -> Gluing:
 
 
 def straight_lines(
-    gluing: Gluing,
-    faces: NDArray[np.int64],
-    barycentric: NDArray[np.float64],
-    vectors: NDArray[np.float64],
+    gluing: Gluing, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
 ) -> Lines:
     """Straight lines given by their midpoints and vectors there, of which the first is the whole extent of the line."""
     halves = np.ascontiguousarray(vectors, dtype=np.float64).copy()

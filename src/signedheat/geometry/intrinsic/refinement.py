@@ -22,11 +22,7 @@ PATIENCE = 5000
 
 
 def refine_all(
-    gluing: Gluing,
-    angle: float,
-    coarsest: float,
-    max_vertices: int,
-    progress: Callable[[float], None] | None = None,
+    gluing: Gluing, angle: float, coarsest: float, max_vertices: int, progress: Callable[[float], None] | None = None
 ) -> tuple[Gluing, NDArray[np.int64], NDArray[np.bool_], bool]:
     """Refine a Delaunay triangulation until no face is thin and then none is large, where that is possible.
 

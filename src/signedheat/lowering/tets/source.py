@@ -64,12 +64,7 @@ class TetSource(Frozen):
 
 
 def tet_source(
-    mesh: TetMesh,
-    planes: Planes,
-    unknowns: NDArray[np.int64],
-    sources: Sequence[Any],
-    diffusion: float,
-    spacing: float,
+    mesh: TetMesh, planes: Planes, unknowns: NDArray[np.int64], sources: Sequence[Any], diffusion: float, spacing: float
 ) -> TetSource:
     """Lower sources to a tet mesh.
 

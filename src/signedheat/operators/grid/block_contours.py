@@ -23,10 +23,7 @@ Refine = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 def block_contour(
-    values: BlockValues,
-    spacing: NDArray[np.float64],
-    level: float,
-    refine: Refine | None = None,
+    values: BlockValues, spacing: NDArray[np.float64], level: float, refine: Refine | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Marching cubes (Lewiner et al. 2003) in the cells whose nodes all have a value: closed where those around do.
 
