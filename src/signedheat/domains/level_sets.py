@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.meshes import Triangles
+from ..geometry.meshes import Triangles, area_vectors
 from ..geometry.polylines import assemble_polylines, leaving
 from ..geometry.surface_points import SNAP, barycentric_on_edges, crossed_sides
 from .curves import Curve
@@ -98,9 +98,8 @@ def snapped(values: NDArray[np.float64], ends: NDArray[np.int64], level: float) 
 def gradient_directions(mesh: Triangles, values: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
     """(k, 3) gradients of a piecewise linear function on some faces, up to a positive factor each."""
     corners = mesh.vertices[mesh.faces[faces]]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
-    of_corners = np.cross(normal[:, None], opposite)
+    of_corners = np.cross(area_vectors(corners)[:, None], opposite)
     rise = values[mesh.faces[faces]]
     most = np.abs(rise).max(axis=1, keepdims=True, initial=0.0)
     rise = rise / np.where(most > 0, most, 1.0)  # lest their sum is beyond what can be written
@@ -142,7 +141,7 @@ def inward(mesh: Triangles, faces: NDArray[np.int64], sides: NDArray[np.int64]) 
     corners = mesh.vertices[mesh.faces[faces]]
     row = np.arange(len(faces))
     along = corners[row, (sides + 1) % 3] - corners[row, sides]
-    return np.cross(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), along)
+    return np.cross(area_vectors(corners), along)
 
 
 def is_consistent(mesh: Triangles) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -187,12 +186,6 @@ class EdgeTable(Frozen):
         """(k, 2) both halfedges of each edge that has exactly two."""
         one = np.flatnonzero(self.mates > np.arange(len(self.mates)))
         return read_only(np.stack([one, self.mates[one]], axis=1))
-
-    def per_edge(self, values: NDArray[Any]) -> NDArray[Any]:
-        """(e,) what (m, 3) values at the sides of faces say of each edge: the last of its faces; zero where none is."""
-        result = np.zeros(len(self.vertices), dtype=values.dtype)
-        result[self.face_edges] = values
-        return result
 
     def elimination_order(self, vertex_order: NDArray[np.integer]) -> NDArray[np.int64]:
         """Fill-reducing order of unknowns at edges, from one of the vertices: ``order[k]`` is eliminated k-th.

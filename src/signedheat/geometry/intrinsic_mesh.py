@@ -101,7 +101,9 @@ class IntrinsicMesh(Frozen):
     @cached_property
     def lengths_of_edges(self) -> NDArray[np.float64]:
         """(e,) lengths, each as one of the edge's faces has it."""
-        return self.edges.per_edge(self.edge_lengths)
+        lengths = np.zeros(self.n_edges)
+        lengths[self.edges.face_edges] = self.edge_lengths
+        return lengths
 
     @property
     def agree_on_lengths(self) -> bool:

@@ -13,6 +13,7 @@ from ..parallel import CHUNK, n_threads
 from .box_tree import BoxTree
 from .cut_faces import overlap
 from .directions import unit
+from .meshes import area_vectors
 
 TOUCHING = 1e-10
 """Depth, over the size of the mesh, up to which triangles only touch."""
@@ -39,7 +40,7 @@ def self_intersections(vertices: NDArray[np.float64], faces: NDArray[np.int64]) 
     corners = centred[ids]
     tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
     slack = TOUCHING * float(np.ptp(centred, axis=0).max())
-    flat, normals = corners.reshape(-1, 9), unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    flat, normals = corners.reshape(-1, 9), unit(area_vectors(corners))
 
     def part(start: int) -> NDArray[np.int64]:
         starts, near = tree.meeting(corners[start : start + CHUNK], slack)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .box_tree import BoxTree
 from .components import grouped
+from .meshes import area_vectors
 from .welding import distinct_rows
 
 FACE_CORNERS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -82,14 +83,7 @@ class TetShapes:
     @cached_property
     def area_vectors(self) -> NDArray[np.float64]:
         """(m, 4, 3) N_k: area times outward normal of the face opposite each corner."""
-        a, b, c, d = (self.vertices[self.tets[:, k]] for k in range(4))
-        vectors = np.empty((len(self.tets), 4, 3))
-        vectors[:, 0] = np.cross(c - b, d - b)
-        vectors[:, 1] = np.cross(d - a, c - a)
-        vectors[:, 2] = np.cross(b - a, d - a)
-        vectors[:, 3] = np.cross(c - a, b - a)
-        vectors *= 0.5
-        return vectors
+        return np.stack([area_vectors(self.vertices[self.tets[:, face]]) for face in FACE_CORNERS], axis=1)
 
     @cached_property
     def volumes(self) -> NDArray[np.float64]:

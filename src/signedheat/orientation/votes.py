@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 
 
-@dataclass(frozen=True, eq=False)
-class Votes:
+class Votes(NamedTuple):
     """Counts over crossings of lines with the parts of a shape, (n_parts,) each; votes are positive for "as it is".
 
     A line enters a solid where it meets it first and leaves it where it meets it last. Where that is the same
@@ -39,6 +38,7 @@ class Votes:
     even_votes: NDArray[np.int64]
 
 
+@compiled
 def votes(starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], n_parts: int) -> Votes:
     """Count the votes of all crossings: the parts crossed along lines, and whether lines come from where normals point.
 
@@ -48,7 +48,32 @@ def votes(starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray
     >>> found.seen_votes.tolist(), found.seen.tolist()
     ([2, 0], [2, 2])
     """
-    return Votes(*_votes(starts, parts, entering, n_parts))
+    crossings, seen, seen_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
+    own, own_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
+    even, even_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
+    latest = np.full(n_parts, -1, np.int64)
+    for line in range(len(starts) - 1):
+        begin, end = starts[line], starts[line + 1]
+        for k in range(begin, end):
+            part, vote = parts[k], 1 if entering[k] else -1
+            crossings[part] += 1
+            if (end - begin) % 2 == 0:
+                even[part] += 1
+                even_votes[part] += vote if (k - begin) % 2 == 0 else -vote
+                if k == begin or k == end - 1:
+                    seen[part] += 1
+                    seen_votes[part] += vote if k == begin else -vote
+            elif end - begin == 1:
+                seen[part] += 2
+            if latest[part] < begin:  # the first of the part on this line
+                own[part] += 2
+                own_votes[part] += vote
+            latest[part] = k
+        for k in range(begin, end):
+            part = parts[k]
+            if latest[part] == k:
+                own_votes[part] -= 1 if entering[k] else -1
+    return Votes(crossings, seen, seen_votes, own, own_votes, even, even_votes)
 
 
 @compiled
@@ -102,38 +127,6 @@ def containers(
                 stack[depth] = part
                 depth += 1
     return found
-
-
-@compiled
-def _votes(
-    starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], n_parts: int
-) -> tuple[NDArray[np.int64], ...]:
-    crossings, seen, seen_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
-    own, own_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
-    even, even_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
-    latest = np.full(n_parts, -1, np.int64)
-    for line in range(len(starts) - 1):
-        begin, end = starts[line], starts[line + 1]
-        for k in range(begin, end):
-            part, vote = parts[k], 1 if entering[k] else -1
-            crossings[part] += 1
-            if (end - begin) % 2 == 0:
-                even[part] += 1
-                even_votes[part] += vote if (k - begin) % 2 == 0 else -vote
-                if k == begin or k == end - 1:
-                    seen[part] += 1
-                    seen_votes[part] += vote if k == begin else -vote
-            elif end - begin == 1:
-                seen[part] += 2
-            if latest[part] < begin:  # the first of the part on this line
-                own[part] += 2
-                own_votes[part] += vote
-            latest[part] = k
-        for k in range(begin, end):
-            part = parts[k]
-            if latest[part] == k:
-                own_votes[part] -= 1 if entering[k] else -1
-    return crossings, seen, seen_votes, own, own_votes, even, even_votes
 
 
 def imbalance(starts: NDArray[np.int64], entering: NDArray[np.bool_]) -> float:
