@@ -74,15 +74,16 @@ def test_a_guess_is_announced():
         sh.signed_distance([side.reversed() if k % 2 else side for k, side in enumerate(sides(0.05))], resolution=32)
 
 
-def test_strokes_are_turned_alike_wherever_distance_is_asked():
+@pytest.mark.parametrize("side", [0.4, 1.2, 18.0])
+def test_a_drawing_is_completed_alike_wherever_distance_is_asked(side):
     lines = sides(0.1)
     lines[2] = lines[2].reversed()
-    near = sh.signed_distance(lines, sh.Grid.around([[-1.5, -1.5], [0.5, 0.5]], 40, padding=0.0))
-    far = sh.signed_distance(lines, sh.Grid.around([[-9.0, -9], [9, 9]], 200, padding=0.0))
-    assert near([[0.0, 0.0]]) < 0
-    assert near([[0.0, -1.2]]) > 0
-    assert far([[0.0, 0.0]]) < 0
-    assert far([[5.0, -5.0]]) > 0
+    everywhere = sh.signed_distance(lines, resolution=65)
+    grid = sh.Grid.around([[0.7, 0.7], [0.7 + side, 0.7 + side]], 19, padding=0.0)  # at, and around, a missing corner
+    inside = (grid.points >= everywhere.grid.origin).all(axis=-1) & (grid.points <= everywhere.grid.upper).all(axis=-1)
+    field = sh.signed_distance(lines, grid)
+    np.testing.assert_allclose(field.values[inside], everywhere(grid.points[inside]), atol=0.03)
+    np.testing.assert_allclose(field.values, distance_to_box(grid.points, (-1, -1), (1, 1)), atol=0.15)
 
 
 def test_points_with_normals_in_the_plane():
@@ -91,6 +92,8 @@ def test_points_with_normals_in_the_plane():
     grid = sh.Grid.around([[-1, -1], [1, 1]], 80)
     field = sh.signed_distance(sh.PointCloud(circle, circle), grid)
     assert np.abs(field.values - (np.linalg.norm(grid.points, axis=-1) - 1)).max() < 0.02
+    one = sh.signed_distance(sh.PointCloud([[0.0, 0]], [[0, 1.0]]), grid)
+    assert one([[0.0, 0.5]]) > 0 > one([[0.0, -0.5]])
 
 
 def test_what_does_not_fit_is_refused():

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..constraints import Constraint, EachComponent, LevelValues
-from ..domains.grid import Grid
+from ..domains.grid import RESOLUTION, Grid
 from ..domains.kinds import Sources
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
@@ -27,6 +27,8 @@ from ..solver import SignedHeatSolver, as_list
 from .distance import CurvesTaken, distance_to_pieces
 from .resolution import on_resolving_triangles
 
+FINEST = 1024
+"""Most cells along a drawing on which it is completed, however fine the grid is on which distance is asked."""
 STROKE_NODES = 96
 """Nodes along the longest side of the triangles on which strokes are compared. Of 150 drawings none is wrong in silence
 and 7 are right with a warning; halved 0 and 5, doubled 0 and 6."""
@@ -50,8 +52,9 @@ def distance_to_lines(
     """Signed distance to polylines in the plane: see `signed_distance`, which calls this.
 
     Strokes are turned until they bound something together, and those left out that do not; the signed heat method
-    decides the sides, and its zero set completes the lines. On grids with solid nodes, and in other dimensions than
-    two, lines are taken as they are, and φ is returned as the method gives it.
+    decides the sides, and its zero set completes the lines. It runs on a grid around the drawing, however much or
+    little of it is asked for. On grids with solid nodes, and in other dimensions than two, lines are taken as they are,
+    and φ is returned as the method gives it.
     """
     if isinstance(constraint, EachComponent | LevelValues):
         raise ConstraintError(
@@ -62,24 +65,30 @@ def distance_to_lines(
     if domain is None:
         domain = Grid.around(bounds_around(listed), resolution, padding, spacing)
     as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
-    measurable = domain.mask is None and domain.dimension == 2
+    if domain.mask is not None or domain.dimension != 2:
+        return SignedHeatSolver(domain, diffusion, progress).distance(listed, constraint)
     note = None
-    if measurable and not as_oriented and all(isinstance(line, Polyline) for line in listed):
+    if not as_oriented and all(isinstance(line, Polyline) for line in listed):
         listed, note = strokes_that_agree(listed, every_piece, within(progress, 0.0, 0.4))
-    phi: GridField = SignedHeatSolver(domain, diffusion, within(progress, 0.4, 0.8)).distance(listed, constraint)
-    if note is not None:
-        phi = replace(phi, diagnostics=phi.diagnostics.noting(note))
-    drawn = [line for line in listed if isinstance(line, Polyline)]
-    if not measurable or not np.isfinite(phi.values).all():
-        return phi
+    solver = SignedHeatSolver(_grid_around(listed, domain), diffusion, within(progress, 0.4, 0.8))
+    phi = cast("GridField[Literal[2]]", solver.distance(listed, constraint))
     if progress is not None:
         progress(0.8, "measure")
     begin = time.perf_counter()
-    values = _measured(
-        cast("GridField[Literal[2]]", phi), np.concatenate([np.empty((0, 2, 2)), *(line.segments for line in drawn)])
-    )
+    drawn = [line.segments for line in listed if isinstance(line, Polyline)]
+    values = _measured(phi, np.concatenate([np.empty((0, 2, 2)), *drawn]), domain.points.reshape(-1, 2))
     timings = {**phi.diagnostics.timings, "measure": time.perf_counter() - begin}
-    return GridField(domain, values, replace(phi.diagnostics, timings=timings))
+    diagnostics = replace(phi.diagnostics, timings=timings)
+    return GridField(domain, values.reshape(domain.shape), diagnostics if note is None else diagnostics.noting(note))
+
+
+def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
+    """A grid around all sources, with cells at most as large as those where distance is asked; around a point those."""
+    bounds = bounds_around(sources)
+    size = float(np.ptp(bounds, axis=0).max())
+    if size == 0:
+        return asked
+    return Grid.around(bounds, spacing=float(np.clip(asked.spacing.min(), size / FINEST, size / RESOLUTION)))
 
 
 def strokes_that_agree(
@@ -119,24 +128,25 @@ def _triangles_around(bounds: NDArray[np.float64]) -> TriangleMesh:
     return TriangleMesh(np.pad(nodes.points.reshape(-1, 2), ((0, 0), (0, 1))), np.hstack([first, second]).T)
 
 
-def _measured(phi: GridField[Literal[2]], given: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distance of every node to the nearest of segments and of the zero set of φ where that is far from them."""
-    nodes = phi.grid.points.reshape(-1, 2)
+def _measured(
+    phi: GridField[Literal[2]], given: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distance of points to the nearest of segments and of the zero set of φ where that is far from them."""
     near = NEAR * float(phi.grid.spacing.max())
-    values = phi.values.ravel()
-    crosses = bool((values < 0).any() and (values >= 0).any())
+    sides = np.where(phi.interpolate(points) < 0, -1.0, 1.0)
+    crosses = bool((phi.values < 0).any() and (phi.values >= 0).any())
     completion = np.concatenate([line.segments for line in phi.contour()]) if crosses else np.empty((0, 2, 2))
     if not len(given):
-        return np.where(phi.values < 0, -1.0, 1.0) * _nearest(completion, nodes)[0].reshape(phi.grid.shape)
-    away, places, nearest = _nearest(given, nodes)
+        return sides * _nearest(completion, points)[0]
+    away, places, nearest = _nearest(given, points)
     if len(completion):
         completion = completion[_nearest(given, completion.mean(axis=1))[0] > near]
-    signs = np.where(away < near, _sides(given, nodes, places, nearest), np.where(values < 0, -1.0, 1.0))
+    signs = np.where(away < near, _sides(given, points, places, nearest), sides)
     if len(completion):
-        completed = _nearest(completion, nodes)[0]
-        signs = np.where(completed < away, np.where(values < 0, -1.0, 1.0), signs)
+        completed = _nearest(completion, points)[0]
+        signs = np.where(completed < away, sides, signs)
         away = np.minimum(away, completed)
-    return (signs * away).reshape(phi.grid.shape)
+    return signs * away
 
 
 def _nearest(
