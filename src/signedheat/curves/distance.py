@@ -49,6 +49,10 @@ class CurvesTaken(Note):
     turned: NDArray[np.int64]
     left_out: NDArray[np.int64]
 
+    @property
+    def important(self) -> bool:
+        return True
+
     def __str__(self) -> str:
         taken = [
             f"{name}: {len(which)}, the first of them number {which[0]}"
