@@ -157,11 +157,8 @@ class SurfacePoints(Frozen):
 
 CurveOrPoints: TypeAlias = Curve | SurfacePoints
 """What distance on a surface is measured to."""
-
 CurvesAndPoints: TypeAlias = CurveOrPoints | Sequence[CurveOrPoints | Sequence[CurveOrPoints]]
 """One source or several; curves and points in a sequence of their own count as one."""
-
-
 ElementList: TypeAlias = Sequence[tuple[int, Sequence[float]]]
 """A curve in the format of potpourri3d: vertices (id, []), edges (id, [t]) and faces (id, [u, v]) in order."""
 

@@ -36,7 +36,6 @@ windows = lazy_module("signedheat.view.windows", "windows")
 Kind = TypeVar("Kind", bound="Exchangeable[Any]")
 Trimesh = TypeVar("Trimesh")
 """The type of trimesh that corresponds to a kind of shape."""
-
 NAME = "signed_distance"
 """Of the values of a field, in objects of PyVista and in files."""
 _SIDES = {"triangle": 3, "quad": 4}

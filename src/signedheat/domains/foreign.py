@@ -63,14 +63,10 @@ class HasTriangles(Protocol):
 
 SurfaceShape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud
 """The kinds of shapes that most file formats support."""
-
-
 Shape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh
 """What a file of a shape may hold. In space points need normals, and volumes are refused: give their boundary."""
-
 ForeignShape: TypeAlias = HasVertices | HasGeometry | HasPointData | HasTriangles | tuple[ArrayLike, ArrayLike]
 """Objects of trimesh, PyVista, meshio and Open3D, and pairs (vertices, faces)."""
-
 TAKEN = "a shape of signedheat, trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces)"
 """What is taken for a shape, for messages."""
 

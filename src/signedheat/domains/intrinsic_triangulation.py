@@ -40,10 +40,8 @@ if TYPE_CHECKING:
 
 AREA_ERROR = 1e-4
 """Largest relative change of the area of a mesh. It is 1e-7 at most where some faces are degenerate."""
-
 LARGEST_ANGLE = 30.0
 """Degrees; for larger minimum angles refinement need not terminate."""
-
 UPWARD = (np.pi / 4) ** np.arange(3)
 """Direction in which no two different points with coordinates that are algebraic numbers are equally high."""
 

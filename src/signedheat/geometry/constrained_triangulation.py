@@ -11,7 +11,6 @@ Edge = tuple[int, int]
 
 CLOSE = 1e-9
 """Distance, in barycentric coordinates, below which a point counts as lying on a segment."""
-
 FLAT = 1e-14
 """Twice the area below which a triangle is as good as flat, and is not made by a flip."""
 

@@ -15,7 +15,6 @@ from .box_tree import LEAF, BoxTree
 
 HEIGHT = 1e-14
 """Height of a triangle over its length up to which it has none: rounding would say where it lies, and its normal."""
-
 TOGETHER = 8
 """Points that go down a tree together. With 16 a million take a tenth less on 20,000 faces, and a tenth more on 1.3
 million, whose boxes are smaller than what 16 points at random are apart; with 4 half as much again."""

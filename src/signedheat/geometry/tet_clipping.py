@@ -19,7 +19,6 @@ from .tet_shapes import TetShapes
 
 FLAT = 1e-10
 """Tets whose volume, over the cube of the longest edge, is below this contain no part of a source."""
-
 TOUCHING = 1e-9
 """Distance, relative to the size of a face, within which a point counts as lying in its plane."""
 

@@ -18,7 +18,6 @@ from .matrices import whole
 
 SMALLEST = 1e-290
 """Unknowns below this have lost bits to underflow, and are left out of the stopping criterion."""
-
 MOST_ITERATIONS = 5000
 
 

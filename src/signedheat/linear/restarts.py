@@ -11,10 +11,8 @@ from scipy import sparse
 
 FAINT = 2.0**-900
 """Rows below this fraction of the largest are computed anew: what underflows on the way to them may be missing."""
-
 Solve = Callable[[NDArray[Any]], NDArray[Any]]
 """From right-hand sides (n, k) or (n,), the solutions."""
-
 Forces = Callable[[NDArray[Any], NDArray[np.bool_]], tuple[NDArray[np.bool_], NDArray[Any]]]
 """From x, zero but on the faint rows, and these: (n,) rows that couple faint ones to others, and A x there."""
 

@@ -15,7 +15,6 @@ from .direct_integration import BATCH, DirectIntegration
 
 PIN = 1e6
 """Stiffness of the springs at vertices on the source, relative to the largest diagonal entry of C."""
-
 ANCHOR = 10.0
 """Least stiffness of all springs together that hold φ, relative to the same."""
 

@@ -18,7 +18,6 @@ from ..geometry.tet_shapes import TetShapes
 
 THIN = 1e-2
 """Volume over the cube of the longest edge below which a tet has a reduced weight; it is 0.118 for a regular tet."""
-
 FLAT = 1e-6
 """Volume over the cube of the longest edge below which a tet counts as flat."""
 

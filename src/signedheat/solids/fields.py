@@ -37,12 +37,10 @@ BYTES_PER_NODE = 12.0
 """Of a value and a confidence."""
 BYTES_AT_WORK = 40e6
 """Of the tiles that are computed at a time, measured; and of what is compiled."""
-
 BYTES_IN_BAND = 6.5
 """Of a node of a band: a value, a confidence, and its share of the tables of blocks."""
 COARSE = 65
 """Nodes along the longest side of the coarse grid of a band at most."""
-
 Result = TypeVar("Result")
 
 

@@ -27,15 +27,12 @@ AT_REST, MOVES = 1e-3, 64
 Nearly all do in 5 to 20 moves."""
 SPLITS = 8
 """How often edges of a rim are halved at most until all are edges of its triangulation."""
-
 PLANE = 1e-12
 """How far a film moves, over its size, when it is at rest: rounding. One in a plane is from the first."""
 AT_ONCE = 1 << 20
 """Pairs of a point and an edge that are looked at together."""
 MOVED = 1e-9
 """Over the size of a lid, how far points are moved to choose among equal triangles: rounding moves them by 1e-15."""
-
-
 Frame = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Origin and (3, 2) axes of a plane."""
 

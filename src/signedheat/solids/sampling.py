@@ -21,10 +21,8 @@ files = lazy_module("signedheat.io.solids", "files")
 
 WIDTHS = (0.05, 0.0158)
 """Widths of the noise by default, over the radius of the shape: variances of .0025 and .00025 (Park et al. 2019)."""
-
 BYTES_PER_SAMPLE = 165
 """At the most, with what finding its nearest face takes."""
-
 Layout = Literal["arrays", "deepsdf"]
 """How samples are kept in a file: an array for each attribute, or ``pos`` and ``neg`` with x, y, z and distance."""
 

@@ -28,14 +28,11 @@ from .sources import GeodesicSources, PlacedSegments, as_curve, through_vertices
 WINDOWS_PER_EDGE, FEW_WINDOWS, ON_SMALL = 100, 4_000_000, 1000
 """A search that makes more windows than this, on average, is cut short; on smooth surfaces ten are usual. Small meshes
 of many sheets take more, which is little in all."""
-
 MANY_PER_EDGE, MANY_WINDOWS = 30, 50_000
 """A search that makes more windows than this goes on in Delaunay triangles: through the long edges of slivers every
 segment of a curve is seen."""
-
 Report: TypeAlias = Callable[[], None]
 """Called every tenth of a second or so; an exception that it raises ends the search."""
-
 _CHUNK = 1 << 16
 
 

@@ -17,7 +17,6 @@ kernel = compiled(error_model="numpy")  # without exceptions, compilation takes 
 
 FLIP, TURN, SPLIT_FACE, SPLIT_EDGE = 0, 1, 2, 3
 """Kinds of steps in a history."""
-
 MOST_FLIPS = 1000
 """An edge that has been flipped as often flips back and forth because of rounding, and is left as it is."""
 

@@ -30,10 +30,8 @@ from .gluing_kernels import (
 
 DONE, GROW, FULL, PAUSED = 0, 1, 2, 3
 """Why `refine` returned: no bad face is left; arrays are full; vertex limit reached; pause to report progress."""
-
 NARROW = np.pi / 3
 """Where segments meet at less than this, or a vertex has a smaller total angle, small angles cannot be avoided."""
-
 N_BINS = 256
 
 

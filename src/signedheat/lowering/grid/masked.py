@@ -29,10 +29,8 @@ from .source import GridSource
 
 DIRECT_NODES = {1: 10_000_000, 2: 1_000_000, 3: 40_000, 4: 5_000}
 """Up to this number of free nodes both systems are factorised, by dimension: factors fill more in higher ones."""
-
 DIRECTION_ERROR = 1e-4
 """Componentwise residual at which the conjugate gradients of step 1 stop."""
-
 FACING = 1.5
 """Cells by which a node may lie past the end of a source at a wall and still count as in front of the source."""
 REFLECTION = 3

@@ -16,8 +16,6 @@ from ...geometry.components import connected_components
 
 STRAIGHT = 0.5
 """Distance between the ends of a single piece, relative to its length, from which it is no curve with a gap."""
-
-
 ROUND = 0.15
 """What counts as the scale of a single piece, relative to its length: about the radius of a circle."""
 

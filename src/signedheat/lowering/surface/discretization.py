@@ -235,7 +235,6 @@ def refuse_too_many(triangles: int, count: int, elements: str, more: float = 0.0
 
 STRENGTH = 100.0
 """Strength of the springs along curves that cross faces, in 1/h: measured on twenty meshes, good and bad."""
-
 SOFT = 10.0
 """λ of `Soft` where none is given, in 1/h."""
 

@@ -20,28 +20,20 @@ from .discretization import SurfaceDiscretization, refuse_too_many
 
 SPOILED = 0.0015
 """Fraction of the area in triangles with an angle above `LARGE`, from which a mesh is refined."""
-
 LARGE = 120.0
 """Degrees."""
-
 NEEDLES = 0.1
 """Fraction of the area in triangles with an angle below `SMALL`, from which a mesh is refined."""
-
 SMALL = 10.0
 """Degrees. Needles resolve distance by their length only, even right-angled ones."""
-
 ANGLE = 20.0
 """Smallest angle of "auto", in degrees: vertices that 28 would take are better spent on large triangles."""
-
 COARSEST = 1.41
 """Largest triangles of "auto", over the mean one: curves on coarser ones are not resolved."""
-
 BYTES_REFINED = 750
 """What each triangle of a refinement takes itself, besides distance on it."""
-
 SHARE_OF_PIECE = 0.5
 """h over the length of the pieces of a curve that is to be completed, where triangles are larger."""
-
 THICKNESS = 1e-9
 """Margin of the triangle inequalities, relative to the mean length, in the triangles that the method runs on."""
 

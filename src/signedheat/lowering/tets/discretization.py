@@ -28,17 +28,12 @@ from .source import TetSource, tet_source
 
 DIRECT_FACES = 20_000
 """Up to this number of faces step 1 is factorised, in O(n²) time; conjugate gradients take O(n⁴ᐟ³)."""
-
 DIRECT_VERTICES = 40_000
 """Up to this number of vertices step 3 is factorised."""
-
 DIRECTION_ERROR = 1e-3
 """Componentwise residual at which conjugate gradients stop: directions are then right to about 0.01°."""
-
 SPRINGS = 30.0
 """Strength of the springs that impose levels, times the mean edge length."""
-
-
 BYTES_PER_TET, BYTES_PER_FACTORED = 1750, 2900
 """Peak for each tet, by conjugate gradients and by factorisation. Measured."""
 

@@ -18,7 +18,6 @@ WINDOW = 8
 """Blocks along each edge of a window."""
 BITS = 20
 """Of the number of a node along an axis."""
-
 Refine = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 

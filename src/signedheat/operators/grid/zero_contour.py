@@ -34,7 +34,6 @@ With the middle three fifths balls and half spaces come out a tenth better, and 
 UNEVEN = 0.05
 """Cells by which crossings may lie off the paraboloid of the next where the zero set is smooth. Of balls of four cells'
 radius, distances are .04 cells off at the most, with .1 by .01; of clipped ones .07 and .12."""
-
 AT_NODE = 1e-6
 """Cells from a node within which all crossings are in one place. A walk from one to the next, which needs ways that
 become shorter, is lost in less than the root of the rounding error, 1e-8."""
