@@ -7,8 +7,6 @@ edges, has its diagonal along the crease.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,61 +43,40 @@ def flipped_along_creases(
     """
     if not 0 < len(faces) <= MOST:
         return faces
-    sharp = _Creases.of(vertices, faces)
-    if not len(sharp.sides):
+    _, _, sharp = _creases(vertices, faces)
+    if not len(sharp):
         return faces
     near = np.zeros(len(vertices), dtype=bool)
-    near[faces[sharp.sides // 3]] = True
+    near[faces[sharp // 3]] = True
     some = np.flatnonzero(near[faces].any(axis=1))
     result: NDArray[np.int64] = faces.copy()
     for _ in range(ROUNDS):
-        creases = _Creases.of(vertices, result[some])
-        first, second, one, other = _flips(vertices, creases, near, held)
+        first, second, one, other = _flips(vertices, result[some], near, held)
         if not len(first):
             break
         result[some[first]], result[some[second]] = one, other
     return result
 
 
-@dataclass(frozen=True, eq=False)
-class _Creases:
-    """Faces, and the edges at which they bend sharply.
-
-    Attributes
-    ----------
-    faces : (m, 3) int
-        Triangles.
-    table : EdgeTable
-        Their edges.
-    normals : (m, 3) float
-        Unit normals.
-    sides : (k, 2) int
-        Both halfedges of the edges at which two faces make an angle of more than `SHARP`.
-    """
-
-    faces: NDArray[np.int64]
-    table: EdgeTable
-    normals: NDArray[np.float64]
-    sides: NDArray[np.int64]
-
-    @classmethod
-    def of(cls, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Creases:
-        table = edge_table(faces)
-        normals = unit(area_vectors(vertices[faces]))
-        one, other = normals[table.pairs // 3].swapaxes(0, 1)
-        return cls(faces, table, normals, table.pairs[np.einsum("ij,ij->i", one, other) < np.cos(SHARP)])
+def _creases(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[EdgeTable, NDArray[np.float64], NDArray[np.int64]]:
+    """Edges and unit normals of faces, and both halfedges of the edges at which two make an angle of over `SHARP`."""
+    table, normals = edge_table(faces), unit(area_vectors(vertices[faces]))
+    one, other = normals[table.pairs // 3].swapaxes(0, 1)
+    return table, normals, table.pairs[np.einsum("ij,ij->i", one, other) < np.cos(SHARP)]
 
 
 def _flips(
-    vertices: NDArray[np.float64], creases: _Creases, whole: NDArray[np.bool_], held: NDArray[np.bool_] | None
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], whole: NDArray[np.bool_], held: NDArray[np.bool_] | None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Pairs of faces to replace, (k,) each, no two of them neighbors, and what replaces them, (k, 3) each.
 
     The edge from a to b has c and d across; the edge from c to d takes its place, unless there is one already: of the
     vertices that are `whole`, one of which it needs, all faces are here.
     """
-    faces, mates = creases.faces, creases.table.mates
-    (first, second), (i, j) = (creases.sides // 3).T, (creases.sides % 3).T
+    table, normals, creases = _creases(vertices, faces)
+    (first, second), (i, j) = (creases // 3).T, (creases % 3).T
     a, b = faces[first, i], faces[first, (i + 1) % 3]
     c, d = faces[first, (i + 2) % 3], faces[second, (j + 2) % 3]
     rim = (  # from, to, the side, the face it belongs to, and which of the new ones it will
@@ -110,19 +87,18 @@ def _flips(
     )
     new = np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)
     made = [unit(area_vectors(vertices[each])) for each in new]
-    normals = creases.normals
     gain = _bend(vertices, a, b, normals[first], normals[second]) - _bend(vertices, c, d, *made)
     reach = np.linalg.norm(vertices[c] - vertices[d], axis=1)
     faces_around = [first, second]
     for tail, head, side, owner, which in rim:
-        beyond = mates[3 * owner + side]
+        beyond = table.mates[3 * owner + side]
         there = beyond >= 0
         other = np.where(there, beyond // 3, owner)
         faces_around.append(other)
         before = _bend(vertices, tail, head, normals[owner], normals[other])
         gain += np.where(there, before - _bend(vertices, tail, head, made[which], normals[other]), 0.0)
     keys = edge_keys(c, d)
-    present = np.isin(keys, edge_keys(*creases.table.vertices.T))
+    present = np.isin(keys, edge_keys(*table.vertices.T))
     gain[present | ~(whole[c] | whole[d]) | (c == d)] = 0.0
     if held is not None:
         gain[held[a] | held[b] | held[c] | held[d]] = 0.0

@@ -27,7 +27,7 @@ from ..memory import available_memory, libraries
 from ..operators.grid.blocks import NODES, SIDE, Blocks
 from ..parallel import n_threads
 from ..progress import Progress
-from .nodes import Tile, distances_in, solved
+from .nodes import distances_in, solved
 from .stores import Scheduler, in_store
 from .winding import Windings
 
@@ -87,16 +87,15 @@ def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Grid
     firsts = np.stack(np.meshgrid(*(np.arange(0, n, EDGE) for n in n_blocks), indexing="ij"), axis=-1).reshape(-1, 3)
     tree, windings = prepared(solid)
 
-    def tile(first: NDArray[np.int64]) -> Tile:
+    def tile(first: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
         stop = np.minimum(first + EDGE, n_blocks)
         axes = (np.arange(*ends) for ends in zip(first, stop, strict=True))
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         return distances_in(tree, windings, grid, SIDE * first, places)
 
-    for done, (first, made) in enumerate(zip(firsts, in_threads(tile, firsts), strict=True)):
-        here = tuple(slice(f, f + n) for f, n in zip(SIDE * first, made.values.shape, strict=True))
-        values[here] = made.values
-        confidence[here] = tree.features.trusted[made.faces]
+    for done, (first, (distances, trusted)) in enumerate(zip(firsts, in_threads(tile, firsts), strict=True)):
+        here = tuple(slice(f, f + n) for f, n in zip(SIDE * first, distances.shape, strict=True))
+        values[here], confidence[here] = distances, trusted
         if progress is not None:
             progress((done + 1) / len(firsts), "distance")
     return cast("GridField[Literal[3]]", GridField(grid, values, solid.diagnostics, confidence, solid=solid))

@@ -7,8 +7,6 @@ for each half of it; those of single nodes are looked at all.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -34,26 +32,10 @@ ALONG_A_CURVE = np.stack(
 """(512, 3) nodes of a block along a space-filling curve."""
 
 
-@dataclass(frozen=True, eq=False)
-class Tile:
-    """Signed distances at the nodes of a box, in some or all of its blocks.
-
-    Attributes
-    ----------
-    values : (a, b, c) float
-        NaN where there is no block.
-    faces : (a, b, c) int
-        Number of the nearest triangle of the tree; −1 where there is no block.
-    """
-
-    values: NDArray[np.float64]
-    faces: NDArray[np.int32]
-
-
 def distances_in(
     tree: FaceTree, windings: Windings, grid: Grid, first: NDArray[np.int64], places: NDArray[np.int64]
-) -> Tile:
-    """Signed distances at the nodes of blocks of a grid, all within `TILE` nodes of each other.
+) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    """(a, b, c) signed distances at the nodes of blocks of a grid, NaN between these; and confidence.
 
     `first` is the first node of the box around them; `places` are the first nodes of the blocks, divided by `SIDE`.
     """
@@ -72,7 +54,7 @@ def distances_in(
         faces[where], squares[where] = tree.nearest(grid.origin + nodes * grid.spacing)
     values = np.sqrt(squares, out=squares)
     inside = _inside(windings, grid, first, values)
-    return Tile(np.negative(values, out=values, where=inside), faces)
+    return np.negative(values, out=values, where=inside), tree.features.trusted[faces]
 
 
 def solved(
@@ -80,15 +62,13 @@ def solved(
 ) -> tuple[NDArray[np.float32], NDArray[np.float16]]:
     """(n, 8, 8, 8) signed distances at the nodes of blocks near each other, and confidence; NaN beyond the grid."""
     first = places.min(axis=0)
-    tile = distances_in(tree, windings, grid, SIDE * first, places)
+    distances, trusted = distances_in(tree, windings, grid, SIDE * first, places)
     values = np.full((len(places), SIDE, SIDE, SIDE), np.nan, dtype=np.float32)
     confidence = np.ones(values.shape, dtype=np.float16)
     for row, place in enumerate(SIDE * (places - first)):
         a, b, c = (slice(p, p + SIDE) for p in place)
-        there = tile.values[a, b, c]
-        i, j, k = there.shape
-        values[row, :i, :j, :k] = there
-        confidence[row, :i, :j, :k] = tree.features.trusted[tile.faces[a, b, c]]
+        i, j, k = distances[a, b, c].shape
+        values[row, :i, :j, :k], confidence[row, :i, :j, :k] = distances[a, b, c], trusted[a, b, c]
     return values, confidence
 
 

@@ -64,20 +64,8 @@ class Level:
     factors: NDArray[np.int64]
 
 
-@dataclass(frozen=True, eq=False)
-class CoarseGuess:
-    """Known values on a level, taken from a finer one.
-
-    Attributes
-    ----------
-    vectors : (l₀, l₁, l₂, n, 4) float32
-        X.
-    where : (l₀, l₁, l₂, stretches) bool
-        Stretches in which X is known and not swept.
-    """
-
-    vectors: NDArray[np.float32]
-    where: NDArray[np.bool_]
+Guess = tuple[NDArray[np.float32], NDArray[np.bool_]]
+"""X on a level, taken from a finer one, and the stretches in which it is known and not swept."""
 
 
 def diffuse_multilevel(
@@ -143,7 +131,7 @@ def skip_finest(
 
 def _diffuse_level(
     sources: NodeSources,
-    guess: CoarseGuess | None,
+    guess: Guess | None,
     time: Callable[[float], float],
     factors: NDArray[np.int64],
     rounds: int,
@@ -152,18 +140,18 @@ def _diffuse_level(
     t = time(_mean_step(sources.steps))
     real = sources.steps > 0
     ratios = np.where(real, t / np.where(real, sources.steps, 1) ** 2, 0.0)
-    start = sources.places >= 0 if guess is None else guess.where
+    given, known = (None, None) if guess is None else guess
+    start = sources.places >= 0 if known is None else known
     if last:
         active = inside = np.ones_like(start)
     else:
         width = np.ceil(BAND * np.sqrt(ratios)).astype(int)
         active = _dilated(start, width)
         inside = _dilated(start, np.maximum(width - MARGIN, 0))
-    if guess is not None:
-        active = active & ~guess.where
-    if guess is None and not last and active.mean() < SMALL:
+    if known is not None:
+        active = active & ~known
+    elif not last and active.mean() < SMALL:
         rounds *= 2
-    given = None if guess is None else guess.vectors
     vectors = diffuse_by_sweeps(sources, active, ratios, rounds, given)
     return Level(vectors, inside, factors)
 
@@ -188,7 +176,7 @@ def _coarser(shape: tuple[int, ...], steps: NDArray[np.float64]) -> tuple[tuple[
     return tuple(int(n) for n in coarse), np.where(coarse > 1, steps * factors, 0.0)
 
 
-def _carried(level: Level, shape: tuple[int, ...], power: float) -> CoarseGuess | None:
+def _carried(level: Level, shape: tuple[int, ...], power: float) -> Guess | None:
     """The values of a level, for the next coarser one: in stretches of which all nodes have a value."""
     assert level.vectors is not None and level.inside is not None
     vectors = untouched_zeros((*shape, 4), np.float32)
@@ -197,7 +185,7 @@ def _carried(level: Level, shape: tuple[int, ...], power: float) -> CoarseGuess 
     full = np.full(counts.shape[3], STRETCH)
     full[-1] = shape[3] - STRETCH * (len(full) - 1)
     where = counts >= full
-    return CoarseGuess(vectors, where) if where.any() else None
+    return (vectors, where) if where.any() else None
 
 
 def collapse(
