@@ -12,6 +12,7 @@ from scipy import sparse
 from ..compiled import compiled
 from ..geometry.components import sums_of
 from ..geometry.directions import unit
+from ..geometry.edges import edge_keys
 from ..geometry.meshes import area_vectors, face_areas
 
 PIECES = 128
@@ -300,11 +301,8 @@ def _in_polygon(
         points = np.concatenate([plane, inner])
         faces, areas = _counterclockwise(points)
         faces = faces[areas > 1e-12 * areas.max()]
-        there = _directed(faces, len(points))
         ahead = np.arange(n), (np.arange(n) + 1) % n
-        missing = ~(
-            np.isin(ahead[0] * len(points) + ahead[1], there) | np.isin(ahead[1] * len(points) + ahead[0], there)
-        )
+        missing = ~np.isin(edge_keys(*ahead), edge_keys(faces.ravel(), np.roll(faces, -1, axis=1).ravel()))
         if not missing.any():
             kept = faces[_inside_polygon(points[faces].mean(axis=1), plane)]
             left = np.setdiff1d(_directed(kept, len(points)), _directed(kept[:, ::-1], len(points)))

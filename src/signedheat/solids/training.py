@@ -16,7 +16,7 @@ SHARP = np.deg2rad(30.0)
 
 
 def training_points(
-    surface: TriangleMesh, n: int, normalize: bool = False, seed: int = 0
+    surface: TriangleMesh, n: int, normalize: bool = False
 ) -> tuple[dict[str, NDArray[np.float32]], dict[str, NDArray[np.float32]]]:
     """n points of each kind, in single precision: those on a closed surface, and those around it with signed distances.
 
@@ -32,7 +32,7 @@ def training_points(
         ``sharp_near_points``, those on the surface moved by normal noise: (n, 3), with (n,) signed distances, negative
         inside, as ``vol_label``, ``random_near_label`` and ``sharp_near_label``.
     """
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     lower, upper = surface.bounds
     center = 0.5 * (lower + upper)
     radius = float(np.linalg.norm(surface.vertices - center, axis=1).max())
