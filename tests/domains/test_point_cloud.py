@@ -292,6 +292,32 @@ def test_left_on_a_thin_plate_is_that_of_its_normals_wherever_curves_start_and_i
         assert (np.sign(values) == sign * np.sign(points[:, 0]))[far].all(), name
 
 
+@pytest.mark.parametrize("thickness", [0.5, 1.0])
+def test_the_sides_of_a_thin_plate_are_joined_at_its_rim_and_nowhere_else(thickness):
+    """Each side is sampled for itself; left of a loop around the plate, over its rim, is right on both sides."""
+    spacing, random = 0.05, np.random.default_rng(0)
+    size = np.array([1.0, 0.8, thickness * spacing])
+    areas = size.prod() / size
+    axis = random.choice(3, 20000, p=areas / areas.sum())
+    end, cells = random.choice([-1.0, 1.0], len(axis)), np.arange(len(axis))
+    points, normals = random.uniform(-0.5, 0.5, (len(axis), 3)), np.zeros((len(axis), 3))
+    points[cells, axis], normals[cells, axis] = end / 2, end
+    points *= size
+    kept = spread_out(np.column_stack([points, normals]), np.full(len(axis), 0.8 * spacing))
+    points, normals = points[kept], normals[kept]
+    cloud = sh.PointCloud(points, normals)
+    edges = cloud.triangulation.edges
+    assert (edges.face_counts == 1).mean() < 0.02
+    assert ((cloud.surface_normals * normals).sum(axis=1) > 0).mean() > 0.995
+    y, z = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]).T / 2
+    corners = np.stack([0 * y, y, z], axis=1) * size
+    share = np.linspace(0, 1, 20, endpoint=False)[:, None]
+    loop = np.concatenate([a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
+    values = sh.signed_distance(cloud.polyline(loop, closed=True), cloud).values
+    far = np.abs(points[:, 0]) > 2 * spacing
+    assert (np.sign(values) == np.sign(points[:, 0]))[far].all()
+
+
 def both_sides(thickness, spacing=0.05):
     """Points on a hollow ball, spread evenly over either side for itself, and normals."""
     random = np.random.default_rng(1)
