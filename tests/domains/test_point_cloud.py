@@ -332,7 +332,8 @@ def both_sides(thickness, spacing=0.05):
 
 
 @pytest.mark.parametrize(
-    ("thickness", "given", "announced"), [(0.5, True, False), (0.5, False, True), (1, False, False), (0.3, True, True)]
+    ("thickness", "given", "announced"),
+    [(0.1, True, False), (0.5, True, False), (0.1, False, True), (0.5, False, True), (1, False, False)],
 )
 def test_sides_nearer_than_points_are_apart_are_kept_apart_or_announced(thickness, given, announced):
     points, normals = both_sides(thickness * 0.05)
@@ -342,6 +343,12 @@ def test_sides_nearer_than_points_are_apart_are_kept_apart_or_announced(thicknes
         agree = (cloud.surface_normals * normals).sum(axis=1) > 0
     assert bool(caught) == announced
     assert announced or max(agree.mean(), 1 - agree.mean()) > 0.98
+
+
+def test_few_points_on_a_ball_are_not_those_of_two_sides():
+    """They stick out of planes all alike."""
+    points = cases.sphere_points(100)
+    assert ((sh.PointCloud(points).surface_normals * points).sum(axis=1) > 0).all()
 
 
 def test_without_normals_a_cloud_has_the_sides_that_orienting_it_gives():
