@@ -219,14 +219,19 @@ class TangentPlanes:
         other side of a plate, the directions in which both sides end have the part of the normals, and distance along
         them leads away over the edge.
         """
-        offset, normal = self.points[there] - self.points[here], self.normals[here]
-        other, opposed = turned_alike(offset, normal, self.normals[there], self.flat[here])
-        middle = unit(np.where(opposed[:, None], self.outward[here] + self.outward[there], normal + other))
-        height, cosine = (offset * middle).sum(axis=1), (normal * middle).sum(axis=1)
-        seen = offset - height[:, None] * middle
-        seen -= ((normal * seen).sum(axis=1) / np.maximum(1 + cosine, 1e-9))[:, None] * (normal + middle)
-        seen += (opposed * np.abs(height))[:, None] * middle
-        return np.einsum("nd,nad->na", seen, self.axes[here])
+
+        def places(pairs: NDArray[np.int64]) -> tuple[NDArray[np.float64]]:
+            here, there = pairs.T
+            offset, normal = self.points[there] - self.points[here], self.normals[here]
+            other, opposed = turned_alike(offset, normal, self.normals[there], self.flat[here])
+            middle = unit(np.where(opposed[:, None], self.outward[here] + self.outward[there], normal + other))
+            height, cosine = dot(offset, middle), dot(normal, middle)
+            seen = offset - height[:, None] * middle
+            seen -= (dot(normal, seen) / np.maximum(1 + cosine, 1e-9))[:, None] * (normal + middle)
+            seen += (opposed * np.abs(height))[:, None] * middle
+            return (np.einsum("nd,nad->na", seen, self.axes[here]),)
+
+        return in_chunks(places, np.column_stack([here, there]))[0]
 
 
 def turned_alike(
@@ -246,15 +251,20 @@ def turned_alike(
     >>> turned_alike(np.array([[1.0, 0, -1], [1, 0, 0]]), up, down, np.array(0.1))[1].tolist()
     [True, False]
     """
-    contrary = (normal * others).sum(axis=-1) < OPPOSITE
-    over, under = (offsets * normal).sum(axis=-1), -(offsets * others).sum(axis=-1)
+    contrary = dot(normal, others) < OPPOSITE
+    over, under = dot(offsets, normal), -dot(offsets, others)
     same = contrary & ((np.abs(over) < flat) | (over * under < 0))
     return np.where(same[..., None], -others, others), contrary & ~same
 
 
+def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Scalar products of vectors (…, 3)."""
+    return np.asarray(np.einsum("...d,...d->...", a, b))
+
+
 def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Vectors (n, 3) of length one; those without length stay."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1), np.finfo(float).tiny)[:, None]
+    return vectors / np.maximum(np.sqrt(dot(vectors, vectors)), np.finfo(float).tiny)[:, None]
 
 
 def principal_axes(
