@@ -17,6 +17,7 @@ from ...discretization import DiffusesEach, Levels
 from ...domains.grid import Grid
 from ...errors import SourceError
 from ...geometry.directions import unit
+from ...geometry.surface_points import SNAP
 from ...linear import upper_triangle
 from ...linear.incomplete_cholesky import from_first
 from ...linear.restarts import Stage
@@ -162,7 +163,7 @@ class MaskedSource(GridSource):
 
     @classmethod
     def of(cls, whole: GridSource, nodes: FreeNodes) -> MaskedSource:
-        """Lower sources to free nodes.
+        """Lower sources to free nodes; what lies on solid ones, but for rounding, is lost.
 
         Raises
         ------
@@ -171,7 +172,7 @@ class MaskedSource(GridSource):
         """
         ids, weights = whole.stencil
         numbers = nodes.numbers[ids]
-        weights = np.where(numbers >= 0, weights, 0.0)
+        weights = np.where((numbers >= 0) & (weights > SNAP), weights, 0.0)
         total = weights.sum(axis=1)
         kept = np.flatnonzero(total > 0)
         lost = np.setdiff1d(whole.source_ids, whole.source_ids[kept])
