@@ -29,6 +29,8 @@ FOUND = [
     ("space grid", 100, 175),
     # samples on solid nodes but for rounding
     ("space grid", 4501, 2867),
+    # normals along the rim of a hole
+    ("space solid", 4501, 6149), ("space solid", 4501, 7419),
     # sources that hardly touch the tets
     ("space tets", 101, 49), ("space tets", 103, 81), ("space tets", 107, 207),
     # more samples in few tets than these can follow exactly

@@ -275,9 +275,7 @@ def _load(rim: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.
     lengths = np.linalg.norm(sides, axis=1)
     load = np.zeros((len(rim), 3))
     for side, length in ((sides, lengths), (np.roll(sides, 1, axis=0), np.roll(lengths, 1))):
-        across = np.cross(side, normals)
-        across *= (0.5 * length / np.maximum(np.linalg.norm(across, axis=1), 1e-300))[:, None]
-        load -= across
+        load -= 0.5 * length[:, None] * unit(np.cross(side, normals))
     return load
 
 
