@@ -220,7 +220,12 @@ def _nodes_between(merged: MergedSources) -> tuple[NDArray[np.int64], NDArray[np
     alike = np.abs(normals[before] - normals[after]) <= STRAIGHT
     for each in (merged.edges, np.where(merged.edges < 0, merged.faces, -1)):
         alike &= each[before] == each[after]
-    return (places[at] % max(len(merged.nodes), 1))[alike], before[alike], after[alike]
+    at, before, after = at[alike], before[alike], after[alike]
+    run = connected_components(k, before, after)  # loops that go straight on, as such without area do, begin somewhere
+    of_runs, link = np.unique(run[before], return_index=True)
+    begins = link[np.bincount(run[before], minlength=k)[of_runs] == np.bincount(run)[of_runs]]
+    at, before, after = (np.delete(each, begins) for each in (at, before, after))
+    return places[at] % max(len(merged.nodes), 1), before, after
 
 
 def _runs(
