@@ -31,6 +31,8 @@ FOUND = [
     ("space grid", 4501, 2867),
     # loops without area
     ("surface curves", 4502, 877), ("surface curves", 4502, 1223), ("surface curves", 4502, 2178),
+    # holes without area
+    ("space queries", 4502, 231), ("space queries", 4502, 5425), ("space queries", 4502, 7984),
     # normals along the rim of a hole
     ("space solid", 4501, 6149), ("space solid", 4501, 7419),
     # sources that hardly touch the tets

@@ -30,6 +30,8 @@ STIFF = 0.1
 """Depth of a wall, over that strip's, whose bending counts by half."""
 AGREEMENT = 0.5
 """Ratio of how far a surface bends and how far it would have to, from which on the lid is clamped: 1 on a ball."""
+NARROWEST = 1e-9
+"""Least width of an opening, over the length of its rim: about what rounding leaves of one."""
 UNBENT = 1e-6
 """Turn of a surface, in radians, that rounding makes of none."""
 
@@ -45,13 +47,10 @@ class Samples:
 
 
 def width_of(lid: Lid) -> float:
-    """Four areas over the length of the rim, the diameter of a circle."""
+    """Four areas over the length of the rim, the diameter of a circle; of slits without area not nothing."""
     rim = lid.vertices[: lid.n_rim]
-    return (
-        4.0
-        * float(face_areas(lid.vertices[lid.faces]).sum())
-        / float(np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1).sum())
-    )
+    length = float(np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1).sum())
+    return max(4.0 * float(face_areas(lid.vertices[lid.faces]).sum()) / length, NARROWEST * length)
 
 
 def smooth_patches(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> NDArray[np.int64]:
