@@ -35,6 +35,7 @@ of thin plates face the wrong way mostly .41 to .96."""
 STEEP = 0.7
 """Cosine between a normal and the direction to a neighbour above which that lies on another side."""
 _NEARBY = 13
+"""Points near an edge among which those on another side are looked for: its own neighbourhood, about twice."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,9 +24,11 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from ..parallel import in_chunks
 from .components import connected_components
+from .directions import unit
 from .edges import edge_table
 from .hole_filling import hole_fillings
 from .nearest import TriangleTree
+from .plane_fits import point_spacing
 from .signed_graph import Links, signs_of
 from .welding import distinct_rows
 
@@ -45,7 +47,7 @@ PULL = 0.03
 along a line, as on the narrow side of a plate. At 0.01 edges at holes are 44 % more; at 0.1 6 % fewer, but 3 of 12
 balls of 200 random points have a hole."""
 NEAREST = 7
-"""Neighbours from which spacing is estimated: in a plane, so many lie in a circle of as many squared spacings."""
+"""Neighbours from which spacing is estimated."""
 GIVEN = 1.0
 """Weight of a given normal, relative to that of a neighbour in the same plane, of which there are six."""
 _CHUNK = 65536
@@ -185,7 +187,7 @@ class TangentPlanes:
         def fitted(rows: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
             some, own = rows[:, :3], rows[:, 3:]
             distances, near = tree.query(some, k=many + 1)
-            spacing = distances[:, nearest] / np.sqrt(nearest / np.pi)
+            spacing = point_spacing(distances[:, nearest], nearest)
             flat = FLAT * spacing
             others, opposed = turned_alike(points[near] - some[:, None], own[:, None], normals[near], flat[:, None])
             apart = np.linalg.norm(others - own[:, None], axis=2)
@@ -260,11 +262,6 @@ def turned_alike(
 def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Scalar products of vectors (…, 3)."""
     return np.asarray(np.einsum("...d,...d->...", a, b))
-
-
-def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Vectors (n, 3) of length one; those without length stay."""
-    return vectors / np.maximum(np.sqrt(dot(vectors, vectors)), np.finfo(float).tiny)[:, None]
 
 
 def principal_axes(

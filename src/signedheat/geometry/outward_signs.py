@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from .local_triangulations import FLAT, turned_alike
-from .plane_fits import PlaneFits, fit_planes, noise_scale, noisy_sizes
+from .plane_fits import PlaneFits, fit_planes, noise_scale, noisy_sizes, point_spacing
 from .signed_graph import Links, signs_of
 
 SPREAD = 0.35
@@ -93,7 +93,7 @@ def kept_on_thin_sheets(
     """
     k = min(NEARBY, len(points) - 1)
     distances, near = scipy.spatial.cKDTree(points).query(points, k=k + 1)
-    flat = FLAT * distances[:, k:] / np.sqrt(k / np.pi)
+    flat = FLAT * point_spacing(distances[:, k:], k)
     offsets = points[near] - points[:, None]
     opposed = turned_alike(offsets, given[:, None], given[near], flat)[1]
     below = -np.sign((offsets * given[:, None]).sum(axis=2))[opposed]

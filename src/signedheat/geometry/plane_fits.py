@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..parallel import in_chunks
+from .directions import axes_across
 
 CLEAN_NEIGHBORS = 12
 """Neighbours that a plane is fitted to where there is no noise to average out."""
@@ -122,6 +123,11 @@ def noise_scale(points: NDArray[np.float64], normals: NDArray[np.float64] | None
     return sizes[min(2, len(sizes) - 1)] if sizes else None
 
 
+def point_spacing(distances: NDArray[np.float64], k: int) -> NDArray[np.float64]:
+    """Distance between points, from that to the k-th neighbour: in a plane, k lie in a circle of k squared spacings."""
+    return distances / np.sqrt(k / np.pi)
+
+
 def share_of_two_sides(points: NDArray[np.float64], normals: NDArray[np.float64]) -> float:
     """Share of points whose neighbours with similar normals are rather those of both sides of a plate that is thinner
     than they are apart: they lie at two heights over a quadric. Estimated from at most 2,000 points.
@@ -141,10 +147,8 @@ def share_of_two_sides(points: NDArray[np.float64], normals: NDArray[np.float64]
         distances, near = tree.query(points[tried], k=k + 1)
         offsets, normal = points[near] - points[tried, None], normals[tried]
         weights = np.exp(-((distances / distances[:, -1:]) ** 2)) * (np.einsum("nkd,nd->nk", normals[near], normal) > 0)
-        first = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
-        first /= np.linalg.norm(first, axis=1)[:, None]
-        frame = np.stack([first, np.cross(normal, first), normal], axis=1)
-        spacing = distances[:, -1] / np.sqrt(k / np.pi)
+        frame = np.stack([*axes_across(normal), normal], axis=1)
+        spacing = point_spacing(distances[:, -1], k)
         x, y, z = np.einsum("nkd,nad->ank", offsets, frame) / spacing[:, None]
         terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2)
         moments = np.einsum("nka,nk,nkb->nab", terms, weights, terms) + 1e-9 * np.eye(6)
