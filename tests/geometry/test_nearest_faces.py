@@ -105,6 +105,30 @@ def test_slivers_are_exact(height, short):
         )
 
 
+def turned_triangle(rng, lean, height, first):
+    """A triangle with a side of length 1 and the third corner at (lean, height) over it, turned and moved."""
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    flat = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [lean, height, 0.0]])
+    return np.roll(flat @ turn.T + rng.uniform(-20, 20, 3), first, axis=0)
+
+
+@pytest.mark.parametrize("lean", [0.0, 1.0, 0.5, 1e-17, -3.0, 1 - 1e-16])
+@pytest.mark.parametrize("height", [1.0, 7.0, 1e-3, 1e-6, 1e-9, 1e-12])
+def test_weights_give_the_place_back(lean, height):
+    """On right-angled triangles, needles and slivers, inside and on their sides: to rounding of the coordinates."""
+    rng = np.random.default_rng(5)
+    for first in range(3):
+        for _ in range(20):
+            triangle = turned_triangle(rng, lean, height, first)
+            weights = rng.dirichlet(np.ones(3), 24)
+            weights[:9] *= np.repeat(1 - np.eye(3), 3, axis=0)  # on each side
+            weights[9:12] = np.eye(3)
+            places = weights / weights.sum(axis=1, keepdims=True) @ triangle
+            found = weights_in(np.repeat(triangle[None], len(places), axis=0), places)
+            np.testing.assert_allclose(found @ triangle, places, rtol=0, atol=1e-13 * max(20, height))
+            assert found.min() >= 0 and np.abs(found.sum(axis=1) - 1).max() < 1e-15
+
+
 def test_a_search_leads_to_the_nearest_face():
     """Outside a convex shape, where no other place is nearer than all around it."""
     mesh = samples.sphere(3)

@@ -174,17 +174,13 @@ def barycentric_on_triangles(
         q = x * rows[f, 6] + y * rows[f, 7] + z * rows[f, 8]
         s, t = 0.0, 0.0
         if feature == 0:
-            lean, along = rows[f, 10] * rows[f, 12] / rows[f, 9], p / rows[f, 9]
             t = q / (rows[f, 11] * rows[f, 12])
-            if lean != 0.0 and lean * t > along:  # rounding, in slivers
-                t = along / lean
-            if lean != 1.0 and (1.0 - lean) * t > 1.0 - along:
-                t = (1.0 - along) / (1.0 - lean)
-            s = along - lean * t
-        elif feature == 1 or feature == 5:
+            s = p / rows[f, 9] - rows[f, 10] * rows[f, 12] / rows[f, 9] * t
+            feature = 3 if s < 0.0 else 2 if s + t > 1.0 else 0  # beyond a side by rounding, which slivers magnify
+        if feature == 1 or feature == 5:
             s = p / rows[f, 9] if feature == 1 else 1.0
         elif feature == 3 or feature == 6:
-            t = (p * rows[f, 10] + q * rows[f, 11]) / rows[f, 12] if feature == 3 else 1.0
+            s, t = 0.0, (p * rows[f, 10] + q * rows[f, 11]) / rows[f, 12] if feature == 3 else 1.0
         elif feature == 2:
             t = ((p - rows[f, 9]) * rows[f, 13] + q * rows[f, 14]) / rows[f, 15]
             s = 1.0 - t
