@@ -17,11 +17,11 @@ FLOORS = [
         "#f3d9c1",
     ),
     (
-        "signed_distance   morphology   solids",
+        "distances   morphology   solids",
         "complete a shape, and measure exactly to it; offsets, shells",
         "#f7e6d0",
     ),
-    ("orientation", "which way faces, points and curves face", "#f7e6d0"),
+    ("orientations", "which way faces, points and curves face", "#f7e6d0"),
     ("curves", "broken curves on surfaces: close them, measure to them, jumps", "#f7e6d0"),
     ("sharpening   tets", "distance to the zero set of φ; tets of a box", "#f7e6d0"),
     ("solver   fields", "SignedHeatSolver; values that know their domain", "#fbf1de"),

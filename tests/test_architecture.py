@@ -30,14 +30,13 @@ FLOORS = [
     {"solver"},
     {"sharpening", "tets"},
     {"curves"},
-    {"orientation"},
+    {"orientations"},
     {"solids"},
-    {"signed_distance", "morphology"},
+    {"distances", "morphology"},
     {"io", "torch"},
     {"view"},
     {"batches"},
-    {"", "public", "results"},  # the package itself, with the public names
-    {"samples"},
+    {"", "public", "results", "samples"},  # the package itself, with the public names
     {"cli", "__main__"},
 ]
 """From the ground up: a module may import what is on its own floor or below. docs/architecture.md shows the same."""
@@ -71,6 +70,44 @@ def test_importing_the_package_leaves_slow_packages_alone():
     code = f"import signedheat.public, sys; print(*sorted(set({SLOW_TO_IMPORT!r}) & set(sys.modules)))"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.split() == []
+
+
+def test_no_public_name_is_that_of_a_module():
+    """Importing a submodule makes it an attribute of its package, in place of whatever had its name."""
+    for name in ("signedheat", "signedheat.batches", "signedheat.io", "signedheat.view"):
+        package = importlib.import_module(name)
+        folder = Path(package.__file__).parent
+        modules = {path.stem for path in folder.glob("*.py")} | {path.parent.name for path in folder.glob("*/*.py")}
+        assert not modules & set(package.__all__), name
+
+
+SUBMODULES = sorted(set(import_graph(PACKAGE)) - {"signedheat", "signedheat.__main__"})
+
+
+@pytest.mark.parametrize(
+    "first",
+    [f"for name in {SUBMODULES!r}: import_module(name)", f"for name in {SUBMODULES[::-1]!r}: import_module(name)"],
+    ids=["forwards", "backwards"],
+)
+def test_public_names_are_the_same_whatever_is_imported_first(first):
+    code = f"""from importlib import import_module
+import signedheat as sh
+{first}
+public = import_module("signedheat.public")
+assert all(getattr(sh, name) is getattr(public, name) for name in (*public.__all__, *public.MODULES))
+print(*dir(sh))"""
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == dir(signedheat)
+
+
+def test_looking_at_the_package_shows_its_public_names_and_nothing_else():
+    code = "import signedheat as sh; print(*dir(sh)); print(callable(sh.signed_distance)); print(*dir(sh))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    names, is_function, again = found.stdout.splitlines()
+    public = importlib.import_module("signedheat.public")
+    assert set(names.split()) == {*public.__all__, *public.MODULES, "__version__"}
+    assert is_function == "True" and again == names
+    assert {"SignedHeatError", "GeometryError", "signed_distance"} <= set(signedheat.__all__)
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from . import io as io
     from . import morphology as morphology
     from . import results as results
+    from . import samples as samples
     from . import torch as torch
     from . import view as view
     from .public import *  # noqa: F403
@@ -31,4 +32,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *import_module(f"{__name__}.public").__all__})
+    public = import_module(f"{__name__}.public")
+    return sorted([*public.__all__, *public.MODULES, "__version__"])

@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from .distances import signed_distance
 from .domains.curves import Curve, CurveOrPoints, CurvesAndPoints
 from .domains.digital_surface import DigitalSurface
 from .domains.foreign import as_shape
@@ -40,7 +41,6 @@ from .lowering.area_elements import area_elements, bounds_around
 from .lowering.grid.discretization import refuse_large_grid
 from .progress import Progress
 from .sharpening.sharpen import sharpen
-from .signed_distance import signed_distance
 from .solids.complete import complete
 from .solids.contouring import sharp_surface
 from .solids.offsets import Offset, Reach, checked_reach

@@ -3,7 +3,7 @@
 from .curves.orientation import CurveOrientation
 from .diagnostics import Diagnostics
 from .fields.solid_queries import Closest
-from .orientation.meshes import Orientation
+from .orientations.meshes import Orientation
 from .solids.deviation import Deviation
 from .solids.sampling import Samples
 

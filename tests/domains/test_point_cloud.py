@@ -13,7 +13,7 @@ from signedheat.diagnostics import PointsLeftOut
 from signedheat.geometry.hole_filling import hole_fillings
 from signedheat.geometry.local_triangulations import local_triangulations
 from signedheat.geometry.outward_signs import spread_out
-from signedheat.orientation.points import orient_points
+from signedheat.orientations.points import orient_points
 from signedheat.samples import sphere
 
 

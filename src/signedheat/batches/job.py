@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 from ..constraints import Constraint, ZeroSet
+from ..distances import grid_around, plain_distance
 from ..domains.digital_surface import DigitalSurface
 from ..domains.grid import RESOLUTION, Grid
 from ..domains.kinds import ShapeLike
@@ -20,7 +21,6 @@ from ..io.fields import BAND_FORMATS
 from ..io.figures import describe, shape_figures
 from ..io.files import distinct_names
 from ..io.shapes import read, save
-from ..signed_distance import grid_around, plain_distance
 from ..solids.complete import complete
 from ..solids.distance import distance_to_shapes
 from ..solids.sampling import WIDTHS, Layout, sample

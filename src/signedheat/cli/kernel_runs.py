@@ -9,6 +9,7 @@ import numpy as np
 from .. import samples
 from ..curves.close import close_curves
 from ..curves.piecewise import piecewise_distance
+from ..distances import signed_distance
 from ..domains.common_subdivision import common_subdivision
 from ..domains.curves import Curve
 from ..domains.digital_surface import DigitalSurface
@@ -19,10 +20,9 @@ from ..domains.point_cloud import PointCloud
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
 from ..fields.redistancing import redistance
-from ..orientation.meshes import orientation
+from ..orientations.meshes import orientation
 from ..sharpening.methods import Convex, Geodesic
 from ..sharpening.sharpen import sharpen
-from ..signed_distance import signed_distance
 from ..solids.complete import complete
 from ..solids.sampling import sample
 from ..solids.thickness import thickness

@@ -28,7 +28,7 @@ from ..io.voxels import LabelImage
 from ..lowering.area_elements import bounds_around
 from ..lowering.grid.discretization import fitting_spacing, memory_estimate
 from ..memory import available_memory
-from ..orientation.meshes import Orientation, orientation
+from ..orientations.meshes import Orientation, orientation
 from ..solids.fields import BYTES_AT_WORK, BYTES_PER_NODE
 from ..solids.thickness import Thickness, thickness
 from .options import Summary, is_planar

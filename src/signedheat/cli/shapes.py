@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..curves.plane import distance_to_lines
 from ..diagnostics import SampledSource
+from ..distances import grid_around, plain_distance
 from ..domains.digital_surface import DigitalSurface
 from ..domains.grid import RESOLUTION, Grid
 from ..domains.polygon_mesh import PolygonMesh
@@ -47,7 +48,6 @@ from ..io.voxels import LabelImage, read_labels
 from ..lowering.tets.discretization import memory_estimate
 from ..memory import refuse_beyond_memory
 from ..progress import Progress, within
-from ..signed_distance import grid_around, plain_distance
 from ..solids.complete import complete
 from ..solids.distance import distance_to_shapes
 from ..tets.tetrahedralize import tetrahedralize

@@ -28,8 +28,8 @@ from ..geometry.meshes import face_areas
 from ..geometry.welding import roundoff, same_positions, welded
 from ..memory import refuse_beyond_memory
 from ..operators.grid.fitted_points import mean_gap
-from ..orientation.meshes import orientation
-from ..orientation.points import orient_points
+from ..orientations.meshes import orientation
+from ..orientations.points import orient_points
 from ..progress import Progress, Stopwatch
 from . import parts
 from .closing import lids_of

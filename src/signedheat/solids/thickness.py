@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..geometry.directions import unit
 from ..geometry.meshes import area_vectors
-from ..orientation.mesh_faces import Mesh, MeshFaces
-from ..orientation.stabbing_lines import LineCrossings, stabbing_lines
+from ..orientations.mesh_faces import Mesh, MeshFaces
+from ..orientations.stabbing_lines import LineCrossings, stabbing_lines
 
 N_LINES = 30_000
 """Lines laid through a shape to measure it."""

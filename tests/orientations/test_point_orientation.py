@@ -6,8 +6,8 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples
-from signedheat.orientation.points import orient_points
-from signedheat.orientation.soups import orient_triangles
+from signedheat.orientations.points import orient_points
+from signedheat.orientations.soups import orient_triangles
 
 
 def box(size, center=(0.0, 0.0, 0.0)):

@@ -26,7 +26,7 @@ from .fields.tet_field import TetField
 from .fields.to_field import Field
 from .fields.vertex_field import VertexField
 from .lowering.area_elements import bounds_around
-from .orientation.orient import orient
+from .orientations.orient import orient
 from .progress import Progress
 from .solids.distance import distance_to_shapes
 from .solver import SignedHeatSolver, as_list
