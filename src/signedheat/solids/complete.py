@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Literal
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from ..constraints import Constraint
-from ..diagnostics import BoundsNothing, CompletedArea, Diagnostics, FacesRestored, LeftOut, Note, OrientedPoints
+from ..diagnostics import Diagnostics, FacesRestored, Note, OrientedPoints
 from ..domains.foreign import SurfaceShape
 from ..domains.joining import joined_shape
 from ..domains.kinds import ShapeLike
@@ -21,11 +20,10 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import flag
 from ..errors import SignedHeatError, SourceError
-from ..geometry.cut_faces import cut_faces
 from ..geometry.directions import axes_across
 from ..geometry.face_tree import FaceTree
 from ..geometry.meshes import face_areas
-from ..geometry.welding import roundoff, same_positions, welded
+from ..geometry.welding import roundoff, welded
 from ..memory import refuse_beyond_memory
 from ..operators.grid.fitted_points import mean_gap
 from ..orientations.meshes import orientation
@@ -38,8 +36,8 @@ from .loose import are_copies, bound_together, fragments, scatter_of
 from .lost_faces import lost_faces
 from .rims import open_edges
 from .solid import Solid
+from .unite import Surface, united
 from .walls import wall_ends
-from .winding import Windings
 
 STEPS = 2
 """Steps that are timed."""
@@ -47,8 +45,6 @@ BYTES_PER_FACE = 1300
 """Measured peak for each face of meshes of 330,000, closed or open; points take less."""
 BYTES_IF_LOOSE, BYTES_OF_HEAT = 3400, 150_000_000
 """The same for loose triangles; and of the grid that they and points are completed on."""
-TRUST = 0.05
-"""Distance from what was given, over its diagonal, at which confidence in the completion has fallen to a half."""
 CELLS = 2.0
 """Cells between neighbouring points of a cloud."""
 SEAM = 0.75
@@ -167,34 +163,6 @@ def _owners(shape: TriangleMesh | PolygonMesh) -> NDArray[np.int64]:
     return shape.refinement.face_polygons if isinstance(shape, PolygonMesh) else np.arange(shape.n_faces)
 
 
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """Triangles of one kind.
-
-    Attributes
-    ----------
-    triangles : (m, 3, 3) float
-        Corners.
-    ids : (m, 3) int
-        Vertices, one number for each position.
-    origins : (m,) int
-        Face that was given, or −1.
-    closing : bool
-        Whether they count in the winding number.
-    """
-
-    triangles: NDArray[np.float64]
-    ids: NDArray[np.int64]
-    origins: NDArray[np.int64]
-    closing: bool
-
-    @classmethod
-    def made(cls, triangles: NDArray[np.float64], closing: bool = True) -> Surface:
-        """Triangles that were not given; their vertices have negative numbers."""
-        ids = -1 - same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)
-        return cls(triangles, ids, np.full(len(triangles), -1), closing)
-
-
 def completed(
     mesh: TriangleMesh,
     completion: Literal["lids", "heat"],
@@ -209,7 +177,7 @@ def completed(
     proper = np.flatnonzero((a != b) & (b != c) & (c != a))
     every = Surface(vertices[mesh.faces[proper]], ids[proper], proper, True)
     bounding = np.ones(len(proper), dtype=bool) if inner is None else ~inner[proper]
-    given, walls = _some(every, bounding, True), [_some(every, ~bounding, False)]
+    given, walls = every.select(bounding, True), [every.select(~bounding, False)]
     if not face_areas(given.triangles).any():
         raise SourceError("no face of the shape has an area", element="shape")
     if completion == "heat":
@@ -239,17 +207,17 @@ def _by_lids(
     copies = ~is_body[labels]
     if copies.any():
         copies[copies] = are_copies(whole.triangles[copies], labels[copies], whole.triangles[~copies])
-    whole, labels = _some(whole, ~copies, True), labels[~copies]
+    whole, labels = whole.select(~copies, True), labels[~copies]
     surfaces, lidded = [], is_body[labels]
     opened = np.isin(np.arange(len(is_body)), open_edges(whole.ids, labels)[1])
     for chosen in fragments(whole.triangles, labels, ~is_body, is_body & opened):
-        pieces, loose = _some(whole, chosen, False), ~is_body[labels[chosen]]
+        pieces, loose = whole.select(chosen, False), ~is_body[labels[chosen]]
         if bound_together(pieces.triangles, labels[chosen], loose):
             surfaces += _scattered(pieces, labels[chosen], method)
             lidded[chosen] = False
         else:
-            surfaces.append(_some(pieces, loose, False))
-    bodies = _some(whole, lidded, True)
+            surfaces.append(pieces.select(loose, False))
+    bodies = whole.select(lidded, True)
     lids = lids_of(bodies.triangles, bodies.ids, labels[lidded], vertices)
     return [bodies, *map(Surface.made, lids), *surfaces], int(copies.sum())
 
@@ -270,7 +238,7 @@ def _by_heat(given: Surface, method: Heat) -> list[Surface]:
     tree = FaceTree.of_triangles(given.triangles)
     cell = float(np.median(np.linalg.norm(made.triangles[:, 1] - made.triangles[:, 0], axis=1)))
     away = tree.distances(made.triangles.mean(axis=1)) > SEAM * cell
-    return [replace(given, closing=True), _some(made, away, True)]
+    return [replace(given, closing=True), made.select(away, True)]
 
 
 def _heat_of(pieces: Surface, method: Heat, cell: float = 0.0) -> Surface | None:
@@ -291,114 +259,3 @@ def _from_points(cloud: PointCloud, method: Heat) -> Solid:
     turns = np.stack([np.cos(2 * np.pi * np.arange(3) / 3), np.sin(2 * np.pi * np.arange(3) / 3)], axis=1)
     ways = turns[:, :1] * first[:, None] + turns[:, 1:] * second[:, None]
     return united([Surface.made(cloud.points[:, None] + 0.25 * gap * ways, False)], True, points=cloud.points)
-
-
-def united(
-    surfaces: list[Surface],
-    keep_overlaps: bool,
-    notes: Sequence[Note] = (),
-    points: NDArray[np.float64] | None = None,
-    copies: int = 0,
-) -> Solid:
-    """The solid that surfaces close: without what lies inside, where bodies overlap, and without idle completion."""
-    whole = _joined(surfaces)
-    closing = np.concatenate([np.full(len(each.triangles), each.closing) for each in surfaces])
-    windings = Windings(whole.triangles[closing])
-    triangles, parents, behind, ahead = _cut(whole, closing, windings)
-    origins = whole.origins[parents]
-    given = origins >= 0
-    buried = behind & ahead
-    bounds = behind != ahead
-    kept = np.where(given, ~buried | keep_overlaps, bounds | ~closing[parents])
-    if not kept.any():
-        kept[:] = True
-    confidence = _confidence(triangles[kept], given[kept], whole, points)
-    diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds, copies)))
-    bounding = (behind & ~ahead)[kept]
-    return Solid(triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics)
-
-
-def _cut(
-    whole: Surface, closing: NDArray[np.bool_], windings: Windings
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Triangles cut along those that close, the triangle each is a piece of, and whether it is inside behind and ahead.
-
-    Between cuts both sides are the same all over a part, which is looked at once.
-    """
-    pieces, parents, met = cut_faces(whole.triangles, whole.ids, whole.triangles[closing], whole.ids[closing])
-    regions = np.arange(len(pieces))
-    uncut = np.flatnonzero(~met[parents])
-    if len(uncut):
-        labels = parts.parts_of(whole.ids[parents[uncut]])
-        largest = np.lexsort((-face_areas(pieces[uncut]), labels))
-        _, first = np.unique(labels[largest], return_index=True)
-        regions[uncut] = uncut[largest[first]][labels]
-    some, where = np.unique(regions, return_inverse=True)
-    behind, ahead = windings.sides(pieces[some])
-    return pieces, parents, behind[where], ahead[where]
-
-
-def _notes(
-    triangles: NDArray[np.float64],
-    origins: NDArray[np.int64],
-    kept: NDArray[np.bool_],
-    buried: NDArray[np.bool_],
-    bounds: NDArray[np.bool_],
-    copies: int,
-) -> list[Note]:
-    notes: list[Note] = []
-    areas, given = face_areas(triangles), origins >= 0
-    total = max(float(areas[given].sum()), np.finfo(float).tiny)
-    covered = buried & given
-    if covered.any() or copies:
-        faces, others = np.unique(origins[covered]), np.unique(origins[given & kept])
-        cut = int(np.isin(faces, others).sum())
-        notes.append(LeftOut(len(faces), float(areas[covered].sum()) / total, cut, copies))
-    made = kept & ~given
-    if made.any():
-        area, corners = float(areas[made].sum()), triangles[made].reshape(-1, 3)
-        box = np.stack([corners.min(axis=0), corners.max(axis=0)])
-        notes.append(CompletedArea(area, area / float(areas[kept].sum()), box[None]))
-    idle = given & kept & ~bounds
-    if float(areas[idle].sum()) > 1e-6 * total:
-        notes.append(BoundsNothing(float(areas[idle].sum()) / total))
-    return notes
-
-
-def _confidence(
-    triangles: NDArray[np.float64], given: NDArray[np.bool_], whole: Surface, points: NDArray[np.float64] | None
-) -> NDArray[np.float32]:
-    """(m,) 1 where surface was given; where it was completed less, the farther from what was given."""
-    confidence = np.ones(len(triangles), dtype=np.float32)
-    if points is None:
-        points = whole.triangles[whole.origins >= 0].reshape(-1, 3)
-    if given.all():
-        return confidence
-    if not len(points):
-        confidence[~given] = 0.5
-        return confidence
-    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    away = scipy.spatial.cKDTree(points).query(triangles[~given].mean(axis=1), workers=-1)[0]
-    trust = TRUST * diagonal / np.maximum(TRUST * diagonal + away, np.finfo(float).tiny)
-    confidence[~given] = np.minimum(trust, np.nextafter(np.float32(1), np.float32(0)))
-    return confidence
-
-
-def _joined(surfaces: list[Surface]) -> Surface:
-    """Several surfaces as one; numbers of vertices that are new, which are negative, stay apart."""
-    ids, lowest = [], 0
-    for each in surfaces:
-        own = np.where(each.ids < 0, each.ids + lowest, each.ids)
-        lowest = min(lowest, int(own.min(initial=0)))
-        ids.append(own)
-    joined = np.concatenate(ids)
-    return Surface(
-        np.concatenate([each.triangles for each in surfaces]),
-        np.unique(joined, return_inverse=True)[1].reshape(joined.shape),
-        np.concatenate([each.origins for each in surfaces]),
-        True,
-    )
-
-
-def _some(surface: Surface, chosen: NDArray[np.bool_] | NDArray[np.int64], closing: bool) -> Surface:
-    return Surface(surface.triangles[chosen], surface.ids[chosen], surface.origins[chosen], closing)
