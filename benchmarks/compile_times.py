@@ -56,7 +56,7 @@ COMMANDS = {
     "sample": "sample ball.stl -o points.npz",
     "info": "info duck.stl",
     "surface": "surface ball.stl curve.csv -o phi.ply",
-    "close": "close ball.stl curve.csv -o curve.txt",
+    "close": "close ball.stl curve.csv -o curve.json",
     "tets": "volume ball.stl --tets -o phi.vtu",
 }
 

@@ -22,7 +22,8 @@ def main(folder: Path) -> float:
     angle = np.linspace(0, 2 * np.pi, 181)
     reach = np.degrees(0.6) * (1 + 0.12 * np.cos(5 * angle))  # with bays
     coast = np.stack([-60 + reach * np.cos(angle) / np.cos(np.radians(15)), 15 + reach * np.sin(angle)], axis=1)
-    pieces = [sh.globe_curve(globe, coast[a : a + 16]) for a in range(0, 170, 22)]  # six of 22 steps are missing
+    points = np.array([direction(*place) for place in coast])
+    pieces = [globe.polyline(points[a : a + 16]) for a in range(0, 170, 22)]  # six of 22 steps are missing
 
     phi = sh.signed_distance(pieces, globe)
     whole = sh.close_curves(globe, pieces)

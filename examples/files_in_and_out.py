@@ -34,10 +34,12 @@ def main(folder: Path) -> float:
     round_walls = sh.signed_distance(sh.io.read_polylines(folder / "line.svg"), sh.io.read_mask(folder / "walls.png"))
 
     globe = samples.sphere(3)
-    (folder / "coast.csv").write_text("longitude,latitude\n-55,-5\n-40,-25\n10,-20\n20,15\n\n10,20\n-30,30\n-60,5\n")
-    coast = sh.io.read_globe_curves(folder / "coast.csv", globe)
-    sh.io.write_curves(folder / "whole.txt", sh.close_curves(globe, coast), globe)
-    along = sh.signed_distance(sh.io.read_curves(folder / "whole.txt", globe), globe)
+    (folder / "coast.csv").write_text(
+        "x,y,z\n.57,-.81,-.1\n.69,-.58,-.42\n.93,.16,-.34\n.91,.33,.26\n\n.93,.16,.34\n.75,-.43,.5\n.5,-.86,.1\n"
+    )
+    coast = sh.io.read_curves(folder / "coast.csv", globe)
+    sh.io.write_curves(folder / "whole.json", sh.close_curves(globe, coast), globe)
+    along = sh.signed_distance(sh.io.read_curves(folder / "whole.json", globe), globe)
 
     labels = np.zeros((40, 40, 40), dtype=np.uint8)
     labels[np.linalg.norm(np.indices(labels.shape) - 20.0, axis=0) < 15] = 3

@@ -245,9 +245,9 @@ def test_methods(make):
 @pytest.fixture
 def folder(tmp_path):
     BALL.save(tmp_path / "ball.ply")
-    sh.io.write_curves(tmp_path / "ring.txt", RING, BALL)
-    sh.io.write_curves(tmp_path / "points.txt", [BALL.points_at([3])], BALL)
-    for name in ("ball.ply", "ring.txt"):
+    sh.io.write_curves(tmp_path / "ring.json", RING, BALL)
+    sh.io.write_curves(tmp_path / "points.json", [BALL.points_at([3])], BALL)
+    for name in ("ball.ply", "ring.json"):
         whole = (tmp_path / name).read_bytes()
         (tmp_path / f"cut-{name}").write_bytes(whole[: len(whole) * 2 // 3])
         (tmp_path / f"empty-{name}").write_bytes(b"")
@@ -267,7 +267,7 @@ MORPH = [
     ("dilate cut-ball.ply 0.1 -o out.stl", 1, "cut-ball.ply"),
     ("dilate empty-ball.ply 0.1 -o out.stl", 1, "the file is empty"),
     ("dilate nan.ply 0.1 -o out.stl", 1, "nan.ply: 1 of 3 vertices hold NaN"),
-    ("dilate ring.txt 0.1 -o out.stl", 1, "not a known format"),
+    ("dilate ring.json 0.1 -o out.stl", 1, "not a known format"),
     ("dilate folder 0.1 -o out.stl", 1, "no extension"),
     ("dilate ball.ply 0.1 -o out.docx", 1, "not a known format"),
     ("dilate ball.ply 0.1 -o nowhere/out.stl", 1, "cannot be written"),
@@ -286,32 +286,36 @@ MORPH = [
     ("thicken ball.ply 0.1 -0.2 -o out.stl", 1, "not negative"),
 ]
 CLOSE = [
-    ("missing.ply ring.txt -o out.obj", 1, "missing.ply: there is no such file"),
-    ("ball.ply missing.txt -o out.obj", 1, "missing.txt: there is no such file"),
-    ("cut-ball.ply ring.txt -o out.obj", 1, "cut-ball.ply"),
-    ("ball.ply cut-ring.txt -o out.obj", 1, "cut-ring.txt"),
-    ("ball.ply empty-ring.txt -o out.obj", 1, "the file is empty"),
-    ("nan.ply ring.txt -o out.obj", 1, "nan.ply: 1 of 3 vertices hold NaN"),
-    ("ball.ply points.txt -o out.obj", 1, "points.txt: curves without sides"),
-    ("ball.ply ring.txt -o out.stl", 1, "not a known format"),
-    ("ball.ply ring.txt -o nowhere/out.obj", 1, "cannot be written"),
-    ("ball.ply ring.txt -o out.obj --preview out.docx", 1, "not a known format"),
-    ("ball.ply ring.txt", 2, "--output"),
-    ("ball.ply ring.txt -o out.obj --diffusion -1", 2, "not positive"),
-    ("ball.ply ring.txt -o out.obj --diffusion nan", 2, "no finite number"),
-    ("ball.ply ring.txt -o out.obj --constraint hopeful", 2, "none of"),
-    ("ball.ply ring.txt -o out.obj --constraint levels:1,2,3", 1, "ring.txt: 3 level values"),
+    ("missing.ply ring.json -o out.obj", 1, "missing.ply: there is no such file"),
+    ("ball.ply missing.json -o out.obj", 1, "missing.json: there is no such file"),
+    ("cut-ball.ply ring.json -o out.obj", 1, "cut-ball.ply"),
+    ("ball.ply cut-ring.json -o out.obj", 1, "cut-ring.json"),
+    ("ball.ply empty-ring.json -o out.obj", 1, "the file is empty"),
+    ("nan.ply ring.json -o out.obj", 1, "nan.ply: 1 of 3 vertices hold NaN"),
+    ("ball.ply points.json -o out.obj", 1, "points.json: curves without sides"),
+    ("ball.ply ring.json -o out.stl", 1, "not a known format"),
+    ("ball.ply ring.json -o nowhere/out.obj", 1, "cannot be written"),
+    ("ball.ply ring.json -o out.obj --preview out.docx", 1, "not a known format"),
+    ("ball.ply ring.json", 2, "--output"),
+    ("ball.ply ring.json -o out.obj --diffusion -1", 2, "not positive"),
+    ("ball.ply ring.json -o out.obj --diffusion nan", 2, "no finite number"),
+    ("ball.ply ring.json -o out.obj --constraint hopeful", 2, "none of"),
+    ("ball.ply ring.json -o out.obj --constraint levels:1,2,3", 1, "ring.json: 3 level values"),
 ]
 
 SURFACE = [
-    ("missing.ply ring.txt -o out.ply", 1, "there is no such file"),
-    ("ball.ply missing.txt -o out.ply", 1, "there is no such file"),
-    ("box.mesh ring.txt -o out.ply", 1, "this is a TetMesh"),
-    ("ball.ply ring.txt -o out.docx", 1, "use one of"),
-    ("ball.ply ring.txt -o out.ply --diffusion=-1", 2, "not positive"),
-    ("ball.ply ring.txt -o out.ply --constraint levels:a", 2, "no finite number"),
-    ("ball.ply ring.txt -o out.ply --constraint soft:-1", 2, "argument --constraint: -1 is not positive ("),
-    ("ball.ply ring.txt -o out.ply --constraint zero", 2, "free, zero-set, hard, each-component, soft, soft:WEIGHT, l"),
+    ("missing.ply ring.json -o out.ply", 1, "there is no such file"),
+    ("ball.ply missing.json -o out.ply", 1, "there is no such file"),
+    ("box.mesh ring.json -o out.ply", 1, "this is a TetMesh"),
+    ("ball.ply ring.json -o out.docx", 1, "use one of"),
+    ("ball.ply ring.json -o out.ply --diffusion=-1", 2, "not positive"),
+    ("ball.ply ring.json -o out.ply --constraint levels:a", 2, "no finite number"),
+    ("ball.ply ring.json -o out.ply --constraint soft:-1", 2, "argument --constraint: -1 is not positive ("),
+    (
+        "ball.ply ring.json -o out.ply --constraint zero",
+        2,
+        "free, zero-set, hard, each-component, soft, soft:WEIGHT, l",
+    ),
 ]
 VOLUME = [
     ("ball.ply", 2, "--output"),

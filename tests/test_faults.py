@@ -186,9 +186,9 @@ sys.exit(main(["info", "ball.stl"]))
 )
 def test_environments_that_make_no_sense(tmp_path, variables):
     ready(tmp_path)
-    command = ["-m", "signedheat", "surface", "ball.stl", "curve.txt", "-o", "phi.ply"]
+    command = ["-m", "signedheat", "surface", "ball.stl", "curve.json", "-o", "phi.ply"]
     sh.io.write_curves(
-        tmp_path / "curve.txt", sh.read(tmp_path / "ball.stl").path([0, 1, 2]), sh.read(tmp_path / "ball.stl")
+        tmp_path / "curve.json", sh.read(tmp_path / "ball.stl").path([0, 1, 2]), sh.read(tmp_path / "ball.stl")
     )
     environment = {**os.environ, **variables}
     done = subprocess.run([sys.executable, *command], cwd=tmp_path, env=environment, capture_output=True, text=True)

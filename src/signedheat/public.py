@@ -10,7 +10,6 @@ from .domains.common_subdivision import common_subdivision
 from .domains.curves import Curve, SurfacePoints
 from .domains.digital_surface import DigitalSurface
 from .domains.foreign import as_shape
-from .domains.globe import globe_curve
 from .domains.grid import Grid
 from .domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from .domains.point_cloud import PointCloud
@@ -100,7 +99,6 @@ __all__ = [
     "complete",
     "curve_orientation",
     "deviation",
-    "globe_curve",
     "intrinsic_delaunay",
     "load_field",
     "offset",

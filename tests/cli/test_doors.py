@@ -37,7 +37,7 @@ def test_two_obj_files_are_two_shapes(tmp_path, capsys):
         samples.sphere(1).save(tmp_path / f"{name}.obj")
     assert main(["info", str(tmp_path / "a.obj"), str(tmp_path / "b.obj"), "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)["files"]) == 2
-    assert main(["info", str(tmp_path / "a.obj"), str(tmp_path / "b.obj"), "--curves", "c.txt"]) == 2
+    assert main(["info", str(tmp_path / "a.obj"), str(tmp_path / "b.obj"), "--curves", "c.json"]) == 2
 
 
 def test_morph_takes_a_spacing_and_tells_what_it_found(tmp_path, ball, capsys):

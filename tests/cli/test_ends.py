@@ -150,7 +150,7 @@ def test_what_other_packages_print_about_damaged_files_is_left_out(ball, tmp_pat
 )
 def test_options_beyond_reason_are_refused_in_one_line(ball, tmp_path, capsys, options):
     command, *given = options
-    curves = ["curves.txt"] if command == "surface" else []
+    curves = ["curves.json"] if command == "surface" else []
     assert main([command, str(ball), *curves, "-o", str(tmp_path / "a.npz"), "--quiet", *given]) in (1, 2)
     assert_one_line(capsys.readouterr().err)
 

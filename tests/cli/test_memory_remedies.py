@@ -63,7 +63,7 @@ def test_what_is_told_to_fit_does(folder, command, size, megabytes, monkeypatch,
 @pytest.mark.parametrize("command", ["surface", "close"])
 def test_surfaces_of_as_many_triangles_as_are_told_fit(folder, command, monkeypatch, capsys):
     (folder / "curve.csv").write_text("0.6,0,0.8\n0,0.6,0.8\n-0.6,0,0.8\n0,-0.6,0.8\n0.6,0,0.8\n")
-    output = {"surface": "out.ply", "close": "out.txt"}[command]
+    output = {"surface": "out.ply", "close": "out.json"}[command]
     monkeypatch.setattr(memory, "_free", lambda: memory.libraries() + 1_500_000)
     assert main([command, "ball.ply", "curve.csv", "-o", output]) == 1
     most = int(re.search(r"at most ([0-9,]+) triangles", capsys.readouterr().err).group(1).replace(",", ""))

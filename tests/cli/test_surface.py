@@ -20,24 +20,24 @@ def files(tmp_path):
     mesh.save(tmp_path / "ball.ply")
     curve = mesh.level_set(mesh.vertices[:, 2], 0.2)[0]
     half = sh.Curve(curve.faces[:60], curve.barycentric[:60])
-    sh.io.write_curves(tmp_path / "curves.txt", [half, mesh.path([0, 30])], mesh)
+    sh.io.write_curves(tmp_path / "curves.json", [half, mesh.path([0, 30])], mesh)
     return tmp_path
 
 
 def test_a_field_comes_out(files, capsys):
     out = files / "phi.npz"
-    arguments = ["surface", str(files / "ball.ply"), str(files / "curves.txt"), "-o", str(out)]
+    arguments = ["surface", str(files / "ball.ply"), str(files / "curves.json"), "-o", str(out)]
     assert main([*arguments, "--constraint", "each-component", "--diffusion", "2"]) == 0
     assert "642 vertices" in capsys.readouterr().out
     mesh = sh.read(files / "ball.ply")
-    curves = sh.io.read_curves(files / "curves.txt", mesh)
+    curves = sh.io.read_curves(files / "curves.json", mesh)
     phi = sh.SignedHeatSolver(mesh, 2.0).distance(curves, sh.EachComponent())
     assert (np.load(out)["values"] == phi.values).all()
 
 
 def test_json_contours_and_a_picture(files, capsys):
     out, picture = files / "phi.vtp", files / "phi.png"
-    arguments = ["surface", str(files / "ball.ply"), str(files / "curves.txt"), "-o", str(out), "--json"]
+    arguments = ["surface", str(files / "ball.ply"), str(files / "curves.json"), "-o", str(out), "--json"]
     assert main([*arguments, "--contours", "5", "--preview", str(picture)]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert summary["minimum"] < 0 < summary["maximum"] and summary["unreached"] == 0
@@ -49,15 +49,15 @@ def test_json_contours_and_a_picture(files, capsys):
 def test_vertices_that_no_curve_reaches_are_told_on_standard_error(tmp_path, capsys):
     mesh = square(5)
     samples.union(mesh, sh.TriangleMesh(mesh.vertices + 5, mesh.faces)).save(tmp_path / "two.ply")
-    sh.io.write_curves(tmp_path / "curve.txt", [mesh.path([10, 11, 12, 13, 14])], mesh)
-    command = ["surface", str(tmp_path / "two.ply"), str(tmp_path / "curve.txt"), "-o", str(tmp_path / "phi.npz")]
+    sh.io.write_curves(tmp_path / "curve.json", [mesh.path([10, 11, 12, 13, 14])], mesh)
+    command = ["surface", str(tmp_path / "two.ply"), str(tmp_path / "curve.json"), "-o", str(tmp_path / "phi.npz")]
     assert main([*command, "--quiet"]) == 0
     said = capsys.readouterr().err
     assert said.startswith("signedheat: no source is connected to 25 of 50 vertices") and said.count("\n") == 1
 
 
 def test_levels(files, capsys):
-    arguments = ["surface", str(files / "ball.ply"), str(files / "curves.txt"), "-o", str(files / "phi.ply")]
+    arguments = ["surface", str(files / "ball.ply"), str(files / "curves.json"), "-o", str(files / "phi.ply")]
     assert main([*arguments, "--constraint", "levels:0,0.5"]) == 0
     assert main([*arguments, "--constraint", "levels:0,0.5,1,2"]) == 1
     assert "4 level values" in capsys.readouterr().err
@@ -80,7 +80,7 @@ def test_info_says_what_lies_where(tmp_path, capsys):
 
 def test_fields_on_surfaces_can_be_contoured_viewed_and_told_about(files, capsys):
     field = str(files / "phi.npz")
-    assert main(["surface", str(files / "ball.ply"), str(files / "curves.txt"), "-o", field, "--quiet"]) == 0
+    assert main(["surface", str(files / "ball.ply"), str(files / "curves.json"), "-o", field, "--quiet"]) == 0
     assert isinstance(sh.load_field(field), sh.VertexField)
     assert main(["contour", field, "0.3", "-o", str(files / "line.json")]) == 0
     phi = sh.load_field(field)

@@ -82,7 +82,6 @@ TAKERS = {
     "close_curves": lambda shape: sh.close_curves(shape, ARCS)[0].barycentric,
     "orient curves": lambda shape: sh.orient(ARCS, shape)[1].faces,
     "intrinsic_delaunay": lambda shape: sh.intrinsic_delaunay(shape).triangles.edge_lengths,
-    "globe_curve": lambda shape: sh.globe_curve(shape, [[0, 0], [30, 20], [70, 0]]).barycentric,
     "transform": lambda shape: sh.transform(shape, np.diag([2.0, 1, -1, 1])).faces,
 }
 
@@ -99,8 +98,8 @@ def test_they_are_saved_and_drawn_and_hold_the_curves_of_files(tmp_path):
     for name, given in {"own": BALL, "trimesh": BALL.to_trimesh(), "arrays": (BALL.vertices, BALL.faces)}.items():
         sh.save(given, tmp_path / f"{name}.ply")
         assert np.array_equal(sh.read(tmp_path / f"{name}.ply").faces, BALL.faces)
-        sh.io.write_curves(tmp_path / f"{name}.txt", ARCS, given)
-        again = sh.io.read_curves(tmp_path / f"{name}.txt", given)
+        sh.io.write_curves(tmp_path / f"{name}.json", ARCS, given)
+        again = sh.io.read_curves(tmp_path / f"{name}.json", given)
         assert np.abs(places_of(again[1]) - places_of(ARCS[1])).max() < 1e-12
         view.save_scene(given, tmp_path / f"{name}.png")
         view.save_slices(sh.signed_distance(BALL, resolution=12), tmp_path / f"{name}-slices.png", given)

@@ -69,7 +69,7 @@ VALUES: dict[str, tuple[str, ...]] = {
     "workers": ("1", "0", "-3"),
     "preview": ("picture.png", "picture.xyz", "missing/picture.png", "picture"),
     "tets": ("", "tets.mesh", "missing.mesh"),
-    "curves": ("curves.csv", "missing.txt"),
+    "curves": ("curves.csv", "missing.json"),
     "mask": ("mask.npy", "missing.npy", "shape.stl"),
     "tiles": ("tiles", "missing/tiles", "curves.csv"),
     "seed": ("0", "1", "-1", "9999999999999999999999"),
@@ -184,14 +184,14 @@ SHAPES: dict[str, Callable[[Random, Path], None]] = {
 }  # fmt: skip
 FLAT = (".csv", ".svg")
 FIELDS = ("field.npz", "field.vti", "field.npy", "on_ball.npz", "plane.npz", "missing.npz", "curves.csv")
-CURVES = ("curves.csv", "curves.txt", "curves.json", "missing.txt", "empty.txt", "field.npz")
+CURVES = ("curves.csv", "curves.json", "missing.json", "empty.json", "field.npz")
 OUTPUTS = {
     "volume": ("out.npz", "out.vti", "out.nrrd", "out.npy", "out.vtu", "-"),
     "surface": ("out.ply", "out.vtp", "out.obj", "out.npz", "-"),
-    "close": ("out.txt", "out.obj", "out.json", "-"),
+    "close": ("out.obj", "out.json", "-"),
     "offset": ("out.stl", "out.obj", "out.ply", "out.off", "out.vtp", "-"),
     "flat": ("out.svg", "out.csv", "-"),
-    "contour": ("out.stl", "out.obj", "out.txt", "out.csv", "out.ply", "-"),
+    "contour": ("out.stl", "out.obj", "out.json", "out.csv", "out.ply", "-"),
     "morph": ("out.stl", "out.obj", "out.ply", "-"),
     "sample": ("out.npz", "-"),
     "view": ("out.pdf", "out.png"),
@@ -202,12 +202,9 @@ ODD_OUTPUTS = ("out", "", "folder", "folder/out.stl", "missing/out.npz", "out.xy
 def _files_beside(random: Random, folder: Path) -> None:
     ball = samples.sphere(1)
     (folder / "folder").mkdir()
-    (folder / "empty.txt").touch()
+    (folder / "empty.json").touch()
     (folder / "other.txt").write_text("1 0 0 0\n0 1 0 0\n0 0 1 0\n")
     (folder / "curves.csv").write_text("x,y,z\n1,0,0\n0,1,0\n-1,0,0\n")
-    (folder / "curves.txt").write_text(
-        one_of(random, ("#offset 0\nv 0\nv 1\ne 2 0.5\nl 0 1 2\n", "v 0\nv 1\n", "f 1 .2 .3\n"))
-    )
     (folder / "curves.json").write_text('{"polylines": [{"points": [[0, 0, 1], [0, 1, 0]], "closed": true}]}')
     grid = sh.Grid([-1.0, -1.0, -1.0], 0.5, [5, 5, 5])
     values = np.linalg.norm(grid.points.reshape(*grid.shape, 3), axis=-1) - 0.7

@@ -254,15 +254,11 @@ def lines() -> list[Files]:
 @cache
 def curves() -> list[Files]:
     """Curves and points on a surface."""
-    files = [
-        written(lambda path: sh.io.write_curves(path, CURVES, BALL), f"curves.{e}") for e in ("txt", "json", "obj")
-    ]
+    files = [written(lambda path: sh.io.write_curves(path, CURVES, BALL), f"curves.{e}") for e in ("json", "obj")]
     table = "x,y,z\n" + "".join(",".join(map(str, p)) + "\n" for p in BALL.vertices[[0, 1, 2]].tolist())
-    segments = "#offset 0\nv 0\nv 1\ne 2 0.5\nf 1 0.2 0.3\nl 0 1 2\nl 2 3\n"
     return [
         *files,
         {"curves.csv": table.encode()},
-        {"curves.txt": segments.encode()},
         {"curves.json": b'{"polylines": [{"points": [[0, 0, 1], [0, 1, 0], [1, 0, 0]], "closed": true}]}'},
     ]
 

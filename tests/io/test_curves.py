@@ -1,4 +1,4 @@
-"""Files of curves: the published demo's format, its sibling with segments, OBJ lines, portable JSON."""
+"""Files of curves: OBJ lines, JSON with vertex ids and weights."""
 
 from __future__ import annotations
 
@@ -23,12 +23,11 @@ def some_curves(mesh):
     ]
 
 
-@pytest.mark.parametrize("extension", ["txt", "json"])
-def test_curves_read_back_the_same(extension, tmp_path):
+def test_curves_read_back_the_same(tmp_path):
     mesh = sphere(2)
     curves = some_curves(mesh)
-    sh.io.write_curves(tmp_path / f"curves.{extension}", curves, mesh)
-    back = sh.io.read_curves(tmp_path / f"curves.{extension}", mesh)
+    sh.io.write_curves(tmp_path / "curves.json", curves, mesh)
+    back = sh.io.read_curves(tmp_path / "curves.json", mesh)
     assert len(back) == len(curves)
     for old, new in zip(curves, back, strict=True):
         assert type(old) is type(new)
@@ -40,12 +39,12 @@ def test_curves_read_back_the_same(extension, tmp_path):
 def test_strict_reading_refuses_points_that_share_no_face(tmp_path):
     mesh = square(5)
     walk = mesh.path([6, 7, 12, 11], closed=True)
-    sh.io.write_curves(tmp_path / "walk.txt", walk, mesh)
-    sh.io.write_curves(tmp_path / "jump.txt", [walk, mesh.path([0, 1, 24])], mesh)
-    assert len(sh.io.read_curves(tmp_path / "walk.txt", mesh, strict=True)) == 1
-    assert len(sh.io.read_curves(tmp_path / "jump.txt", mesh)) == 2
+    sh.io.write_curves(tmp_path / "walk.json", walk, mesh)
+    sh.io.write_curves(tmp_path / "jump.json", [walk, mesh.path([0, 1, 24])], mesh)
+    assert len(sh.io.read_curves(tmp_path / "walk.json", mesh, strict=True)) == 1
+    assert len(sh.io.read_curves(tmp_path / "jump.json", mesh)) == 2
     with refused(sh.errors.SourceError, "curve 1"):
-        sh.io.read_curves(tmp_path / "jump.txt", mesh, strict=True)
+        sh.io.read_curves(tmp_path / "jump.json", mesh, strict=True)
 
 
 def test_obj_lines_read_back_as_the_same_lines(tmp_path):
@@ -68,29 +67,6 @@ def test_obj_lines_on_the_vertices_of_the_mesh(tmp_path):
     assert (mesh.faces[curves[0].faces, curves[0].barycentric.argmax(axis=1)] == [5, 6, 10]).all()
 
 
-def test_the_demo_format(tmp_path):
-    mesh = square(4)
-    path = tmp_path / "curves.txt"
-    path.write_text("signed_curve\nv 5\ne 4 0.25\nf 2 0.2 0.3\n\nsigned_curve 1\nl 6 7 8\nunsigned_point\nv 0\n")
-    first, second, third = sh.io.read_curves(path, mesh)
-    tail, head = mesh.edges.vertices[4]
-    a, b, c = mesh.vertices[mesh.faces[2]]
-    expected = [mesh.vertices[5], 0.75 * mesh.vertices[tail] + 0.25 * mesh.vertices[head], 0.2 * a + 0.3 * b + 0.5 * c]
-    assert np.abs(positions(mesh, first) - expected).max() < 1e-15
-    assert np.abs(positions(mesh, second) - mesh.vertices[[7, 6, 5]]).max() == 0
-    assert isinstance(third, sh.SurfacePoints)
-
-
-def test_the_segment_format(tmp_path):
-    mesh = square(5)
-    path = tmp_path / "curves.txt"
-    path.write_text("#offset 0\nv 6\nv 7\nl 0 1\n#l 1 2\nv 8\nn\nv 12\nl 1 2\nv 8\nl 4 3\n")
-    (curve,) = sh.io.read_curves(path, mesh)  # node 4 is where node 2 is: the segments form one chain
-    assert (mesh.faces[curve.faces, curve.barycentric.argmax(axis=1)] == [6, 7, 8, 12]).all()
-    path.write_text("v 6\nv 7\nl 1 2\n")
-    assert sh.io.read_curves(path, mesh)[0].n_points == 2
-
-
 def test_portable_json_joins_segments_in_any_order(tmp_path):
     mesh = square(5)
     nodes = [{"v": [v], "w": [1.0]} for v in (6, 7, 8, 13, 12)]
@@ -99,36 +75,6 @@ def test_portable_json_joins_segments_in_any_order(tmp_path):
     path.write_text(json.dumps({"groups": [{"kind": "signed_curve", "nodes": nodes, "segments": segments}]}))
     (curve,) = sh.io.read_curves(path, mesh)
     assert (mesh.faces[curve.faces, curve.barycentric.argmax(axis=1)] == [6, 7, 8, 13, 12]).all()
-
-
-def test_edges_of_polygons_are_numbered_by_first_appearance(tmp_path):
-    mesh = sh.PolygonMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]], [[0, 1, 2, 3], [1, 4, 2]])
-    path = tmp_path / "curves.txt"
-    path.write_text("signed_curve\ne 0 0.25\ne 2 0.5\ne 4 0.5\n")
-    (curve,) = sh.io.read_curves(path, mesh)
-    assert np.abs(positions(mesh.triangulation, curve) - [[0.25, 0, 0], [0.5, 1, 0], [1.5, 0, 0]]).max() < 1e-15
-
-
-@pytest.mark.parametrize(
-    ("content", "error", "element"),
-    [
-        ("", sh.errors.FileFormatError, None),
-        ("hello world\n", sh.errors.FileFormatError, "line 1"),
-        ("signed_curve\nv x\n", sh.errors.FileFormatError, "line 2"),
-        ("signed_curve\ne 9999 0.5\nv 1\n", sh.errors.FileFormatError, "line 2"),
-        ("signed_curve\ne 3 1.5\nv 1\n", sh.errors.FileFormatError, "line 2"),
-        ("signed_curve\nf 3 0.5\nv 1\n", sh.errors.FileFormatError, "line 2"),
-        ("signed_curve\nv 1\nv 9999\n", sh.errors.SourceError, "vertex 9999"),
-        ("signed_curve\nv 1\n", sh.errors.SourceError, None),
-        ("v 1\nv 2\nl 1 7\n", sh.errors.FileFormatError, "segment [0, 6]"),
-        ("# nothing\n", sh.errors.FileFormatError, None),
-    ],
-)
-def test_damaged_text_is_refused_with_file_and_line(content, error, element, tmp_path):
-    path = tmp_path / "broken.txt"
-    path.write_text(content)
-    with refused(error, element, file="broken.txt"):
-        sh.io.read_curves(path, square(4))
 
 
 @pytest.mark.parametrize(
@@ -159,7 +105,7 @@ def test_unknown_formats_are_refused_and_nothing_is_overwritten(tmp_path):
     mesh = square(4)
     with refused(sh.errors.FileFormatError):
         sh.io.read_curves(tmp_path / "curves.svg", mesh)
-    path = tmp_path / "curves.txt"
+    path = tmp_path / "curves.json"
     path.write_text("kept")
     with refused(sh.errors.SourceError, "item 0"):
         sh.io.write_curves(path, ["no curve"], mesh)

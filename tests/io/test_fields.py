@@ -106,19 +106,6 @@ def test_formats_whose_package_is_missing_are_refused_before_anything_is_written
     assert not list(tmp_path.iterdir())
 
 
-def test_vdb_keeps_single_precision_and_the_exact_grid(tmp_path):
-    phi = field()
-    grid = sh.Grid((0.1 + 0.2, -10 / 3, 1e-9), phi.grid.spacing, phi.grid.shape)
-    sh.GridField(grid, phi.values).save(tmp_path / "phi.vdb")
-    back = sh.load_field(tmp_path / "phi.vdb")
-    np.testing.assert_array_equal(back.values, phi.values.astype(np.float32))
-    np.testing.assert_array_equal(back.grid.origin, grid.origin)
-    np.testing.assert_array_equal(back.grid.spacing, grid.spacing)
-    (tmp_path / "phi.vdb").write_bytes((tmp_path / "phi.vdb").read_bytes()[:200])
-    with refused(sh.errors.FileFormatError, file="phi.vdb"):
-        sh.load_field(tmp_path / "phi.vdb")
-
-
 @pytest.mark.parametrize("ending", FORMATS)
 def test_truncated_fields_are_refused_by_name(tmp_path, ending):
     phi = field()

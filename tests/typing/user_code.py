@@ -79,7 +79,7 @@ pieces = sh.piecewise_distance(mesh, [curve])
 assert_type(pieces, sh.PiecewiseField)
 assert_type(pieces.gradient(mesh.points_at([0])), NDArray[np.float64])
 assert_type(sh.close_curves(mesh, [curve, curve]), list[sh.Curve])
-assert_type(sh.io.read_curves("curves.txt", mesh), list[sh.Curve | sh.SurfacePoints])
+assert_type(sh.io.read_curves("curves.json", mesh), list[sh.Curve | sh.SurfacePoints])
 
 # --- unions where it truly is one
 field = sh.load_field("phi.npz")

@@ -34,7 +34,7 @@ def about_curves(written: str) -> tuple[Option, ...]:
             metavar="MESH",
             help="surface, points or voxels: .obj .ply .stl .off .vtp .glb .pc .xyz .npy .nrrd .vti",
         ),
-        option("curves", metavar="CURVES", help="curves and points on it: .txt .obj .json .csv"),
+        option("curves", metavar="CURVES", help="curves and points on it: .obj .json .csv"),
         output(written),
         option(
             "--constraint",
@@ -50,12 +50,6 @@ def about_curves(written: str) -> tuple[Option, ...]:
             metavar="T",
             help="diffusion time in squared spacings (1; with --plain three, extrapolated, unless curves end); larger "
             "values close gaps more roundly",
-        ),
-        option(
-            "--globe",
-            action="store_true",
-            help="the mesh is a globe, and curves are longitudes and latitudes in degrees, joined along great circles: "
-            ".csv .geojson",
         ),
         option(
             "--intrinsic",
@@ -138,7 +132,7 @@ def surface(arguments: Namespace) -> Summary:
     "close",
     "complete broken curves on a surface",
     "The zero set of the signed distance to broken curves: closed, but for ends at the boundary of the surface.",
-    *about_curves("completed curves: .txt .obj .json; on a globe .geojson"),
+    *about_curves("completed curves: .obj .json"),
     option("--preview", metavar="PNG", help="draw the distance, with the completed curves"),
     *(UP, format_option("json")),
     diffusion=None,
@@ -179,7 +173,7 @@ def close(arguments: Namespace) -> Summary:
 
 
 def surface_and_curves(arguments: Namespace) -> tuple[Any, list[Any]]:
-    """The surface, and the curves on it; on a globe those in longitude and latitude."""
+    """The surface, and the curves on it."""
     domain: Any = sh.read(arguments.mesh)
     kind = type(domain).__name__
     if not hasattr(domain, "triangulation"):
@@ -193,7 +187,7 @@ def surface_and_curves(arguments: Namespace) -> tuple[Any, list[Any]]:
         raise SourceError(
             f"--intrinsic is for triangle meshes; this is a {kind}", remedy="leave it out", path=arguments.mesh
         )
-    return domain, (sh.io.read_globe_curves if arguments.globe else sh.io.read_curves)(arguments.curves, domain)
+    return domain, sh.io.read_curves(arguments.curves, domain)
 
 
 def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -> sh.VertexField:

@@ -10,7 +10,7 @@ from .options import Summary, command, option, whole_number
 from .parts import reports
 from .terminal import say_error
 
-CURVES = (".txt", ".json")
+CURVES = (".json",)
 """Extensions of files that have curves, and nothing else."""
 
 
@@ -33,9 +33,9 @@ def check_files(arguments: Namespace) -> None:
         "files",
         metavar="FILE",
         nargs="+",
-        help="shapes, polylines in the plane or fields; a .txt or .json file after a shape has curves on it",
+        help="shapes, polylines in the plane or fields; a .json file after a shape has curves on it",
     ),
-    option("--curves", metavar="CURVES", help="curves on the shape: .txt .json .obj .csv"),
+    option("--curves", metavar="CURVES", help="curves on the shape: .json .obj .csv"),
     option(
         "--resolution",
         type=whole_number(2),

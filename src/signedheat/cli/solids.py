@@ -63,7 +63,7 @@ def check_volume(arguments: Namespace) -> None:
     "Signed distance to a shape, broken or not, at the nodes of a grid in space; or to polylines, positive to their "
     "left, in the plane.",
     FLAT_SHAPE,
-    output("field: .npz .vti .nrrd .npy .vdb .vtkhdf"),
+    output("field: .npz .vti .nrrd .npy .vdb"),
     option(
         "--tets",
         nargs="?",
@@ -256,9 +256,9 @@ def sample(arguments: Namespace) -> Summary:
     "contour",
     "surface of equal distance in a field",
     "The closed surface, the curves on a surface or the lines in the plane, on which a field takes a level.",
-    option("field", metavar="FIELD", help=".npz .vti .nrrd .npy .vdb"),
+    option("field", metavar="FIELD", help=".npz .vti .nrrd .npy"),
     option("level", metavar="LEVEL", type=finite, help="in the units of the field"),
-    output(f"{SURFACES}; of a field on a surface, curves: .obj .txt .json; in the plane, lines: .svg .csv"),
+    output(f"{SURFACES}; of a field on a surface, curves: .obj .json; in the plane, lines: .svg .csv"),
     format_option("stl"),
 )
 def contour(arguments: Namespace) -> Summary:

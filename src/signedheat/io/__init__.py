@@ -3,7 +3,6 @@
 from .curves import CURVE_FORMATS, read_curves, write_curves
 from .fields import FIELD_FORMATS, VALUE_FORMATS, VERTEX_FIELD_FORMATS, ensure_field_writable, load_field, save_field
 from .files import ensure_writable
-from .globe import read_globe_curves
 from .polylines import POLYLINE_FORMATS, read_polylines, write_polylines
 from .scenes import read_step
 from .shapes import SHAPE_FORMATS, read, save
@@ -28,7 +27,6 @@ __all__ = [
     "load_field",
     "read",
     "read_curves",
-    "read_globe_curves",
     "read_labels",
     "read_mask",
     "read_polylines",

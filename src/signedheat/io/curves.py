@@ -1,16 +1,9 @@
-"""Reading and writing of curves on surfaces.
-
-The text format of the published demo, a similar one with oriented segments, OBJ line elements, and JSON, in which
-points are vertex ids with weights. Edges are numbered by first appearance in the faces (corners 0–1, 1–2, 2–0, face
-after face) and have the direction in which their first face runs along them; a fraction s is from tail to head.
-"""
+"""Reading and writing of curves on surfaces: JSON with vertex ids and weights, OBJ line elements, tables of points."""
 
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Iterable, Sequence
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +23,6 @@ from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.polylines import assemble_polylines
 from ..geometry.surface_points import locate_points
 from .files import PathLike, format_for, reading, replacing, text
-from .globe import write_geojson
 from .meshes import read_obj_elements
 from .points import read_point_lists
 
@@ -57,13 +49,10 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
     Parameters
     ----------
     path : str or path
-        A ``.txt`` file of the published demo: ``signed_curve`` (a following ``1`` reverses it), ``unsigned_curve`` or
-        ``unsigned_point``, then nodes ``v vertex``, ``e edge fraction``, ``f face a b [c]`` (ids from 0) or ``l`` and
-        vertex ids from 1; or nodes and oriented segments ``l i j`` between them, with ``#offset 0`` where ids start at
-        0. A ``.obj`` file with line elements: on the vertices of the mesh if its vertices are those, projected onto it
-        if not. A ``.json`` file with vertex ids and weights, or with ``{"polylines": [{"points": [[x, y, z], …],
-        "closed": false}, …]}``, and a ``.csv`` file with x, y and z on each line and an empty line between polylines,
-        both projected onto the surface.
+        A ``.json`` file with vertex ids and weights, or with ``{"polylines": [{"points": [[x, y, z], …], "closed":
+        false}, …]}``; a ``.obj`` file with line elements; or a ``.csv`` file with x, y and z on each line and an empty
+        line between polylines. Points in space are projected onto the surface, unless the vertices of an ``.obj``
+        file are those of the mesh.
     domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
         The surface that the ids refer to.
     strict : bool
@@ -86,8 +75,8 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
     >>> import tempfile, signedheat as sh
     >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_curves(f"{folder}/curves.txt", [mesh.path([0, 1, 2])], mesh)
-    ...     read_curves(f"{folder}/curves.txt", mesh)
+    ...     write_curves(f"{folder}/curves.json", [mesh.path([0, 1, 2])], mesh)
+    ...     read_curves(f"{folder}/curves.json", mesh)
     [Curve(3 points, open, oriented)]
     """
     read_groups = format_for(path, READERS, "curves")
@@ -124,8 +113,7 @@ def write_curves(
 ) -> None:
     """Write curves and points on a surface, in the format given by the extension.
 
-    ``.txt`` (the published demo's format) and ``.json`` keep everything except given normals, exactly; ``.obj`` has
-    polylines in space.
+    ``.json`` keeps everything except given normals, exactly; ``.obj`` has polylines in space.
 
     Parameters
     ----------
@@ -146,8 +134,8 @@ def write_curves(
     >>> import tempfile, signedheat as sh
     >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_curves(f"{folder}/side.txt", mesh.path([0, 1]), mesh)
-    ...     read_curves(f"{folder}/side.txt", mesh)
+    ...     write_curves(f"{folder}/side.json", mesh.path([0, 1]), mesh)
+    ...     read_curves(f"{folder}/side.json", mesh)
     [Curve(2 points, open, oriented)]
     """
     content_of = format_for(path, WRITERS, "curves")
@@ -204,74 +192,6 @@ def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[NDArray[np
         for v, w in zip(ids, nodes[k].weights, strict=True):
             weights[k, corners.index(v)] = w
     return faces, weights
-
-
-def edge_vertices(domain: EmbeddedSurface) -> NDArray[np.int64]:
-    """(e, 2) tails and heads of the edges of a domain, by first appearance in its faces."""
-    if not isinstance(domain, PolygonMesh):
-        return domain.triangulation.edges.vertices
-    ends = np.stack([domain.corners, domain.next_corners], axis=1)
-    first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)[1]
-    return ends[np.sort(first)]
-
-
-def read_text(path: PathLike, domain: EmbeddedSurface) -> list[Group]:
-    """Curves in either of the two text formats.
-
-    That of the published demo has lines that begin a curve, or points; in the other one, nodes are joined by segments
-    ``l i j``, which count them from 1 unless ``#offset`` says otherwise.
-    """
-    lines = [line.split() for line in text(path).splitlines()]
-    has_kinds = any(words and words[0] in KINDS for words in lines)
-    groups: list[tuple[Group, bool]] = []
-    nodes: list[Node] = []
-    segments: list[tuple[int, int]] = []
-    offset, edges = 1, None
-    for number, words in enumerate(lines, start=1):
-        try:
-            if words[:1] == ["#offset"] and len(words) > 1 and not has_kinds:
-                if not re.fullmatch(r"[-+]?\d{1,18}", words[1]):
-                    raise ValueError("the offset is no whole number")
-                offset = int(words[1])
-            elif not words or words[0].startswith("#") or (words[0] == "n" and not has_kinds):
-                continue
-            elif words[0] in KINDS:
-                nodes = []
-                groups.append((Group(words[0], nodes), words[1:2] == ["1"]))
-            elif has_kinds and not groups:
-                raise ValueError(f"a node comes before any {', '.join(KINDS)}")
-            elif words[0] == "l" and has_kinds:
-                nodes += [Node((int(word) - 1,), (1.0,)) for word in words[1:]]
-            elif words[0] == "l":
-                segments += pairwise(int(word) - offset for word in words[1:])
-            else:
-                edges = edge_vertices(domain) if edges is None and words[0] == "e" else edges
-                nodes.append(parsed(words, edges, domain))
-        except (ValueError, IndexError) as error:
-            cause = f"line {number}, '{' '.join(words)[:60]}', makes no sense ({error})"
-            raise FileFormatError(cause, element=f"line {number}") from error
-    if not has_kinds:
-        return polylines_of_segments(SIGNED, nodes, segments)
-    return [Group(group.kind, group.nodes[::-1] if reverse else group.nodes) for group, reverse in groups]
-
-
-def parsed(words: list[str], edges: NDArray[np.int64] | None, domain: EmbeddedSurface) -> Node:
-    """A node from ``v i``, ``e i s`` or ``f i a b [c]``."""
-    kind, index, numbers = words[0], int(words[1]), [float(word) for word in words[2:]]
-    if kind == "v":
-        return Node((index,), (1.0,))
-    table = edges if kind == "e" else domain.triangulation.faces if kind == "f" else None
-    if table is None:
-        raise ValueError(f"'{kind}' is none of v, e, f, l")
-    if not 0 <= index < len(table):
-        raise ValueError(f"there is no {'edge' if kind == 'e' else 'face'} {index}; ids go from 0 to {len(table) - 1}")
-    if len(numbers) != (1 if kind == "e" else 2) and not (kind == "f" and len(numbers) == 3):
-        raise ValueError("an edge needs one number after its id, a face two or three")
-    weights = (1 - numbers[0], numbers[0]) if kind == "e" else (*numbers[:2], 1 - numbers[0] - numbers[1])
-    if not all(np.isfinite(weights)) or min(weights) < -1e-6 or (len(numbers) == 3 and abs(sum(numbers) - 1) > 1e-6):
-        raise ValueError("fractions must be between 0 and 1 and add up to no more than 1")
-    pairs = [(int(v), max(w, 0.0)) for v, w in zip(table[index], weights, strict=True) if w > 0]
-    return Node(tuple(v for v, _ in pairs), tuple(w for _, w in pairs))
 
 
 def polylines_of_segments(kind: str, nodes: list[Node], segments: Sequence[tuple[int, int]]) -> list[Group]:
@@ -393,26 +313,6 @@ def _groups_to_write(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -
     return groups
 
 
-def write_text(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
-    """The format of the published demo."""
-    table = edge_vertices(domain)
-    number = {tuple(sorted(e)): (k, e[0]) for k, e in enumerate(table.tolist())}
-    lines = []
-    for curve, group in zip(curves, _groups_to_write(curves, domain), strict=True):
-        lines.append(group.kind)
-        faces = [*curve.faces.tolist(), int(curve.faces[0])]
-        weights = [*curve.barycentric.tolist(), curve.barycentric[0].tolist()]
-        for node, face, inside in zip(group.nodes, faces, weights, strict=False):
-            if len(node.vertices) == 1:
-                lines.append(f"v {node.vertices[0]}")
-            elif len(node.vertices) == 2 and tuple(sorted(node.vertices)) in number:
-                edge, tail = number[tuple(sorted(node.vertices))]
-                lines.append(f"e {edge} {node.weights[0 if node.vertices[0] != tail else 1]!r}")
-            else:
-                lines.append(f"f {face} {' '.join(repr(w) for w in inside)}")
-    return "\n".join(lines) + "\n"
-
-
 def write_json(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
     """JSON with vertex ids and weights."""
     groups = []
@@ -441,12 +341,9 @@ READERS: dict[str, Callable[..., Iterable[Group | Curve]]] = {
     ".csv": read_csv,
     ".json": read_json,
     ".obj": read_obj,
-    ".txt": read_text,
 }
 WRITERS: dict[str, Callable[..., str]] = {
-    ".geojson": write_geojson,
     ".json": write_json,
     ".obj": write_obj,
-    ".txt": write_text,
 }
 CURVE_FORMATS = frozenset(WRITERS)

@@ -31,7 +31,6 @@ from .meshes import write_obj
 from .ply import read_ply, write_ply
 from .tets import TET_FIELD_FORMATS, load_cells, store_cells
 from .vdb import write_vdb
-from .vtk_hdf import image_in_hdf, write_vtkhdf
 from .vtk_xml import read_vtp, write_vti, write_vtp
 
 CONVENTION = (
@@ -45,9 +44,7 @@ OF_BANDS = (
 CLIPPED = "signed distance, negative inside, in the units of the shape; beyond the band plus or minus its half width"
 BYTES_PER_NODE = 20.0
 """Of bands written whole: values, their copy in the order of the file, and what is written."""
-HDF = ".vtkhdf"
-"""Of files that are written, and not read."""
-_DIMENSIONS = {".vti": (1, 2, 3), HDF: (2, 3), ".vdb": (3,)}
+_DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}
 """Numbers of axes that a format supports; the others support any number."""
 
 
@@ -57,12 +54,7 @@ def write_field(field: GridField | TetField | VertexField, path: PathLike) -> No
         save_field(field, path)
     elif isinstance(field, TetField):
         format_for(path, dict.fromkeys(TET_FIELD_FORMATS), "a field on tets")
-        if extension(path) == HDF:
-            tets = Elements(field.mesh.vertices, tets=field.mesh.tets, values={NAME: field.values})
-            with replacing(path) as temporary:
-                temporary.write_bytes(write_vtkhdf(tets, path))
-        else:
-            store_cells(field.mesh.to_meshio({NAME: field.values}), path)
+        store_cells(field.mesh.to_meshio({NAME: field.values}), path)
     elif isinstance(field, VertexField):
         write = format_for(path, {".npz": None, ".obj": write_obj, **VALUE_FORMATS}, "a field on a surface")
         simple = on_simple_surface(field)
@@ -76,7 +68,7 @@ def save_field(field: GridField, path: PathLike) -> None:
     """Write a field on a grid, in the format given by the extension.
 
     ``.npz`` (NumPy), ``.vti`` (VTK, ParaView), ``.nrrd`` (3D Slicer, medical imaging), ``.npy`` with a ``.json`` of the
-    same name next to it, ``.vdb`` (OpenVDB; single precision), ``.vtkhdf`` (VTK's HDF5, which is not read).
+    same name next to it, ``.vdb`` (OpenVDB; single precision; not read back).
 
     Parameters
     ----------
@@ -127,8 +119,8 @@ def load_field(path: PathLike) -> Field:
     Parameters
     ----------
     path : str or path
-        A ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` (with its ``.json``) or ``.vdb`` file; images of other programs can be
-        read if their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file has a field on tets; ``.ply``, ``.vtp``,
+        A ``.npz``, ``.vti``, ``.nrrd`` or ``.npy`` (with its ``.json``) file; images of other programs can be read if
+        their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file has a field on tets; ``.ply``, ``.vtp``,
         or ``.npz`` with vertices, one on a surface; ``.npz`` with blocks one in a band.
 
     Returns
@@ -150,14 +142,21 @@ def load_field(path: PathLike) -> Field:
     ...     bool((load_field(f"{folder}/phi.vti").values == phi.values).all())
     True
     """
-    if extension(path) in TET_FIELD_FORMATS - {HDF}:
+    if extension(path) in TET_FIELD_FORMATS:
         return _load_tet_field(path)
     names = names_in_npz(path) if extension(path) == ".npz" else set()
     if extension(path) in _VALUES or {"values", "vertices"} <= names:
         return load_vertex_field(path)
     if "coarse_values" in names:
         return _load_band(path)
-    image = read_image(path, FIELD_FORMATS - {HDF}, "a field")
+    if extension(path) == ".vdb":
+        raise FileFormatError(
+            "OpenVDB files are written and not read",
+            remedy="keep the field as .npz too; of others' files, read the values by OpenVDB, which Blender's Python "
+            "has, and pass them to sh.GridField",
+            path=path,
+        )
+    image = read_image(path, FIELD_FORMATS - {".vdb"}, "a field")
     if extension(path) == ".npy":
         contents(Path(path).with_suffix(".json"))  # which says where the values are
     with reading(path):
@@ -244,10 +243,7 @@ def _write_for_vtk(field: GridField, path: Path) -> None:
         values, convention = {NAME: whole_values(field)}, CLIPPED
     elif field.confidence is not None:
         values[CONFIDENCE] = field.confidence
-    if extension(path) == HDF:
-        path.write_bytes(image_in_hdf(grid, values))
-    else:
-        path.write_bytes(write_vti(grid.origin, grid.spacing, values, convention))
+    path.write_bytes(write_vti(grid.origin, grid.spacing, values, convention))
 
 
 def _write_nrrd(field: GridField, path: Path) -> None:
@@ -293,7 +289,6 @@ _VALUES: dict[str, Callable[[PathLike, tuple[str, ...]], Elements]] = {".ply": r
 VALUE_FORMATS: dict[str, Callable[[Elements, PathLike], bytes]] = {
     ".ply": write_ply,
     ".vtp": write_vtp,
-    HDF: write_vtkhdf,
 }
 """Formats of surfaces with values at their vertices."""
 _GRID_WRITERS: dict[str, Callable[[GridField, Path], None]] = {
@@ -302,8 +297,7 @@ _GRID_WRITERS: dict[str, Callable[[GridField, Path], None]] = {
     ".nrrd": _write_nrrd,
     ".vdb": write_vdb,
     ".vti": _write_for_vtk,
-    HDF: _write_for_vtk,
 }
-_BAND_WRITERS = {ending: _GRID_WRITERS[ending] for ending in (".npz", ".vdb", ".vti", HDF)}
+_BAND_WRITERS = {ending: _GRID_WRITERS[ending] for ending in (".npz", ".vdb", ".vti")}
 FIELD_FORMATS, BAND_FORMATS = frozenset(_GRID_WRITERS), frozenset(_BAND_WRITERS)
 VERTEX_FIELD_FORMATS = frozenset({".npz", ".obj", *VALUE_FORMATS})

@@ -35,7 +35,7 @@ PACKAGE = f"{__package__.partition('.')[0]}."
 TAKEN = {".off": 14, ".stl": 5, ".xyz": 4, ".ply": 2}
 """Bytes that a shape takes while it is read for each byte of its file, measured with some hundred thousand faces; less
 where files may hold more than positions and faces. Of other formats the parts that are read first say more."""
-NEEDED = {".nrrd": ("nrrd", "NRRD files"), ".vtkhdf": ("h5py", "VTKHDF files")}
+NEEDED = {".nrrd": ("nrrd", "NRRD files")}
 """Packages by which formats are written."""
 READING_MODULES = f"{__package__}.", run_limited.__module__, f"{PACKAGE}packages"
 """Modules that read, and those by which they call parsers of other packages."""

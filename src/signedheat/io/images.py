@@ -35,7 +35,6 @@ from .files import (
     unpacked,
     with_messages,
 )
-from .vdb import read_vdb_image
 from .vtk_xml import read_vti
 
 NIBABEL = ("nibabel", "NIfTI files")
@@ -275,7 +274,6 @@ READERS: dict[str, Callable[[PathLike], Image]] = {
     ".npy": _read_npy,
     ".npz": _read_npz,
     ".nrrd": _read_nrrd,
-    ".vdb": lambda path: _aligned(*read_vdb_image(path)),
     ".vti": _read_vti,
     **dict.fromkeys(NIFTI, _read_nifti),
     **dict.fromkeys(PICTURES, _read_picture),

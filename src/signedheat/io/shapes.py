@@ -17,7 +17,6 @@ from .points import read_e57, read_las, read_pcd, read_xyz, write_xyz
 from .scenes import read_3mf, read_glb, step_mesh
 from .tets import TET_FORMATS, read_tets, store_cells
 from .voxels import read_volume
-from .vtk_hdf import write_vtkhdf
 from .vtk_xml import read_vtp, write_vtp
 
 READERS: dict[str, Callable[[PathLike], Elements | Shape]] = {
@@ -49,7 +48,6 @@ WRITERS: dict[str, Callable[[Elements, PathLike], bytes]] = {
     ".pc": write_pc,
     ".ply": write_ply,
     ".stl": write_stl,
-    ".vtkhdf": write_vtkhdf,
     ".vtp": write_vtp,
     ".xyz": write_xyz,
 }
@@ -115,7 +113,7 @@ def read(path: PathLike) -> Shape:
 def save(shape: Shape | ForeignShape, path: PathLike) -> None:
     """Write a shape, in the format given by the extension.
 
-    OBJ, OFF, PLY, VTP, VTKHDF (by h5py), XYZ and PC keep every bit of the coordinates; STL has single precision. The
+    OBJ, OFF, PLY, VTP, XYZ and PC keep every bit of the coordinates; STL has single precision. The
     file is written under a temporary name and renamed, so that an existing file survives a failure.
 
     Parameters

@@ -50,7 +50,7 @@ TETGEN = (".node", ".ele")
 """Extensions of the files of TetGen, which are read and written as a pair."""
 TET_FORMATS = frozenset(MODULES)
 
-TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtkhdf", ".vtu"})
+TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
 
 COUNTED = {
     "PhysicalNames": 1,
