@@ -6,32 +6,82 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
+from ..frozen import read_only
+from .triangle_kernels import find_edges
 
 SINGLE, DOUBLE = 2.0**-22, 2.0**-46
 """How far apart, over the largest coordinate, the same place may come out in single and in double precision."""
+SHORT_EDGES = 0.1
+"""Share of the open edges that may be so short that welding collapses them."""
 _HALF = 0xFFFFFFFF
 _CELL = 16.0
 """Side of the cells in which points are looked up, over the tolerance: few points are near a wall."""
 
 
-def roundoff(points: NDArray[np.float64]) -> float:
-    """Distance below which points are at one place: a few units in the last place of the largest coordinate.
+def welded_vertices(
+    points: NDArray[np.float64], tails: NDArray[np.int64], heads: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Find the vertices of faces that are at one place, exactly or but for rounding.
 
-    Coordinates that single precision holds without loss are taken to come from it, as those of STL files do.
+    Only rims may be torn by rounding. So vertices at different places become one where both are on open edges, of an
+    odd number of faces, and if rounding explains how they differ: by a few units in the last place of the largest
+    coordinate, along axes whose coordinates make use of that last place.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Vertices. Coordinates that single precision holds without loss are taken to come from it, as in STL files.
+    tails, heads : (h,) int
+        First and last vertex of each side of all faces.
+
+    Returns
+    -------
+    (n,) int
+        First vertex at the place of each.
 
     Examples
     --------
-    >>> roundoff(np.array([[1.0, 0.0, 0.0]])) == SINGLE, roundoff(np.array([[0.1, 1.0, 0.0]])) == DOUBLE
-    (True, True)
+    Two triangles whose common side is torn by the last bit; whole numbers are no result of rounding.
+
+    >>> torn = np.array([[0, 0, 0.1], [1, 0, 0], [0, 1.1, 0], [1, 0, 0], [1, 1, 0.3], [0, np.nextafter(1.1, 2), 0]])
+    >>> tails, heads = np.array([0, 1, 2, 3, 4, 5]), np.array([1, 2, 0, 4, 5, 3])
+    >>> welded_vertices(torn, tails, heads).tolist()
+    [0, 1, 2, 1, 4, 2]
+    >>> welded_vertices(np.round(torn) + 1e7, tails, heads).tolist()
+    [0, 1, 2, 1, 4, 2]
     """
-    largest = float(np.abs(points).max(initial=0.0))
+    same = same_positions(points)
+    single = _is_single(points)
+    farthest = float(np.abs(points).max(initial=0.0)) * (SINGLE if single else DOUBLE)
+    if (welded(points, farthest) == same).all():
+        return same
+    tails, heads = same[tails], same[heads]
+    edges, _, counts, _, _ = find_edges(read_only(tails), read_only(heads), tails != heads, len(points))
+    is_open = (edges >= 0) & (np.append(counts, 0)[edges] % 2 == 1)
+    rims = np.unique(np.concatenate([tails[is_open], heads[is_open]]))
+    lengths = np.abs(points[tails[is_open]] - points[heads[is_open]]).max(axis=1)
+    if len(rims):
+        tolerance = min(farthest, float(np.quantile(lengths, SHORT_EDGES)) / 4)
+        own = np.arange(len(points))
+        own[rims] = rims[welded(points[rims], np.where(_is_rounded(points, single), tolerance, 0.0))]
+        same = own[same]
+    return same
+
+
+def _is_single(points: NDArray[np.float64]) -> bool:
+    """Whether single precision holds all coordinates without loss."""
     with np.errstate(over="ignore", under="ignore"):
-        is_single = largest < 1e38 and bool((points.astype(np.float32) == points).all())
-    return largest * (SINGLE if is_single else DOUBLE)
+        return bool((points.astype(np.float32) == points).all())
 
 
-def welded(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
-    """(n,) first point within `tolerance` of each of (n, 3) points; its own index where there is none before.
+def _is_rounded(points: NDArray[np.float64], single: bool) -> NDArray[np.bool_]:
+    """(3,) whether coordinates along an axis make use of the last place of the largest of them."""
+    last_places = np.ldexp(1.0, np.frexp(np.abs(points).max(axis=0))[1] - (24 if single else 53))
+    return (np.fmod(points, 2.0 * last_places) != 0).any(axis=0)
+
+
+def welded(points: NDArray[np.float64], tolerance: float | NDArray[np.float64]) -> NDArray[np.int64]:
+    """(n,) first point within `tolerance` along each axis of each of (n, 3) points; its own index if there is none.
 
     Chains are not followed: a point is compared with such only as stand for themselves. Takes O(n) time as long as few
     points stand for themselves within one cell of 16 tolerances.
@@ -42,7 +92,7 @@ def welded(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
     [0, 1, 0, 1]
     """
     smallest = float(np.nextafter(np.abs(points).max(initial=0.0), np.inf)) * 2.0**-60
-    return _weld(np.ascontiguousarray(points), max(tolerance, smallest, 1e-300))
+    return _weld(np.ascontiguousarray(points), np.maximum(np.broadcast_to(tolerance, 3), max(smallest, 1e-300)))
 
 
 def same_positions(points: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -126,7 +176,7 @@ def mixed(a: int, b: int, c: int) -> int:
 
 
 @compiled
-def _weld(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
+def _weld(points: NDArray[np.float64], tolerances: NDArray[np.float64]) -> NDArray[np.int64]:
     n = len(points)
     bits = 4
     while (1 << bits) < 2 * n:
@@ -134,26 +184,27 @@ def _weld(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
     mask = (1 << bits) - 1
     heads, following = np.full(1 << bits, -1, dtype=np.int32), np.full(n, -1, dtype=np.int32)
     owner = np.empty(n, dtype=np.int64)
-    side = _CELL * tolerance
+    (near_x, near_y, near_z), (side_x, side_y, side_z) = tolerances, _CELL * tolerances
     for p in range(n):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        low = (np.floor((x - tolerance) / side), np.floor((y - tolerance) / side), np.floor((z - tolerance) / side))
-        high = (np.floor((x + tolerance) / side), np.floor((y + tolerance) / side), np.floor((z + tolerance) / side))
+        low = (np.floor((x - near_x) / side_x), np.floor((y - near_y) / side_y), np.floor((z - near_z) / side_z))
+        high = (np.floor((x + near_x) / side_x), np.floor((y + near_y) / side_y), np.floor((z + near_z) / side_z))
         found = np.int32(-1)
         for i in range(np.int64(low[0]), np.int64(high[0]) + 1):
             for j in range(np.int64(low[1]), np.int64(high[1]) + 1):
                 for k in range(np.int64(low[2]), np.int64(high[2]) + 1):
                     q = heads[mixed(i, j, k) & mask]
                     while q >= 0:
-                        gap = max(abs(points[q, 0] - x), abs(points[q, 1] - y), abs(points[q, 2] - z))
-                        if gap <= tolerance and (found < 0 or q < found):
+                        is_near = abs(points[q, 0] - x) <= near_x and abs(points[q, 1] - y) <= near_y
+                        if is_near and abs(points[q, 2] - z) <= near_z and (found < 0 or q < found):
                             found = q
                         q = following[q]
         if found >= 0:
             owner[p] = found
             continue
         owner[p] = p
-        home = mixed(np.int64(np.floor(x / side)), np.int64(np.floor(y / side)), np.int64(np.floor(z / side))) & mask
+        i, j, k = np.int64(np.floor(x / side_x)), np.int64(np.floor(y / side_y)), np.int64(np.floor(z / side_z))
+        home = mixed(i, j, k) & mask
         following[p] = heads[home]
         heads[home] = p
     return owner

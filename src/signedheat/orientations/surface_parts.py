@@ -16,7 +16,7 @@ from ..geometry.edges import (
     orient_faces,
     pair_halfedges,
 )
-from ..geometry.welding import coincident_faces, roundoff, welded
+from ..geometry.welding import coincident_faces, welded_vertices
 
 ALMOST_ALL = 0.95
 """Share of a part's area from which a part that is there again elsewhere is a duplicate."""
@@ -58,7 +58,7 @@ class SurfaceParts:
     @cached_property
     def places(self) -> NDArray[np.int64]:
         """(n,) first vertex at the place of each."""
-        return welded(self.vertices, roundoff(self.vertices))
+        return welded_vertices(self.vertices, self.corners, self.corners[self._following])
 
     @cached_property
     def tails(self) -> NDArray[np.int64]:

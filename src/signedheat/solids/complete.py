@@ -23,7 +23,7 @@ from ..errors import SignedHeatError, SourceError
 from ..geometry.directions import axes_across
 from ..geometry.face_tree import FaceTree
 from ..geometry.meshes import face_areas
-from ..geometry.welding import roundoff, welded
+from ..geometry.welding import welded_vertices
 from ..memory import refuse_beyond_memory
 from ..operators.grid.fitted_points import mean_gap
 from ..orientations.meshes import orientation
@@ -172,7 +172,7 @@ def completed(
 ) -> Solid:
     """The solid that oriented triangles are, of which inner ones bound nothing; its origins are theirs."""
     vertices = mesh.vertices
-    ids = welded(vertices, roundoff(vertices))[mesh.faces]
+    ids = welded_vertices(vertices, mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel())[mesh.faces]
     a, b, c = ids.T
     proper = np.flatnonzero((a != b) & (b != c) & (c != a))
     every = Surface(vertices[mesh.faces[proper]], ids[proper], proper, True)
