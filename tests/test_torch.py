@@ -31,6 +31,17 @@ def test_values_are_those_of_the_solid():
     np.testing.assert_allclose(single.numpy(), solid.distance(points), atol=1e-6)
 
 
+@pytest.mark.parametrize("shape", [(), (1,), (4, 5), (0,)])
+def test_batches_of_any_shape(shape):
+    solid, points = sh.complete(broken_ball()), torch.from_numpy(some_points(20))
+    points = points[: int(np.prod(shape))].reshape(*shape, 3).requires_grad_()
+    found = sh.torch.distance(solid, points)
+    assert found.shape == shape
+    np.testing.assert_array_equal(found.detach().numpy(), solid.distance(points.detach().numpy()))
+    found.sum().backward()
+    assert points.grad.shape == points.shape
+
+
 def test_gradients_by_points_are_those_of_finite_differences():
     solid = sh.complete(broken_ball())
     points = torch.from_numpy(some_points(40)).requires_grad_()

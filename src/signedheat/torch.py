@@ -34,15 +34,15 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
     ----------
     solid : Solid
         What `complete` has made of a mesh. Complete anew when an optimiser has moved the vertices.
-    points : (n, 3) tensor
-        Where, on any device.
+    points : (..., 3) tensor
+        Where, on any device; batches of any shape.
     vertices : (k, 3) tensor, optional
         Those of the mesh that was completed, to be differentiated by.
 
     Returns
     -------
-    (n,) tensor
-        Of the points' type and device; computed on the processor in double precision.
+    (...) tensor
+        In the shape of the points, of their type and device; computed on the processor in double precision.
 
     Raises
     ------
@@ -66,7 +66,8 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
     (0.5, [[0.0, 0.0, 1.0]], 1.0)
     """
     points = torch.as_tensor(points)
-    found = solid.closest(points.detach().cpu().double().numpy())
+    rows, shape = points.reshape(-1, points.shape[-1] if points.ndim else 1), points.shape[:-1]
+    found = solid.closest(rows.detach().cpu().double().numpy())
     nearest = torch.from_numpy(found.points)
     if vertices is not None:
         if solid.source is None:
@@ -86,8 +87,8 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
         moves = vertices.cpu().double()
         moves = moves - moves.detach()
         nearest = nearest.index_add(0, torch.from_numpy(given), (weights[..., None] * moves[corners]).sum(dim=1))
-    exact = points.cpu().double()
+    exact = rows.cpu().double()
     slopes = torch.from_numpy(found.gradients)
     moved = (exact - exact.detach()) - (nearest - nearest.detach())
     values = torch.from_numpy(found.distances) + (moved * slopes).sum(dim=1)
-    return values.to(device=points.device, dtype=points.dtype)
+    return values.reshape(shape).to(device=points.device, dtype=points.dtype)

@@ -133,11 +133,17 @@ def refuse_extreme(
         )
 
 
-def query_points(values: object, columns: int) -> NDArray[np.float64]:
-    """`values` as an array of shape (n, columns), or (columns,), of finite positions within `LARGEST`."""
+def query_points(values: object, columns: int) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+    """`values`, of shape (..., columns), as (n, columns) finite positions within `LARGEST`, and the leading shape."""
     points = contiguous(values, "points")
-    if points.shape[-1:] != (columns,) or not np.isfinite(points).all():
-        raise GeometryError(f"points must be finite, with {columns} coordinates each", element="points")
+    if points.shape[-1:] != (columns,):
+        raise GeometryError(
+            f"points must have shape (..., {columns}), not {points.shape}",
+            remedy=f"give {columns} coordinates for each",
+            element="points",
+        )
+    if not np.isfinite(points).all():
+        raise GeometryError("points must be finite", remedy="leave out NaN and infinity", element="points")
     farthest = float(np.abs(points).max(initial=0.0))
     if farthest > LARGEST:
         raise GeometryError(
@@ -145,7 +151,19 @@ def query_points(values: object, columns: int) -> NDArray[np.float64]:
             remedy=f"evaluate at points up to {LARGEST:g}",
             element="points",
         )
-    return points
+    return points.reshape(-1, columns), points.shape[:-1]
+
+
+def shaped(values: NDArray[Scalar], shape: tuple[int, ...]) -> NDArray[Scalar]:
+    """(n, ...) values at points in the shape that these were given in; () is that of a single one.
+
+    Examples
+    --------
+    >>> shaped(np.zeros((6, 4)), (2, 3)).shape, shaped(np.ones((1, 4)), ()), float(shaped(np.ones(1), ()))
+    ((2, 3, 4), array([1., 1., 1., 1.]), 1.0)
+    """
+    result: NDArray[Scalar] = values.reshape((*shape, *values.shape[1:]))[()]
+    return result
 
 
 def refuse_lost_spacing(steps: NDArray[np.float64], first: NDArray[np.float64], last: NDArray[np.float64]) -> None:

@@ -17,7 +17,7 @@ from ..domains.exchange import Displayed, with_values
 from ..domains.grid import Dimension, Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import contiguous, finite_number, query_points
+from ..domains.validation import contiguous, finite_number, query_points, shaped
 from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError
 from ..frozen import Frozen
 from ..geometry.edge_flips import flipped_along_creases
@@ -125,19 +125,15 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
         Parameters
         ----------
-        points : (n, d) or (d,) float
+        points : (..., d) float
             Positions, in the units of the grid.
 
         Returns
         -------
-        (n,) float, or one float
-            Signed distances.
+        (...) float
+            Signed distances, in the shape of the points: one number for one point.
         """
-        places = self._checked(points)
-        if self.solid is None:
-            return self.interpolate(places)
-        values = self.solid.distance(places.reshape(-1, self.grid.dimension))
-        return values.reshape(places.shape[:-1]) if places.ndim > 1 else values[0]
+        return self.interpolate(points) if self.solid is None else self.solid.distance(points)
 
     def interpolate(self, points: ArrayLike) -> NDArray[np.float64]:
         """φ at points in space, by multilinear interpolation between nodes; beyond a band between the coarse ones.
@@ -147,12 +143,12 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
         Parameters
         ----------
-        points : (n, d) or (d,) float
+        points : (..., d) float
             Positions, in the units of the grid.
 
         Returns
         -------
-        (n,) float, or one float
+        (...) float
             Signed distances, interpolated from the nodes around that have a value; NaN where none has one.
 
         Examples
@@ -161,9 +157,9 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         >>> line.interpolate([[0.5], [2.5]])  # between nodes, and beyond the last one
         array([0.5, 4. ])
         """
-        points = self._checked(points)
-        (values,) = in_chunks(self._values_at, points.reshape(-1, self.grid.dimension))
-        return values.reshape(points.shape[:-1]) if points.ndim > 1 else values[0]
+        places, shape = query_points(points, self.grid.dimension)
+        (values,) = in_chunks(self._values_at, places)
+        return shaped(values, shape)
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
         """∇φ at points in space: exact where the field has its solid, else central differences, interpolated.
@@ -172,12 +168,12 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
         Parameters
         ----------
-        points : (n, d) float
+        points : (..., d) float
             Positions, in the units of the grid.
 
         Returns
         -------
-        (n, d) float
+        (..., d) float
             Gradients; of length about 1, since φ is a distance.
 
         Examples
@@ -187,18 +183,18 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         array([[1. ],
                [1.5]])
         """
-        points = np.atleast_2d(self._checked(points))
         if self.solid is not None:
             return self.solid.closest(points).gradients
-        (slopes,) = in_chunks(lambda chunk: (self._slopes(self._into_box(chunk)),), points)
-        return slopes
+        places, shape = query_points(points, self.grid.dimension)
+        (slopes,) = in_chunks(lambda chunk: (self._slopes(self._into_box(chunk)),), places)
+        return shaped(slopes, shape)
 
     def closest(self, points: ArrayLike) -> Closest:
         """The nearest place of the solid's surface for points in space: `Solid.closest`.
 
         Parameters
         ----------
-        points : (n, 3) float
+        points : (..., 3) float
             Positions, in the units of the grid; they may lie outside of it.
 
         Returns
@@ -224,7 +220,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
                 remedy="take it from signed_distance or Solid.field, not from a file",
                 element="field",
             )
-        return self.solid.closest(np.atleast_2d(self._checked(points)))
+        return self.solid.closest(points)
 
     @property
     def whole(self) -> GridField[Dimension]:
@@ -465,12 +461,12 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
         Parameters
         ----------
-        points : (n, d) float
+        points : (..., d) float
             Positions, such as the vertices of an offset.
 
         Returns
         -------
-        (n,) float
+        (...) float
             From 0 to 1; at points outside the grid, that of the nearest point of its box; 1 if the field has none.
 
         Examples
@@ -479,11 +475,11 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         >>> line.confidence_at([[0.5]]).tolist()
         [0.75]
         """
-        places = np.atleast_2d(self._checked(points))
-        if self.confidence is None:
-            return np.ones(len(places), dtype=np.float32)
         if self.solid is not None:
-            return self.solid.closest(places).confidence
+            return self.solid.closest(points).confidence
+        places, shape = query_points(points, self.grid.dimension)
+        if self.confidence is None:
+            return np.ones(shape, dtype=np.float32)[()]
         inside = self._into_box(places)
         index = (inside - self.grid.origin) / self.grid.spacing
         if self.blocks is None:
@@ -492,7 +488,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             found = BlockValues(self.blocks, self.confidence.astype(np.float32)).interpolated(index)
             beyond = np.isnan(found)
             found[beyond] = self.whole.confidence_at(inside[beyond])
-        return np.clip(found, 0, 1).astype(np.float32)
+        return shaped(np.clip(found, 0, 1).astype(np.float32), shape)
 
     @property
     def surface_confidence(self) -> float | None:
@@ -517,9 +513,6 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         [0.0, 1.0]
         """
         files.write_field(self, path)
-
-    def _checked(self, points: ArrayLike) -> NDArray[np.float64]:
-        return query_points(points, self.grid.dimension)
 
     def _into_box(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.clip(points, self.grid.origin, self.grid.upper)

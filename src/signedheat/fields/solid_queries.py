@@ -11,21 +11,21 @@ from numpy.typing import ArrayLike, NDArray
 
 @dataclass(frozen=True, eq=False)
 class Closest:
-    """The nearest place of a solid's surface for each of some points.
+    """The nearest place of a solid's surface for each of some points, in the shape of these.
 
     Attributes
     ----------
-    distances : (n,) float
+    distances : (...) float
         Signed distances, negative inside.
-    points : (n, 3) float
+    points : (..., 3) float
         The nearest places.
-    faces : (n,) int
+    faces : (...) int
         Face of the shape that was given on which each lies; −1 on the completion.
-    barycentric : (n, 3) float
+    barycentric : (..., 3) float
         Where in it: weights of its corners, for triangles; NaN elsewhere.
-    gradients : (n, 3) float
+    gradients : (..., 3) float
         Gradients of the distance, of length 1; on the surface, its normals.
-    confidence : (n,) float
+    confidence : (...) float
         1 where surface was given; on the completion less, the farther from its rim.
 
     Examples
@@ -45,11 +45,11 @@ class Closest:
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """(n,) whether the place lies on the completion."""
+        """(...) whether the place lies on the completion."""
         return self.faces < 0
 
     def __repr__(self) -> str:
-        return f"Closest({len(self.points)} points, {int(self.completed.sum())} on the completion)"
+        return f"Closest({np.size(self.faces)} points, {np.count_nonzero(self.completed)} on the completion)"
 
 
 class SolidQueries(Protocol):
@@ -60,10 +60,10 @@ class SolidQueries(Protocol):
         """(m, 3, 3) corners of all that distance is measured to."""
 
     def distance(self, points: ArrayLike) -> NDArray[np.float64]:
-        """(n,) signed distances of (n, 3) points, negative inside."""
+        """(...) signed distances of (..., 3) points, negative inside."""
 
     def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """(n,) whether points are inside."""
+        """(...) whether points are inside."""
 
     def closest(self, points: ArrayLike) -> Closest:
-        """The nearest place for each of (n, 3) points."""
+        """The nearest place for each of (..., 3) points."""

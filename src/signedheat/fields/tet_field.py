@@ -15,7 +15,7 @@ from ..discretization import SourceTerm
 from ..domains.exchange import Displayed, with_values
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import contiguous, finite_number, query_points
+from ..domains.validation import contiguous, finite_number, query_points, shaped
 from ..errors import GeometryError, UnsupportedTypeError
 from ..frozen import Frozen
 from ..geometry.marching_tets import closed_level_set
@@ -91,16 +91,15 @@ class TetField(Displayed, Combinable, Frozen):
 
         Parameters
         ----------
-        points : (n, 3) or (3,) float
+        points : (..., 3) float
             Positions, in the units of the mesh.
 
         Returns
         -------
-        (n,) float, or one float
-            Signed distances; NaN where the nearest tet has a vertex without a value.
+        (...) float
+            Signed distances, in the shape of the points; NaN where the nearest tet has a vertex without a value.
         """
-        points = query_points(points, 3)
-        places = points.reshape(-1, 3)
+        places, shape = query_points(points, 3)
         corners, weights, away = self._place(places)
         steps = (places - away)[:, None] - self.mesh.vertices[corners]
         tangents = self.values[corners] + np.einsum("pki,pki->pk", self._vertex_gradients[corners], steps) / 2
@@ -109,7 +108,7 @@ class TetField(Displayed, Combinable, Frozen):
         if len(outside):
             slopes = np.einsum("pk,pki->pi", weights[outside], self._vertex_gradients[corners[outside]])
             values[outside] += np.einsum("pi,pi->p", slopes, away[outside])
-        return values.reshape(points.shape[:-1]) if points.ndim > 1 else values[0]
+        return shaped(values, shape)
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
         """∇φ at points in space: volume-weighted means at the vertices, interpolated.
@@ -118,22 +117,23 @@ class TetField(Displayed, Combinable, Frozen):
 
         Parameters
         ----------
-        points : (n, 3) or (3,) float
+        points : (..., 3) float
             Positions, in the units of the mesh.
 
         Returns
         -------
-        (n, 3) float
+        (..., 3) float
             Gradients; of length about 1, since φ is a distance.
 
         Examples
         --------
         >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
         >>> TetField(mesh, [0.0, 1.0, 2.0, 3.0]).gradient([0.2, 0.2, 0.2])
-        array([[1., 2., 3.]])
+        array([1., 2., 3.])
         """
-        corners, weights, _ = self._place(query_points(points, 3).reshape(-1, 3))
-        return np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners])
+        places, shape = query_points(points, 3)
+        corners, weights, _ = self._place(places)
+        return shaped(np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners]), shape)
 
     @property
     def tet_gradients(self) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.projection import closest_points
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import array_of, finite_number, finite_rows
+from ..domains.validation import array_of, finite_number, query_points, shaped
 from ..errors import OutsideError
 from ..frozen import Frozen
 from ..geometry.meshes import gradients_along
@@ -89,23 +89,23 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
 
         Parameters
         ----------
-        points : SurfacePoints, Curve or (n, 3) float
+        points : SurfacePoints, Curve or (..., 3) float
             Points on the surface, or positions in space, for which the closest points of the surface are taken.
 
         Returns
         -------
-        (n,) float
-            Signed distances.
+        (...) float
+            Signed distances, in the shape of the points.
         """
         finest = self.finest
+        faces, weights, shape = self._at(points)
         if isinstance(finest.domain, IntrinsicTriangulation):
-            faces, weights = finest.domain.locate(*self._at(points)[2:])
+            faces, weights = finest.domain.locate(faces, weights)
             corners = finest.domain.faces[faces]
         else:
-            mesh, _, faces, weights = self._at(points)
-            corners = mesh.faces[faces]
+            corners = finest.domain.triangulation.faces[faces]
         values = finest.domain.on_triangulation(finest.values)
-        return np.einsum("ik,ik->i", weights, values[corners])
+        return shaped(np.einsum("ik,ik->i", weights, values[corners]), shape)
 
     @property
     def finest(self) -> VertexField[SurfaceDomain]:
@@ -116,7 +116,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return cast("VertexField[SurfaceDomain]", finer)
 
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
-        """(n, 3) ∇φ in space at points, in the triangles on which φ is linear; for `points` see `__call__`.
+        """(..., 3) ∇φ in space at points, in the triangles on which φ is linear; for `points` see `__call__`.
 
         Examples
         --------
@@ -126,11 +126,11 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         >>> phi.gradient([[0.75, 0.5, 0.0]]).tolist()
         [[1.0, 0.0, 0.0]]
         """
-        _, _, faces, weights = self._at(points)
         finest = self.finest
+        faces, weights, shape = self._at(points)
         if isinstance(finest.domain, IntrinsicTriangulation):
-            return finest.domain.gradient(finest.values, faces, weights)
-        return self.face_gradients[faces]
+            return shaped(finest.domain.gradient(finest.values, faces, weights), shape)
+        return shaped(self.face_gradients[faces], shape)
 
     @cached_property
     def face_gradients(self) -> NDArray[np.float64]:
@@ -294,10 +294,9 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
 
     def _at(
         self, points: Curve | SurfacePoints | ArrayLike
-    ) -> tuple[TriangleMesh, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
-        field = self._embedded
-        mesh = field.domain.triangulation
-        values = field.domain.on_triangulation(field.values)
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], tuple[int, ...]]:
+        """(n,) faces of points and (n, 3) barycentric coordinates in them, and the shape that the points have."""
+        mesh = self._embedded.domain.triangulation
         if isinstance(points, (Curve, SurfacePoints)):
             outside = np.flatnonzero((points.faces < 0) | (points.faces >= mesh.n_faces))
             if len(outside):
@@ -307,9 +306,10 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
                     remedy="make it for this surface",
                     element=f"point {outside[0]}",
                 )
-            return mesh, values, points.faces, points.barycentric
-        faces, weights, _ = closest_points(mesh, finite_rows(points, "points", 3))
-        return mesh, values, faces, weights
+            return points.faces, points.barycentric, points.faces.shape
+        places, shape = query_points(points, 3)
+        faces, weights, _ = closest_points(mesh, places)
+        return faces, weights, shape
 
 
 def on_simple_surface(field: VertexField) -> VertexField[SurfaceShape]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..diagnostics import Diagnostics
 from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import finite_number, flag, positive_number, query_points
+from ..domains.validation import finite_number, flag, positive_number, query_points, shaped
 from ..errors import InexactWarning, SignedHeatError, SourceError, warn_user
 from ..fields.grid_field import GridField
 from ..fields.solid_queries import Closest
@@ -125,7 +125,17 @@ class Solid(Frozen, ShortRepr):
         return _mesh(self.triangles)
 
     def distance(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Signed distances of (n, 3) points, negative inside: exact, in time O(n log m) on all threads.
+        """Signed distances of points, negative inside: exact, in time O(n log m) on all threads.
+
+        Parameters
+        ----------
+        points : (..., 3) float
+            Positions, in the units of the shape.
+
+        Returns
+        -------
+        (...) float
+            In the shape of the points: one number for one point.
 
         Raises
         ------
@@ -138,15 +148,15 @@ class Solid(Frozen, ShortRepr):
         >>> complete(samples.sphere(3)).distance([[0.0, 0.0, 0.5], [0.0, 0.0, 2.0]]).round(2)
         array([-0.5,  1. ])
         """
-        places = _checked(points)
+        places, shape = query_points(points, 3)
         result = np.empty(len(places))
         for begin in range(0, len(places), MANY):
             order = begin + order_in_space(places[begin : begin + MANY])
             (result[order],) = in_chunks(self._distances, places[order])
-        return result
+        return shaped(result, shape)
 
     def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """(n,) whether (n, 3) points are inside.
+        """(...) whether (..., 3) points are inside.
 
         Examples
         --------
@@ -154,10 +164,11 @@ class Solid(Frozen, ShortRepr):
         >>> complete(samples.without_faces(samples.sphere(3), 0.2)).inside([[0.0, 0.0, 0.5], [0.0, 0.0, 2.0]])
         array([ True, False])
         """
-        return self.windings.inside(_checked(points))
+        places, shape = query_points(points, 3)
+        return shaped(self.windings.inside(places), shape)
 
     def closest(self, points: ArrayLike) -> Closest:
-        """The nearest place for each of (n, 3) points.
+        """The nearest place for each of (..., 3) points.
 
         Raises
         ------
@@ -171,14 +182,14 @@ class Solid(Frozen, ShortRepr):
         >>> found.points.round(3).tolist(), found.gradients.round(3).tolist()
         ([[0.0, 0.0, 1.0]], [[0.0, 0.0, 1.0]])
         """
-        places = _checked(points)
+        places, shape = query_points(points, 3)
         order = order_in_space(places)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
         results = (
             [part[back] for part in in_chunks(self._closest, places[order])] if len(places) else self._closest(places)
         )
-        return Closest(*results)
+        return Closest(*(shaped(values, shape) for values in results))
 
     def field(
         self,
@@ -384,10 +395,6 @@ class Solid(Frozen, ShortRepr):
             given = origins >= 0
             weights[given] = weights_in(self.source.vertices[self.source.faces[origins[given]]], found.places[given])
         return signs * lengths, found.places, origins, weights, gradients, self.confidence[ids]
-
-
-def _checked(points: ArrayLike) -> NDArray[np.float64]:
-    return query_points(points, 3).reshape(-1, 3)
 
 
 def _mesh(triangles: NDArray[np.float64]) -> TriangleMesh:
