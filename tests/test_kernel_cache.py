@@ -14,7 +14,7 @@ import pytest
 
 import signedheat as sh
 from signedheat import compiled
-from signedheat.compiled import Kernel, announce
+from signedheat.compiled import Kernel
 
 SCALING = """
 from signedheat.compiled import compiled
@@ -45,18 +45,17 @@ def cache(tmp_path, monkeypatch):
 @pytest.fixture
 def shifted(tmp_path, monkeypatch):
     """Makes a kernel that calls one of another file, as a fresh process would; tells what was compiled."""
-    told = []
-    monkeypatch.setattr(type(announce), "__call__", lambda self, name: told.append(name.rpartition(".")[2]))
     monkeypatch.syspath_prepend(str(tmp_path))
 
     def make(factor=2.0, shift=1.0):
-        told.clear()
         for name in ("scaling", "shifting"):
             sys.modules.pop(name, None)
         (tmp_path / "scaling.py").write_text(SCALING.format(factor=factor))
         (tmp_path / "shifting.py").write_text(SHIFTING.format(shift=shift))
         importlib.invalidate_caches()
-        return importlib.import_module("shifting").shifted(3.0), sorted(told)
+        shifting = importlib.import_module("shifting")
+        value, kernels = shifting.shifted(3.0), (shifting.scaled, shifting.shifted)
+        return value, [kernel.__name__ for kernel in kernels if kernel.dispatcher.stats.cache_misses]
 
     monkeypatch.setattr(sys, "dont_write_bytecode", True)  # files of the same size and second are told apart
     return make
@@ -163,6 +162,16 @@ def test_numbers_of_threads_that_are_none(monkeypatch, threads, cache, shifted):
     with pytest.raises(sh.errors.SignedHeatError) as caught:
         shifted()
     assert caught.value.element == "NUMBA_NUM_THREADS" and caught.value.remedy
+
+
+def test_compiling_is_logged_once(cache, shifted, caplog, capfd, monkeypatch):
+    """On the logger of the package, and nowhere else where nobody sits before it."""
+    monkeypatch.setattr(compiled, "announce", type(compiled.announce)("compiling what this needs"))
+    with caplog.at_level("INFO", logger="signedheat"):
+        shifted()
+        shifted(shift=5.0)
+    assert [record.levelname for record in caplog.records if "compiling" in record.message] == ["INFO"]
+    assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a terminal")

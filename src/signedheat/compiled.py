@@ -47,7 +47,7 @@ made: list[Kernel[..., Any]] = []
 """The kernels that this process has used."""
 
 
-announce = Announcement("compiling what this needs, once (signedheat warmup compiles all)", "compiling %s")
+announce = Announcement("compiling what this needs, once (signedheat warmup compiles all)")
 
 
 class Kernel(Generic[Parameters, Returned]):
@@ -89,8 +89,13 @@ class Kernel(Generic[Parameters, Returned]):
         with _LOCK:
             _prepare()
             made.append(self)
+            if numba.config.DISABLE_JIT:
+                return self.function
             if Kernel.is_kept and Path(self.function.__code__.co_filename).is_file():  # not what was typed in
-                wanted, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(cache_folder() / _digest(self))
+                folder = cache_folder() / _digest(self)
+                if not any(folder.glob("*/*.nbi")):
+                    announce()
+                wanted, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
                 try:
                     return numba.njit(cache=True, **self.options)(self.function)
                 except RuntimeError as error:  # no folder can be written to
@@ -201,9 +206,6 @@ class _Listener:
             if event.is_end and vars(self.held).pop("lock", None):
                 _unlock()
         elif event.is_start:
-            function = event.data["dispatcher"].py_func
-            if any(function is kernel.function for kernel in made):
-                announce(f"{function.__module__}.{function.__qualname__}")
             if self.depth == 0:
                 self.was_on = gc.isenabled()
                 gc.disable()

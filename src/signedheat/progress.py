@@ -16,24 +16,30 @@ Result = TypeVar("Result")
 
 logger = logging.getLogger("signedheat")
 
+CLEAR_LINE = "\r\x1b[2K"
+"""What takes a progress bar off a terminal."""
+
 Progress = Callable[[float, str], None]
 """Called with the fraction done, from 0 to 1, and the name of the step that begins."""
 
 
 class Announcement:
-    """Prints something on a terminal, once in a process; each time in the log, with what it is about."""
+    """A line that is said once in a process: in the log, and to whoever sits before a terminal or a notebook."""
 
     are_wanted = True
-    """Whether any are; not where nothing but results are to be printed."""
+    """Whether any are printed; not where nothing but results are to be."""
 
-    def __init__(self, text: str, logged: str) -> None:
-        self._text, self._logged, self._is_printed = text, logged, False
+    def __init__(self, text: str) -> None:
+        self._text, self._is_made = text, False
 
-    def __call__(self, about: object) -> None:
-        logger.info(self._logged, about)
-        if self.are_wanted and not self._is_printed and sys.stderr is not None and sys.stderr.isatty():
-            self._is_printed = True
-            sys.stderr.write(f"\r\x1b[2Ksignedheat: {self._text}\n")
+    def __call__(self) -> None:
+        if self._is_made:
+            return
+        self._is_made = True
+        logger.info(self._text)
+        is_terminal = sys.stderr is not None and sys.stderr.isatty()
+        if self.are_wanted and (is_terminal or "ipykernel" in sys.modules):
+            sys.stderr.write(f"{CLEAR_LINE if is_terminal else ''}signedheat: {self._text}\n")
 
 
 class Stopwatch:

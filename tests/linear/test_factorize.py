@@ -190,7 +190,7 @@ def test_where_pardiso_would_pay_it_is_named_once(monkeypatch):
     monkeypatch.setattr(linear, "LARGE", 5)
     monkeypatch.setattr(linear, "HAS_MKL", True)
     monkeypatch.setattr(linear, "available_backends", lambda: ["superlu"])
-    monkeypatch.setattr(linear, "advise", Announcement("pip install mkl", "%d"))
+    monkeypatch.setattr(linear, "advise", Announcement("pip install mkl"))
     monkeypatch.setattr("sys.stderr", Terminal())
     factorize(matrix, backend="superlu")
     factorize(matrix[:4, :4])

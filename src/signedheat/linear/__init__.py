@@ -35,9 +35,7 @@ LARGE = 40_000
 """Unknowns from which PARDISO is worth its size: SuperLU takes 1.3 times its time there, 2.5 times at 160,000."""
 HAS_MKL = platform.machine() in ("x86_64", "AMD64") and sys.platform != "darwin"
 """Whether there is an MKL for this machine."""
-advise = Announcement(
-    "pip install mkl makes large surfaces and tets up to 2.5 times as fast", "SuperLU factorises %d unknowns"
-)
+advise = Announcement("pip install mkl makes large surfaces and tets up to 2.5 times as fast")
 
 
 class Factor(Protocol):
@@ -126,5 +124,5 @@ def factorize(
     if name == "cholmod":
         return CholmodFactor(upper, order)
     if upper.shape[0] >= LARGE and backend is None and HAS_MKL:
-        advise(upper.shape[0])
+        advise()
     return SuperLUFactor(upper, order)
