@@ -119,3 +119,52 @@ def test_info_of_voxels_in_an_array(tmp_path, capsys):
     assert main(["info", str(tmp_path / "box.npy"), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["kind"], found["n_faces"], found["open_edges"], found["area"]) == ("DigitalSurface", 22, 0, 22.0)
+
+
+def test_alone_it_says_what_it_can(capsys):
+    assert main([]) == 0
+    printed, said = capsys.readouterr()
+    assert "watertight" in printed and "usage" in printed and said == ""
+
+
+def test_info_of_a_folder(tmp_path, ball, capsys):
+    (tmp_path / "inner").mkdir()
+    samples.sphere(1).save(tmp_path / "inner" / "small.stl")
+    (tmp_path / "notes.txt").write_text("no shape")
+    assert main(["info", str(tmp_path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["files"]
+    assert [each["file"] for each in found] == [ball, str(tmp_path / "inner" / "small.stl")]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["offset", "ball.ply", "0.1", "-o", "ball.ply"],
+        ["volume", "ball.ply", "-o", "./ball.ply"],
+        ["watertight", "ball.ply", "-o", "ball.ply"],
+        ["watertight", "ball.ply", "-o", ".", "--surface", "ply"],
+        ["deviation", "ball.ply", "ball.ply", "-o", "table.csv", "ball.ply"],
+    ],
+    ids=" ".join,
+)
+def test_an_output_that_is_the_input_is_refused(tmp_path, ball, capsys, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    before = (tmp_path / "ball.ply").read_bytes()
+    assert main(command) in (1, 2)
+    assert "replace" in capsys.readouterr().err
+    assert (tmp_path / "ball.ply").read_bytes() == before
+
+
+@pytest.mark.parametrize("order", ["shapes first", "outputs first", "outputs between", "each with its own option"])
+def test_several_outputs_of_deviation(tmp_path, ball, capsys, order):
+    outputs = [str(tmp_path / "table.csv"), str(tmp_path / "coloured.ply")]
+    command = {
+        "shapes first": [ball, ball, "-o", *outputs],
+        "outputs first": ["-o", *outputs, ball, ball],
+        "outputs between": [ball, "-o", *outputs, ball],
+        "each with its own option": [ball, ball, "-o", outputs[0], "-o", outputs[1]],
+    }[order]
+    assert main(["deviation", *command, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["output"] == outputs
+    assert all((tmp_path / name).stat().st_size for name in ("table.csv", "coloured.ply"))
+    assert main(["deviation", ball]) == 2

@@ -78,3 +78,52 @@ def test_samples_for_trainers(tmp_path, folder, capsys):
     figures(tmp_path, capsys, folder / "plank.ply", "--sample", "300", "--normalize")
     with np.load(tmp_path / "out" / "plank_surface.npz") as on:
         assert np.linalg.norm(on["random_surface"][:, :3], axis=1).max() <= 1
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_one_shape_goes_into_a_file(tmp_path, folder, capsys):
+    target = tmp_path / "whole.ply"
+    command = ["watertight", str(folder / "plank.ply"), "-o", str(target), "--workers", "1"]
+    assert main([*command, "--sample", "50"]) == 0
+    printed, said = capsys.readouterr()
+    assert printed.startswith(f"{target}: 1 body, volume 1.3") and printed.count("\n") == 1 and said == ""
+    assert_closed_manifold(sh.read(target))
+    made = {"whole.ply", "whole_sdf.npz", "whole_surface.npz", "in"}
+    assert {path.name for path in tmp_path.iterdir()} == made
+    assert main([*command, "--json"]) == 0
+    (shape,) = json.loads(capsys.readouterr().out)["shapes"]
+    assert shape["output"] == [str(target)]
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_folders_are_named_as_such(tmp_path, folder, capsys):
+    plank = str(folder / "plank.ply")
+    for name in ("whole.stl/", "whole"):
+        assert main(["watertight", plank, "-o", f"{tmp_path}/{name}", "--workers", "1"]) == 0
+        assert (tmp_path / name / "plank.stl").is_file()
+    capsys.readouterr()
+    for inputs in ([plank, str(folder / "ball.stl")], [str(folder)]):
+        assert main(["watertight", *inputs, "-o", str(tmp_path / "both.stl")]) == 2
+        assert "folder" in capsys.readouterr().err
+    assert main(["watertight", plank, "-o", str(tmp_path / "a.stl"), "--surface", "obj"]) == 2
+    assert not (tmp_path / "both.stl").exists() and not (tmp_path / "a.stl").exists()
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_one_label_of_an_image(tmp_path, capsys):
+    """Where the image is: turned and moved."""
+    nrrd = pytest.importorskip("nrrd")
+    labels = np.zeros((8, 9, 10), dtype=np.uint8)
+    labels[2:6, 2:6, 2:6], labels[6:8] = 3, 1
+    turned = np.array([[0, 0.5, 0], [-0.5, 0, 0], [0, 0, 0.5]])
+    header = {"space": "left-posterior-superior", "space directions": turned, "space origin": np.array([10, 20, 30.0])}
+    nrrd.write(str(tmp_path / "labels.nrrd"), labels, header)
+    target = tmp_path / "three.stl"
+    command = ["watertight", str(tmp_path / "labels.nrrd"), "-o", str(target), "--workers", "1"]
+    assert main([*command, "--label", "3"]) == 0
+    bounds = sh.read(target).bounds
+    middle = np.array([10, 20, 30]) + np.array([3.5, 3.5, 3.5]) @ turned
+    assert bounds.mean(axis=0) == pytest.approx(middle, abs=0.02)
+    assert bounds[1] - bounds[0] == pytest.approx([2, 2, 2], abs=0.1)
+    assert main(command) == 1
+    assert "label" in capsys.readouterr().err

@@ -23,7 +23,7 @@ class Input:
     name: str
 
 
-def expand(inputs: Iterable[str | os.PathLike[str]], results: Path) -> list[Input]:
+def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None) -> list[Input]:
     """Every shape among files, folders and patterns, once, in order.
 
     Folders, with those in them, give the files whose extensions are those of shapes; files that are named are taken
@@ -69,11 +69,11 @@ def named_path(name: str | os.PathLike[str]) -> Path:
     return Path(name)
 
 
-def _files(path: Path, results: Path) -> tuple[list[Path], Path]:
+def _files(path: Path, results: Path | None) -> tuple[list[Path], Path]:
     """Files, and the folder that their names are relative to."""
     if path.is_dir():
-        avoided = os.path.realpath(results)
-        if Path(os.path.realpath(path)).is_relative_to(avoided):
+        avoided = None if results is None else os.path.realpath(results)
+        if avoided is not None and Path(os.path.realpath(path)).is_relative_to(avoided):
             raise FileFormatError(
                 "results would lie among the shapes, and be taken for some the next time",
                 remedy="name another folder for them, such as one in this one",
@@ -81,7 +81,9 @@ def _files(path: Path, results: Path) -> tuple[list[Path], Path]:
             )
         inner = (Path(folder, name) for folder, _, names in os.walk(path, onerror=_fail) for name in names)
         shapes = sorted(file for file in inner if extension(file) in READERS and _is_file_or_broken_link(file))
-        return [file for file in shapes if not Path(os.path.realpath(file)).is_relative_to(avoided)], path
+        if avoided is not None:
+            shapes = [file for file in shapes if not Path(os.path.realpath(file)).is_relative_to(avoided)]
+        return shapes, path
     if path.exists() or not MAGIC & set(str(path)):
         return [path], path.parent  # whether it can be read is for its worker to say
     fixed = next(k for k, part in enumerate(path.parts) if MAGIC & set(part))

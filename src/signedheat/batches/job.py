@@ -19,8 +19,9 @@ from ..fields.grid_field import GridField
 from ..io.arrays import write_npz
 from ..io.fields import BAND_FORMATS
 from ..io.figures import describe, shape_figures
-from ..io.files import distinct_names
+from ..io.files import distinct_names, extension
 from ..io.shapes import read, save
+from ..io.voxels import LABEL_FORMATS, read_labels
 from ..solids.complete import complete
 from ..solids.distance import distance_to_shapes
 from ..solids.sampling import WIDTHS, Layout, sample
@@ -216,6 +217,8 @@ class Watertight:
         the volume, near the surface and near sharp edges, and their signed distances.
     normalize : bool
         Move and scale the shape into the unit sphere, for the samples.
+    label : float, optional
+        Of an image of labels, the voxels with this one; the surface lies where the image does.
 
     Examples
     --------
@@ -236,6 +239,7 @@ class Watertight:
     spacing: float | None = None
     samples: int | None = None
     normalize: bool = False
+    label: float | None = None
 
     def __post_init__(self) -> None:
         if self.samples is not None:
@@ -247,8 +251,11 @@ class Watertight:
 
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
         """Make it of one shape, in a file that begins with `stem`; figures, and all notes under "notes"."""
-        shape = read(path)
-        solid = complete(shape.smooth_surface if isinstance(shape, DigitalSurface) else shape)
+        if extension(path) in LABEL_FORMATS:
+            image = read_labels(path)
+            solid = complete(image.to_world(image.surface(self.label)))
+        else:
+            solid = complete(read(path))
         names = ("thickness", "contoured", "tolerance", "resolution", "spacing")
         options = {name: getattr(self, name) for name in names}
         with warnings.catch_warnings(record=True) as caught:

@@ -24,7 +24,7 @@ from pathlib import Path
 from signal import SIG_IGN, SIGINT, Signals, signal
 from typing import Any
 
-from ..errors import MemoryLimitError, SignedHeatError
+from ..errors import FileFormatError, MemoryLimitError, SignedHeatError
 from ..io.files import move_into_place, replaceable, writing
 from .inputs import Input
 from .manifest import Outcome, State, source_of
@@ -96,6 +96,9 @@ class Task:
         with writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
         for file in made:
+            if os.path.realpath(folder / file.name) == os.path.realpath(self.shape.path):
+                cause = "the result would replace the shape that it is made of"
+                raise FileFormatError(cause, remedy="choose another folder", path=folder / file.name)
             with writing(folder / file.name):
                 replaceable(folder / file.name)
         for file in made:

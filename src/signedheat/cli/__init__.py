@@ -16,7 +16,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import SignedHeatError
-from .options import parser_of
+from .options import parser_of, refuse_output_over_input
 from .terminal import Signals, open_standard_streams, say, write_out
 
 FAILED, BUG = 1, 70
@@ -54,9 +54,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> int:
     """Everything else is imported here, where all that may go wrong is caught."""
-    arguments = parser_of(import_module(f"{__name__}.shell").COMMANDS).parse_args(argv)
+    parser = parser_of(import_module(f"{__name__}.shell").COMMANDS)
+    arguments = parser.parse_args(argv)
+    if "run" not in arguments:
+        parser.print_help()
+        return 0
     if arguments.check is not None:
         arguments.check(arguments)
+    refuse_output_over_input(arguments)
     public = import_module("signedheat.public")
     if arguments.preview is not None:
         public.view.ensure_picture_writable(arguments.preview)

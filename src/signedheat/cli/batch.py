@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import tempfile
 from argparse import Namespace
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,6 +14,7 @@ import signedheat as sh
 
 from ..errors import SignedHeatError, SourceError
 from .options import (
+    LABEL,
     METHOD,
     MOST_WORKERS,
     ROOM,
@@ -31,9 +34,10 @@ from .options import (
     whole_number,
     workers,
 )
-from .parts import pool, shapes
+from .parts import files, inputs, pool, shapes
 from .terminal import ProgressBar, say, write_out
 
+SURFACE_FILES = ("stl", "obj", "ply", "off", "vtp")
 MANY = (
     option(
         "inputs",
@@ -41,8 +45,7 @@ MANY = (
         nargs="+",
         help="files, folders with all in them, patterns in quotes; - takes a list from standard input, a line for each",
     ),
-    output("results, and manifest.jsonl", "FOLDER"),
-    option("--surface", choices=("stl", "obj", "ply", "off", "vtp"), default="stl", help="files of surfaces (stl)"),
+    option("--surface", choices=SURFACE_FILES, help="files of surfaces (stl)"),
     workers("processes (one for each processor)"),
     option("--time-limit", type=positive, metavar="S", help="seconds after which a shape is given up"),
 )
@@ -83,6 +86,7 @@ def check_batch(arguments: Namespace) -> None:
     "the same for many shapes",
     "Fields, offsets, samples and reports of many shapes, each in a process of its own, with a manifest of what came "
     "of each. What is done is skipped when the batch is started again.",
+    output("results, and manifest.jsonl", "FOLDER"),
     *(*MANY, WANTED, RUNNING, SAMPLING, ROOM, STEPS, METHOD),
     check=check_batch,
     usage="FILE [FILE ...] -o FOLDER [--volume] [--offset D ...] [--sample] [--info] [options]",
@@ -90,7 +94,7 @@ def check_batch(arguments: Namespace) -> None:
 def batch(arguments: Namespace) -> Summary:
     """Do the job for every shape."""
     options = {"threads": arguments.threads, "scheduler": arguments.scheduler}
-    done = made_of_each(arguments, job_of(arguments), **options)
+    done = made_of_each(arguments, arguments.output, job_of(arguments), **options)
     states = [outcome.state for outcome in done.outcomes]
     counts = {state: states.count(state) for state in dict.fromkeys(states)}
     seconds = sum(outcome.seconds for outcome in done.outcomes)
@@ -108,6 +112,22 @@ def batch(arguments: Namespace) -> Summary:
     return summary, f"{done.manifest}: {len(states)} shapes, {each}{before}, {pool.duration(seconds)} of work"
 
 
+def names_surface(output: str) -> bool:
+    """Whether an output is the name of a surface's file, and not of a folder."""
+    is_folder = output.endswith(("/", os.sep)) or os.path.isdir(output)
+    return not is_folder and Path(output).suffix.lower().lstrip(".") in SURFACE_FILES
+
+
+def check_watertight(arguments: Namespace) -> None:
+    """Reject options that contradict each other; take the format from the name of the output."""
+    refuse_together(arguments, "--spacing", "--resolution")
+    if names_surface(arguments.output):
+        ending = Path(arguments.output).suffix.lower().lstrip(".")
+        if arguments.surface not in (None, ending):
+            arguments.parser.error(f"--surface {arguments.surface} and -o {arguments.output} do not go together")
+        arguments.surface = ending
+
+
 @command(
     "watertight",
     "closed meshes of broken shapes",
@@ -115,7 +135,8 @@ def batch(arguments: Namespace) -> Summary:
     "from the faces that were given, and back. Faces are kept where they bound the solid and join with its completion; "
     "elsewhere the surface is contoured with its edges and corners. Sheets are refused unless they are given a "
     "thickness.",
-    *MANY,
+    output("a file for one shape; or a folder for the files of many, and manifest.jsonl"),
+    *(*MANY, LABEL),
     option("--thickness", type=positive, metavar="D", help="of the solids around sheets"),
     option("--contour", action="store_true", help="contour everything: even triangles in place of few"),
     option("--tolerance", type=positive, metavar="D", help="fewer triangles, no farther away than this (manifold3d)"),
@@ -129,12 +150,13 @@ def batch(arguments: Namespace) -> Summary:
         "in the volume and near both with distances",
     ),
     option("--normalize", action="store_true", help="move and scale the shape of the samples into the unit sphere"),
-    check=lambda arguments: refuse_together(arguments, "--spacing", "--resolution"),
+    check=check_watertight,
+    usage="FILE [FILE ...] -o OUT [options]",
 )
 def watertight(arguments: Namespace) -> Summary:
     """Do it for every shape; a line for each."""
     job = sh.batches.Watertight(
-        surfaces=f".{arguments.surface}",
+        surfaces=f".{arguments.surface or 'stl'}",
         thickness=arguments.thickness,
         contoured=arguments.contour,
         tolerance=arguments.tolerance,
@@ -142,8 +164,11 @@ def watertight(arguments: Namespace) -> Summary:
         spacing=arguments.spacing,
         samples=arguments.sample,
         normalize=arguments.normalize,
+        label=arguments.label,
     )
-    done = made_of_each(arguments, job, in_words)
+    if names_surface(arguments.output):
+        return one_watertight(arguments, job)
+    done = made_of_each(arguments, arguments.output, job, in_words)
     summary = {
         "inputs": arguments.inputs,
         "manifest": str(done.manifest),
@@ -153,6 +178,31 @@ def watertight(arguments: Namespace) -> Summary:
     }
     closed = len(done.outcomes) - len(done.failures)
     return summary, f"{done.manifest}: {closed} of {len(done.outcomes)} shapes closed"
+
+
+def one_watertight(arguments: Namespace, job: sh.batches.Watertight) -> Summary:
+    """Do it for one shape, in files that are named after the output."""
+    target = Path(arguments.output)
+    n_shapes = len(inputs.expand(listed(arguments.inputs)))
+    if n_shapes != 1:
+        arguments.parser.error(f"{n_shapes} shapes do not go into one file: name a folder, such as -o {target.stem}/")
+    sh.io.ensure_writable(target, {target.suffix.lower()}, "a surface")
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}-") as folder:
+        done = made_of_each(arguments, folder, job)
+        (outcome,) = done.outcomes
+        stem = Path(outcome.name).name
+        names = {made: target.with_name(target.stem + Path(made).name.removeprefix(stem)) for made in outcome.outputs}
+        for made, name in names.items():
+            files.move_into_place(Path(folder, made), name)
+    written = [str(name) for name in names.values()]
+    summary = {
+        "inputs": arguments.inputs,
+        "manifest": None,
+        "shapes": [{"output": written, **outcome.figures}] if outcome.is_done else [],
+        "skipped": 0,
+        "failed": len(done.failures),
+    }
+    return summary, f"{target}: {in_words(dict(outcome.figures))}" if outcome.is_done else ""
 
 
 def in_words(figures: dict[str, object]) -> str:
@@ -169,6 +219,7 @@ def in_words(figures: dict[str, object]) -> str:
 
 def made_of_each(
     arguments: Namespace,
+    folder: str,
     job: Callable[[Path, Path], Mapping[str, object]],
     line: Callable[[dict[str, object]], str] | None = None,
     **options: Any,
@@ -190,7 +241,7 @@ def made_of_each(
 
         return sh.batches.run(
             listed(arguments.inputs),
-            arguments.output,
+            folder,
             job,
             workers=arguments.workers,
             time_limit=arguments.time_limit,
@@ -228,7 +279,7 @@ def job_of(arguments: Namespace) -> sh.batches.Job:
     return sh.batches.Job(
         volume=f".{arguments.volume}" if arguments.volume else None,
         offsets=tuple(arguments.offset),
-        surfaces=f".{arguments.surface}",
+        surfaces=f".{arguments.surface or 'stl'}",
         samples=sampling,
         resolution=arguments.resolution or sh.batches.Job.resolution,
         spacing=spacing[0] if spacing is not None and len(spacing) == 1 else spacing,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from argparse import Namespace
+from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import SignedHeatError
 from .options import Summary, command, option, whole_number
-from .parts import reports
+from .parts import inputs, reports
 from .terminal import say_error
 
 CURVES = (".json",)
@@ -33,7 +35,7 @@ def check_files(arguments: Namespace) -> None:
         "files",
         metavar="FILE",
         nargs="+",
-        help="shapes, polylines in the plane or fields; a .json file after a shape has curves on it",
+        help="shapes, polylines in the plane, fields, folders of shapes; a .json file after a shape has curves on it",
     ),
     option("--curves", metavar="CURVES", help="curves on the shape: .json .obj .csv"),
     option(
@@ -49,6 +51,7 @@ def check_files(arguments: Namespace) -> None:
 )
 def info(arguments: Namespace) -> Summary:
     """Inspect files; of several, those that cannot be read do not stop the others."""
+    arguments.files = list(_without_folders(arguments.files))
     if len(arguments.files) == 1:
         return reports.report(arguments.files[0], arguments)
     summaries, texts, failed = [], [], 0
@@ -62,3 +65,9 @@ def info(arguments: Namespace) -> Summary:
             summaries.append(summary)
             texts.append(text)
     return {"files": summaries, "failed": failed}, "\n\n".join(texts)
+
+
+def _without_folders(names: list[str]) -> Iterator[str]:
+    """The names, with the shapes in a folder in place of it."""
+    for name in names:
+        yield from (str(found.path) for found in inputs.expand([name])) if os.path.isdir(name) else (name,)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import re
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Mapping
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
 from .. import __version__
+from ..errors import FileFormatError
 from .terminal import say, write_out
 
 Summary: TypeAlias = tuple[dict[str, Any], str]
@@ -137,7 +139,7 @@ def parser_of(commands: Iterable[Command]) -> Parser:
     )
     whole.add_argument("--version", action="version", version=f"signedheat {__version__}")
     whole.set_defaults(whole=whole)
-    added = whole.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
+    added = whole.add_subparsers(metavar="COMMAND", parser_class=Parser)
     for each in commands:
         each.add_to(added)
     return whole
@@ -151,6 +153,24 @@ def option(*names: str, **settings: Any) -> Option:
 def group(title: str, *options: Option) -> Group:
     """Options under a title of their own."""
     return Group(title, options)
+
+
+INPUTS = ("shape", "mesh", "field", "file", "files", "inputs", "curves", "scan", "nominal", "mask", "tets")
+"""Arguments that may name a file that is read."""
+
+
+def refuse_output_over_input(arguments: Namespace) -> None:
+    """Raise `FileFormatError` if a file that would be written is one that is read."""
+    for written in _names(getattr(arguments, "output", None)):
+        for read in (name for argument in INPUTS for name in _names(getattr(arguments, argument, None))):
+            if written != "-" and os.path.realpath(written) == os.path.realpath(read) and not os.path.isdir(read):
+                raise FileFormatError("the output would replace the input", remedy="name another file", path=written)
+
+
+def _names(value: Any) -> list[str]:
+    """The names of files in the value of an argument, but for those that cannot be any."""
+    values = value if isinstance(value, list) else [value]
+    return [name for name in values if isinstance(name, str) and "\0" not in name]
 
 
 def output(help: str, metavar: str = "OUT") -> Option:

@@ -16,10 +16,12 @@ if TYPE_CHECKING:
     from .. import diagnostics as diagnostics
     from .. import parallel as parallel
     from .. import samples as samples
+    from ..batches import inputs as inputs
     from ..batches import pool as pool
     from ..curves import close as close
     from ..curves import distance as distance
     from ..domains import inspection as inspection
+    from ..io import files as files
     from ..lowering.surface import discretization as discretization
     from . import kernel_runs as kernel_runs
     from . import reports as reports
@@ -28,7 +30,8 @@ else:
     numpy = lazy_module("numpy", "commands")
     PARTS = {
         **{"compiled": "compiled", "diagnostics": "diagnostics", "parallel": "parallel", "samples": "samples"},
-        **{"pool": "batches.pool", "inspection": "domains.inspection"},
+        **{"inputs": "batches.inputs", "pool": "batches.pool"},
+        **{"inspection": "domains.inspection", "files": "io.files"},
         **{"close": "curves.close", "distance": "curves.distance"},
         **{"discretization": "lowering.surface.discretization"},
         **{"kernel_runs": "cli.kernel_runs", "reports": "cli.reports", "shapes": "cli.shapes"},

@@ -7,7 +7,7 @@ import os
 import time
 import warnings
 from argparse import Namespace
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from multiprocessing import get_context
 
 from ..progress import Announcement
@@ -17,7 +17,7 @@ from .info import info
 from .options import Command, Summary, command, is_quiet, option
 from .parts import compiled, kernel_runs, parallel
 from .solids import contour, morph, offset, sample, volume
-from .terminal import ProgressBar
+from .terminal import ProgressBar, say
 from .view import demo, deviation, view
 
 BASH = """_signedheat() {{
@@ -45,6 +45,8 @@ REPLIES = {
     "bash": 'mapfile -t COMPREPLY < <(compgen -W "$offered" -- "$word")',
     "zsh": 'COMPREPLY=($(compgen -W "$offered" -- "$word"))',  # it has no mapfile
 }
+TICK = 0.5
+"""Seconds after which the progress of compiling is drawn again."""
 BEFORE = {"bash": "", "zsh": "autoload -U +X bashcompinit && bashcompinit\n"}
 
 
@@ -101,10 +103,18 @@ def warmup(arguments: Namespace) -> Summary:
         ProgressBar(is_quiet(arguments)) as progress,
         ProcessPoolExecutor(parallel.n_threads(), get_context("spawn")) as pool,
     ):
-        jobs = [pool.submit(_job, name) for name in kernel_runs.JOBS]
-        for number, job in enumerate(as_completed(jobs)):
-            job.result()
-            progress((number + 1) / len(jobs), "compile")
+        names = {pool.submit(_job, name): name for name in kernel_runs.JOBS}
+        waiting = set(names)
+        while waiting:
+            n_done = len(names) - len(waiting)
+            progress(n_done / len(names), f"compiling, {n_done} of {len(names)} parts done")
+            done, waiting = wait(waiting, TICK, FIRST_COMPLETED)
+            for job in done:
+                job.result()
+                n_done += 1
+                if not is_quiet(arguments):
+                    progress.clear()
+                    say(f"signedheat: compiled {n_done} of {len(names)}: {names[job]}")
     seconds, cpu = time.perf_counter() - begin, sum(os.times()[:4]) - spent
     folder = str(compiled.cache_folder())
     summary = {"seconds": round(seconds, 2), "cpu_seconds": round(cpu, 2), "folder": folder}

@@ -100,22 +100,39 @@ def shape_or_field(path: str) -> Any:
     return thing
 
 
+def check_deviation(arguments: Namespace) -> None:
+    """Take SCAN and NOMINAL from behind the outputs, if those came first; reject a line without them."""
+    shapes_named = [name for name in (arguments.scan, arguments.nominal) if name is not None]
+    missing = 2 - len(shapes_named)
+    if missing:
+        shapes_named += arguments.output[-missing:]
+        del arguments.output[-missing:]
+    if len(shapes_named) != 2:
+        arguments.parser.error("the following arguments are required: SCAN, NOMINAL")
+    arguments.scan, arguments.nominal = shapes_named
+
+
 @command(
     "deviation",
     "how far a scan is off a nominal part",
     "Signed distances of a scan's points to a nominal part, positive outside of it: percentiles; the scan in colours, "
     "a picture with the histogram, or a table. Both must be in one place: nothing is aligned.",
-    option("scan", metavar="SCAN", help="mesh or points: .stl .obj .ply .off .vtp .glb .xyz .pcd .las .laz .e57"),
-    option("nominal", metavar="NOMINAL", help="the part as it should be, broken or not, also .step"),
+    option(
+        "scan", metavar="SCAN", nargs="?", help="mesh or points: .stl .obj .ply .off .vtp .glb .xyz .pcd .las .laz .e57"
+    ),
+    option("nominal", metavar="NOMINAL", nargs="?", help="the part as it should be, broken or not, also .step"),
     option(
         "-o",
         "--output",
         metavar="OUT",
-        action="append",
+        nargs="+",
+        action="extend",
         default=[],
-        help="coloured .ply, picture .png .pdf .svg .jpg, or table .csv; may be given several times",
+        help="any of: coloured .ply, picture .png .pdf .svg .jpg, table .csv",
     ),
     option("--tolerance", type=positive, metavar="T", help="say which share of the points is within it"),
+    check=check_deviation,
+    usage="SCAN NOMINAL [-o OUT ...] [--tolerance T]",
 )
 def deviation(arguments: Namespace) -> Summary:
     """Read, check that the result can be written, measure, write."""
