@@ -17,7 +17,7 @@ PACKAGE = Path(signedheat.__file__).parent
 
 FLOORS = [
     {"cache", "compiled", "diagnostics", "errors", "frozen", "memory"}
-    | {"jobs", "packages", "parallel", "progress", "reprs"},
+    | {"jobs", "packages", "parallel", "processes", "progress", "reprs"},
     {"geometry"},
     {"linear"},
     {"operators"},

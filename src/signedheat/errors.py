@@ -8,6 +8,17 @@ import warnings
 from typing import TypeVar
 
 
+def printable(text: str) -> str:
+    """Text with its control characters escaped: what a file holds or is called must not drive a terminal.
+
+    Examples
+    --------
+    >>> print(printable("two\\nlines, café"))
+    two\\nlines, café
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
 class SignedHeatError(ValueError):
     """Base class of every error that signedheat raises for bad input.
 
@@ -39,13 +50,13 @@ class SignedHeatError(ValueError):
         element: str | None = None,
         path: str | os.PathLike[str] | None = None,
     ) -> None:
-        cause = " ".join(cause.split())  # one line, whatever was quoted
+        cause = printable(" ".join(cause.split()))  # one line, whatever was quoted
         super().__init__(cause)
         self.cause, self.remedy, self.element = cause, remedy, element
         self.path = None if path is None else str(path)
 
     def __str__(self) -> str:
-        return ": ".join(part for part in (self.path, self.cause, self.remedy) if part is not None)
+        return ": ".join(printable(part) for part in (self.path, self.cause, self.remedy) if part is not None)
 
     def at(self: AnyError, path: str | os.PathLike[str]) -> AnyError:
         """The same error, about a file."""
@@ -109,4 +120,4 @@ def warn_user(message: str, category: type[Warning]) -> None:
     depth, frame = 2, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in within:
         frame, depth = frame.f_back, depth + 1
-    warnings.warn(message, category, stacklevel=depth)
+    warnings.warn(printable(" ".join(message.split())), category, stacklevel=depth)

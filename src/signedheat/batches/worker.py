@@ -24,8 +24,9 @@ from pathlib import Path
 from signal import SIG_IGN, SIGINT, Signals, signal
 from typing import Any
 
-from ..errors import FileFormatError, MemoryLimitError, SignedHeatError
+from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, printable
 from ..io.files import move_into_place, replaceable, writing
+from ..processes import command_for
 from .inputs import Input
 from .manifest import Outcome, State, source_of
 
@@ -71,9 +72,9 @@ class Task:
             except MemoryError:
                 message, is_starved = "there was not enough memory", True
             except (SignedHeatError, OSError) as error:
-                message, is_starved = " ".join(str(error).split()), isinstance(error, MemoryLimitError)
+                message, is_starved = printable(str(error)), isinstance(error, MemoryLimitError)
             except Exception as error:
-                message = " ".join(f"{type(error).__name__}: {error}".split())
+                message = printable(" ".join(f"{type(error).__name__}: {error}".split()))
         shutil.rmtree(self.scratch, ignore_errors=True)
         figures = figures if state == "done" else {}
         return self.outcome(state, time.perf_counter() - begin, message, tuple(outputs), figures), is_starved
@@ -188,17 +189,16 @@ class Worker:
         if code < 0 and Signals(-code).name == "SIGKILL":
             return "its process was killed, as it is where memory ends"
         last = next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
-        return f"its process died (status {code}: {last:.200})"
+        return printable(f"its process died (status {code}: {last:.200})")
 
     def _started(self) -> subprocess.Popen[bytes]:
         self._errors = tempfile.TemporaryFile()
-        path = os.pathsep.join(path for path in sys.path if path)
         return subprocess.Popen(
-            [sys.executable, "-c", f"from {__name__} import serve; serve()"],
+            command_for(f"{__name__}:serve"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
-            env={**os.environ, **dict.fromkeys(THREADS, str(self.threads)), "PYTHONPATH": path},
+            env={**os.environ, **dict.fromkeys(THREADS, str(self.threads))},
         )
 
 

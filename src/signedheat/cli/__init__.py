@@ -15,7 +15,7 @@ from importlib import import_module
 from pathlib import Path
 
 from .. import __version__
-from ..errors import SignedHeatError
+from ..errors import SignedHeatError, printable
 from .options import parser_of, refuse_output_over_input
 from .terminal import Signals, open_standard_streams, say, write_out
 
@@ -78,7 +78,7 @@ def _run(argv: Sequence[str] | None) -> int:
 def _say_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
     """A warning on a line of its own; not those of packages about each other, which some have always shown."""
     if sys.warnoptions or not issubclass(category, DeprecationWarning | PendingDeprecationWarning):
-        say(f"signedheat: {' '.join(str(message).split())}")
+        say(printable(f"signedheat: {' '.join(str(message).split())}"))
 
 
 @contextmanager
@@ -100,12 +100,12 @@ def _one_line(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return "there is not enough memory: choose a lower resolution or a smaller shape"
     if _is_expected(error):
-        return " ".join(str(error).split())
+        return printable(str(error))
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     place = f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}" if trace else "nowhere"
-    about = " ".join(f"{type(error).__name__}: {error}".split())
+    about = printable(" ".join(f"{type(error).__name__}: {error}".split()))
     return (
         f"this is a bug in signedheat {__version__} ({about:.200}; {place}), not your mistake: please report it, with "
         "the command and what it prints when SIGNEDHEAT_TRACEBACK=1 is set"

@@ -12,7 +12,7 @@ from typing import Any
 
 import signedheat as sh
 
-from ..errors import SignedHeatError, SourceError
+from ..errors import SignedHeatError, SourceError, printable
 from .options import (
     LABEL,
     METHOD,
@@ -109,7 +109,8 @@ def batch(arguments: Namespace) -> Summary:
     }
     each = ", ".join(f"{number} {state}" for state, number in counts.items())
     before = f" ({done.skipped} of them before)" if done.skipped else ""
-    return summary, f"{done.manifest}: {len(states)} shapes, {each}{before}, {pool.duration(seconds)} of work"
+    counted = f"{len(states)} shapes, {each}{before}, {pool.duration(seconds)} of work"
+    return summary, f"{printable(str(done.manifest))}: {counted}"
 
 
 def names_surface(output: str) -> bool:
@@ -177,7 +178,7 @@ def watertight(arguments: Namespace) -> Summary:
         "failed": len(done.failures),
     }
     closed = len(done.outcomes) - len(done.failures)
-    return summary, f"{done.manifest}: {closed} of {len(done.outcomes)} shapes closed"
+    return summary, f"{printable(str(done.manifest))}: {closed} of {len(done.outcomes)} shapes closed"
 
 
 def one_watertight(arguments: Namespace, job: sh.batches.Watertight) -> Summary:
@@ -234,10 +235,10 @@ def made_of_each(
         def report(outcome: sh.batches.Outcome) -> None:
             if not outcome.is_done:
                 progress.clear()
-                say(f"signedheat: {outcome.input}: {outcome.state}: {outcome.message}")
+                say(printable(f"signedheat: {outcome.input}: {outcome.state}: {outcome.message}"))
             elif line is not None and not is_quiet(arguments):
                 progress.clear()
-                write_out(f"{outcome.outputs[0]}: {line(dict(outcome.figures))}")
+                write_out(printable(f"{outcome.outputs[0]}: {line(dict(outcome.figures))}"))
 
         return sh.batches.run(
             listed(arguments.inputs),

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import signedheat as sh
 
-from ..errors import SourceError
+from ..errors import SourceError, printable
 from .options import (
     UP,
     Option,
@@ -118,7 +118,7 @@ def surface(arguments: Namespace) -> Summary:
     if arguments.preview:
         up = "xyz".index(arguments.up)
         sh.view.save_surface(field, arguments.preview, sources, arguments.contours or 20, up)
-    text = f"{arguments.output}: {len(field.values)} vertices, φ from {low:.4g} to {high:.4g}"
+    text = f"{printable(arguments.output)}: {len(field.values)} vertices, φ from {low:.4g} to {high:.4g}"
     if summary["unreached"]:
         text += f", {summary['unreached']} vertices without any source"
     if summary.get("completed"):
@@ -169,7 +169,9 @@ def close(arguments: Namespace) -> Summary:
         "n_closed": closed,
     }
     curve = "curve" if len(found) == 1 else "curves"
-    return summary, _with_pieces(field, summary, f"{arguments.output}: {len(found)} {curve}, {closed} of them closed")
+    return summary, _with_pieces(
+        field, summary, f"{printable(arguments.output)}: {len(found)} {curve}, {closed} of them closed"
+    )
 
 
 def surface_and_curves(arguments: Namespace) -> tuple[Any, list[Any]]:

@@ -351,7 +351,7 @@ SCHEDULER = option("--scheduler", metavar="ADDRESS", help="a running Dask cluste
 
 
 def workers(help: str) -> Option:
-    """The number of processes."""
+    """The number of processes or threads."""
     return option("--workers", type=whole_number(1, MOST_WORKERS), metavar="N", help=help)
 
 
@@ -363,7 +363,7 @@ TILES = group(
         help="compute the band in tiles, which are kept in this folder: for bands larger than memory; the same command "
         "continues where it was stopped",
     ),
-    workers("processes for them (threads of this one)"),
+    workers("threads that compute them (one for each processor)"),
     SCHEDULER,
 )
 SLICES = option("--preview", metavar="PNG", help="draw the result: in space, three slices")

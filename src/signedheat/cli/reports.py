@@ -16,7 +16,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.segments import segments_of
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import SourceError
+from ..errors import SourceError, printable
 from ..geometry.geodesics.paths import gaps
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import EDGE, FACE, VERTEX, locate_points
@@ -77,7 +77,7 @@ def report(file: str, arguments: Namespace) -> Summary:
                 path=arguments.curves,
             )
         summary["curves"] = curve_reports(shape, read_curves(arguments.curves, shape))
-        text += f"\n\n{arguments.curves}\n{curves_text(summary['curves'])}"
+        text += f"\n\n{printable(arguments.curves)}\n{curves_text(summary['curves'])}"
     return summary, text
 
 
@@ -305,6 +305,6 @@ def _table(summary: dict[str, Any]) -> str:
             value = "yes" if value else "no"
         elif isinstance(value, float):
             value = f"{value:g}"
-        rows.append((key.removeprefix("n_").replace("_", " "), str(value)))
+        rows.append((key.removeprefix("n_").replace("_", " "), printable(str(value))))
     width = max(len(name) for name, _ in rows)
     return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)

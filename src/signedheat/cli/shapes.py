@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import multiprocessing
 from argparse import Namespace
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, overload
@@ -24,7 +23,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
 from ..domains.transforms import transform
-from ..errors import FileFormatError, GeometryError, SignedHeatError, SourceError
+from ..errors import FileFormatError, GeometryError, SignedHeatError, SourceError, printable
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..io import (
@@ -107,7 +106,8 @@ def unit_scale(arguments: Namespace) -> float:
     own, _, wanted = arguments.units.rpartition(":")
     own = own or unit_of(arguments.shape)
     if own is None and not is_quiet(arguments):
-        say(f"signedheat: {arguments.shape} does not say its units: taken as {wanted} (else --units inch:{wanted})")
+        cause = f"{printable(arguments.shape)} does not say its units"
+        say(f"signedheat: {cause}: taken as {wanted} (else --units inch:{wanted})")
     return METRES[own or wanted] / METRES[wanted]
 
 
@@ -198,7 +198,7 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
             field = distance_to_shapes(shape, domain, **options, **repair, progress=progress)
     if not arguments.quiet:
         for note in field.diagnostics.important:
-            say(f"signedheat: {note}")
+            say(printable(f"signedheat: {note}"))
     return field
 
 
@@ -207,7 +207,7 @@ def in_band(solid: Any, grid: Grid, arguments: Namespace, progress: Progress | N
     options = {"grid": grid, "band": arguments.band, "store": arguments.tiles, "progress": progress}
     if arguments.tiles is None or arguments.workers is None:
         return solid.field(scheduler=arguments.scheduler, **options)
-    with ProcessPoolExecutor(arguments.workers, multiprocessing.get_context("spawn")) as pool:
+    with ThreadPoolExecutor(arguments.workers) as pool:
         field = solid.field(scheduler=pool, **options)
         return field
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import os
+import subprocess
 import time
 import warnings
 from argparse import Namespace
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
-from multiprocessing import get_context
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 
+from ..errors import SignedHeatError
+from ..processes import command_for
 from ..progress import Announcement
 from .batch import batch, watertight
 from .curves import close, surface
@@ -97,32 +99,45 @@ def commands_of(whole: argparse.ArgumentParser) -> dict[str, argparse.ArgumentPa
     "in the cache of the user; run it again after an update.",
 )
 def warmup(arguments: Namespace) -> Summary:
-    """Run everything once on small shapes, where the system allows one of each kind, in several processes."""
+    """Run everything once on small shapes, in several processes."""
     begin, spent = time.perf_counter(), sum(os.times()[:4])
     with (
         ProgressBar(is_quiet(arguments)) as progress,
-        ProcessPoolExecutor(parallel.n_threads(), get_context("spawn")) as pool,
+        ThreadPoolExecutor(parallel.n_threads()) as pool,
     ):
-        names = {pool.submit(_job, name): name for name in kernel_runs.JOBS}
+        names = {pool.submit(_run_apart, name): name for name in kernel_runs.JOBS}
         waiting = set(names)
-        while waiting:
-            n_done = len(names) - len(waiting)
-            progress(n_done / len(names), f"compiling, {n_done} of {len(names)} parts done")
-            done, waiting = wait(waiting, TICK, FIRST_COMPLETED)
-            for job in done:
-                job.result()
-                n_done += 1
-                if not is_quiet(arguments):
-                    progress.clear()
-                    say(f"signedheat: compiled {n_done} of {len(names)}: {names[job]}")
+        try:
+            while waiting:
+                n_done = len(names) - len(waiting)
+                progress(n_done / len(names), f"compiling, {n_done} of {len(names)} parts done")
+                done, waiting = wait(waiting, TICK, FIRST_COMPLETED)
+                for job in done:
+                    job.result()
+                    n_done += 1
+                    if not is_quiet(arguments):
+                        progress.clear()
+                        say(f"signedheat: compiled {n_done} of {len(names)}: {names[job]}")
+        finally:
+            for job in waiting:
+                job.cancel()
     seconds, cpu = time.perf_counter() - begin, sum(os.times()[:4]) - spent
     folder = str(compiled.cache_folder())
     summary = {"seconds": round(seconds, 2), "cpu_seconds": round(cpu, 2), "folder": folder}
     return summary, f"everything is compiled, in {seconds:.0f} s; kept in {folder}"
 
 
-def _job(name: str) -> None:
-    """Run one in a process of its own, which announces nothing."""
+def _run_apart(name: str) -> None:
+    """Run a job in a process of its own: compiling occupies one processor of each process."""
+    done = subprocess.run(command_for(f"{__name__}:run_job", name), stdin=subprocess.DEVNULL, capture_output=True)
+    if done.returncode:
+        lines = done.stderr.decode("utf-8", errors="replace").split("\n")
+        cause = next((line for line in reversed(lines) if line.strip()), f"status {done.returncode}")
+        raise SignedHeatError(f"{name} could not be compiled ({cause:.200})", remedy="install numba again")
+
+
+def run_job(name: str) -> None:
+    """Run a job of `warmup` without announcements and warnings."""
     Announcement.are_wanted = False
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # about shapes too small to say anything

@@ -7,6 +7,7 @@ from typing import Any
 
 import signedheat as sh
 
+from ..errors import printable
 from ..packages import require
 from .options import (
     FLAT_SHAPE,
@@ -94,7 +95,7 @@ def volume(arguments: Namespace) -> Summary:
     summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), **shapes.place_of(image)}
     nodes = " × ".join(map(str, field.grid.shape))
     there = "" if arguments.band is None else f" ({summary['nodes']:,} of them there)"
-    text = f"{arguments.output}: {nodes} nodes{there}, {shapes.range_in_words(summary)}"
+    text = f"{printable(arguments.output)}: {nodes} nodes{there}, {shapes.range_in_words(summary)}"
     return summary, text + shapes.hint(field)
 
 
@@ -108,7 +109,7 @@ def _on_tets(arguments: Namespace) -> Summary:
         sh.view.save_slices(field, arguments.preview, shape)
     n_tets = field.mesh.n_tets
     summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), "n_tets": n_tets}
-    return summary, f"{arguments.output}: {n_tets} tets, {shapes.range_in_words(summary)}"
+    return summary, f"{printable(arguments.output)}: {n_tets} tets, {shapes.range_in_words(summary)}"
 
 
 def check_offset(arguments: Namespace) -> None:
@@ -223,7 +224,7 @@ def morph(arguments: Namespace) -> Summary:
     summary = {"input": arguments.shape, "operation": arguments.operation, "distances": arguments.distances}
     summary |= {"output": arguments.output, **shapes.counts(surface)}
     summary |= {"field": shapes.describe(fields[0])} if fields else {}
-    return summary, f"{arguments.output}: {arguments.operation}, closed surface of {surface.n_faces} faces"
+    return summary, f"{printable(arguments.output)}: {arguments.operation}, closed surface of {surface.n_faces} faces"
 
 
 @command(
@@ -248,8 +249,8 @@ def sample(arguments: Namespace) -> Summary:
     figures = taken.figures
     summary = {"input": arguments.shape, "output": arguments.output, **figures, "field": shapes.describe(field)}
     inside = figures["inside_share"]
-    text = f"{arguments.output}: {len(taken.points)} points, {figures['near']} near the surface, {inside:.1%} inside"
-    return summary, text
+    counts = f"{len(taken.points)} points, {figures['near']} near the surface, {inside:.1%} inside"
+    return summary, f"{printable(arguments.output)}: {counts}"
 
 
 @command(
@@ -288,4 +289,4 @@ def contour(arguments: Namespace) -> Summary:
         numbers = shapes.counts(found)
     kind = next(name for name in ("curves", "lines", "faces") if name in numbers)
     summary = {"input": arguments.field, "level": arguments.level, "output": path, **numbers}
-    return summary, f"{path}: {numbers[kind]} {kind}"
+    return summary, f"{printable(path)}: {numbers[kind]} {kind}"

@@ -11,7 +11,7 @@ import time
 from types import FrameType
 from typing import Any, TextIO
 
-from ..errors import FileFormatError
+from ..errors import FileFormatError, printable
 
 PLAIN = str.maketrans(
     {
@@ -33,6 +33,8 @@ PLAIN = str.maketrans(
 )
 """What is written instead of characters that a stream cannot hold."""
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+CLEAR = "\r\x1b[2K"
+"""Takes away what is on the present line of a terminal."""
 APART = 1.0
 """Seconds within which a further signal is taken for the same one."""
 
@@ -47,7 +49,7 @@ def open_standard_streams() -> None:
 
 
 def fitting(text: str, stream: TextIO) -> str:
-    """Text that a stream can hold.
+    """Text that a stream can hold, without control characters other than the ends of lines.
 
     Examples
     --------
@@ -55,6 +57,7 @@ def fitting(text: str, stream: TextIO) -> str:
     >>> fitting("φ at 8 × 8 nodes of café.stl", io.TextIOWrapper(io.BytesIO(), encoding="ascii"))
     'phi at 8 x 8 nodes of caf\\\\xe9.stl'
     """
+    text = "\n".join(map(printable, text.split("\n")))
     encoding = getattr(stream, "encoding", None) or "utf-8"
     try:
         text.encode(encoding)
@@ -63,12 +66,17 @@ def fitting(text: str, stream: TextIO) -> str:
     return text
 
 
-def say(text: str, end: str = "\n") -> None:
+def say(text: str) -> None:
     """Write to standard error; where it is closed or full, nobody can be informed."""
+    _write_error("", text, "\n")
+
+
+def _write_error(before: str, text: str, after: str) -> None:
+    """Write text to standard error, between characters that go there as they are."""
     stream = sys.stderr
     try:
         if stream is not None:
-            stream.write(fitting(text, stream) + end)
+            stream.write(before + fitting(text, stream) + after)
             stream.flush()
     except (OSError, ValueError):
         _abandon(stream)
@@ -76,7 +84,7 @@ def say(text: str, end: str = "\n") -> None:
 
 def say_error(error: BaseException) -> None:
     """Write an error to standard error, in one line."""
-    say(f"signedheat: {' '.join(str(error).split())}")
+    say(printable(f"signedheat: {error}"))
 
 
 def write_out(text: str) -> None:
@@ -128,12 +136,12 @@ class ProgressBar:
         width = max(10, min(40, shutil.get_terminal_size().columns - 36))
         full = round(width * min(max(fraction, 0.0), 1.0))
         seconds = time.perf_counter() - self._begin
-        say(f"\r\x1b[2K{'━' * full}{'╌' * (width - full)} {fraction:4.0%} {seconds:6.1f} s  {step}", end="")
+        _write_error(CLEAR, f"{'━' * full}{'╌' * (width - full)} {fraction:4.0%} {seconds:6.1f} s  {step}", "")
 
     def clear(self) -> None:
         """Take the bar away, for a line of text."""
         if self._is_shown:
-            say("\r\x1b[2K", end="")
+            _write_error(CLEAR, "", "")
 
     def __enter__(self) -> ProgressBar:
         return self

@@ -13,7 +13,7 @@ from typing import Any
 
 import signedheat as sh
 
-from ..errors import FileFormatError, MissingPackageError
+from ..errors import FileFormatError, MissingPackageError, printable
 from ..jobs import run_limited
 from .options import UP, Summary, command, is_quiet, option, positive, whole_number
 from .parts import inspection, samples, shapes
@@ -143,7 +143,7 @@ def deviation(arguments: Namespace) -> Summary:
         found = sh.deviation(scan, nominal, progress)
     summary: dict[str, Any] = {"scan": arguments.scan, "nominal": arguments.nominal, **found.figures}
     low, middle, high = found.percentiles((1, 50, 99))
-    text = f"{arguments.scan}: {len(found.of_surface)} points, 98 % of them {low:.4g} to {high:.4g} off "
+    text = f"{printable(arguments.scan)}: {len(found.of_surface)} points, 98 % of them {low:.4g} to {high:.4g} off "
     text += f"{arguments.nominal}, median {middle:.4g}, root mean square {found.rms:.4g}"
     if arguments.tolerance is not None:
         share = found.within(arguments.tolerance)

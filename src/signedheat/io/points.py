@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from pathlib import Path
+from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from ..domains.exchange import Elements
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
 from ..packages import lazy_module, require
-from .files import PathLike, contents, ensure_fits, parsed_by_others, reading, refuse_kind, size_of, text
+from .files import PathLike, contents, damaged, ensure_fits, parsed_by_others, reading, refuse_kind, size_of, text
 
 SEPARATORS = str.maketrans(",;", "  ")
 NUMBERS = {"F": "f", "I": "i", "U": "u"}
@@ -21,6 +22,10 @@ NUMBERS = {"F": "f", "I": "i", "U": "u"}
 laspy = lazy_module("laspy", ".las and .laz files")
 pye57 = lazy_module("pye57", ".e57 files")
 
+CHECKSUM = 4
+"""Bytes at the end of each page of an E57 file."""
+SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance "
+"""Namespace of the attributes by which XML names schemas."""
 BYTES = 60
 """Measured: what each point takes at most while a file is read."""
 
@@ -174,9 +179,16 @@ def read_las(path: PathLike) -> PointCloud:
 
 
 def read_e57(path: PathLike) -> PointCloud:
-    """Points of all scans of an E57 file, in its own place for each; those that are marked invalid are left out."""
+    """Points of all scans of an E57 file, in its own place for each; those that are marked invalid are left out.
+
+    Raises
+    ------
+    FileFormatError
+        If its description defines entities or names schemas: pye57 would open what these refer to, here or elsewhere.
+    """
     size, opened = size_of(path), pye57.E57
     with reading(path):
+        _refuse_references(_e57_description(contents(path)))
 
         def parse() -> NDArray[np.float64]:
             file = opened(str(path))
@@ -189,6 +201,42 @@ def read_e57(path: PathLike) -> PointCloud:
             return np.concatenate([np.zeros((0, 3)), *(np.stack([s[a] for a in axes], axis=1) for s in scans)])
 
         return _cloud(parsed_by_others(parse, size), path)
+
+
+def _e57_description(data: bytes) -> bytes:
+    """The XML of an E57 file, whose pages each end with a checksum."""
+    if data[:8] != b"ASTM-E57" or len(data) < 48:
+        raise damaged("it does not begin as E57 files do")
+    offset, length, page = struct.unpack_from("<QQQ", data, 24)
+    if not CHECKSUM < page <= len(data) or max(offset, length) > len(data):
+        raise damaged(f"it announces {length} bytes of description at {offset}, and has {len(data)} bytes")
+    payload = page - CHECKSUM
+    first, begin = divmod(offset, page)
+    n_pages = -(-(begin + length) // payload)
+    pages = (data[k * page : k * page + payload] for k in range(first, first + n_pages))
+    return b"".join(pages)[begin : begin + length]
+
+
+def _refuse_references(description: bytes) -> None:
+    """Raise `FileFormatError` if XML refers to anything outside itself, or is not in UTF-8, as E57 wants it."""
+
+    def refuse(*_: object) -> None:
+        raise FileFormatError("its description defines entities or names a schema", remedy="export the scan again")
+
+    def begin(version: str, encoding: str | None, standalone: int) -> None:
+        if (encoding or "utf-8").lower() != "utf-8":
+            raise FileFormatError(f"its description is in {encoding}", remedy="export the scan again, in UTF-8")
+
+    def element(name: str, attributes: dict[str, str]) -> None:
+        if any(attribute.startswith(SCHEMA_INSTANCE) for attribute in attributes):
+            refuse()
+
+    parser = expat.ParserCreate("utf-8", " ")
+    parser.XmlDeclHandler, parser.StartDoctypeDeclHandler, parser.StartElementHandler = begin, refuse, element
+    try:
+        parser.Parse(description, True)
+    except expat.ExpatError as error:
+        raise damaged(f"its description is no XML ({error})") from error
 
 
 def _cloud(points: NDArray[np.float64], path: PathLike) -> PointCloud:

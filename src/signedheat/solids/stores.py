@@ -150,8 +150,9 @@ def _computed(folder: str, key: str, missing: list[int], scheduler: Scheduler) -
     """Numbers of tiles, as they are done."""
     if not missing:
         return
+    if isinstance(scheduler, ThreadPoolExecutor):
+        _plan(folder, key)  # once, before all threads need it
     if scheduler is None:
-        _plan(folder, key)
         with ThreadPoolExecutor(n_threads()) as pool:
             yield from _computed(folder, key, missing, pool)
     elif isinstance(scheduler, str):
