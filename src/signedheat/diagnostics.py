@@ -412,10 +412,8 @@ class Jumps(Note):
     ----------
     objective : float
         The objective of Eq. 16, before what jumps off the cut was smoothed.
-    least : float
-        The least that was found, before jumps were concentrated: `objective` itself where they were not.
     bound, gap : float
-        A lower bound of the objective, and the relative difference of `least` and it.
+        A lower bound of the objective, and the relative difference of the objective and it.
     rounds : int
         Number of iterations.
     continuous : bool
@@ -427,7 +425,6 @@ class Jumps(Note):
     """
 
     objective: float
-    least: float
     bound: float
     gap: float
     rounds: int
@@ -438,5 +435,4 @@ class Jumps(Note):
 
     def __str__(self) -> str:
         cut = "continuous" if self.continuous else f"cuts of length {self.cut_length:.3g}"
-        given = f"{self.objective / self.least - 1:.2%} above it" if self.objective > self.least > 0 else "reached"
-        return f"{cut}; least objective found within {self.gap:.2%}, {given}"
+        return f"{cut}; objective within {self.gap:.2%} of the least"

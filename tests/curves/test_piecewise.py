@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -11,9 +9,9 @@ import signedheat as sh
 from refusals import refused
 from shapes.jump_program import minimize_exactly
 from shapes.surface_cases import flipped
-from shapes.triangulated import cylinder, klein_bottle, moebius
+from shapes.triangulated import cylinder, moebius
 from signedheat.curves import piecewise
-from signedheat.curves.cut_lines import smoothed, unforked
+from signedheat.curves.cut_lines import smoothed
 from signedheat.curves.jumps import JumpProblem, minimize
 from signedheat.diagnostics import Jumps
 from signedheat.discretization import discretize
@@ -46,18 +44,17 @@ CASES = {
 
 
 def exact_distance(*arguments, **options) -> sh.PiecewiseField:
-    """Piecewise distance from the exact solution of the linear program, whose jumps are not gathered."""
+    """Piecewise distance from the exact solution of the linear program."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(piecewise, "minimize", lambda problem, **_: minimize_exactly(problem))
-        return sh.piecewise_distance(*arguments, slack=0, **options)
+        return sh.piecewise_distance(*arguments, **options)
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_fast_is_as_good_as_exact(case):
     mesh, curve = CASES[case]()
     fast, exact = (
-        way(mesh, curve, intrinsic=False).diagnostics.note(Jumps)
-        for way in (partial(sh.piecewise_distance, slack=0), exact_distance)
+        way(mesh, curve, intrinsic=False).diagnostics.note(Jumps) for way in (sh.piecewise_distance, exact_distance)
     )
     assert exact.gap < 1e-6
     assert exact.objective * (1 - 1e-6) <= fast.objective <= 1.005 * exact.objective
@@ -158,21 +155,6 @@ def test_inconsistently_oriented_curve():
     for side in (1, -1):
         vertex = np.argmin(np.linalg.norm(mesh.vertices - [0, 0.8 * side, 0.6], axis=1))
         assert phi(mesh.points_at([vertex]))[0] == pytest.approx(side * np.arcsin(0.6), abs=0.1)
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_cut_of_turned_halves_does_not_fork(seed):
-    """Scanned shapes are bumpy: there the directions beside the cut turn within several triangles."""
-    mesh, (first, second) = bumpy_halves(seed)
-    phi = sh.piecewise_distance(mesh, [first, second])
-    assert 1 <= len(phi.cut) <= 2
-    ends = np.concatenate([line.vertices[[0, -1]] for line in phi.cut])
-    assert np.unique(ends, return_counts=True)[1].max() <= 2
-    gap, faces = np.stack([second.barycentric[-1], first.barycentric[0]]), [second.faces[-1], first.faces[0]]
-    places = np.einsum("ik,ikd->id", gap, mesh.vertices[mesh.faces[faces]])
-    for place in places:  # the cut comes near both places where the curve turns
-        near = min(np.linalg.norm(line.points - place, axis=1).min() for line in phi.cut)
-        assert near < 4 * mesh.edge_lengths.max()
 
 
 def test_polygons_equal_triangles():
@@ -276,7 +258,7 @@ def test_unoriented_curve_across_faces(kind):
 
 def test_smoothing_takes_small_jumps_away_and_leaves_the_cut():
     mesh, curve = CASES["round the tube"]()
-    rough, smooth = (sh.piecewise_distance(mesh, curve, smoothing=width, slack=0) for width in (None, 1.0))
+    rough, smooth = (sh.piecewise_distance(mesh, curve, smoothing=width) for width in (None, 1.0))
     small = np.abs(rough.jumps)[~rough.is_cut]
     assert small.max() > 1e-3
     assert np.abs(smooth.jumps)[~smooth.is_cut].max() < 1e-12
@@ -295,7 +277,7 @@ def test_smoothed_between_the_means_at_vertices_and_step_three():
     assert np.ptp(difference) < 1e-4
     triangles, pairs = rough.triangles, rough.pairs
     none = np.zeros(len(pairs.faces), dtype=bool)
-    narrow, _ = smoothed(triangles, pairs, np.zeros(mesh.n_faces, complex), rough.values, none, 1e-9)
+    narrow = smoothed(triangles, pairs, np.zeros(mesh.n_faces, complex), rough.values, none, 1e-9)
     weight = np.repeat(mesh.face_areas, 3)
     mean = np.bincount(mesh.faces.ravel(), weight * rough.values.ravel()) / np.bincount(mesh.faces.ravel(), weight)
     assert np.allclose(narrow, mean[mesh.faces])
@@ -389,13 +371,13 @@ def test_bad_domain_and_source():
         sh.piecewise_distance(sh.intrinsic_delaunay(mesh), across)
 
 
-@pytest.mark.parametrize(("step", "above"), [("integrate", 0.4), ("cut", 0.6), ("cut", 0.7)])
+@pytest.mark.parametrize(("step", "above"), [("integrate", 0.4), ("cut", 0.6)])
 def test_progress_can_cancel(step, above):
     class Stop(Exception):
         pass
 
     def progress(fraction, now):
-        if now == step and above < fraction < 0.8:  # amid the rounds
+        if now == step and above <= fraction < 0.8:  # amid the rounds
             raise Stop
 
     mesh, curve = CASES["open arc"]()
@@ -466,94 +448,7 @@ def test_line_along_a_cylinder_is_distance_on_the_strip_cut_open():
     assert cut.length == pytest.approx(2.0)
     assert np.allclose(cut.jumps, around, rtol=0.01)
     assert np.ptp(phi.values, axis=None) == pytest.approx(around, rel=0.01)
-    assert phi.diagnostics.note(Jumps).integration_error < 0.002  # .017 where jumps stay spread
-
-
-def bumpy_halves(seed: int) -> tuple[sh.TriangleMesh, list[sh.Curve]]:
-    rng = np.random.default_rng(seed)
-    ball = shaken(sphere(4), 0.004)
-    waves = np.cos(ball.vertices @ rng.normal(scale=2.0, size=(3, 5)) + rng.uniform(0, 6, 5)).sum(axis=1)
-    mesh = sh.TriangleMesh(ball.vertices * (1 + 0.08 * waves[:, None]), ball.faces)
-    whole = max(mesh.level_set(mesh.vertices @ rng.normal(size=3), 0.0), key=lambda curve: curve.n_points)
-    half = whole.n_points // 2
-    parts = [sh.Curve(whole.faces[s], whole.barycentric[s]) for s in (slice(half), slice(half, None))]
-    return mesh, [parts[0], parts[1].reversed()]
-
-
-def loop_of_a_klein_bottle() -> tuple[sh.TriangleMesh, sh.Curve]:
-    """Once round the figure of eight."""
-    mesh = klein_bottle(60, 32)
-    return mesh, mesh.path(np.arange(32), closed=True)
-
-
-def arc_round_a_torus() -> tuple[sh.TriangleMesh, sh.Curve]:
-    mesh = shaken(torus(n_around=80, n_across=36), 0.01)
-    whole = max(mesh.level_set(mesh.vertices @ [1, 0.2, 0.1], 0.0), key=lambda curve: curve.n_points)
-    part = slice(int(0.4 * whole.n_points))
-    return mesh, sh.Curve(whole.faces[part], whole.barycentric[part])
-
-
-FORKED = {
-    "halves": lambda: bumpy_halves(5),
-    "open arc": CASES["open arc"],
-    "arc round a torus": arc_round_a_torus,
-    "loop of a Klein bottle": loop_of_a_klein_bottle,
-    "path on a Klein bottle": lambda: ((m := klein_bottle(96, 48)), m.path(np.arange(60) * 48 + 12)),
-}
-
-
-def test_cuts_do_not_fork_and_slopes_are_nearer_than_with_forks():
-    """Some of them forked, or it would show nothing."""
-    forked = 0
-    for case, made in FORKED.items():
-        mesh, curves = made()
-        raw, clean = (sh.piecewise_distance(mesh, curves, smoothing=w) for w in (None, 10.0))
-        notes = [phi.diagnostics.note(Jumps) for phi in (raw, clean)]
-        assert forks(clean) == 0 and len(clean.cut) <= 3, case
-        assert notes[1].integration_error < 0.85 * notes[0].integration_error, case
-        assert notes[1].least == notes[0].objective and notes[1].objective <= 1.1 * notes[1].least, case
-        forked += forks(raw) > 0
-    assert forked >= 2
-
-
-def forks(phi: sh.PiecewiseField) -> int:
-    edges = np.unique(phi.pairs.edges[phi.is_cut])
-    return int((np.bincount(phi.triangles.edges.vertices[edges].ravel()) > 2).sum())
-
-
-@pytest.mark.parametrize("spare", [0, 7, 30, 60])
-def test_few_functions_are_made_for_many_lines(spare):
-    """Sixty lines of which some are not needed: so many go, and the surface is cut open some ten times."""
-    mesh = sphere(4)
-    triangles = discretize(mesh).triangles
-    pairs = face_pairs(triangles)
-    used, chosen = np.zeros(mesh.n_vertices, dtype=bool), []
-    for pair in np.random.default_rng(0).permutation(len(pairs.faces)):
-        ends = triangles.edges.vertices[pairs.edges[pair]]
-        if not used[ends].any() and len(chosen) < 60:
-            used[ends] = True
-            chosen.append(pair)
-    needed, cut = np.zeros((2, len(pairs.faces)), dtype=bool)
-    cut[chosen] = True
-    needed[chosen[spare:]] = True
-    heights = np.zeros(3 * mesh.n_faces)
-    heights[pairs.tails[chosen, 0]] = heights[pairs.heads[chosen, 0]] = np.where(needed[chosen], 2.0, 1.0)
-    made = []
-
-    def integrate(opened):
-        made.append(opened)
-        return heights.reshape(-1, 3), 1.0 + (needed & ~opened).sum()
-
-    found = unforked(triangles, pairs, cut, integrate)
-    assert np.array_equal(found.cut, needed) and found.n_lines == 60 - spare
-    assert len(made) < 16
-
-
-def test_slack_is_never_exceeded():
-    mesh, curve = loop_of_a_klein_bottle()
-    notes = [sh.piecewise_distance(mesh, curve, slack=s).diagnostics.note(Jumps) for s in (0.01, 0.1)]
-    assert notes[0].objective <= 1.01 * notes[0].least
-    assert notes[1].objective > 1.01 * notes[1].least
+    assert phi.diagnostics.note(Jumps).integration_error < 0.012  # .017 where jumps are not smoothed
 
 
 def sheared(mesh: sh.TriangleMesh) -> sh.TriangleMesh:
@@ -586,10 +481,3 @@ def test_unoriented_curve_along_edges_of_bad_triangles():
     assert isinstance(phi.domain, sh.IntrinsicTriangulation)
     assert np.abs(phi(mesh.points_at(ids))).max() < 0.5 * mesh.edge_lengths.mean()
     assert phi(mesh.points_at((ids + 384) % 768)).min() > 1.0
-
-
-@pytest.mark.parametrize("slack", [-0.1, np.nan, "much"])
-def test_bad_slack(slack):
-    mesh = sphere(1)
-    with refused(sh.errors.SignedHeatError, "slack"):
-        sh.piecewise_distance(mesh, mesh.path([0, mesh.faces[0, 1]]), slack=slack)

@@ -231,15 +231,11 @@ def check_piecewise(given: Subject) -> str:
     domain = surface(random)
     sources = [source(random, domain) for _ in range(random.integers(1, 3))]
     smoothing = random.choice([None, 0.1, 10.0, 1000.0])
-    slack = random.choice([0.0, 0.1])
-    phi, warned = announced(lambda: sh.piecewise_distance(domain, sources, smoothing=smoothing, slack=slack))
+    phi, warned = announced(lambda: sh.piecewise_distance(domain, sources, smoothing=smoothing))
     judge(phi.values, warned, length_of_edges(embedded(domain)))
     for cut in phi.cut:
         judge(cut.points, False, np.inf, "cut")
     if smoothing is not None:
-        edges = np.unique(phi.pairs.edges[phi.is_cut])
-        if (np.bincount(phi.triangles.edges.vertices[edges].ravel()) > 2).any():
-            raise Wrong("the cut forks")
         if (np.abs(phi.jumps)[~phi.is_cut] > 0).any():
             raise Wrong("jumps off the cut")
     return "distance"

@@ -1,14 +1,8 @@
-"""Functions that jump on lines: found among jumps everywhere, then as few as slopes need, unforked; smooth elsewhere.
-
-The least cost of Eq. 16 leads the jumps that follow from some directions along branching lines, and some along lines of
-their own. Without a branch the function that continues across it still follows most directions.
-"""
+"""Lines on which a function jumps, found among jumps everywhere, and the function smoothed between them (Fig. 12)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,32 +22,8 @@ FAR = 3.0
 TWIG = 5.0
 """A branch of a cut whose jump is nowhere this many times that side is none, unless the cut itself is as low."""
 
-HARDLY_WORSE = 1.1
-"""Error of slopes, relative to that with all lines, up to which fewer lines are worth more."""
-
 WIDEST = 10.0
 """Greatest width, over the root of the area of a part: that is step 3 all but alone. By more M is rounded away."""
-
-
-class Opened(NamedTuple):
-    """A function that jumps on some lines only.
-
-    Attributes
-    ----------
-    cut : (p,) bool
-        The pairs of faces that the lines separate.
-    n_lines : int
-        How many lines these are.
-    values : (m, 3) float
-        The function at the corners of the triangles.
-    error : float
-        That of its slopes.
-    """
-
-    cut: NDArray[np.bool_]
-    n_lines: int
-    values: NDArray[np.float64]
-    error: float
 
 
 def typical_size(triangles: IntrinsicMesh) -> float:
@@ -117,104 +87,6 @@ def without_twigs(edges: NDArray[np.int64], high: NDArray[np.bool_]) -> NDArray[
         left = np.delete(left, np.concatenate(low))
 
 
-def unforked(
-    triangles: IntrinsicMesh,
-    pairs: FacePairs,
-    cut: NDArray[np.bool_],
-    integrate: Callable[[NDArray[np.bool_]], tuple[NDArray[np.float64], float]],
-) -> Opened:
-    """What is left of a cut when its lines are taken away, lowest first, and the function that jumps there.
-
-    While there are forks, the lowest line at each goes; then as many others as slopes allow that get `HARDLY_WORSE`,
-    all of them, half of them, a quarter: few functions are made, however many lines there are.
-
-    Parameters
-    ----------
-    triangles, pairs : IntrinsicMesh, FacePairs
-        The surface.
-    cut : (p,) bool
-        Pairs that it separates.
-    integrate : callable
-        From a cut to the values of the function that jumps there only, and the error of its slopes.
-    """
-    values, error = integrate(cut)
-    limit = HARDLY_WORSE * error
-    lines = lines_by_height(triangles, pairs, cut, values)
-    while spare := lowest_at_forks(triangles.edges.vertices, lines):
-        cut = cut & ~np.isin(pairs.edges, np.concatenate(spare))
-        values, error = integrate(cut)
-        lines = lines_by_height(triangles, pairs, cut, values)
-    batch = len(lines)
-    while batch:
-        fewer = cut & ~np.isin(pairs.edges, np.concatenate(lines[:batch]))
-        without, its_error = integrate(fewer)
-        if its_error <= limit:
-            cut, values, error = fewer, without, its_error
-            lines = lines_by_height(triangles, pairs, cut, values)
-            batch = min(batch, len(lines))
-        else:
-            batch //= 2
-    return Opened(cut, len(lines), values, error)
-
-
-def fewest_lines(found: Sequence[Opened]) -> int:
-    """Which of some functions jumps on the fewest lines, of those whose slopes are `HARDLY_WORSE` than the best.
-
-    Examples
-    --------
-    >>> many, few, wrong = (Opened(np.zeros(0), n, np.zeros(0), error) for n, error in ((9, 1.0), (2, 1.05), (1, 3.0)))
-    >>> fewest_lines([many, few, wrong])
-    1
-    """
-    limit = HARDLY_WORSE * min(each.error for each in found)
-    good = [k for k, each in enumerate(found) if each.error <= limit]
-    return min(good, key=lambda k: (found[k].n_lines, found[k].error))
-
-
-def lines_by_height(
-    triangles: IntrinsicMesh, pairs: FacePairs, cut: NDArray[np.bool_], values: NDArray[np.float64]
-) -> list[NDArray[np.int64]]:
-    """The edges of each line of a cut, the line with the least mean jump first."""
-    height = np.abs(pairs.ends(values)).mean(axis=1)[cut]
-    edges, which = np.unique(pairs.edges[cut], return_inverse=True)
-    mean = np.bincount(which, height) / np.bincount(which)
-    tails, heads = triangles.edges.vertices[edges].T
-    lines = [chain for chain, _, _ in assemble_polylines(tails, heads, directed=False)]
-    return [edges[line] for line in sorted(lines, key=lambda line: float(mean[line].mean()))]
-
-
-def lowest_at_forks(vertices: NDArray[np.int64], lines: Sequence[NDArray[np.int64]]) -> list[NDArray[np.int64]]:
-    """The first of some lines at every vertex where three or more of their ends meet.
-
-    Parameters
-    ----------
-    vertices : (e, 2) int
-        The ends of each edge.
-    lines : sequence of (j,) int
-        Edges.
-
-    Examples
-    --------
-    >>> ends = np.array([[5, 6], [6, 7], [7, 5], [5, 9], [8, 9]])
-    >>> loop, tail, rest = np.array([0, 1, 2]), np.array([3]), np.array([4])
-    >>> lowest_at_forks(ends, [tail, rest, loop])
-    [array([3])]
-    >>> lowest_at_forks(ends, [rest, loop])
-    []
-    """
-    if not lines:
-        return []
-    is_fork = np.bincount(vertices[np.concatenate(lines)].ravel()) > 2
-    settled, spare = np.zeros_like(is_fork), []
-    for line in lines:
-        forks = np.unique(vertices[line])
-        forks = forks[is_fork[forks]]
-        if not settled[forks].all():
-            spare.append(line)
-            settled[forks] = True
-    return spare
-
-
 def is_continuous(
     triangles: IntrinsicMesh,
     pairs: FacePairs,
@@ -254,8 +126,8 @@ def smoothed(
     rough: NDArray[np.float64],
     cut: NDArray[np.bool_],
     width: float,
-) -> tuple[NDArray[np.float64], float]:
-    """(m, 3) values continuous off the cut, and the error of their slopes: ``(M + w² C) φ = M φ₀ + w² b``.
+) -> NDArray[np.float64]:
+    """(m, 3) values continuous off the cut: ``(M + w² C) φ = M φ₀ + w² b``.
 
     The heat flow of Fig. 12 on what φ₀ differs by from a function of slopes Y, so that it does not flatten those. It
     minimises ``∫ (φ − φ₀)² + w² ∫ |∇φ − Y|²`` on the surface cut open: within the width w it is step 3 (Eq. 13), which
@@ -283,30 +155,7 @@ def smoothed(
     squared = np.minimum(width**2, WIDEST**2 * np.bincount(part, mass))[part]
     matrix = sparse.csr_matrix(sparse.diags_array(squared) @ stiffness + sparse.diags_array(mass))
     pulled = np.bincount(owner, share * rough.ravel()) + squared * divergence(opened, directions)
-    at_corners = factorize(matrix).solve(pulled)[opened.corner_vertices]
-    return at_corners, slope_error(triangles, at_corners, directions)
-
-
-def on_lines(
-    triangles: IntrinsicMesh,
-    pairs: FacePairs,
-    directions: NDArray[np.complex128],
-    width: float,
-    rough: NDArray[np.float64],
-    progress: Callable[[float], None] | None = None,
-) -> Opened:
-    """Values `smoothed` between the lines on which rough ones jump, less forks.
-
-    `progress` is called with the fraction of the cut that is gone, each time that the surface has been cut open.
-    """
-    lines = high_jumps(triangles, pairs, rough)
-
-    def integrate(cut: NDArray[np.bool_]) -> tuple[NDArray[np.float64], float]:
-        if progress is not None:
-            progress(1.0 - cut.sum() / max(lines.sum(), 1))
-        return smoothed(triangles, pairs, directions, rough, cut, width)
-
-    return unforked(triangles, pairs, lines, integrate)
+    return factorize(matrix).solve(pulled)[opened.corner_vertices]
 
 
 def slope_error(triangles: IntrinsicMesh, at_corners: NDArray[np.float64], directions: NDArray[np.complex128]) -> float:

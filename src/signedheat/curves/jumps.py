@@ -1,21 +1,17 @@
-"""The constants of piecewise-continuous integration: those of least cost, with a certificate, and of fewer jumps.
+"""The constants of piecewise-continuous integration: those of least cost, with a certificate.
 
 Summed over the two ends of an edge, the cost of a pair of faces in Eq. 16 is ``w (b − a)``, whatever the constants are,
 plus ``2w`` times the distance of x = c_f − c_g from the interval [a, b], whose ends are the values of x that make φ
 continuous at one end of the edge and at the other. The dual of ``min Σ 2w dist(K c, [a, b])`` is a flow y from face to
 face across edges, conserved in every face, with capacities 2w; every such flow proves that no constants have a smaller
 cost than ``−Σ max(a y, b y)``.
-
-Where Y turns, its curl is spread over an area. The least sum of absolute jumps leads it to the cut on as many parallel
-lines as there are triangles next to each other, because each jump costs what it is high, together or apart. A cost that
-rises less and less with the height of a jump leads it on one line (reweighted least absolute values: Candès, Wakin &
-Boyd 2008).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,26 +20,13 @@ from threadpoolctl import threadpool_limits
 
 from ..geometry.components import connected_components
 from ..linear import factorize
+from ..linear.splitting import split_rounds
 
 LOOSE = 0.15
 """Gap from which on it is checked whether constants leave a cut. Without one, what is left is below the triangles."""
 _LOOK = 25  # rounds between two evaluations of the gap
-_RELAXATION = 1.6
 _THRESHOLD = 4.0  # initial threshold of the proximal step, relative to a typical difference
 _GROWTH, _PATIENCE = 2.0, 250  # factor by which it may grow, at most every so many rounds; tuned on tori and spheres
-
-HEIGHT = 3.0
-"""s, in sides of a typical triangle: jumps below it cost as before. What is higher is a cut (`cut_lines.FAR`)."""
-
-REWEIGHTINGS = 2
-"""More of them move cuts without an end, towards the shortest instead of the lowest ones."""
-
-CHEAPER = 0.5
-"""Cost of jumps on a cut that is to be kept, relative to others. On four shapes the objective is then .4 to .9 % above
-the least, and slopes are as good as without (.7: .3 to .4 %, slopes up to 2 % worse)."""
-
-_TOLERANCE, _MAX_ROUNDS = 0.02, 200  # the same lines, to a vertex, as with .005 and 600 on nine shapes of eleven
-_FINELY = 0.005, 600  # the same for the last constants: with the above the objective is up to .9 % higher
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,16 +151,17 @@ def minimize(
         least = problem.objective(best)
         threshold = _THRESHOLD * problem.scale
         negligible = 1e-9 * threshold * problem.weights.sum()
-        z, scaled, rounds = step.copy(), np.zeros_like(step), 0
+
+        def proximal(target: NDArray[np.float64]) -> NDArray[np.float64]:
+            excess = target - np.clip(target, low, high)
+            return target - np.clip(excess, -threshold, threshold)
+
+        def solve(target: NDArray[np.float64]) -> NDArray[np.float64]:
+            return factor.solve(transposed @ (spring * target))
+
+        steps, rounds = split_rounds(proximal, solve, problem.differences, step, step), 0
         while least - bound > max(tolerance * least, negligible) and rounds < max_rounds:
-            for _ in range(_LOOK):
-                before, target = z, step + scaled
-                excess = target - np.clip(target, low, high)
-                z = target - np.clip(excess, -threshold, threshold)
-                scaled = target - z
-                constants = factor.solve(transposed @ (spring * (z - scaled)))
-                difference = problem.differences(constants)
-                step = _RELAXATION * difference + (1.0 - _RELAXATION) * z
+            constants, difference, z, before, scaled = next(islice(steps, _LOOK - 1, None))
             rounds += _LOOK
             value = problem.objective(constants)
             if value < least:
@@ -223,42 +207,6 @@ def regions_moved(problem: JumpProblem, constants: NDArray[np.float64]) -> NDArr
         total = np.cumsum(np.tile(problem.weights[at], 2)[order])
         constants[region == here] += shifts[order[np.searchsorted(total, 0.5 * total[-1])]]
     return constants
-
-
-def concentrated(
-    problem: JumpProblem,
-    constants: NDArray[np.float64],
-    side: float,
-    progress: Callable[[float], None] | None = None,
-) -> Iterator[NDArray[np.float64]]:
-    """Constants of the faces whose jumps lie on fewer and fewer lines.
-
-    Each round minimises the tangent of the cost ``s log(1 + jump / s)`` at the jumps of the round before: edges that
-    jump become cheap.
-
-    Parameters
-    ----------
-    problem : JumpProblem
-        The problem.
-    constants : (n_faces,) float
-        Constants that minimise its objective.
-    side : float
-        The longest side of a typical triangle.
-    progress : callable, optional
-        Called with a fraction from 0 to 1 in each round.
-    """
-    for _ in range(REWEIGHTINGS):
-        difference = problem.differences(constants)
-        jump = np.abs(difference - np.clip(difference, problem.low, problem.high))
-        tangent = replace(problem, weights=problem.weights / (1.0 + jump / (HEIGHT * side)))
-        constants = minimize(tangent, _TOLERANCE, _MAX_ROUNDS, progress).constants
-        yield constants
-
-
-def keeping(problem: JumpProblem, cut: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Constants of the faces with jumps on the (p,) pairs of a cut, and otherwise of nearly the least objective."""
-    cheaper = replace(problem, weights=np.where(cut, CHEAPER, 1.0) * problem.weights)
-    return minimize(cheaper, *_FINELY).constants
 
 
 def _lags(

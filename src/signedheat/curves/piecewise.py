@@ -2,8 +2,7 @@
 
 In Eq. 16 φ is linear in every face with gradient exactly Y, so it is known up to one constant per face. Where Y is
 integrable, the constants make φ continuous across edges; elsewhere φ jumps, and the weighted L1 norm concentrates the
-jumps on a cut that is short and runs where Y is not integrable. The cut is then made clean, and φ smooth near it
-(`cut_lines`).
+jumps on a cut that is short and runs where Y is not integrable. Jumps elsewhere are then smoothed (`cut_lines`).
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from ..domains.foreign import ForeignShape, converted
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import finite_number, positive_number
+from ..domains.validation import positive_number
 from ..errors import GeometryError, InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..fields.piecewise_field import IntrinsicPiecewiseField, PiecewiseField
 from ..geometry.curve_segments import CurveSegments
@@ -37,19 +36,11 @@ from ..memory import refuse_beyond_memory
 from ..method import diffuse, normalize
 from ..progress import Progress, Stopwatch
 from ..solver import as_list
-from .cut_lines import (
-    fewest_lines,
-    high_jumps,
-    integration_error,
-    is_continuous,
-    on_lines,
-    smoothed,
-    typical_size,
-)
-from .jumps import JumpProblem, JumpSolution, concentrated, keeping, minimize
+from .cut_lines import high_jumps, integration_error, is_continuous, smoothed
+from .jumps import JumpProblem, JumpSolution, minimize
 
 SMOOTHING = 10.0
-"""Width of the smoothing in mean edge lengths. Less leaves steps where a fork was, more spreads over the surface what
+"""Width of the smoothing in mean edge lengths. More spreads over the surface what
 the cut does not take up: .43 % against 1.3 % of error without any bound, on halves of a curve on a bumpy sphere."""
 
 ROUGH = 1.0
@@ -67,7 +58,6 @@ def piecewise_distance(
     sources: CurvesAndPoints,
     *,
     diffusion: float = 1.0,
-    slack: float = 0.1,
     intrinsic: bool | Literal["auto"] = "auto",
     smoothing: float | None = SMOOTHING,
     progress: Progress | None = None,
@@ -77,13 +67,11 @@ def piecewise_distance(
     Minimises ``Σ_e |e| exp(−κ_e) (|jump at one end| + |jump at the other|)`` over functions whose gradient in every
     triangle is the diffused, normalised source normal Y; κ_e is the difference between the components of Y along e in
     the two faces at e (Eq. 15, Eq. 16). Edges at the source have 100 times the weight, so that the cut avoids the
-    source wherever possible. Then jumps that are spread over an area are gathered on few lines, which raises the
-    objective by some per cent, lines that slopes hardly need are taken away, at forks all but two, and what jumps
-    elsewhere is smoothed (Fig. 12): φ is discontinuous on clean lines only, and its slopes are near Y. For curves that
-    bound a region the field has no cut, and differs from that of `SignedHeatSolver.distance` by at most
-    ``integration_error / √λ`` in the root mean square, λ the least positive eigenvalue of the Laplacian. Surfaces may
-    have any topology, orientable or not; curves whose parts have opposite orientations get a cut that joins the points
-    at which the orientation changes.
+    source wherever possible. Then jumps that are not on lines are smoothed (Fig. 12): φ is discontinuous on lines only,
+    and its slopes are near Y. For curves that bound a region the field has no cut, and differs from that of
+    `SignedHeatSolver.distance` by at most ``integration_error / √λ`` in the root mean square, λ the least positive
+    eigenvalue of the Laplacian. Surfaces may have any topology, orientable or not; curves whose parts have opposite
+    orientations get a cut that joins the points at which the orientation changes.
 
     Parameters
     ----------
@@ -94,8 +82,6 @@ def piecewise_distance(
         field is then ``intrinsic_delaunay(surface, keep=sources)``, which can also be passed as the domain.
     diffusion : float
         τ in ``t = τ h²``.
-    slack : float
-        Rise of the objective, relative to the least, that is allowed for gathering jumps; 0 takes the optimum's lines.
     intrinsic : "auto", True or False
         As for `SignedHeatSolver`: "auto" refines a triangle mesh intrinsically where large angles or needles would
         spoil directions. The domain of the field is then the refinement.
@@ -110,8 +96,8 @@ def piecewise_distance(
     PiecewiseField
         Its median over the source is zero. The objective is certified to be within 0.2 % of the least (300 thousand
         faces: minutes), or within 15 % if φ has no cut: what is left then are jumps smaller than the triangles.
-        ``diagnostics.note(Jumps)`` has the objective, the least one with a lower
-        bound of it, and the size of the jumps: see `diagnostics.Jumps`. If the triangles are so large or thin that φ
+        ``diagnostics.note(Jumps)`` has the objective, a lower bound of it, and the size of the jumps: see
+        `diagnostics.Jumps`. If the triangles are so large or thin that φ
         has hardly the slope that it should, there is an `InexactWarning`.
 
     Raises
@@ -123,7 +109,7 @@ def piecewise_distance(
     MemoryLimitError
         If the field does not fit into memory; nothing has been allocated then.
     ValueError
-        If `diffusion` or `smoothing` is not positive and finite, or `slack` negative.
+        If `diffusion` or `smoothing` is not positive and finite.
 
     Examples
     --------
@@ -147,7 +133,6 @@ def piecewise_distance(
         smoothing = positive_number(smoothing, "smoothing")
     listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(sources)
     stopwatch = Stopwatch(progress, steps=5)
-    slack = finite_number(slack, "slack", least=0)
     with stopwatch("prepare"):
         diffusion = positive_number(diffusion, "diffusion")
         domain, discretization = _retriangulated(domain, listed, intrinsic)
@@ -163,25 +148,12 @@ def piecewise_distance(
         problem = jump_problem(triangles, pairs, slopes, guarded_edges(triangles, parts))
         continuous = partial(is_continuous, triangles, pairs, slopes, directions)
         solution = minimize(problem, progress=part_of(progress, 0.4, 0.6, "integrate"), enough=continuous)
-        jumping = solution.constants
-        values = slopes + jumping[:, None]
+        values = slopes + solution.constants[:, None]
     with stopwatch("cut"):
         cut = high_jumps(triangles, pairs, values)
         if smoothing is not None:
-            candidates = [jumping]
-            if not continuous(jumping):
-                inner = part_of(progress, 0.6, 0.7, "cut")
-                gathered = concentrated(problem, jumping, typical_size(triangles), inner)
-                limit = (1.0 + slack) * solution.objective
-                candidates += [constants for constants in gathered if problem.objective(constants) <= limit]
-            width, inner = smoothing * 2 * discretization.spacing, part_of(progress, 0.7, 0.8, "cut")
-            clean = partial(on_lines, triangles, pairs, directions, width, progress=inner)
-            found = [clean(slopes + constants[:, None]) for constants in candidates]
-            best = fewest_lines(found)
-            jumping, cut, values = candidates[best], found[best].cut, found[best].values
-            if best:
-                jumping = keeping(problem, cut)
-                values = smoothed(triangles, pairs, directions, slopes + jumping[:, None], cut, width)[0]
+            width = smoothing * 2 * discretization.spacing
+            values = smoothed(triangles, pairs, directions, values, cut, width)
     with stopwatch("finish"):
         phi = _field(domain, triangles, centered(triangles, values, parts), cut)
         error = integration_error(phi, directions)
@@ -194,7 +166,7 @@ def piecewise_distance(
             "anything. Pass intrinsic=True",
             InexactWarning,
         )
-    notes = (jumps_of(phi, solution, problem.objective(jumping), error), *discretization.notes)
+    notes = (jumps_of(phi, solution, error), *discretization.notes)
     return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
 
 
@@ -203,11 +175,10 @@ def part_of(progress: Progress | None, start: float, stop: float, step: str) -> 
     return None if progress is None else lambda share: progress(start + (stop - start) * share, step)
 
 
-def jumps_of(phi: PiecewiseField, solution: JumpSolution, objective: float, error: float) -> Jumps:
+def jumps_of(phi: PiecewiseField, solution: JumpSolution, error: float) -> Jumps:
     """The note on the jumps of a field, and on the objective that it minimises."""
     return Jumps(
-        objective=objective,
-        least=min(objective, solution.objective),
+        objective=solution.objective,
         bound=solution.bound,
         gap=solution.gap,
         rounds=solution.rounds,

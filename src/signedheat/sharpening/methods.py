@@ -18,6 +18,7 @@ from ..diagnostics import ConvexRounds, Note
 from ..discretization import Discretization, SourceTerm
 from ..domains.validation import finite_number, positive_number
 from ..errors import OutsideError, SignedHeatError, SourceError, UnsupportedTypeError
+from ..linear.splitting import split_rounds
 from ..lowering.direct_integration import DirectIntegration
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
@@ -202,15 +203,15 @@ class Convex:
             phi = np.nan_to_num(values)
             reach = max(float(np.ptp(phi)), typical_size(sizes, elements.slopes(phi).shape[1]))
             pull = elements.masses * np.sign(phi) / reach
-            relaxed = limited = at_most_one(elements.slopes(phi))  # which may be the slopes of rounding alone
-            dual = np.zeros_like(limited)
+            start = at_most_one(elements.slopes(phi))  # which may be the slopes of rounding alone
+
+            def solve(target: NDArray[np.float64]) -> NDArray[np.float64]:
+                return factor.solve(pull + elements.divergence(target))
+
+            rounds = split_rounds(at_most_one, solve, elements.slopes, start, start, self.relaxation)
             number, residual = 0, np.inf
             while number < self.max_rounds and residual > self.tolerance:
-                before, limited = limited, at_most_one(relaxed + dual)
-                dual += relaxed - limited
-                phi = factor.solve(pull + elements.divergence(limited - dual))
-                slopes = elements.slopes(phi)
-                relaxed = self.relaxation * slopes + (1.0 - self.relaxation) * limited
+                phi, slopes, limited, before, _ = next(rounds)
                 gaps = [((slopes - limited) ** 2).sum(axis=1), ((limited - before) ** 2).sum(axis=1)]
                 residual = max(np.sqrt(sizes @ gap / total) for gap in gaps)
                 number += 1

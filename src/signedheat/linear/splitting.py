@@ -1,0 +1,58 @@
+"""The alternating direction method of multipliers, ADMM (Boyd et al. 2011), for ``min f(z) + g(x)  s.t.  z = K x``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+RELAXATION = 1.6
+"""Over-relaxation of K x; from 1.5 to 1.8 rounds are fewest."""
+Map = Callable[[NDArray[Any]], NDArray[Any]]
+
+
+class Round(NamedTuple):
+    """The state after one round.
+
+    Attributes
+    ----------
+    solution, image : array
+        x, and K x.
+    split, before : array
+        z, and z in the round before.
+    scaled_dual : array
+        Multipliers over the penalty. The next round sees what is changed in place.
+    """
+
+    solution: NDArray[Any]
+    image: NDArray[Any]
+    split: NDArray[Any]
+    before: NDArray[Any]
+    scaled_dual: NDArray[Any]
+
+
+def split_rounds(
+    proximal: Map, solve: Map, apply: Map, image: NDArray[Any], split: NDArray[Any], relaxation: float = RELAXATION
+) -> Iterator[Round]:
+    """Iterate from K x and z, without end.
+
+    `proximal` makes the next z of K x plus the scaled dual, `solve` the x nearest to z minus the scaled dual.
+
+    Examples
+    --------
+    >>> clip = lambda values: np.clip(values, -1.0, 1.0)
+    >>> rounds = split_rounds(clip, lambda target: 0.5 * (target + 3.0), np.copy, np.zeros(1), np.zeros(1))
+    >>> [next(rounds) for _ in range(50)][-1].split.tolist()  # min (x - 3)² with |x| ≤ 1
+    [1.0]
+    """
+    relaxed, dual = image, np.zeros_like(image)
+    while True:
+        before, target = split, relaxed + dual
+        split = proximal(target)
+        dual = target - split
+        solution = solve(split - dual)
+        image = apply(solution)
+        relaxed = relaxation * image + (1.0 - relaxation) * split
+        yield Round(solution, image, split, before, dual)
