@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
 import os
-import sys
 import warnings
 from typing import TypeVar
 
@@ -117,7 +117,7 @@ class InexactWarning(UserWarning):
 def warn_user(message: str, category: type[Warning]) -> None:
     """Issue a warning attributed to the line of user code that called this package."""
     within = {__name__.partition(".")[0], "functools"}  # dispatchers stand between functions of ours
-    depth, frame = 2, sys._getframe(1)
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in within:
+    depth, frame = 1, inspect.currentframe()
+    while frame and frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in within:
         frame, depth = frame.f_back, depth + 1
     warnings.warn(printable(" ".join(message.split())), category, stacklevel=depth)

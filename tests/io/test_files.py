@@ -257,24 +257,6 @@ def test_damaged_tetgen_files(tmp_path, content):
     assert caught.value.path and caught.value.path.endswith(("bad.node", "bad.ele"))
 
 
-def test_parsers_of_others_are_stopped():
-    steps = 0
-
-    def forever():
-        nonlocal steps
-        while True:
-            steps += 1
-
-    with pytest.raises(TimeoutError):
-        run_limited(forever, 0.2)
-    deadline = time.monotonic() + 20
-    while len([t for t in threading.enumerate() if "run" in t.name]) and time.monotonic() < deadline:
-        time.sleep(0.01)
-    before = steps
-    time.sleep(0.1)
-    assert steps == before
-
-
 @pytest.mark.parametrize("name", ["tets.mesh", "lines.svg"])
 def test_a_file_on_which_a_parser_takes_too_long_is_refused(tmp_path, monkeypatch, name):
     monkeypatch.setattr(files, "run_limited", lambda job, seconds: run_limited(lambda: time.sleep(0.2), 0.01))
