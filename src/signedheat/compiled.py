@@ -7,18 +7,16 @@ of code as it was imported, since files may have been edited before a kernel is 
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import logging
 import os
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from pickle import UnpicklingError
-from threading import RLock, local
+from threading import RLock
 from types import CodeType
 from typing import Any, Generic, ParamSpec, TypeVar, overload
 
@@ -29,18 +27,15 @@ from .packages import lazy_module
 from .progress import Announcement
 
 numba = lazy_module("numba", "compiled kernels")
-events = lazy_module("numba.core.event", "compiled kernels")
 extending = lazy_module("numba.extending", "compiled kernels")
 
 logger = logging.getLogger("signedheat")
 MOST_THREADS = 1024
 OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """Dividing by zero is no exception; C does not call kernels, so that what it would call is not compiled."""
-PATIENCE = 2.0
-"""Seconds after which a lock on the cache is taken to be left by a process that was killed: writing takes .01."""
 DAMAGE = OSError, EOFError, UnpicklingError
 """What reading or writing the cache raises where files are damaged or cannot be written. Kernels raise none of them."""
-_LOCK = RLock()
+_lock = RLock()
 Parameters = ParamSpec("Parameters")
 Returned = TypeVar("Returned")
 made: list[Kernel[..., Any]] = []
@@ -77,7 +72,7 @@ class Kernel(Generic[Parameters, Returned]):
             if not Kernel.is_kept or not any(isinstance(each, DAMAGE) for each in _chain(error)):
                 raise
             logger.warning("the cache of compiled kernels is not used any more: %s", error)
-        with _LOCK:
+        with _lock:
             Kernel.is_kept = False
             while made:
                 vars(made.pop()).pop("dispatcher", None)
@@ -86,7 +81,7 @@ class Kernel(Generic[Parameters, Returned]):
     @cached_property
     def dispatcher(self) -> Callable[Parameters, Returned]:
         """What Numba makes of the function, which is the function itself if ``NUMBA_DISABLE_JIT`` is set."""
-        with _LOCK:
+        with _lock:
             _prepare()
             made.append(self)
             if numba.config.DISABLE_JIT:
@@ -167,7 +162,7 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
 
 @cache
 def _prepare() -> None:
-    """Make kernels types of Numba, so that compiled code can call them, and listen to what it compiles.
+    """Make kernels types of Numba, so that compiled code can call them.
 
     Raises
     ------
@@ -182,56 +177,3 @@ def _prepare() -> None:
             element="NUMBA_NUM_THREADS",
         )
     extending.typeof_impl.register(Kernel)(lambda kernel, _: numba.typeof(kernel.dispatcher))
-
-    events.Listener.register(_Listener)
-    listener = _Listener()
-    for kind in ("numba:compile", "numba:compiler_lock"):
-        events.register(kind, listener)
-
-
-class _Listener:
-    """Listens to Numba: announces what it compiles, and searches for no garbage meanwhile, an eighth of the time.
-
-    What was compiled is written between the end of that and the end of Numba's own lock on threads. Processes wait for
-    one another there: of two that write one kernel for two kinds of arguments, each could take the other's file for its
-    own.
-    """
-
-    def __init__(self) -> None:
-        self.depth, self.was_on = 0, True
-        self.held = local()
-
-    def notify(self, event: Any) -> None:
-        if event.kind == "numba:compiler_lock":
-            if event.is_end and vars(self.held).pop("lock", None):
-                _unlock()
-        elif event.is_start:
-            if self.depth == 0:
-                self.was_on = gc.isenabled()
-                gc.disable()
-            self.depth += 1
-        else:
-            self.depth -= 1
-            if self.depth == 0 and self.was_on:
-                gc.enable()
-            self.held.lock = _lock()
-
-
-def _lock() -> bool:
-    """Wait until no other process writes to the cache; returns whether there is a lock to be taken off."""
-    until = time.monotonic() + PATIENCE
-    with suppress(OSError):
-        cache_folder().mkdir(parents=True, exist_ok=True)
-        while time.monotonic() < until:
-            try:
-                os.close(os.open(cache_folder() / "lock", os.O_CREAT | os.O_EXCL))
-                return True
-            except FileExistsError:
-                time.sleep(0.001)
-        return True  # left by a process that was killed
-    return False
-
-
-def _unlock() -> None:
-    with suppress(OSError):
-        (cache_folder() / "lock").unlink()
