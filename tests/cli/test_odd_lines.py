@@ -118,9 +118,9 @@ def test_distances_that_nearly_agree_get_files_of_their_own(folder, monkeypatch)
         path.unlink()
 
 
-@pytest.mark.parametrize("odd", ["", "fish", "--", "bash zsh", "٣", "\0", "bash\n"])
-def test_odd_shells(folder, capsys, odd):
-    assert ended(folder, capsys, "completion", {}, odd) == 2
+@pytest.mark.parametrize("odd", ["", ".", "../x", "a/b", "p ly", "\0", "ply\n"])
+def test_odd_formats_of_standard_input(folder, capsys, odd):
+    assert ended(folder, capsys, "info", {}, "-", "--from", odd) == 2
 
 
 def told_by_batch(capsys, *options):

@@ -11,7 +11,6 @@ import pytest
 import signedheat as sh
 from signedheat import samples
 from signedheat.cli import main
-from signedheat.cli.standard import sniffed
 
 
 @pytest.fixture
@@ -25,53 +24,46 @@ def run(monkeypatch, capsysbinary):
     return ran
 
 
-@pytest.mark.parametrize("ending", [".stl", ".obj", ".ply", ".off", ".vtp"])
-def test_formats_are_told_from_their_beginning(tmp_path, ending):
-    path = tmp_path / f"ball{ending}"
-    samples.sphere(1).save(path)
-    assert sniffed(path.read_bytes()) == ending
-
-
-def test_points_curves_and_fields_too(tmp_path):
-    for name in ("a.xyz", "a.pc"):
-        samples.oriented_points(samples.sphere(1), 20).save(tmp_path / name)
-    assert sniffed((tmp_path / "a.xyz").read_bytes()) == ".xyz"
-    assert sniffed((tmp_path / "a.pc").read_bytes()) == ".obj"  # which reads the same lines
-    sh.io.write_polylines(tmp_path / "a.svg", [sh.Polyline([[0, 0], [1, 0], [1, 1]], closed=True)])
-    assert sniffed((tmp_path / "a.svg").read_bytes()) == ".svg"
-    assert sniffed(b"0,1\n2,3\n") == ".csv"
-    for nothing in (b"", b"what is this\n", b"\0\1\2"):
-        with pytest.raises(sh.errors.FileFormatError) as caught:
-            sniffed(nothing)
-        assert caught.value.path == "standard input"
-
-
 def test_a_shape_goes_through_a_pipe(tmp_path, run):
     """Of a process the first time."""
     ball = tmp_path / "ball.ply"
     samples.sphere(2).save(ball)
     arguments = ["--resolution", "20"]
-    command = [sys.executable, "-m", "signedheat", "offset", "-", "0.5", "-o", "-", "--format", "obj", *arguments]
+    command = [
+        sys.executable,
+        "-m",
+        "signedheat",
+        "offset",
+        "-",
+        "0.5",
+        "--from",
+        "ply",
+        "-o",
+        "-",
+        "--format",
+        "obj",
+        *arguments,
+    ]
     done = subprocess.run(command, input=ball.read_bytes(), capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
     (tmp_path / "grown.obj").write_bytes(done.stdout)
     assert np.linalg.norm(sh.read(tmp_path / "grown.obj").vertices, axis=1) == pytest.approx(1.5, abs=0.05)
-    status, printed, _ = run("volume", "-", "-o", "-", "--json", *arguments, data=ball.read_bytes())
+    status, printed, _ = run("volume", "-", "--from", ".ply", "-o", "-", "--json", *arguments, data=ball.read_bytes())
     assert status == 0
     with np.load(io.BytesIO(printed)) as arrays:
         same = sh.signed_distance(sh.read(ball), resolution=20)
         np.testing.assert_array_equal(arrays["values"], same.values)
-    told = json.loads(run("info", "-", "--json", data=ball.read_bytes())[1])
+    told = json.loads(run("info", "-", "--from", "ply", "--json", data=ball.read_bytes())[1])
     assert told["file"] == "standard input" and told["n_vertices"] == 162
 
 
 def test_what_goes_wrong_names_standard_input(tmp_path, run):
     status, _, said = run(
-        "volume", "-", "-o", str(tmp_path / "a.npz"), data=b"ply\nformat ascii 1.0\nelement vertex 9\n"
+        "volume", "-", "--from", "ply", "-o", str(tmp_path / "a.npz"), data=b"ply\nformat ascii 1.0\nelement vertex 9\n"
     )
     assert status == 1 and said.startswith(b"signedheat: standard input: ") and said.count(b"\n") == 1
     status, _, said = run("volume", "-", "-o", str(tmp_path / "a.npz"))
-    assert status == 1 and b"standard input" in said
+    assert status == 1 and b"standard input" in said and b"--from" in said
     samples.sphere(1).save(tmp_path / "ball.ply")
     status, printed, said = run("offset", str(tmp_path / "ball.ply"), "0.1", "0.2", "-o", "-", "--resolution", "16")
     assert status == 2 and b"one surface" in said and printed == b""

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import SignedHeatError, printable
-from .options import parser_of, refuse_output_over_input
+from .options import parser_of, refuse_output_over_input, without_exponents
 from .terminal import Signals, open_standard_streams, say, write_out
 
 FAILED, BUG = 1, 70
@@ -55,7 +55,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: Sequence[str] | None) -> int:
     """Everything else is imported here, where all that may go wrong is caught."""
     parser = parser_of(import_module(f"{__name__}.shell").COMMANDS)
-    arguments = parser.parse_args(argv)
+    if "_ARGCOMPLETE" in os.environ:  # set by the shell function of argcomplete, which waits for words
+        import_module("argcomplete").autocomplete(parser)
+    arguments = parser.parse_args(without_exponents(sys.argv[1:] if argv is None else argv))
     if "run" not in arguments:
         parser.print_help()
         return 0

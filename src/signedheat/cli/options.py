@@ -12,6 +12,7 @@ import re
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from decimal import Decimal
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
@@ -45,11 +46,7 @@ ABSENT: Mapping[str, Any] = {
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser with one-line errors that accepts negative numbers, 1e-3 included, as arguments."""
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self._negative_number_matcher = re.compile(r"^-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)
+    """An argument parser with one-line errors."""
 
     def error(self, message: str) -> NoReturn:
         """Exit with status 2."""
@@ -97,6 +94,13 @@ class Command:
         parser.set_defaults(**{**ABSENT, **self.absent}, run=self.run, parser=parser, check=self.check)
         parser.add_argument("--json", action="store_true", help="print a summary as JSON")
         parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+        parser.add_argument(
+            "--from",
+            type=ending,
+            dest="input_format",
+            metavar="EXT",
+            help="format of standard input, where - stands for a file",
+        )
         for each in self.options:
             inside = parser.add_argument_group(each.title) if isinstance(each, Group) else parser
             for given in each.options if isinstance(each, Group) else (each,):
@@ -138,11 +142,22 @@ def parser_of(commands: Iterable[Command]) -> Parser:
         "in the units of the file.",
     )
     whole.add_argument("--version", action="version", version=f"signedheat {__version__}")
-    whole.set_defaults(whole=whole)
     added = whole.add_subparsers(metavar="COMMAND", parser_class=Parser)
     for each in commands:
         each.add_to(added)
     return whole
+
+
+def without_exponents(words: Iterable[str]) -> list[str]:
+    """Words with negative numbers such as -1e-3 in plain digits, for argparse would take them for options.
+
+    Examples
+    --------
+    >>> without_exponents(["offset", "-1e-3", "-2.5e1", "--quiet"])
+    ['offset', '-0.001', '-25.0', '--quiet']
+    """
+    is_number = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE).fullmatch
+    return [format(Decimal(repr(float(word))), "f") if is_number(word) else word for word in words]
 
 
 def option(*names: str, **settings: Any) -> Option:
@@ -197,6 +212,13 @@ def finite(word: str) -> float:
     if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f"'{word}' is no finite number")
     return value
+
+
+def ending(word: str) -> str:
+    """The extension of a file, without its first dot."""
+    if not re.fullmatch(r"\.?\w+(\.gz)?", word):
+        raise argparse.ArgumentTypeError(f"{word!r} is no extension of a file")
+    return word.removeprefix(".")
 
 
 def positive(word: str) -> float:

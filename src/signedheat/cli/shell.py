@@ -1,8 +1,7 @@
-"""Commands about the installation, `completion` and `warmup`; and all commands, in the order of the help."""
+"""The command about the installation, `warmup`; and all commands, in the order of the help."""
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import time
@@ -16,80 +15,14 @@ from ..progress import Announcement
 from .batch import batch, watertight
 from .curves import close, surface
 from .info import info
-from .options import Command, Summary, command, is_quiet, option
+from .options import Command, Summary, command, is_quiet
 from .parts import compiled, kernel_runs, parallel
 from .solids import contour, morph, offset, sample, volume
 from .terminal import ProgressBar, say
 from .view import demo, deviation, view
 
-BASH = """_signedheat() {{
-    local word="${{COMP_WORDS[COMP_CWORD]}}" before="${{COMP_WORDS[COMP_CWORD-1]}}" offered=""
-    if [ "$COMP_CWORD" -eq 1 ]; then
-        offered="{commands}"
-    else
-        case "${{COMP_WORDS[1]}} $before" in
-{choices}
-            *) case "${{COMP_WORDS[1]}}" in
-{options}
-            esac
-        esac
-    fi
-    case "$word" in
-        -*) ;;
-        *) [ "$COMP_CWORD" -gt 1 ] && case "$offered" in -*) offered="" ;; esac ;;
-    esac
-    {reply}
-}}
-complete -o default -o bashdefault -F _signedheat signedheat
-"""
-"""Options and choices; where there are none, files."""
-REPLIES = {
-    "bash": 'mapfile -t COMPREPLY < <(compgen -W "$offered" -- "$word")',
-    "zsh": 'COMPREPLY=($(compgen -W "$offered" -- "$word"))',  # it has no mapfile
-}
 TICK = 0.5
 """Seconds after which the progress of compiling is drawn again."""
-BEFORE = {"bash": "", "zsh": "autoload -U +X bashcompinit && bashcompinit\n"}
-
-
-@command(
-    "completion",
-    "completion for bash and zsh",
-    "Prints what a shell needs to complete commands, options and files: in bash, put "
-    "'eval \"$(signedheat completion bash)\"' into ~/.bashrc; for zsh, the same with zsh into ~/.zshrc, after "
-    "compinit.",
-    option("shell", metavar="SHELL", choices=("bash", "zsh"), help="bash or zsh"),
-)
-def completion(arguments: Namespace) -> Summary:
-    """Print the script for a shell."""
-    script = script_for(arguments.whole, arguments.shell)
-    return {"shell": arguments.shell, "script": script}, script.rstrip()
-
-
-def script_for(whole: argparse.ArgumentParser, shell: str) -> str:
-    """The script that makes a shell complete what the whole parser takes."""
-    commands = commands_of(whole)
-    choices, options = [], []
-    for name, parser in commands.items():
-        named = [action for action in parser._actions if action.option_strings]
-        options.append(f'                {name}) offered="{" ".join(o for a in named for o in a.option_strings)}" ;;')
-        for action in named:
-            if action.choices:
-                keys = "|".join(f'"{name} {word}"' for word in action.option_strings)
-                choices.append(f'            {keys}) offered="{" ".join(map(str, action.choices))}" ;;')
-        places = [action for action in parser._actions if not action.option_strings and action.choices]
-        if places:
-            choices.append(f'            "{name} {name}") offered="{" ".join(map(str, places[0].choices or ()))}" ;;')
-    parts = {"commands": " ".join(commands), "choices": "\n".join(choices), "options": "\n".join(options)}
-    return BEFORE[shell] + BASH.format(**parts, reply=REPLIES[shell])
-
-
-def commands_of(whole: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    """The parsers of the commands, by name."""
-    for action in whole._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            return dict(action.choices)
-    return {}
 
 
 @command(
@@ -146,5 +79,5 @@ def run_job(name: str) -> None:
 
 COMMANDS: tuple[Command, ...] = (
     *(volume, surface, close, offset, watertight, contour, morph, sample, deviation, batch),
-    *(info, view, demo, completion, warmup),
+    *(info, view, demo, warmup),
 )
