@@ -26,12 +26,12 @@ from .errors import SignedHeatError
 from .packages import lazy_module
 from .progress import Announcement
 
-numba = lazy_module("numba", "compiled kernels")
-extending = lazy_module("numba.extending", "compiled kernels")
+numba: Any = lazy_module("numba", "compiled kernels")
+extending: Any = lazy_module("numba.extending", "compiled kernels")
 
-logger = logging.getLogger("signedheat")
+logger: logging.Logger = logging.getLogger("signedheat")
 MOST_THREADS = 1024
-OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """Dividing by zero is no exception; C does not call kernels, so that what it would call is not compiled."""
 DAMAGE = OSError, EOFError, UnpicklingError
 """What reading or writing the cache raises where files are damaged or cannot be written. Kernels raise none of them."""
@@ -42,7 +42,7 @@ made: list[Kernel[..., Any]] = []
 """The kernels that this process has used."""
 
 
-announce = Announcement("compiling what this needs, once (signedheat warmup compiles all)")
+announce: Announcement = Announcement("compiling what this needs, once (signedheat warmup compiles all)")
 
 
 class Kernel(Generic[Parameters, Returned]):
@@ -57,13 +57,13 @@ class Kernel(Generic[Parameters, Returned]):
     3.0
     """
 
-    is_kept = True
+    is_kept: bool = True
     """Whether what is compiled is kept on disk: no longer once the cache was found damaged, or the disk full."""
 
     def __init__(self, function: Callable[Parameters, Returned], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
         self.function = function
-        self.options = {**OPTIONS, **options}
+        self.options: dict[str, Any] = {**OPTIONS, **options}
 
     def __call__(self, *arguments: Parameters.args, **named: Parameters.kwargs) -> Returned:
         try:

@@ -52,8 +52,10 @@ class SignedHeatError(ValueError):
     ) -> None:
         cause = printable(" ".join(cause.split()))  # one line, whatever was quoted
         super().__init__(cause)
-        self.cause, self.remedy, self.element = cause, remedy, element
-        self.path = None if path is None else str(path)
+        self.cause: str = cause
+        self.remedy: str | None = remedy
+        self.element: str | None = element
+        self.path: str | None = None if path is None else str(path)
 
     def __str__(self) -> str:
         return ": ".join(printable(part) for part in (self.path, self.cause, self.remedy) if part is not None)

@@ -15,7 +15,7 @@ from .errors import SignedHeatError
 from .jobs import run_limited
 from .packages import lazy_module
 
-distributed = lazy_module("distributed", "Dask clusters")
+distributed: Any = lazy_module("distributed", "Dask clusters")
 
 CHUNK = 1 << 13
 """Rows that a thread works on at a time."""

@@ -14,7 +14,7 @@ from .jobs import run_cancellable
 
 Result = TypeVar("Result")
 
-logger = logging.getLogger("signedheat")
+logger: logging.Logger = logging.getLogger("signedheat")
 
 CLEAR_LINE = "\r\x1b[2K"
 """What takes a progress bar off a terminal."""

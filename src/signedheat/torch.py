@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from .solids.solid import Solid
 if TYPE_CHECKING:
     from torch import Tensor
 
-torch = lazy_module("torch", "tensors")
+torch: Any = lazy_module("torch", "tensors")
 
 SAME = 1e-5
 """Difference between vertices and those of the solid, over the greatest coordinate: what single precision rounds off,

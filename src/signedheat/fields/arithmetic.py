@@ -63,7 +63,7 @@ class Arithmetic:
     (array([ 1., -0., -1.]), 1.0, array([1., 0., 1.]))
     """
 
-    __array_priority__ = 1000.0  # numbers of NumPy leave operators to the field
+    __array_priority__: float = 1000.0  # numbers of NumPy leave operators to the field
 
     def __array__(self: HasValues, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.values, dtype=dtype, copy=copy)

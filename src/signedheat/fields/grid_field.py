@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Generic, Literal, cast, overload
+from typing import TYPE_CHECKING, Any, Generic, Literal, cast, overload
 
 import numpy as np
 import scipy
@@ -30,8 +30,8 @@ from .arithmetic import Combinable, Rule
 from .levels import on_level, refuse_beyond_walls
 from .solid_queries import Closest, SolidQueries
 
-files = lazy_module("signedheat.io.fields", "files")
-ply = lazy_module("signedheat.io.ply", "files")
+files: Any = lazy_module("signedheat.io.fields", "files")
+ply: Any = lazy_module("signedheat.io.ply", "files")
 
 if TYPE_CHECKING:
     import pyvista

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,7 @@ from ..packages import lazy_module
 from .arithmetic import Combinable
 from .levels import refuse_beyond_walls
 
-files = lazy_module("signedheat.io.fields", "files")
+files: Any = lazy_module("signedheat.io.fields", "files")
 
 if TYPE_CHECKING:
     import pyvista

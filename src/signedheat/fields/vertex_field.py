@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Generic, cast, overload
+from typing import TYPE_CHECKING, Any, Generic, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,7 +29,7 @@ from ..geometry.meshes import gradients_along
 from ..packages import lazy_module
 from .arithmetic import Combinable, Rule
 
-files = lazy_module("signedheat.io.fields", "files")
+files: Any = lazy_module("signedheat.io.fields", "files")
 
 if TYPE_CHECKING:
     import pyvista

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, OutsideError
 from ..packages import lazy_module
 
-measure = lazy_module("skimage.measure", "contours")
+measure: Any = lazy_module("skimage.measure", "contours")
 
 CLEARANCE = 1e-3
 """Crossings stay this fraction of a cell away from the nodes, so that no two vertices of a surface coincide."""

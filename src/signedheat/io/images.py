@@ -38,9 +38,9 @@ from .files import (
 from .vtk_xml import read_vti
 
 NIBABEL = ("nibabel", "NIfTI files")
-nibabel = lazy_module(*NIBABEL)
-nrrd = lazy_module("nrrd", "NRRD files")
-Pillow = lazy_module("PIL.Image", "pictures as masks")
+nibabel: Any = lazy_module(*NIBABEL)
+nrrd: Any = lazy_module("nrrd", "NRRD files")
+Pillow: Any = lazy_module("PIL.Image", "pictures as masks")
 
 CONFIDENCE = "confidence"
 NIFTI = (".nii", ".nii.gz")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 from xml.parsers import expat
 
 import numpy as np
@@ -19,8 +20,8 @@ from .files import PathLike, contents, damaged, ensure_fits, parsed_by_others, r
 SEPARATORS = str.maketrans(",;", "  ")
 NUMBERS = {"F": "f", "I": "i", "U": "u"}
 """Types of fields, and their letters for NumPy."""
-laspy = lazy_module("laspy", ".las and .laz files")
-pye57 = lazy_module("pye57", ".e57 files")
+laspy: Any = lazy_module("laspy", ".las and .laz files")
+pye57: Any = lazy_module("pye57", ".e57 files")
 
 CHECKSUM = 4
 """Bytes at the end of each page of an E57 file."""

@@ -15,7 +15,7 @@ from ..packages import lazy_module
 from .files import PathLike, contents, format_for, parsed_by_others, reading, replacing
 from .points import read_point_lists, write_point_lists
 
-svgpathtools = lazy_module("svgpathtools", "SVG drawings")
+svgpathtools: Any = lazy_module("svgpathtools", "SVG drawings")
 
 CURVE_PIECES = 64
 """Number of segments that approximate a Bézier curve or an arc."""

@@ -12,7 +12,7 @@ from scipy import sparse
 from ..errors import FactorizationError
 from ..packages import lazy_module
 
-cholmod = lazy_module("sksparse.cholmod", "factors of CHOLMOD")
+cholmod: Any = lazy_module("sksparse.cholmod", "factors of CHOLMOD")
 
 
 class CholmodFactor:
@@ -29,7 +29,9 @@ class CholmodFactor:
     backend = "cholmod"
 
     def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None = None) -> None:
-        self.n, self.dtype, self._order = upper.shape[0], upper.dtype, order
+        self.n: int = upper.shape[0]
+        self.dtype: np.dtype[Any] = upper.dtype
+        self._order = order
         lower = sparse.csc_matrix((upper.data.conj(), upper.indices, upper.indptr), shape=upper.shape)
         if order is not None:
             whole = lower + sparse.tril(lower, -1).conj().T

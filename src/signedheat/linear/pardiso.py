@@ -46,7 +46,8 @@ class PardisoFactor:
         self._take(_Analysis(upper, order), upper)
 
     def _take(self, analysis: _Analysis, upper: sparse.csr_matrix) -> None:
-        self.n, self.dtype = upper.shape[0], upper.dtype
+        self.n: int = upper.shape[0]
+        self.dtype: np.dtype[Any] = upper.dtype
         self._analysis, self._values = analysis, upper.data
         with analysis.lock:
             analysis.factorize(self._values)

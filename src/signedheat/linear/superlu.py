@@ -34,7 +34,8 @@ class SuperLUFactor:
     backend = "superlu"
 
     def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None = None) -> None:
-        self.n, self.dtype = upper.shape[0], upper.dtype
+        self.n: int = upper.shape[0]
+        self.dtype: np.dtype[Any] = upper.dtype
         self._order = elimination_order(upper) if order is None else order
         matrix = whole(upper)[self._order][:, self._order]
         with threadpool_limits(1, "blas"):  # its dense blocks are tiny: threads cost ten times what they gain

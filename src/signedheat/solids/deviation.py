@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +23,7 @@ from ..progress import Progress
 from .complete import complete
 from .solid import Solid
 
-pictures = lazy_module("signedheat.view.deviations", "pictures")
+pictures: Any = lazy_module("signedheat.view.deviations", "pictures")
 
 PERCENTILES = (0.0, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 100.0)
 """Of deviations, that summaries have."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from ..geometry.meshes import face_areas
 from ..memory import refuse_beyond_memory
 from ..packages import lazy_module
 
-files = lazy_module("signedheat.io.solids", "files")
+files: Any = lazy_module("signedheat.io.solids", "files")
 
 WIDTHS = (0.05, 0.0158)
 """Widths of the noise by default, over the radius of the shape: variances of .0025 and .00025 (Park et al. 2019)."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +16,7 @@ from ..geometry.nearest import foot_on_triangle
 from ..geometry.self_intersections import self_intersections
 from ..packages import lazy_module
 
-manifold3d = lazy_module("manifold3d", "simplified surfaces")
+manifold3d: Any = lazy_module("manifold3d", "simplified surfaces")
 
 ATTEMPTS = 8
 """Attempts, each with half the tolerance for manifold3d, until its result is one that can be taken: of 51 surfaces at

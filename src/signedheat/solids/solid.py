@@ -34,7 +34,7 @@ from .simplification import simplified
 from .stores import Scheduler
 from .winding import Windings
 
-files = lazy_module("signedheat.io.solids", "files")
+files: Any = lazy_module("signedheat.io.solids", "files")
 
 MANY = 1 << 18
 """Points that are put in order together."""

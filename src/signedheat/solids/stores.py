@@ -30,7 +30,7 @@ from ..progress import Progress
 from .nodes import solved
 from .winding import Windings
 
-distributed = lazy_module("distributed", "Dask clusters")
+distributed: Any = lazy_module("distributed", "Dask clusters")
 
 RETRIES = 3
 """How often a tile is given to another worker of a cluster after one has died."""

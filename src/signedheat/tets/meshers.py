@@ -22,8 +22,8 @@ from ..errors import GeometryError
 from ..lowering.area_elements import area_elements, bounds_around
 from ..packages import lazy_module
 
-pytetwild = lazy_module("pytetwild", "tets of fTetWild")
-tetgen = lazy_module("tetgen", "tets of TetGen")
+pytetwild: Any = lazy_module("pytetwild", "tets of fTetWild")
+tetgen: Any = lazy_module("tetgen", "tets of TetGen")
 
 
 def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:

@@ -30,7 +30,7 @@ from .figures import new_figure, picture
 from .slices import clearest_layer, draw_line, draw_plane, draw_slices
 from .surfaces import draw_shape, draw_surface
 
-pillow = lazy_module("PIL.Image", "pictures")
+pillow: Any = lazy_module("PIL.Image", "pictures")
 
 SIDE = 3.4
 """Of the picture, in inches."""

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure, SubFigure
 
-backend_agg = lazy_module("matplotlib.backends.backend_agg", "pictures")
-mpl_cm = lazy_module("matplotlib.cm", "pictures")
-mpl_colors = lazy_module("matplotlib.colors", "pictures")
-mpl_figure = lazy_module("matplotlib.figure", "pictures")
+backend_agg: Any = lazy_module("matplotlib.backends.backend_agg", "pictures")
+mpl_cm: Any = lazy_module("matplotlib.cm", "pictures")
+mpl_colors: Any = lazy_module("matplotlib.colors", "pictures")
+mpl_figure: Any = lazy_module("matplotlib.figure", "pictures")
 
 PICTURE_FORMATS = frozenset({".png", ".pdf", ".svg", ".jpg"})
 INSIDE_TO_OUTSIDE = ["#0b3c5d", "#3f7fae", "#a9cce3", "#fbfaf5", "#f6c9a0", "#d9793a", "#8c2d04"]

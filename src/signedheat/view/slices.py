@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
 
-mpl_collections = lazy_module("matplotlib.collections", "pictures")
+mpl_collections: Any = lazy_module("matplotlib.collections", "pictures")
 
 AXES = "xyz"
 TET_NODES = 64

@@ -21,7 +21,7 @@ from ..packages import lazy_module
 from .figures import even_colors, isolines_between
 from .surfaces import INNER_COLOR, OUTER_COLOR
 
-pyvista = lazy_module("pyvista", "windows")
+pyvista: Any = lazy_module("pyvista", "windows")
 
 BODY = "#d8d2c0"
 LINE = "#1a1a1a"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from ...geometry.marching import CAP, CLEARANCE
 from ...packages import lazy_module
 from .blocks import SIDE, BlockValues
 
-measure = lazy_module("skimage.measure", "contours")
+measure: Any = lazy_module("skimage.measure", "contours")
 
 WINDOW = 8
 """Blocks along each edge of a window."""

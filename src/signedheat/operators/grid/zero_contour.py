@@ -9,7 +9,7 @@ Arrays have four axes, of which the first ones are unused in fewer dimensions; p
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -23,7 +23,7 @@ from .closest_points import circle_distance, crossed_edges, crossings_at, neares
 from .stencil import by_slabs
 from .wavefront import padded_shape, sweep_lines
 
-measure = lazy_module("skimage.measure", "contours")
+measure: Any = lazy_module("skimage.measure", "contours")
 
 SMOOTHING = 1.0
 """Standard deviation, in cells, of the Gaussian that smooths arrays of signs. Of balls, half spaces and boxes, 24 to 96
