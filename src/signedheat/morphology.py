@@ -33,9 +33,9 @@ from .fields.arithmetic import smooth_difference, smooth_intersection, smooth_un
 from .fields.grid_field import GridField
 from .fields.to_field import Field
 from .fields.vertex_field import VertexField
-from .geometry.components import element_components
 from .geometry.face_features import FaceFeatures
 from .geometry.face_tree import FaceTree
+from .geometry.meshes import part_volumes
 from .geometry.nearest import weights_in
 from .lowering.area_elements import area_elements, bounds_around
 from .lowering.grid.discretization import refuse_large_grid
@@ -472,7 +472,7 @@ def _linear(shape: Shapes | Solid, values: NDArray[np.float64]) -> Reach:
 
 def _without_crumbs(wall: TriangleMesh, thickness: float) -> TriangleMesh:
     """A wall without cavities smaller than a ball as wide as it is thick."""
-    parts, volumes = _part_volumes(wall)
+    parts, volumes = part_volumes(wall.vertices, wall.faces)
     crumbs = (volumes < 0) & (volumes > -np.pi / 6 * thickness**3)
     if not crumbs.any():
         return wall
@@ -480,16 +480,9 @@ def _without_crumbs(wall: TriangleMesh, thickness: float) -> TriangleMesh:
     return TriangleMesh(wall.vertices[used], faces.reshape(-1, 3))
 
 
-def _part_volumes(mesh: TriangleMesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """(m,) connected part of each face, and the volumes that parts have inside; negative for cavities."""
-    parts = element_components(mesh.faces)
-    a, b, c = (mesh.vertices - mesh.vertices.mean(axis=0))[mesh.faces].transpose(1, 0, 2)
-    return parts, np.bincount(parts, (a * np.cross(b, c)).sum(axis=1)) / 6
-
-
 def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
     """A wall with a hole straight down from the bottom of its largest cavity, where it is the widest."""
-    parts, volumes = _part_volumes(wall)
+    parts, volumes = part_volumes(wall.vertices, wall.faces)
     if not volumes.min() < 0:
         raise SignedHeatError("the wall has no cavity to drain", remedy="leave out drain, or make the wall thinner")
     radius = 0.5 * diameter

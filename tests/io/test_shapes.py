@@ -1,6 +1,7 @@
 """Shapes from files and back: every element kept, in order; everything damaged refused in one clear sentence."""
 
 import base64
+import warnings
 
 import numpy as np
 import pytest
@@ -331,3 +332,14 @@ def test_negative_ids_of_obj_count_back_from_their_line(tmp_path):
     square = "v 0 0 {z}\nv 1 0 {z}\nv 0 1 {z}\nf -3 -2 -1\n"
     (tmp_path / "two.obj").write_text(square.format(z=0) + square.format(z=1))
     assert sh.read(tmp_path / "two.obj").faces.tolist() == [[0, 1, 2], [3, 4, 5]]
+
+
+@pytest.mark.parametrize(("place", "loses"), [((0, 0, 0), False), ((431250.1, 5412300.3, 112.2), True)])
+def test_stl_says_when_single_precision_is_too_little(tmp_path, place, loses):
+    ball = samples.sphere(3)
+    house = sh.TriangleMesh(ball.vertices + place, ball.faces)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        house.save(tmp_path / "house.stl")
+        house.save(tmp_path / "house.ply")
+    assert [issubclass(warning.category, sh.errors.InexactWarning) for warning in caught] == [True] * loses

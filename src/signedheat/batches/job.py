@@ -261,7 +261,10 @@ class Watertight:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", InexactWarning)
             surface, way = closed_surface(solid, **options)
-        save(surface, f"{stem}{self.surfaces}")
+        with warnings.catch_warnings(record=True) as losses:
+            warnings.simplefilter("always", InexactWarning)
+            save(surface, f"{stem}{self.surfaces}")
+        way = "; ".join([way, *(str(loss.message) for loss in losses)])
         if self.samples is not None:
             on, around = training_points(surface, self.samples, self.normalize)
             write_npz(f"{stem}_surface.npz", **on)

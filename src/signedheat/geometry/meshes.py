@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .components import element_components
 from .edges import EdgeTable
 
 
@@ -47,6 +48,19 @@ def area_vectors(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
 def face_areas(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     """(m,) areas of (m, 3, 3) triangles."""
     return np.linalg.norm(area_vectors(triangles), axis=1)
+
+
+def part_volumes(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """(m,) connected part of each triangle, and the volume inside each part; negative for cavities.
+
+    Volumes are taken about a vertex of each part, so that nothing cancels far from the origin.
+    """
+    parts = element_components(faces)
+    first = np.unique(parts, return_index=True)[1]
+    corners = vertices[faces] - vertices[faces[first, 0]][parts, None]
+    return parts, np.bincount(parts, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6
 
 
 def divided_at(

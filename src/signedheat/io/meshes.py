@@ -12,14 +12,16 @@ from numpy.typing import NDArray
 
 from ..domains.exchange import Elements
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import FileFormatError
+from ..errors import FileFormatError, InexactWarning, warn_user
 from ..geometry.directions import unit
-from ..geometry.welding import distinct_rows
+from ..geometry.welding import distinct_rows, same_positions
 from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers, reading, refuse_kind, text
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 BYTES = 400
 """Measured: what each line of an OBJ file takes while it is read."""
+MOVED = 1e-4
+"""Share of the size of a shape by which rounding may move vertices without a warning."""
 _HEADER = 84  # of STL, in bytes: 80 of comment, 4 that count the facets
 
 
@@ -44,7 +46,7 @@ def read_stl(path: PathLike) -> TriangleMesh:
 
 
 def write_stl(shape: Elements, path: PathLike) -> bytes:
-    """Binary STL, in single precision."""
+    """Binary STL, in single precision; a warning if that is too little for the shape."""
     if shape.kind != "TriangleMesh":
         kinds = ".obj, .ply, .off or .vtp" if len(shape.counts) else ".ply or .xyz"
         raise refuse_kind(shape.kind, path, "triangles", kinds)
@@ -55,8 +57,22 @@ def write_stl(shape: Elements, path: PathLike) -> bytes:
         raise FileFormatError(
             "coordinates are too large for the single precision of STL", remedy="save it as .ply", path=path
         )
+    warn_of_rounding(shape.points, shape.points.astype(np.float32).astype(np.float64))
     facets["normal"] = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     return b"signedheat".ljust(80) + len(facets).to_bytes(4, "little") + facets.tobytes()
+
+
+def warn_of_rounding(points: NDArray[np.float64], rounded: NDArray[np.float64]) -> None:
+    """Warn if rounding joins vertices of a shape, or moves them far for its size."""
+    largest_move = float(np.abs(points - rounded).max())
+    places, rounded_places = (np.count_nonzero(same_positions(p) == np.arange(len(p))) for p in (points, rounded))
+    if places > rounded_places or largest_move > MOVED * float(np.ptp(points, axis=0).max()):
+        joined = f" and joins {places - rounded_places:,} of them to others" if places > rounded_places else ""
+        warn_user(
+            f"the single precision of STL moves vertices by up to {largest_move:.2g}{joined}: save it as .ply, or move "
+            "it to the origin first",
+            InexactWarning,
+        )
 
 
 def _text_corners(data: bytes) -> NDArray[np.float64]:

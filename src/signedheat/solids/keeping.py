@@ -21,7 +21,7 @@ from ..geometry.conforming import conforming
 from ..geometry.cut_faces import cut_faces
 from ..geometry.directions import unit
 from ..geometry.face_tree import FaceTree
-from ..geometry.meshes import area_vectors
+from ..geometry.meshes import area_vectors, part_volumes
 from ..geometry.self_intersections import self_intersections
 from .fields import Evaluated
 from .parts import parts_of
@@ -170,9 +170,8 @@ def _exchanged(
 
 def _without_crumbs(mesh: TriangleMesh, boxes: Boxes) -> TriangleMesh:
     """A mesh without bodies and cavities smaller than a cell that lie in boxes or next to them."""
-    parts = element_components(mesh.faces)
-    a, b, c = (mesh.vertices - mesh.vertices.mean(axis=0))[mesh.faces].transpose(1, 0, 2)
-    small = np.abs(np.bincount(parts, (a * np.cross(b, c)).sum(axis=1)) / 6) < boxes.cell**3
+    parts, volumes = part_volumes(mesh.vertices, mesh.faces)
+    small = np.abs(volumes) < boxes.cell**3
     beyond = ~boxes.grown.have(mesh.vertices)[mesh.faces].all(axis=1)
     crumbs = small & (np.bincount(parts, beyond) == 0)
     return _compact(mesh.vertices, mesh.faces[~crumbs[parts]])

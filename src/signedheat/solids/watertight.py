@@ -10,7 +10,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, SourceError
 from ..geometry.components import element_components
 from ..geometry.face_tree import FaceTree
-from ..geometry.meshes import face_areas
+from ..geometry.meshes import face_areas, part_volumes
 from ..geometry.self_intersections import self_intersections
 from .keeping import given_surface, unjoined
 from .simplification import simplified
@@ -66,8 +66,7 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
     faces that were given; `from_faces` that from faces that bound the solid to the surface, less the level.
     """
     corners = surface.vertices[surface.faces]
-    volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
-    parts = element_components(surface.faces)
+    volumes = part_volumes(surface.vertices, surface.faces)[1]
     behind, ahead = solid.windings.sides(solid.triangles)
     bounds = (behind != ahead) | (level > 0)
     given, made = solid.triangles[bounds & (solid.origins >= 0)], solid.triangles[bounds & (solid.origins < 0)]
@@ -75,7 +74,7 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
     off = np.abs(closest.distances - level)[~closest.completed]
     back = FaceTree.of_triangles(corners).distances(_places(given)) - level if len(given) else np.zeros(1)
     return {
-        "bodies": int((np.bincount(parts, volumes) > 0).sum()),
+        "bodies": int((volumes > 0).sum()),
         "vertices": surface.n_vertices,
         "faces": surface.n_faces,
         "volume": float(volumes.sum()),
