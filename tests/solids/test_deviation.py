@@ -80,3 +80,57 @@ def test_command(tmp_path, capsys):
     assert said["output"] == outputs and all(Path(each).exists() for each in outputs)
     assert main(words) == 0
     assert "100.00% within 0.2" in capsys.readouterr().out
+
+
+def terrain(height, n=24):
+    """A graph over a square with sides of 10, its normals up."""
+    x, y = np.meshgrid(np.linspace(0, 10, n), np.linspace(0, 10, n), indexing="ij")
+    ids = np.arange(n * n).reshape(n, n)
+    a, b, c, d = (ids[i : n - 1 + i, j : n - 1 + j].ravel() for i, j in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    vertices = np.column_stack([x.ravel(), y.ravel(), height(x, y).ravel()])
+    return vertices, np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+
+
+HEIGHTS = {
+    "panel": lambda x, y: 0 * x,
+    "waves": lambda x, y: 0.5 * np.sin(1.5 * x) * np.cos(y),
+    "valley": lambda x, y: 0.08 * ((x - 5) ** 2 + (y - 5) ** 2),
+    "hill": lambda x, y: -0.08 * ((x - 5) ** 2 + (y - 5) ** 2),
+    "tilted facade": lambda x, y: 2 * x + np.where((x > 4) & (x < 6) & (y > 4), -1.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("name", HEIGHTS)
+@pytest.mark.parametrize("place", [(0, 0, 0), (431250.5, 5412300.25, 80)])
+def test_open_nominals_have_sides(name, place):
+    vertices, faces = terrain(HEIGHTS[name])
+    turned = faces.copy()
+    turned[::5] = turned[::5, ::-1]
+    inner = np.flatnonzero((np.abs(vertices[:, :2] - 5) < 4).all(axis=1))
+    rise = np.random.default_rng(0).choice([-0.02, 0.02], len(inner))
+    points = vertices[inner] + rise[:, None] * [0, 0, 1]
+    for part in (faces, turned):
+        found = sh.deviation(points + place, (vertices + place, part))
+        np.testing.assert_array_equal(np.sign(found.distances), np.sign(rise))
+        assert not found.completed.any() and not found.beyond_rim.any()
+    opposite = sh.deviation(points, sh.complete((vertices, faces[:, ::-1])))
+    np.testing.assert_array_equal(np.sign(opposite.distances), -np.sign(rise))
+
+
+def test_polygons_and_parts_of_an_assembly_have_sides():
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+    points = np.array([[0.5, 0.5, 0.1], [0.5, 0.5, -0.1]])
+    np.testing.assert_allclose(sh.deviation(points, sh.PolygonMesh(corners, [[0, 1, 2, 3]])).distances, [0.1, -0.1])
+    body = box((0, 0, 1), (1, 1, 2))
+    both = samples.union(body, sh.TriangleMesh(corners, [[0, 1, 2], [0, 2, 3]]))
+    found = sh.deviation(np.vstack([points, [[0.5, 0.5, 1.25], [0.5, 0.5, 0.75]]]), both)
+    np.testing.assert_allclose(found.distances, [0.1, -0.1, -0.25, 0.25])
+
+
+def test_points_beyond_the_rim_say_so():
+    vertices, faces = terrain(HEIGHTS["panel"])
+    points = np.array([[5, 5, 1], [-1, 5, 1], [11, 11, -1], [0, 5, 1], [0, 0, -1]])
+    found = sh.deviation(points, (vertices, faces))
+    assert found.beyond_rim.tolist() == [False, True, True, False, False]
+    assert found.figures["beyond_rim"] == 0.4
+    np.testing.assert_allclose(found.distances, [1, np.sqrt(2), -np.sqrt(3), 1, -1])

@@ -149,6 +149,8 @@ def deviation(arguments: Namespace) -> Summary:
         share = found.within(arguments.tolerance)
         summary |= {"tolerance": arguments.tolerance, "within": share}
         text += f", {share:.2%} within {arguments.tolerance:g}"
+    if found.beyond_rim.any():
+        text += f"; {summary['beyond_rim']:.2%} beyond the rim of it"
     for output in arguments.output:
         found.save(output)
         text += f"; {output}"

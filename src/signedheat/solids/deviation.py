@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..domains.foreign import as_shape
+from ..domains.foreign import SurfaceShape, as_shape
+from ..domains.joining import joined_shape
 from ..domains.kinds import ShapeLike
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
@@ -18,6 +19,11 @@ from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..frozen import Frozen
+from ..geometry.edges import orient_faces, pair_halfedges
+from ..geometry.face_features import FaceFeatures
+from ..geometry.face_tree import FaceTree, NearestFaces
+from ..geometry.meshes import face_areas
+from ..geometry.welding import welded_vertices
 from ..packages import lazy_module
 from ..progress import Progress
 from .complete import complete
@@ -31,6 +37,12 @@ EXTREME = 99.0
 """Percentile of absolute deviations at which colours are full and histograms end: few outliers do not wash them out."""
 BINS = 40
 """Of histograms."""
+OPEN = 0.25
+"""Share of the whole surface that is completed, from which a nominal is measured as an open surface."""
+TIE = 1e-9
+"""Relative difference below which distances are equal."""
+STRAIGHT = 1 - 1e-6
+"""Cosine to the normal above which a point is straight above its nearest place, or below."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +61,9 @@ class Deviation(Frozen):
         The nearest places of the part.
     completed : (n,) bool
         Whether these lie on surface that the nominal part did not have, and that closes it.
+    beyond_rim : (n,) bool
+        Whether points are beyond the rim of an open nominal, such as a panel or a terrain: their side is that of the
+        surface continued.
 
     Examples
     --------
@@ -62,6 +77,7 @@ class Deviation(Frozen):
     distances: NDArray[np.float64]
     nearest: NDArray[np.float64]
     completed: NDArray[np.bool_]
+    beyond_rim: NDArray[np.bool_]
 
     @property
     def points(self) -> NDArray[np.float64]:
@@ -110,6 +126,7 @@ class Deviation(Frozen):
             "rms": self.rms,
             "percentiles": {f"{p:g}": v for p, v in zip(PERCENTILES, self.percentiles().tolist(), strict=True)},
             "on_completion": float(self.completed.mean()),
+            "beyond_rim": float(self.beyond_rim.mean()),
         }
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -138,6 +155,10 @@ def deviation(
     Both are in one place already: nothing is aligned. The nominal part may be broken; its faces decide what is outside.
     The scan's faces are not looked at, so it does not matter how they are turned.
 
+    Open nominals, such as panels, facades and terrains, are measured as they are: deviations are positive on the side
+    to which most of the area of each of their parts faces as given. A part is open if it bounds nothing, and all of
+    them are if a quarter of the surface would have to be completed.
+
     Parameters
     ----------
     scan : shape, or (n, 3) points
@@ -150,7 +171,7 @@ def deviation(
     Returns
     -------
     Deviation
-        Positive outside of the part, where there is too much.
+        Positive outside of the part or in front of it, where there is too much.
 
     Raises
     ------
@@ -175,4 +196,57 @@ def deviation(
     if points.shape[1] != 3:
         raise SourceError("the scan lies in the plane", remedy="pass a shape in space", element="scan")
     found = solid.closest(points)
-    return Deviation(shape, found.distances, found.points, found.completed)
+    distances, nearest, completed = found.distances, found.points, found.completed
+    beyond_rim = np.zeros(len(points), dtype=bool)
+    part = solid if isinstance(nominal, Solid) else joined_shape(nominal)
+    is_open, surface = _open_surface(solid, part)
+    if surface is not None:
+        front = FaceTree.of(surface).search(points)
+        by_side = is_open | ((distances > 0) & (front.distances <= (1 + TIE) * distances))
+        signed = np.where(front.cosines < 0, -front.distances, front.distances)
+        distances, completed = np.where(by_side, signed, distances), completed & ~by_side
+        nearest = np.where(by_side[:, None], front.places, nearest)
+        beyond_rim = by_side & _beyond_rim(surface, front)
+    return Deviation(shape, distances, nearest, completed, beyond_rim)
+
+
+def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, FaceFeatures | None]:
+    """Whether a nominal is open as a whole; and those of its faces that have sides only, turned to agree."""
+    if isinstance(given, PointCloud):
+        return False, None
+    areas, was_given = face_areas(solid.triangles), solid.origins >= 0
+    is_open = bool(areas[~was_given].sum() > OPEN * areas.sum())
+    has_sides = was_given.copy()
+    if not is_open:
+        behind, ahead = solid.windings.sides(solid.triangles)
+        has_sides &= ~(behind | ahead)
+    if not has_sides.any():
+        return False, None
+    if isinstance(given, Solid):
+        given = solid.faces if solid.source is None else solid.source
+    mesh = given.triangulation
+    owners = given.refinement.face_polygons if isinstance(given, PolygonMesh) else np.arange(mesh.n_faces)
+    return is_open, FaceFeatures.of(mesh.vertices, _agreeing(mesh)[np.isin(owners, solid.origins[has_sides])])
+
+
+def _agreeing(mesh: TriangleMesh) -> NDArray[np.int64]:
+    """(m, 3) faces, turned where most of the area of their part faces the other way."""
+    heads = np.roll(mesh.faces, -1, axis=1).ravel()
+    ids = welded_vertices(mesh.vertices, mesh.faces.ravel(), heads)
+    tails, owners = ids[mesh.faces.ravel()], np.repeat(np.arange(mesh.n_faces), 3)
+    pairs = pair_halfedges(tails, ids[heads], mesh.n_vertices)
+    turned = orient_faces(pairs, tails, owners, face_areas(mesh.vertices[mesh.faces])).turned
+    faces = tails.reshape(-1, 3)
+    return np.where(turned[:, None], faces[:, ::-1], faces)
+
+
+def _beyond_rim(surface: FaceFeatures, front: NearestFaces) -> NDArray[np.bool_]:
+    """(n,) whether points are neither above nor below a surface: the nearest place is on its rim, and not straight."""
+    rim_edges = np.bincount(surface.edges.ravel()) == 1
+    rim_vertices = np.zeros(len(surface.vertices), dtype=bool)
+    on_rim = rim_edges[surface.edges]
+    rim_vertices[surface.faces[on_rim]] = rim_vertices[np.roll(surface.faces, -1, axis=1)[on_rim]] = True
+    features, faces = front.features, front.faces
+    corners = (features - 1) % 3
+    is_beyond = np.where(features > 3, rim_vertices[surface.faces[faces, corners]], on_rim[faces, corners])
+    return is_beyond & (features > 0) & (front.distances > 0) & (np.abs(front.cosines) < STRAIGHT)
