@@ -162,13 +162,7 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
 
 @cache
 def _prepare() -> None:
-    """Make kernels types of Numba, so that compiled code can call them.
-
-    Raises
-    ------
-    SignedHeatError
-        If ``NUMBA_NUM_THREADS`` is no number of threads.
-    """
+    """Make kernels types of Numba, so that compiled code can call them."""
     threads = os.environ.get("NUMBA_NUM_THREADS")
     if threads is not None and not (threads.isdecimal() and 0 < int(threads) <= MOST_THREADS):
         raise SignedHeatError(

@@ -47,11 +47,6 @@ def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -
 def run_limited(job: Callable[[], Any], seconds: float) -> Any:
     """Run a job on a thread of its own, and wait for it no longer than so many seconds; returns the job's result.
 
-    Raises
-    ------
-    TimeoutError
-        If the job takes longer.
-
     Examples
     --------
     >>> run_limited(lambda: 6 * 7, 10.0)

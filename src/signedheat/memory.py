@@ -45,19 +45,7 @@ def libraries() -> int:
 
 
 def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float], remedy: Callable[[int], str]) -> None:
-    """Raise `MemoryLimitError` if there is not enough memory for so many elements.
-
-    Parameters
-    ----------
-    what : str
-        What is to be computed, for the message.
-    count : int
-        Number of elements.
-    estimate : callable
-        From a number of elements to the bytes that they take at the most, growing.
-    remedy : callable
-        From the largest number of elements that fits to what to do.
-    """
+    """Raise `MemoryLimitError` if there is not enough memory for so many elements."""
     available = available_memory()
     needed = estimate(count) + libraries()
     if available is None or needed <= available:

@@ -42,14 +42,6 @@ class LazyModule:
 def lazy_module(name: str, purpose: str) -> Any:
     """A handle that is used like a module, which is imported at the first use of something in it.
 
-    Parameters
-    ----------
-    name : str
-        As in ``import name``.
-    purpose : str
-        What needs the module, in the plural: "NRRD files". At its first use the handle raises
-        `MissingPackageError` with these words where the package is not installed.
-
     Examples
     --------
     >>> statistics = lazy_module("statistics", "examples")
@@ -61,18 +53,6 @@ def lazy_module(name: str, purpose: str) -> Any:
 
 def require(name: str, purpose: str) -> ModuleType:
     """Import a module now, as before a long computation whose result it has to write.
-
-    Parameters
-    ----------
-    name : str
-        As in ``import name``.
-    purpose : str
-        What needs the module, in the plural.
-
-    Raises
-    ------
-    MissingPackageError
-        If its package is not installed, or cannot be imported. The message says what needs it and how to get it.
 
     Examples
     --------

@@ -31,11 +31,6 @@ def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None
 
     Names follow the files: ``parts/a.stl`` in the folder ``.`` gives ``parts/a``. Two files that differ in extension
     alone keep it in their names.
-
-    Raises
-    ------
-    FileFormatError
-        If a name cannot be one, a folder cannot be read, nothing matches a pattern, or there is no shape at all.
     """
     paths: dict[str, Path] = {}  # by where each is, links apart
     below: dict[str, str] = {}  # names below the folder that each was found in
@@ -56,13 +51,7 @@ def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None
 
 
 def named_path(name: str | os.PathLike[str]) -> Path:
-    """The path with a name. An empty name is refused: it may be a variable that is not set, and not the current folder.
-
-    Raises
-    ------
-    FileFormatError
-        If the name is empty, or none.
-    """
+    """The path with a name; an empty one, as of a variable that is not set, is refused."""
     if not os.fspath(name) or "\0" in str(name):
         cause = "holds a null character" if os.fspath(name) else "is empty"
         raise FileFormatError(f"the name {cause}", remedy="name a file or a folder, or . for this one", path=name)

@@ -105,13 +105,7 @@ def _line(outcome: Outcome) -> str:
 
 
 def _read(path: Path) -> dict[str, Outcome]:
-    """Outcomes by name, the last of each; lines that are damaged or cut off are left out.
-
-    Raises
-    ------
-    FileFormatError
-        If something else has its name: a folder, a pipe.
-    """
+    """Outcomes by name, the last of each; lines that are damaged or cut off are left out."""
     outcomes: dict[str, Outcome] = {}
     if not os.path.lexists(path) or (path.is_file() and not path.stat().st_size):
         return outcomes

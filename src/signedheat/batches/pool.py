@@ -198,13 +198,6 @@ def _locked(folder: Path) -> Iterator[Path]:
 
     Gives a place in it for what is not finished, without what a batch has left there that was killed. The system
     releases the lock when the process ends, however it does.
-
-    Raises
-    ------
-    FileFormatError
-        If it cannot be made.
-    SignedHeatError
-        If there is another batch in it.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

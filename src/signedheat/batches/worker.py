@@ -115,13 +115,7 @@ class Worker:
         self._process: subprocess.Popen[bytes] | None = None
 
     def do(self, task: Task, time_limit: float | None) -> Done:
-        """Do a task; what takes longer than `time_limit` seconds is stopped.
-
-        Raises
-        ------
-        SignedHeatError
-            If the job cannot be sent to a process.
-        """
+        """Do a task; what takes longer than `time_limit` seconds is stopped."""
         try:
             message = pickle.dumps(task)
         except Exception as error:

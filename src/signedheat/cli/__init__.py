@@ -23,19 +23,7 @@ FAILED, BUG = 1, 70
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command.
-
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        Arguments; those of the process by default.
-
-    Returns
-    -------
-    int
-        0: done; 1: failed, with one line on standard error; 2: bad usage; 70: failed by a fault of the program;
-        128 + the number of a signal: stopped by it.
-    """
+    """Run a command."""
     open_standard_streams()
     with Signals() as signals, _warnings_in_lines():
         try:

@@ -253,13 +253,7 @@ def made_of_each(
 
 
 def listed(inputs: list[str]) -> list[str]:
-    """Inputs, with the lines of standard input in place of ``-``.
-
-    Raises
-    ------
-    SourceError
-        If standard input is to be read and has no lines.
-    """
+    """Inputs, with the lines of standard input in place of ``-``."""
     if "-" not in inputs:
         return inputs
     lines = [line.rstrip("\r\n") for line in (sys.stdin or ()) if line.strip()]

@@ -40,13 +40,7 @@ class StandardFiles:
 
 @contextmanager
 def standard_files(arguments: Namespace) -> Iterator[StandardFiles]:
-    """Put files in place of ``-`` among the arguments, and write what was made.
-
-    Raises
-    ------
-    FileFormatError
-        If standard input is to be read, and `--from` does not say what format it has.
-    """
+    """Put files in place of ``-`` among the arguments, and write what was made."""
     inputs = [name for name in INPUTS if getattr(arguments, name, None) == "-"]
     output = getattr(arguments, "output", None) == "-"
     listed = getattr(arguments, "files", []) == ["-"]

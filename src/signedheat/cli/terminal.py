@@ -88,13 +88,7 @@ def say_error(error: BaseException) -> None:
 
 
 def write_out(text: str) -> None:
-    """Write to standard output.
-
-    Raises
-    ------
-    FileFormatError
-        If it is closed or full. That whoever was reading, such as ``head``, has read enough is no error.
-    """
+    """Write to standard output."""
     stream = sys.stdout
     try:
         if stream is None:

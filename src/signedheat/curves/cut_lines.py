@@ -61,12 +61,7 @@ def without_twigs(edges: NDArray[np.int64], high: NDArray[np.bool_]) -> NDArray[
 
     What is left is joined to longer lines, among which there may be such lines again.
 
-    Parameters
-    ----------
-    edges : (k, 2) int
-        Vertex ids; the same edge may come more than once.
-    high : (k,) bool
-        Edges that keep a line.
+    Shapes: `edges` (k, 2), `high` (k,).
 
     Examples
     --------

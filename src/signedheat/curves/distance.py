@@ -74,17 +74,6 @@ def distance_to_pieces(
     There is a warning if most of them bound nothing, if loops were turned that might as well be right, if the inside
     hangs on a piece for which wide gaps are closed, and if heat completes the curves otherwise than by what is
     shortest.
-
-    Parameters
-    ----------
-    solver : SignedHeatSolver
-        Of a surface.
-    curves : Curve, SurfacePoints or a sequence of them
-        The pieces.
-    constraint : Constraint, optional
-        As in `SignedHeatSolver.distance`.
-    every_piece : bool
-        Leave none out.
     """
     listed = flattened(curves)
     if isinstance(solver.domain, TriangleMesh) and not is_consistent(solver.domain):

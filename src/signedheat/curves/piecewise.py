@@ -264,13 +264,7 @@ def conforms(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoi
 def conforming(
     discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]
 ) -> SurfaceDiscretization:
-    """The discretisation itself, if unoriented curves run along its edges; rounding may move them off edges.
-
-    Raises
-    ------
-    SourceError
-        If one does not.
-    """
+    """The discretisation itself, if unoriented curves run along its edges; rounding may move them off edges."""
     if conforms(discretization, sources):
         return discretization
     raise SourceError(

@@ -36,17 +36,6 @@ def on_resolving_triangles(
 
     Meshes that are too thin to be triangulated anew, and other surfaces, are taken as they are. On loops inside single
     triangles, which those cannot see, triangles are made that do.
-
-    Parameters
-    ----------
-    measure : callable
-        Takes a solver.
-    solver : SignedHeatSolver
-        For the triangles of the mesh.
-    curves : Curve, SurfacePoints or a sequence of them
-        What is to be resolved.
-    always : bool
-        Whether triangles are made for all curves, large ones too.
     """
     mesh = solver.domain
     if isinstance(mesh, TriangleMesh) and (always or are_small(solver, curves)):
@@ -86,13 +75,7 @@ def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveO
 
 
 def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
-    """The discretisation that the solver uses for all sources, or else that of its domain.
-
-    Raises
-    ------
-    SourceError
-        If the domain is no surface, so that no curve lies on it.
-    """
+    """The discretisation that the solver uses for all sources, or else that of its domain."""
     made = solver.discretization
     found = made if isinstance(made, SurfaceDiscretization) else discretize(solver.domain)
     if not isinstance(found, SurfaceDiscretization):

@@ -45,11 +45,6 @@ def curve_of_elements(triangles: Triangles, points: Sequence[tuple[int, Sequence
 
     Edges are counted in the order in which faces, and the sides of each, have them first, and run as there. A single
     point is a source of its own.
-
-    Raises
-    ------
-    SourceError
-        If there is no such element.
     """
     starts, halfedges = triangles.edges.halfedges
     first_corner = np.full(triangles.n_vertices, -1)

@@ -140,15 +140,6 @@ class TetReport:
 def inspect(shape: Shape) -> SurfaceReport | CloudReport | TetReport:
     """Count the elements and defects of a shape, in O(n) time.
 
-    Parameters
-    ----------
-    shape : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or TetMesh
-        Any shape, however broken.
-
-    Returns
-    -------
-    SurfaceReport, CloudReport or TetReport
-
     Examples
     --------
     >>> report = inspect(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 2, 3]]))

@@ -23,13 +23,7 @@ Body: TypeAlias = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
-    """The shape itself, or one mesh of several; tets are their boundary.
-
-    Raises
-    ------
-    SourceError
-        If there is no shape, or it is a curve or polyline, or one of several is no mesh.
-    """
+    """The shape itself, or one mesh of several; tets are their boundary."""
     shapes = as_shapes(shape)
     if not shapes:
         raise SourceError("there is no shape", remedy="pass at least one")

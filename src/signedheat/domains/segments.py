@@ -28,11 +28,6 @@ def segments_of(
     Consecutive points of a curve that share no face are joined by a geodesic path. Curves with given normals need
     `positions`: in space, of vertices or, if every face lies in a plane of its own, of corners. `number` is the index
     of the source, for messages.
-
-    Raises
-    ------
-    SourceError
-        If the source does not fit the surface.
     """
     raise SourceError(
         f"source {number} is a {type(source).__name__}: on a surface, distance is measured to a "

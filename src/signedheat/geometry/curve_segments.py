@@ -128,19 +128,7 @@ def joined_end_to_end(
 
     A curve that runs back along the one before it is a copy of that, and does not continue it.
 
-    Parameters
-    ----------
-    parts : sequence of CurveSegments
-        Curves, with their positive side to the left of their segments.
-    may_go_on : (k,) bool
-        Which of them may be part of a longer line.
-
-    Returns
-    -------
-    lines : list of CurveSegments
-        In order of the first curve of each.
-    which : (k,) int
-        The line that each curve is part of.
+    Shapes: `may_go_on` (k,); returned: lines, which (k,).
     """
     merged = MergedSources.of(parts)
     bounds = np.cumsum([0, *(len(part.ends) for part in parts)])

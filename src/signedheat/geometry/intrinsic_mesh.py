@@ -237,11 +237,6 @@ def mollify(lengths: NDArray[np.float64], margin: float) -> tuple[NDArray[np.flo
 def laid_out(mesh: Triangles, margin: float) -> tuple[IntrinsicMesh, float]:
     """The intrinsic mesh of a mesh, mollified, and the length that mollification has added to all edges.
 
-    Raises
-    ------
-    GeometryError
-        If the mesh has no more area than rounding of its coordinates may make.
-
     Examples
     --------
     >>> from signedheat import TriangleMesh

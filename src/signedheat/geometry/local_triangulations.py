@@ -77,17 +77,7 @@ def local_triangulations(
 ) -> LocalTriangulations:
     """Triangulate points sampled from an unknown surface, in O(n log n) time.
 
-    Parameters
-    ----------
-    points : (n, 3) float
-        Distinct points.
-    normals : (n, 3) float
-        Unit normals, consistent with each other but for single ones.
-    n_neighbors : int
-        Size of the neighbourhoods. No triangle has a circumradius beyond the distance to the last neighbour, to which
-        the difference of normals counts.
-    given : (n, 3) float, optional
-        Unit normals to whose side each connected component is turned as a whole; `normals` by default.
+    Shapes: `points` (n, 3), `normals` (n, 3), `given` (n, 3).
 
     Notes
     -----
@@ -424,17 +414,7 @@ def voronoi_fans(places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArra
     first. Two neighbours whose sides of the cell meet span a Delaunay triangle with the origin, and the corner between
     them is its circumcentre: no circumradius exceeds the square's.
 
-    Parameters
-    ----------
-    places : (n, k, 2) float
-        Neighbours of each point in its own tangent plane, relative to the point, nearest first.
-
-    Returns
-    -------
-    neighbours : (n, MAX_SIDES) int
-        Column of the neighbour beyond each side of the cell; −1 on sides that are left of the square.
-    counts : (n,) int
-        Number of sides.
+    Shapes: `places` (n, k, 2); returned: neighbours (n, MAX_SIDES), counts (n,).
     """
     n, k = places.shape[:2]
     neighbours = np.full((n, MAX_SIDES), -1, dtype=np.int64)

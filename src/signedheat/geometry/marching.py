@@ -68,13 +68,7 @@ def level_lines(
 
 
 def heights_above(values: NDArray[np.float64], spacing: NDArray[np.float64], level: float) -> NDArray[np.float64]:
-    """Values minus the level, kept away from zero so that crossings respect `CLEARANCE`.
-
-    Raises
-    ------
-    OutsideError
-        If the values do not take the level.
-    """
+    """Values minus the level, kept away from zero so that crossings respect `CLEARANCE`."""
     height = values - level
     finite = height[np.isfinite(height)]
     low, high = float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))

@@ -43,11 +43,6 @@ def closed_level_set(
     Normals point to the greater values. Vertices of the surface lie where φ takes the level, to second order, by its
     values and gradients at the ends of edges. Where the surface meets the boundary of the mesh it is closed along the
     boundary, on the side below the level. Tets with a NaN corner count as outside the mesh.
-
-    Raises
-    ------
-    OutsideError
-        If the values do not take the level.
     """
     tets = mesh.tets[~np.isnan(values[mesh.tets]).any(axis=1)]
     below = values < level

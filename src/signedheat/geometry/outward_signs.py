@@ -125,17 +125,7 @@ def outward_signs(
 ) -> OutwardSigns:
     """Signs that turn axes outwards.
 
-    Parameters
-    ----------
-    fits : PlaneFits
-        Where the points are, and how noisy.
-    axes : (n, 3) float
-        Unit normals, up to sign.
-    given : bool
-        Whether the axes' own signs are evidence. It is weak, and says only which signs agree: all may be inverted. If
-        hardly more of them seem wrong than points contradict each other, they are kept, or all inverted.
-    groups : (n,) int, optional
-        Points of the same group, counted from 0, share one sign.
+    Shapes: `axes` (n, 3), `groups` (n,).
     """
     # links between chosen points; node m of the graph is the outside, node m + 1 the signs as given
     n = len(axes)
@@ -198,16 +188,7 @@ def sign_links(
     One node past the points is the outside, whose sign is 1. Points in a plane have no tets: then there are links
     between neighbours alone, and none with the outside.
 
-    Parameters
-    ----------
-    places : (n, 3) float
-        Distinct points.
-    axes : (n, 3) float
-        Unit normals, up to sign.
-    reaches : (n,) float
-        Distance to neighbours.
-    noisy : bool
-        Whether places are so rough that balls are no better evidence than neighbours.
+    Shapes: `places` (n, 3), `axes` (n, 3), `reaches` (n,).
 
     Examples
     --------

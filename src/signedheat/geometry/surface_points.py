@@ -55,13 +55,7 @@ class LocatedPoints:
 def locate_points(
     triangles: IntrinsicMesh, faces: NDArray[np.int64], barycentric: NDArray[np.float64], name: str = "point"
 ) -> LocatedPoints:
-    """Find the vertex, edge or face that contains each of n points, given by faces and barycentric coordinates.
-
-    Raises
-    ------
-    SourceError
-        If a face does not exist.
-    """
+    """Find the vertex, edge or face that contains each of n points, given by faces and barycentric coordinates."""
     outside = np.flatnonzero((faces < 0) | (faces >= triangles.n_faces))
     if len(outside):
         raise SourceError(
@@ -98,13 +92,7 @@ def points_at_vertices(triangles: IntrinsicMesh, vertices: NDArray[np.int64]) ->
 def corners_at(
     faces: NDArray[np.int64], vertices: NDArray[np.int64], n_vertices: int, name: str = "point"
 ) -> NDArray[np.int64]:
-    """(k,) the first corner ``3 face + k`` at each vertex.
-
-    Raises
-    ------
-    SourceError
-        If a vertex does not exist or has no face.
-    """
+    """(k,) the first corner ``3 face + k`` at each vertex."""
     if not np.issubdtype(vertices.dtype, np.integer):
         if len(vertices) == 0:
             return np.empty(0, dtype=np.int64)

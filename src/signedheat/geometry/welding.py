@@ -27,17 +27,7 @@ def welded_vertices(
     odd number of faces, and if rounding explains how they differ: by a few units in the last place of the largest
     coordinate, along axes whose coordinates make use of that last place.
 
-    Parameters
-    ----------
-    points : (n, 3) float
-        Vertices. Coordinates that single precision holds without loss are taken to come from it, as in STL files.
-    tails, heads : (h,) int
-        First and last vertex of each side of all faces.
-
-    Returns
-    -------
-    (n,) int
-        First vertex at the place of each.
+    Shapes: `points` (n, 3), `tails`, `heads` (h,); returned: an array (n,).
 
     Examples
     --------
@@ -136,13 +126,7 @@ def coincident_faces(
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """First face on the same corners as each, and whether it runs the other way round.
 
-    Returns
-    -------
-    first : (p,) int
-        Least id among the faces on the same corners in the same or in the opposite order. Faces that name a vertex
-        twice stand for themselves; −1 for those on fewer than three vertices.
-    reversed : (p,) bool
-        Whether the order is opposite to that of `first`.
+    Returned: first (p,), reversed (p,).
 
     Examples
     --------

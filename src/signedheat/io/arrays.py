@@ -26,13 +26,7 @@ def read_npy(path: PathLike) -> NDArray[Any]:
 
 
 def read_npz(path: PathLike, wanted: Collection[str], needed: Collection[str] = ()) -> dict[str, NDArray[Any]]:
-    """Those of the wanted arrays of a ``.npz`` file that are there, and all that are needed.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is missing or damaged, or one that is needed is not there.
-    """
+    """Those of the wanted arrays of a ``.npz`` file that are there, and all that are needed."""
     data = contents(path)
     with reading(path), ZipFile(io.BytesIO(data)) as archive:
         members = {info.filename: info for info in archive.infolist()}

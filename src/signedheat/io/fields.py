@@ -69,18 +69,6 @@ def save_field(field: GridField, path: PathLike) -> None:
 
     ``.npz`` (NumPy), ``.vti`` (VTK, ParaView), ``.nrrd`` (3D Slicer, medical imaging), ``.npy`` with a ``.json`` of the
     same name next to it, ``.vdb`` (OpenVDB; single precision; not read back).
-
-    Parameters
-    ----------
-    field : GridField
-        The field.
-    path : str or path
-        The file. It is written under a temporary name and renamed, so that an existing file survives a failure.
-
-    Raises
-    ------
-    FileFormatError
-        If the format is unknown, does not support the dimension of the field, or the file cannot be written.
     """
     if not isinstance(field, GridField):
         raise FileFormatError(f"a {type(field).__name__} is no field on a grid: it has formats of its own", path=path)
@@ -101,15 +89,7 @@ def save_field(field: GridField, path: PathLike) -> None:
 
 
 def ensure_field_writable(path: PathLike, in_band: bool = False) -> None:
-    """Check before a long computation that a field can be written, in a band or whole.
-
-    Raises
-    ------
-    FileFormatError
-        If the format is unknown, or no file can be made there.
-    MissingPackageError
-        If the format needs a package that is not installed.
-    """
+    """Check before a long computation that a field can be written, in a band or whole."""
     ensure_writable(path, BAND_FORMATS if in_band else FIELD_FORMATS, "a field in a band" if in_band else "a field")
 
 

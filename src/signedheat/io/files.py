@@ -84,18 +84,7 @@ def refuse_kind(kind: str, path: PathLike, holds: str, instead: str) -> FileForm
 
 @contextmanager
 def reading(path: PathLike) -> Iterator[None]:
-    """A context in which every exception of a parser becomes an error that names the file.
-
-    Raises
-    ------
-    SignedHeatError
-        Those raised within; about this file, unless they name another.
-    MemoryLimitError
-        If what the file announces does not fit into memory.
-    FileFormatError
-        For everything else: the file is damaged. What our own code beyond the readers raises, as when a kernel cannot
-        be compiled, says nothing about the file, and stays as it is.
-    """
+    """A context in which every exception of a parser, though none of our other code, becomes an error of the file."""
     try:
         with np.errstate(all="ignore"):  # values are looked at by the shapes and fields that are made of them
             yield
@@ -124,13 +113,7 @@ def _is_ours(error: BaseException) -> bool:
 
 
 def parsed_by_others(parse: Callable[[], T], size: int) -> T:
-    """What code of another package makes of a file of `size` bytes, without its warnings, and within a limit of time.
-
-    Raises
-    ------
-    TimeoutError
-        If it takes ten seconds, and one for each 100 kB, to which `reading` gives the name of the file.
-    """
+    """Parse a file of `size` bytes by code of another package, without its warnings and within a limit of time."""
 
     def quietly() -> T:
         with np.errstate(all="ignore"):
@@ -166,15 +149,7 @@ _one_at_a_time = threading.Lock()
 
 
 def contents(path: PathLike) -> bytes:
-    """The bytes of a file.
-
-    Raises
-    ------
-    FileFormatError
-        If it is missing, is not a regular file, cannot be read, or is empty.
-    MemoryLimitError
-        If it is larger than the memory that is free.
-    """
+    """The bytes of a file."""
     with _opened(path) as (file, size):
         ensure_fits(TAKEN.get(extension(path), 1) * size, path)
         data = file.read()
@@ -214,13 +189,7 @@ def _opened(path: PathLike) -> Iterator[tuple[BinaryIO, int]]:
 
 
 def companion_contents(path: PathLike, name: str) -> bytes:
-    """The bytes of a file that another one names, which must lie in the same folder or below it.
-
-    Raises
-    ------
-    FileFormatError
-        If it lies elsewhere, or cannot be read.
-    """
+    """The bytes of a file that another one names, which must lie in the same folder or below it."""
     folder = os.path.realpath(Path(path).parent)
     named = os.path.realpath(os.path.join(folder, name))
     if os.path.isabs(name) or os.path.commonpath([folder, named]) != folder:
@@ -231,13 +200,7 @@ def companion_contents(path: PathLike, name: str) -> bytes:
 
 
 def ensure_fits(size: int, path: PathLike, remedy: str = "check that it is not damaged, or free some memory") -> None:
-    """Check before anything is allocated that so many bytes, which a file has or announces, are free.
-
-    Raises
-    ------
-    MemoryLimitError
-        If they are not.
-    """
+    """Check before anything is allocated that so many bytes, which a file has or announces, are free."""
     free = available_memory()
     if free is not None and size > free:
         raise MemoryLimitError(
@@ -271,24 +234,7 @@ def text(path: PathLike) -> str:
 
 
 def ensure_writable(path: PathLike, formats: Collection[str], purpose: str) -> None:
-    """Check before a long computation that its result can be written.
-
-    Parameters
-    ----------
-    path : path
-        The file.
-    formats : collection of str
-        Supported extensions, with the dot.
-    purpose : str
-        What is to be written, for the message.
-
-    Raises
-    ------
-    FileFormatError
-        If the extension is not supported, or the file cannot be created.
-    MissingPackageError
-        If the format needs a package that is not installed.
-    """
+    """Check before a long computation that its result can be written."""
     format_for(path, dict.fromkeys(formats), purpose)
     if extension(path) in NEEDED:
         require(*NEEDED[extension(path)])
@@ -301,11 +247,6 @@ def replacing(path: PathLike) -> Iterator[Path]:
     """A temporary file to write to, which is renamed to `path` on success and removed otherwise.
 
     It lies in the folder that `path` leads to, and has the permissions of the file there, or those that new files have.
-
-    Raises
-    ------
-    FileFormatError
-        If the file cannot be written, or is no regular file; what exists is then left unchanged.
     """
     with writing(path):
         temporary = _new_file(path)
@@ -318,13 +259,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
 
 
 def move_into_place(source: Path, path: PathLike) -> None:
-    """Give a whole file its place: that of the file that `path` leads to, whose permissions stay, or a new one.
-
-    Raises
-    ------
-    FileFormatError
-        If it cannot be, or what is there is no regular file; what exists is then left unchanged.
-    """
+    """Give a whole file its place: that of the file that `path` leads to, whose permissions stay, or a new one."""
     with replacing(path) as temporary:
         try:
             _permit(source, os.stat(temporary))
@@ -336,13 +271,7 @@ def move_into_place(source: Path, path: PathLike) -> None:
 
 
 def replaceable(path: PathLike) -> os.stat_result | None:
-    """Status of the file that would be replaced; None if there is none.
-
-    Raises
-    ------
-    FileFormatError, PermissionError
-        If it is no regular file, or must not be written.
-    """
+    """Status of the file that would be replaced; None if there is none."""
     real = Path(os.path.realpath(path))
     status = os.stat(real) if real.exists() else None
     if status is not None and not stat.S_ISREG(status.st_mode):

@@ -102,15 +102,7 @@ class Image:
 
 
 def read_image(path: PathLike, formats: Collection[str], purpose: str) -> Image:
-    """An image of real numbers, in one of some formats.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is missing, of another format, truncated or damaged, or has no real numbers.
-    MemoryLimitError
-        If it announces more than fits into memory.
-    """
+    """An image of real numbers, in one of some formats."""
     read = format_for(path, {ending: READERS[ending] for ending in formats}, purpose)
     with reading(path):
         image = read(path)

@@ -114,25 +114,7 @@ def _header_of(
 
 
 def write_parts(parts: Iterator[tuple[NDArray[np.float64], NDArray[np.int64]]], path: PathLike) -> tuple[int, int]:
-    """Write triangles that are more than fit into memory to a binary PLY file as they come, in double precision.
-
-    Parameters
-    ----------
-    parts : iterable of (n, 3) float and (m, 3) int
-        Vertices, and faces, which count the vertices of all parts before.
-    path : str or path
-        The file, ``.ply``. An existing one survives a failure.
-
-    Returns
-    -------
-    vertices, faces : int
-        How many there were.
-
-    Raises
-    ------
-    FileFormatError
-        If the format is another one, or the file cannot be written.
-    """
+    """Write triangles that are more than fit into memory to a binary PLY file as they come, in double precision."""
     ensure_writable(path, {".ply"}, "a mesh part by part")
     n_vertices = n_faces = 0
 

@@ -35,11 +35,6 @@ def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[NDArray[np.float6
     """Numbers of each block of lines, between empty lines: all lines have as many, one of `widths`.
 
     They are separated by commas, semicolons, tabs or spaces. What follows ``#`` and a header line are skipped.
-
-    Raises
-    ------
-    FileFormatError
-        If a line has other numbers, or there is no line of numbers.
     """
     blocks: list[list[list[float]]] = [[]]
     columns = 0
@@ -159,13 +154,7 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, NDArray[np.fl
 
 
 def read_las(path: PathLike) -> PointCloud:
-    """Points of a LAS or LAZ file, with its scale and offset; it has no normals.
-
-    Raises
-    ------
-    MissingPackageError
-        If laspy is not installed, or for LAZ no package that it decompresses with.
-    """
+    """Points of a LAS or LAZ file, with its scale and offset; it has no normals."""
     size, opened = size_of(path), laspy.open
     if Path(path).suffix.lower() == ".laz" and not laspy.LazBackend.detect_available():
         require("lazrs", ".laz files")
@@ -180,13 +169,7 @@ def read_las(path: PathLike) -> PointCloud:
 
 
 def read_e57(path: PathLike) -> PointCloud:
-    """Points of all scans of an E57 file, in its own place for each; those that are marked invalid are left out.
-
-    Raises
-    ------
-    FileFormatError
-        If its description defines entities or names schemas: pye57 would open what these refer to, here or elsewhere.
-    """
+    """Points of all scans of an E57 file, in its own place for each; those that are marked invalid are left out."""
     size, opened = size_of(path), pye57.E57
     with reading(path):
         _refuse_references(_e57_description(contents(path)))

@@ -133,15 +133,7 @@ class _Object:
 
 
 def read_3mf(path: PathLike) -> TriangleMesh:
-    """All that a package builds, placed, one object after another, in the units of the file (`unit_of`).
-
-    Raises
-    ------
-    FileFormatError
-        If it is damaged, holds no mesh, or its components contain themselves.
-    MemoryLimitError
-        If what it unpacks to does not fit into memory.
-    """
+    """All that a package builds, placed, one object after another, in the units of the file (`unit_of`)."""
     with reading(path):
         package = _Package(path)
         root = package.model(package.root)
@@ -154,13 +146,7 @@ def read_3mf(path: PathLike) -> TriangleMesh:
 
 
 def unit_of(path: PathLike) -> str | None:
-    """The unit of length of a file: what a 3MF file says, metres in glTF; None where formats do not say.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, or its unit is none that 3MF knows.
-    """
+    """The unit of length of a file: what a 3MF file says, metres in glTF; None where formats do not say."""
     if extension(path) in (".glb", ".gltf"):
         return "m"
     if extension(path) != ".3mf":

@@ -69,15 +69,7 @@ LARGE = rb"^(\d{9,})(?=[ \t]*\r?$|(?:[ \t]+\S+){3})"
 
 
 def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
-    """Read a `TetMesh`; or, from a file without tets, its surface.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is missing, truncated or damaged.
-    GeometryError
-        If it has neither tets nor faces.
-    """
+    """Read a `TetMesh`; or, from a file without tets, its surface."""
     mesh = load_cells(path)
     kinds = {block.type for block in mesh.cells}
     if "tetra" in kinds:
@@ -124,15 +116,7 @@ def _module(path: PathLike) -> Any:
 
 
 def refuse_announcements(path: PathLike) -> None:
-    """Check that a Gmsh file can hold what it announces, and that a table up to its largest node number fits.
-
-    Raises
-    ------
-    FileFormatError
-        If it announces more things than it has bytes.
-    MemoryLimitError
-        If its nodes have numbers so large that there is no memory for the table which meshio makes of them.
-    """
+    """Check that a Gmsh file can hold what it announces, and that a table up to its largest node number fits."""
     data = contents(path)
     form = re.search(rb"\$MeshFormat\s+(\S+)\s+([01])\s+([48])\s", data)
     if form is None:

@@ -59,13 +59,7 @@ def available_backends() -> list[str]:
 
 
 def chosen_backend(backend: str | None = None) -> str:
-    """The name of the back end that `factorize` takes.
-
-    Raises
-    ------
-    SignedHeatError
-        If it is not available here.
-    """
+    """The name of the back end that `factorize` takes."""
     available = available_backends()
     name = backend or os.environ.get("SIGNEDHEAT_BACKEND") or available[0]
     if name not in available:
@@ -103,11 +97,6 @@ def factorize(
     -------
     Factor
         Solves ``matrix @ x = rhs``.
-
-    Raises
-    ------
-    FactorizationError
-        If the matrix is not positive definite, or the factor does not fit into memory.
 
     Examples
     --------

@@ -187,15 +187,7 @@ def components_of(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> ND
 
 
 def sample_on_grid(shapes: Sequence[Any], grid: Grid) -> AreaSamples:
-    """Bisect the elements of shapes until no edge is longer than `SIZE` cells; merge them per cell and component.
-
-    Raises
-    ------
-    SourceError
-        If a shape cannot be used on this grid, or no part of any lies within it.
-    CancellingNormalsError
-        If their normals cancel everywhere.
-    """
+    """Bisect the elements of shapes until no edge is longer than `SIZE` cells; merge them per cell and component."""
     steps = np.zeros(4)
     steps[4 - grid.dimension :] = grid.spacing
     nodes = NodeSources.empty(padded_shape(grid.shape), steps)

@@ -92,13 +92,7 @@ def _(
 
 
 def faces_of(shapes: Sequence[SurfaceShape], center: NDArray[np.float64]) -> FaceFeatures | None:
-    """The faces of some shapes around a centre; None if none has any extent.
-
-    Raises
-    ------
-    SourceError
-        If one has points instead of faces.
-    """
+    """The faces of some shapes around a centre; None if none has any extent."""
     meshes = [shape for shape in shapes if not isinstance(shape, PointCloud)]
     if len(meshes) != len(shapes):
         raise SourceError("fields on tets are sharpened to faces, and points have none", element="shape")

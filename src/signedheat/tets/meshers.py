@@ -30,27 +30,6 @@ def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: flo
     """Fill a box around a shape with tets of about the same size, by TetGen.
 
     Only the box is given to TetGen, which fails on intersecting faces: tets need not conform to the shape.
-
-    Parameters
-    ----------
-    shape : TriangleMesh, PolygonMesh or PointCloud
-        Any shape, however broken.
-    resolution : int
-        Number of tet edges along the longest side of the shape's box.
-    padding : float, optional
-        Distance between shape and box on every side, in the units of the shape; by default a fifth of its longest side.
-
-    Returns
-    -------
-    TetMesh
-        The tets.
-
-    Raises
-    ------
-    MissingPackageError
-        If the package `tetgen` is not installed.
-    GeometryError
-        If the shape has no extent.
     """
     lower, upper, spacing = _box_around(shape, resolution, padding)
     volume = 1.64 * spacing**3 / (6 * np.sqrt(2))  # an upper bound for TetGen that gives this mean edge length
@@ -60,29 +39,7 @@ def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: flo
 
 
 def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:
-    """Fill a box around a shape with tets that approximately conform to its faces, by fTetWild.
-
-    Parameters
-    ----------
-    shape : TriangleMesh or PolygonMesh
-        Any shape, however broken.
-    resolution : int
-        Number of tet edges along the longest side of the shape's box.
-    padding : float, optional
-        Distance between shape and box on every side, in the units of the shape; by default a fifth of its longest side.
-
-    Returns
-    -------
-    TetMesh
-        The tets.
-
-    Raises
-    ------
-    MissingPackageError
-        If the package `pytetwild` is not installed.
-    GeometryError
-        If the shape has no faces, or no extent.
-    """
+    """Fill a box around a shape with tets that approximately conform to its faces, by fTetWild."""
     if isinstance(shape, PointCloud):
         raise GeometryError(
             "fTetWild follows faces, and a point cloud has none",

@@ -35,15 +35,7 @@ CLOSEST = 0.07
 
 
 def ensure_picture_writable(path: PathLike) -> None:
-    """Find out before a long computation whether a picture of its result can be written.
-
-    Raises
-    ------
-    FileFormatError
-        If the format is unknown, or no file can be made there.
-    MissingPackageError
-        If matplotlib is not installed.
-    """
+    """Find out before a long computation whether a picture of its result can be written."""
     ensure_writable(path, PICTURE_FORMATS, "a picture")
     require("matplotlib", "pictures")
 
@@ -57,13 +49,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 @contextmanager
 def picture(path: PathLike, width: float, height: float, dpi: int = 130) -> Iterator[Figure]:
-    """A figure to draw into, which is then written in the format given by the extension.
-
-    Raises
-    ------
-    FileFormatError
-        If the picture cannot be written; before anything is drawn.
-    """
+    """A figure to draw into, which is then written in the format given by the extension."""
     ensure_picture_writable(path)
     figure = new_figure(width, height)
     yield figure

@@ -69,17 +69,7 @@ def geodesic_paths(
     algorithm), and wherever it bends around a vertex the other side is tried. `name` is what the points belong to, for
     messages.
 
-    Returns
-    -------
-    located : LocatedPoints
-        All points between, path after path.
-    counts : (k,) int
-        Number of points on each path.
-
-    Raises
-    ------
-    SourceError
-        If a start and its end are not connected.
+    Returned: located, counts (k,).
     """
     starts, ends = faces_at(triangles, start), faces_at(triangles, end)
     queue = Queue.empty(triangles.n_edges)

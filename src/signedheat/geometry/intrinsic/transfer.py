@@ -213,14 +213,7 @@ def _joined(
 ) -> NDArray[np.int64]:
     """(r, 2) the points that pieces of segments run between: each from where the last one ended, or from a node.
 
-    Parameters
-    ----------
-    points : LocatedPoints
-        The nodes, then where each piece ends in its face, then where each begins.
-    faces, owners : (r,) int
-        Face and segment of each piece.
-    nodes : (s, 2) int
-        Ends of the segments.
+    Shapes: `faces`, `owners` (r,), `nodes` (s, 2).
     """
     n = len(points) - 2 * len(faces)
     last = np.append(np.diff(owners) > 0, True)

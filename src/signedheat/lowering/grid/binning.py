@@ -28,14 +28,6 @@ def merge_in_cells(
 
     The vectors of all parts, divided by `scale`, are added to the `sources` at the nodes around them, with the weights
     of multilinear interpolation.
-
-    Returns
-    -------
-    samples : tuple
-        positions (s, d), vectors (s, d), weights (s,), components (s,); sorted by component, then in order of first
-        appearance. Samples without weight are left out.
-    sources : NodeSources
-        The sum of the given sources and those of the simplices; replaces the given ones, whose arrays it may reuse.
     """
     slots = untouched_zeros((int(np.prod(shape - 1)),), np.int32)
     dimension = corners.shape[2]

@@ -78,11 +78,6 @@ class GridIntegration(SolvesEach):
 
         The multipliers take up what the penalty leaves, except for what nearly dependent rows hide from it: that is
         small, and corrected directly. Rows that contradict each other are met in the least-squares sense.
-
-        Raises
-        ------
-        MemoryLimitError
-            If that does not fit into the memory that is left.
         """
         refuse_beyond_memory(
             f"the zero set imposed exactly on {self.grid.n_nodes:,} nodes",

@@ -163,13 +163,7 @@ class MaskedSource(GridSource):
 
     @classmethod
     def of(cls, whole: GridSource, nodes: FreeNodes) -> MaskedSource:
-        """Lower sources to free nodes; what lies on solid ones, but for rounding, is lost.
-
-        Raises
-        ------
-        SourceError
-            If a source lies within solid nodes.
-        """
+        """Lower sources to free nodes; what lies on solid ones, but for rounding, is lost."""
         ids, weights = whole.stencil
         numbers = nodes.numbers[ids]
         weights = np.where((numbers >= 0) & (weights > SNAP), weights, 0.0)

@@ -117,11 +117,6 @@ def surface_source(
     positions : (n_vertices, 3) float, optional
         Vertices in space, for curves whose normals are given.
 
-    Raises
-    ------
-    SourceError
-        If there is no source, one does not fit the surface, or oriented curves cancel each other.
-
     Examples
     --------
     >>> from signedheat import Curve
@@ -297,13 +292,7 @@ def free_end_arcs(
     Curves end with an edge at a vertex. The weight of an end is the length of that edge, but at least `least`:
     subdividing a curve into short edges must not make its ends vanish. (The published code has no least weight.)
 
-    Returns
-    -------
-    faces : (j,) int
-        Faces behind the ends.
-    vectors : (j,) complex
-        ``∫ e^{iθ} dθ`` over the part of the corner that lies behind the end, in the layout of the face, times the
-        weight of the end and divided by the angle of the whole arc.
+    Returned: faces (j,), vectors (j,).
     """
     faces, vectors = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.complex128)]
     marked = np.zeros(triangles.n_vertices, dtype=bool)

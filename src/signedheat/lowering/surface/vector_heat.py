@@ -55,16 +55,7 @@ class VectorHeat:
         return np.bincount(self.triangles.edges.face_edges.ravel(), thirds).astype(np.float64)
 
     def solve(self, sources: Sequence[csr_array], changes: int = 0) -> list[list[NDArray[np.complex128]]]:
-        """X for each X₀, in stages, each up to a positive factor, NaN between the source and the stage's border.
-
-        Parameters
-        ----------
-        sources : sequence of (1, n_edges) complex sparse
-            X₀.
-        changes : int
-            How many derivatives of X by t are wanted. The stages have so many columns after that of X: ``(M + tL)⁻¹ M``
-            applied to X once, twice …, of which those derivatives are combinations (`extrapolated`).
-        """
+        """X for each X₀, in stages, each up to a positive factor, NaN between the source and the stage's border."""
         starts = np.zeros((self.triangles.n_edges, len(sources), 1 + changes), dtype=np.complex128)
         for k, source in enumerate(sources):
             starts[source.indices, k, 0] = scaled(source.data, float(self.mass.min()))[0]

@@ -80,11 +80,6 @@ def tet_source(
         What distance is measured to, in any position. Parts outside the mesh are dropped, and noted.
     diffusion, spacing : float
         τ and h in ``t = τ max(h, h_source)²``.
-
-    Raises
-    ------
-    SourceError
-        If a source is of another kind, lies outside the mesh, has no normals, or its normals cancel.
     """
     cuts, components, outside, n_components, n_unknowns = [], [], np.zeros(len(sources)), 0, int(unknowns.max()) + 1
     for number, source in enumerate(sources):

@@ -31,11 +31,6 @@ def block_contour(
     level set leaves the grid it is closed along the walls, `CAP` cells outside. `refine` moves (n, 3) points, in cells,
     along the edges of the grid that they lie on. Vertices are in cells from the first node on, faces counter-clockwise
     as seen from the side of greater values.
-
-    Raises
-    ------
-    OutsideError
-        If the values do not take the level.
     """
     vertices, faces = zip(*contour_parts(values, spacing, level, refine), strict=True)
     return np.concatenate(vertices), np.concatenate(faces)

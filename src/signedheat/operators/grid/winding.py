@@ -33,22 +33,7 @@ def winding_numbers(
 ) -> NDArray[np.float64]:
     """(*shape) winding number of a shape around the nodes of a grid, smooth over two cells across the shape.
 
-    Parameters
-    ----------
-    nodes : NodeSources
-        Area vectors spread over the nodes, divided by ``(Π spacing)^((d − 1) / d)``.
-    shape : tuple of int
-        Nodes along each axis of the grid, in two or three dimensions.
-    positions : (s, d) float
-        Where the area vectors are, in cells from the first node; those outside the grid may be among them.
-    vectors : (s, d) float
-        Area times unit normal, in units of length.
-
-    Returns
-    -------
-    (*shape) float
-        1 inside a closed shape with outward normals, 0 outside; 2 where two such overlap; a half on the rim of a flat
-        sheet's side. At a face, the mean of its two sides.
+    Shapes: `positions` (s, d), `vectors` (s, d); returned: an array (*shape).
     """
     dimension = len(shape)
     spacing = nodes.steps[4 - dimension :]
