@@ -26,10 +26,11 @@ MOST = 4096
 DIVIDED = 1 << 20
 """Triangles behind a rim that are made by division at most, of which `MOST` are taken: those of a flat side behind
 slots .0012 to .1 as wide as they are long are 430,000 to 140,000."""
-STIFF = 0.1
+STIFF = 0.03
 """Depth of a wall, over that strip's, whose bending counts by half."""
-AGREEMENT = 0.5
-"""Ratio of how far a surface bends and how far it would have to, from which on the lid is clamped: 1 on a ball."""
+AGREEMENT = 0.4
+"""Ratio of how far a surface bends and how far it would have to, or of the latter and the former, up to which its lid
+does not bend; from twice that on it is clamped. 1 on a ball."""
 NARROWEST = 1e-9
 """Least width of an opening, over the length of its rim: about what rounding leaves of one."""
 UNBENT = 1e-6
@@ -137,8 +138,11 @@ def continuation(
     at_rim = unit(middle - np.einsum("ni,nij->nj", mean, slopes)) * enough[:, None]
     outwards = unit(np.cross(at_rim, along))
     bends, must = width * (slopes[:, 0] * outwards).sum(axis=1), 2.0 * (outwards * vertex_normals(lid)[:n]).sum(axis=1)
-    curvatures = np.where(enough, (slopes * frame).sum(axis=(1, 2)), 0.0)
-    held = np.where(enough, _agreement(bends, must), 0.0)
+    least, most = np.minimum(np.abs(bends), np.abs(must)), np.maximum(np.abs(bends), np.abs(must))
+    ratio = np.sign(bends * must) * least / np.maximum(most, UNBENT)
+    held = enough * np.clip(ratio / AGREEMENT - 1.0, 0.0, 1.0)
+    fits = np.minimum(1.0, np.abs(must) / np.maximum(np.abs(bends), UNBENT))  # more curved, it would not come round
+    curvatures = np.where(enough, fits * (slopes * frame).sum(axis=(1, 2)), 0.0)
     return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(held, m), 0.0)
 
 
@@ -153,11 +157,3 @@ def _within(
     near = np.concatenate([np.asarray(each, dtype=np.int64) for each in found])
     own = samples.patches[near] == patches[rows]
     return rows[own], near[own]
-
-
-def _agreement(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
-    """1 where two numbers agree within a factor of 1 / `AGREEMENT`, 0 where they differ by its square or are 0."""
-    swap = np.abs(one) > np.abs(other)
-    low, high = np.where(swap, other, one), np.where(swap, one, other)
-    ratio = low * np.sign(high) / np.maximum(np.abs(high), UNBENT)
-    return np.asarray(np.clip((ratio - AGREEMENT**2) / (AGREEMENT - AGREEMENT**2), 0.0, 1.0))

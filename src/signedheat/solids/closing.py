@@ -1,141 +1,238 @@
-"""Close the rims of bodies by lids."""
+"""Close the boundary of a chain of triangles by lids."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from ..frozen import Frozen
 from ..geometry.box_tree import BoxTree
-from ..geometry.components import connected_components
-from . import bending, creases, lids
-from .rims import loops, meeting_edges, open_edges
+from ..geometry.components import element_components
+from ..geometry.directions import unit
+from ..geometry.edges import edge_keys, edge_table
+from ..geometry.meshes import area_vectors, face_areas
+from . import bending, creases, lids, walls
+from .lost_faces import MOST_SIDES, least_bent
+from .rims import boundary, corners_of, loops
+from .spanning import Frame, frame_of
 
 
-def lids_of(
-    triangles: NDArray[np.float64], ids: NDArray[np.int64], parts: NDArray[np.int64], vertices: NDArray[np.float64]
-) -> list[NDArray[np.float64]]:
-    """(k, 3, 3) corners of the triangles of each lid that closes a rim of oriented parts."""
-    edges, owners = open_edges(ids, parts)
-    order = np.argsort(parts, kind="stable")
-    starts = np.concatenate([[0], np.cumsum(np.bincount(parts))])
-    made: list[lids.Lid] = []
+def closed_by(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], *, bent: bool = True
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Close the boundary of a chain of directed triangles, whatever the parts that they belong to.
+
+    Small holes are closed by the triangles between their corners that bend least, where these continue the surface;
+    rims that run along each other by strips; and each loop that is left by a lid: a thin plate that continues how the
+    surface bends, flat faces that meet in creases, or a film.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        Positions, no two of which are the same place.
+    faces : (m, 3) int
+        Chain of triangles; those that are there several times count several times.
+    bent : bool
+        Whether lids bend as the surface does towards their rims. The less the surface there bends as it must to come
+        round, the flatter they are.
+
+    Returns
+    -------
+    vertices : (n + k, 3) float
+        The positions, followed by new ones.
+    added : (p, 3) int
+        Triangles such that with them each edge has as many triangles in one direction as in the other. Where lids have
+        more points along an edge than faces have, triangles without area lie between.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> ball = samples.sphere(2)
+    >>> _, added = closed_by(ball.vertices, ball.faces[1:])
+    >>> sorted(added[0]) == sorted(ball.faces[0])
+    True
+    """
+    faces = np.asarray(faces, dtype=np.int64)
+    if not len(boundary(faces)):
+        return vertices, np.empty((0, 3), dtype=np.int64)
+    centre = vertices[np.unique(faces)].mean(axis=0)
+    positions = vertices - centre
+    chain = np.concatenate([faces, small_lids(positions, faces)])
+    chain = np.concatenate([chain, strips(positions, chain)])
+    surface = _Surface(positions, chain)
     with threadpool_limits(1, "blas"):  # systems of a few hundred unknowns: threads would only wait
-        for part in np.unique(owners):
-            here = order[starts[part] : starts[part + 1]]
-            own = triangles[here]
-            patches, tree = bending.smooth_patches(own, ids[here]), BoxTree.of(own.min(axis=1), own.max(axis=1))
-            ends = _Ends.of(ids[here], patches, len(vertices))
-            rims = loops(edges[np.searchsorted(owners, part) : np.searchsorted(owners, part, side="right")])
-            made += [_lid(vertices[loop], own, tree, patches, ends.at(loop)) for loop in _openings(rims, vertices)]
-    return [lid.vertices[lid.faces] for lid in made]
-
-
-def _openings(rims: list[NDArray[np.int64]], vertices: NDArray[np.float64]) -> list[NDArray[np.int64]]:
-    """Loops around openings: rims without stretches along which others run, each end joined to the nearest start."""
-    if len(rims) < 2:
-        return rims
-    owners = np.repeat(np.arange(len(rims)), [len(rim) for rim in rims])
-    edges = np.concatenate([np.stack([rim, np.roll(rim, -1)], axis=1) for rim in rims])
-    one, other = meeting_edges(vertices[edges])
-    apart = owners[one] != owners[other]
-    met = np.zeros(len(edges), dtype=bool)
-    met[one[apart]] = met[other[apart]] = True
-    shared = np.split(met, np.cumsum([len(rim) for rim in rims])[:-1])
-    whole = [rim for rim, some in zip(rims, shared, strict=True) if not some.any()]
-    partly = [(rim, some) for rim, some in zip(rims, shared, strict=True) if some.any() and not some.all()]
-    chains = [chain for rim, some in partly for chain in _chains(rim, some)]
-    if not chains:
-        return whole
-    following = scipy.spatial.cKDTree(vertices[[chain[0] for chain in chains]]).query(
-        vertices[[chain[-1] for chain in chains]]
-    )[1]
-    if len(np.unique(following)) < len(chains):  # which start belongs to which end is not clear
-        return whole + [rim for rim, _ in partly]
-    cycles = connected_components(len(chains), np.arange(len(chains)), following)
-    for first in np.unique(cycles, return_index=True)[1]:
-        loop, at = [chains[first]], following[first]
-        while at != first:
-            loop.append(chains[at])
-            at = following[at]
-        joined = np.concatenate(loop)
-        joined = joined[joined != np.roll(joined, 1)]
-        if len(joined) > 2:
-            whole.append(joined)
-    return whole
-
-
-def _chains(rim: NDArray[np.int64], met: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
-    """Stretches of a rim, as vertices, none of whose edges is met."""
-    turn = int(np.argmax(met)) + 1
-    rim, free = np.roll(rim, -turn), np.flatnonzero(~np.roll(met, -turn))
-    runs = np.split(free, np.flatnonzero(np.diff(free) > 1) + 1)
-    return [rim[np.append(run, run[-1] + 1) % len(rim)] for run in runs]
+        new, count = [vertices], len(vertices)
+        triangles = [chain]
+        for loop in surface.loops:
+            points, lid = _lid(surface, loop, bent)
+            names = np.concatenate([loop, count + np.arange(len(points))])
+            triangles.append(names[lid])
+            new.append(points + centre)
+            count += len(points)
+    closed = np.concatenate(triangles)
+    assert not edge_table(closed).balance.any(), "lids balance each directed edge"
+    return np.concatenate(new), closed[len(faces) :]
 
 
 @dataclass(frozen=True, eq=False)
-class _Ends:
-    """Smooth patches that end at edges, by numbers of the edges in the direction of lids."""
+class _Surface(Frozen):
+    """A chain of triangles, and what is asked of it where it ends."""
 
-    keys: NDArray[np.int64]
-    patches: NDArray[np.int64]
-    size: int
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
 
-    @classmethod
-    def of(cls, ids: NDArray[np.int64], patches: NDArray[np.int64], size: int) -> _Ends:
-        keys = (np.roll(ids, -1, axis=1) * size + ids).ravel()
-        order = np.argsort(keys, kind="stable")
-        return cls(keys[order], np.repeat(patches, 3)[order], size)
+    @cached_property
+    def loops(self) -> list[NDArray[np.int64]]:
+        """Closed loops around the gaps."""
+        return loops(self.vertices, self.faces, boundary(self.faces))
 
-    def at(self, loop: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(n,) the patch at each edge of a loop; where there is no such edge, at the last one before it."""
-        keys = loop * self.size + np.roll(loop, -1)
-        found = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
-        there = self.keys[found] == keys
-        last = np.maximum.accumulate(np.where(there, np.arange(len(loop)), int(np.argmax(there))))
-        return self.patches[found[last]]
+    @cached_property
+    def triangles(self) -> NDArray[np.float64]:
+        """(m, 3, 3) corners."""
+        return self.vertices[self.faces]
+
+    @cached_property
+    def areas(self) -> NDArray[np.float64]:
+        """(m,) areas."""
+        return face_areas(self.triangles)
+
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """(m, 3) unit normals."""
+        return unit(area_vectors(self.triangles))
+
+    @cached_property
+    def parts(self) -> NDArray[np.int64]:
+        """(m,) faces that share edges hang together."""
+        return element_components(edge_table(self.faces).face_edges)
+
+    @cached_property
+    def patches(self) -> NDArray[np.int64]:
+        """(m,) faces that hang together across edges that are not sharp."""
+        return bending.smooth_patches(self.triangles, self.faces)
+
+    @cached_property
+    def tree(self) -> BoxTree:
+        """Their boxes."""
+        return BoxTree.of(self.triangles.min(axis=1), self.triangles.max(axis=1))
+
+    @cached_property
+    def _sides(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Sorted keys of the directed sides of faces, and the sides: of several, that of the largest face first."""
+        keys = (self.faces * len(self.vertices) + np.roll(self.faces, -1, axis=1)).ravel()
+        order = np.lexsort((-np.repeat(self.areas, 3), keys))
+        return keys[order], order
+
+    def behind(self, loop: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(n,) the face behind each edge of a loop, the largest of several, and its third vertex."""
+        keys, order = self._sides
+        face, side = np.divmod(order[np.searchsorted(keys, np.roll(loop, -1) * len(self.vertices) + loop)], 3)
+        return face, self.faces[face, (side + 2) % 3]
+
+
+def small_lids(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(k, 3) triangles that close the small holes of a surface, and its gaps without area, between their vertices."""
+    surface = _Surface(vertices, faces)
+    triangles, chosen, corners = [np.empty((0, 3), dtype=np.int64)], [], []
+    for loop in surface.loops:
+        places = corners_of(surface.vertices[loop])
+        if len(places) < 3:
+            triangles.append(_fan(loop))
+        elif len(places) <= MOST_SIDES:
+            chosen.append(loop)
+            corners.append(places)
+    if not chosen:
+        return np.concatenate(triangles)
+    rims = [loop[places] for loop, places in zip(chosen, corners, strict=True)]
+    normals = [
+        surface.normals[surface.behind(loop)[0][places]] for loop, places in zip(chosen, corners, strict=True)
+    ]
+    touching = np.zeros(len(surface.vertices), dtype=bool)
+    touching[np.concatenate(rims)] = True
+    edges = edge_table(surface.faces).vertices
+    edges = edges[touching[edges].all(axis=1)]
+    taken = np.sort(edge_keys(edges[:, 0], edges[:, 1]))
+    for loop, places, lid in zip(
+        chosen, corners, least_bent(surface.vertices, rims, np.concatenate(normals), taken), strict=True
+    ):
+        if len(lid):
+            triangles.append(lid)
+            if len(places) < len(loop):
+                along = [np.arange(a, b + 1) for a, b in zip(places, [*places[1:], places[0] + len(loop)], strict=True)]
+                triangles += [_fan(loop[side % len(loop)]) for side in along if len(side) > 2]
+    return np.concatenate(triangles)
+
+
+def _fan(points: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(k − 2, 3) triangles from the first of some points to the others."""
+    return np.stack([np.full(len(points) - 2, points[0]), points[1:-1], points[2:]], axis=1)
+
+
+def strips(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(k, 3) triangles between vertices of rims that run along each other, along stretches or all around."""
+    surface = _Surface(vertices, faces)
+    chain = np.concatenate([faces, *walls.seams(_rims(surface))])
+    surface = _Surface(vertices, chain)
+    rims = _rims(surface)
+    areas = np.bincount(surface.parts, surface.areas) if rims else np.zeros(0)
+    return np.concatenate([chain, *walls.wall_ends(rims, areas)])[len(faces) :]
+
+
+def _rims(surface: _Surface) -> list[walls.Rim]:
+    """Rims of what is more than a single face."""
+    if not surface.loops:
+        return []
+    counts = np.bincount(surface.parts)
+    rims = []
+    for loop in surface.loops:
+        face, third = surface.behind(loop)
+        parts = surface.parts[face]
+        if (counts[parts] > 1).all():
+            rims.append(walls.Rim.of(loop, surface.vertices[loop], surface.vertices[third], parts))
+    return rims
 
 
 def _lid(
-    corners: NDArray[np.float64],
-    own: NDArray[np.float64],
-    tree: BoxTree,
-    patches: NDArray[np.int64],
-    ends: NDArray[np.int64],
-) -> lids.Lid:
-    if len(corners) == 3:
-        return lids.Lid(corners, np.array([[0, 1, 2]]), 3)
-    for frame in (lids.frame_of(corners), None):
-        if lid := _spanned(corners, frame, own, tree, patches, ends):
+    surface: _Surface, loop: NDArray[np.int64], bent: bool
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The lid of a loop: the points that it adds to the loop's, and triangles."""
+    corners = surface.vertices[loop]
+    if len(loop) == 3:
+        return np.empty((0, 3)), np.array([[0, 1, 2]])
+    if not bent and creases.is_flat(corners) and (flat := creases.flat_lid(corners)):
+        return flat
+    for frame in (frame_of(corners), None):
+        if lid := _spanned(surface, loop, frame, bent):
             return lid
     raise AssertionError("a disc has room for every loop")
 
 
 def _spanned(
-    corners: NDArray[np.float64],
-    frame: lids.Frame | None,
-    own: NDArray[np.float64],
-    tree: BoxTree,
-    patches: NDArray[np.int64],
-    ends: NDArray[np.int64],
-) -> lids.Lid | None:
+    surface: _Surface, loop: NDArray[np.int64], frame: Frame | None, bent: bool
+) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
     """The lid of a loop, triangulated in a plane or without one in a disc; None if it crosses itself in that plane."""
+    corners, behind = surface.vertices[loop], surface.behind(loop)[0]
     rim = lids.SmoothRim.of(corners)
-    smooth = lids.pattern(rim.points, frame, float(rim.places[0]))
+    smooth = lids.pattern(rim, frame)
     if smooth is None:
         return None
     flat = lids.film(smooth)
-    width, points = bending.width_of(flat), flat.vertices[: flat.n_rim]
-    near = bending.samples_near(own, tree, patches, scipy.spatial.cKDTree(points), bending.REACH * width)
-    normals, curvatures, held = bending.continuation(flat, near, ends[rim.edges_at(points)], width)
-    bent = lids.plate(flat, normals, curvatures, held) if held.any() else None
-    if bent is None:
-        middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
-        nearest = scipy.spatial.cKDTree(points).query(middles)[1]
-        if lid := creases.creased(corners, normals[nearest]):
+    plate = None
+    if bent:
+        width, points = bending.width_of(flat), flat.vertices[: flat.n_rim]
+        near = bending.samples_near(
+            surface.triangles, surface.tree, surface.patches, scipy.spatial.cKDTree(points), bending.REACH * width
+        )
+        ends = surface.patches[behind[rim.edges_at(flat.places)]]
+        normals, curvatures, held = bending.continuation(flat, near, ends, width)
+        plate = lids.plate(flat, normals, curvatures, held, width) if held.any() else None
+    if plate is None:
+        lid = creases.creased(corners, surface.normals[behind])
+        if lid is not None:
             return lid
-    pattern = lids.pattern(lids.cut_to_pieces(corners), frame)
-    return None if pattern is None else lids.draped(pattern, bent or flat)
+    return lids.draped(corners, rim.starts, frame, plate or flat)

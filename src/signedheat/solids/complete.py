@@ -30,14 +30,12 @@ from ..orientations.meshes import orientation
 from ..orientations.points import orient_points
 from ..progress import Progress, Stopwatch
 from . import parts
-from .closing import lids_of
+from .closing import closed_by, small_lids, strips
 from .heat import Heat, heat_surface
 from .loose import are_copies, bound_together, fragments, scatter_of
-from .lost_faces import lost_faces
 from .rims import open_edges
 from .solid import Solid
 from .unite import Surface, united
-from .walls import wall_ends
 
 STEPS = 2
 """Steps that are timed."""
@@ -182,9 +180,9 @@ def completed(
         raise SourceError("no face of the shape has an area", element="shape")
     if completion == "heat":
         return united(_by_heat(given, method) + walls, keep_overlaps)
-    lost = lost_faces(vertices, given.ids)
-    ends = wall_ends(vertices, np.concatenate([given.ids, lost]))
-    surfaces, copies = _by_lids(given, np.concatenate([lost, ends]), vertices, method)
+    lost = small_lids(vertices, given.ids)
+    added = np.concatenate([lost, strips(vertices, np.concatenate([given.ids, lost]))])
+    surfaces, copies = _by_lids(given, added, vertices, method)
     restored = float(face_areas(vertices[lost]).sum() / face_areas(given.triangles).sum())
     notes = [FacesRestored(len(lost), restored / (1 + restored))] if len(lost) else []
     return united(surfaces + walls, keep_overlaps, notes, copies=copies)
@@ -218,8 +216,9 @@ def _by_lids(
         else:
             surfaces.append(pieces.select(loose, False))
     bodies = whole.select(lidded, True)
-    lids = lids_of(bodies.triangles, bodies.ids, labels[lidded], vertices)
-    return [bodies, *map(Surface.made, lids), *surfaces], int(copies.sum())
+    positions, added = closed_by(vertices, bodies.ids)
+    lids = Surface(positions[added], added, np.full(len(added), -1), True)
+    return [bodies, lids, *surfaces], int(copies.sum())
 
 
 def _scattered(pieces: Surface, labels: NDArray[np.int64], method: Heat) -> list[Surface]:

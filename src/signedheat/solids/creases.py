@@ -8,143 +8,185 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.directions import unit
-from .lids import Lid, area_vector, least_triangles
+from .rims import corners_of
+from .spanning import area_vector, frame_of, spanned
 
 FLAT = 0.01
 """Distance from a plane, over their size, up to which points lie in it."""
 FOLDED = -0.8
 """Cosine between the normals of a lid and of the surface at its rim up to which it is folded back over the surface."""
-MOST_CORNERS = 128
-"""Corners of a rim up to which planes are looked for."""
+MOST_RUNS = 64
+"""Stretches of a rim in one plane each from which on it has no flat lid."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """A straight part of a rim, (k, 3) points without its end, or a crease; sums of the lengths and unit normals of the
-    surface there, over its edges."""
+    """A straight part of a rim, or a crease.
 
-    points: NDArray[np.float64]
+    Attributes
+    ----------
+    points : (k,) int
+        Its points, without its end.
+    normal : (3,) float
+        Sum over its edges of length times unit normal of the surface there.
+    """
+
+    points: NDArray[np.int64]
     normal: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """Sides one after another that lie in a plane: the first, how many, and the unit normal of a lid in that plane."""
+    """Sides one after another that lie in a plane.
+
+    Attributes
+    ----------
+    first, count : int
+        The first side, and how many there are.
+    points : (k,) int
+        Their points, with the end.
+    opening : (3,) float
+        Area vector of a lid in that plane.
+    """
 
     first: int
     count: int
-    normal: NDArray[np.float64]
+    points: NDArray[np.int64]
+    opening: NDArray[np.float64]
 
 
-def creased(loop: NDArray[np.float64], normals: NDArray[np.float64]) -> Lid | None:
-    """The lid of flat faces that closes a rim, if there is one.
+def is_flat(points: NDArray[np.float64]) -> bool:
+    """Whether points lie in a plane.
 
-    Sides of the rim that lie in a plane are closed in that plane: by a straight crease, if what comes before them and
-    after them lies in one plane with their ends; three such runs by creases to the place where their planes meet. So
-    sides of a box come back with the edge or the corner where they met. No face is folded back over the surface. The
-    unit normals are those of the surface at the edges that begin at each point; 0 where they are not clear.
+    Examples
+    --------
+    >>> is_flat(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.001]]))
+    True
     """
-    sides = _sides(loop, normals)
-    polygons: list[NDArray[np.float64]] = []
-    while 2 < len(sides) <= MOST_CORNERS:
-        points = np.concatenate([side.points for side in sides])
-        if _is_flat(points):
-            return _lid(loop, [*polygons, points])
-        runs = _runs(sides)
-        if peak := _peak(sides, runs):
-            return _lid(loop, [*polygons, *peak])
-        left = _without_one(sides, runs, polygons)
-        if left is None:
-            return None
-        sides = left
-    return None
-
-
-def _sides(loop: NDArray[np.float64], normals: NDArray[np.float64]) -> list[_Side]:
-    """Straight parts of a loop."""
-    ways = np.roll(loop, -1, axis=0) - loop
-    weighted = np.linalg.norm(ways, axis=1)[:, None] * normals
-    ways = unit(ways)
-    corners = np.flatnonzero(np.linalg.norm(ways - np.roll(ways, 1, axis=0), axis=1) > FLAT)
-    if not len(corners):
-        return []
-    points, weighted = np.roll(loop, -corners[0], axis=0), np.roll(weighted, -corners[0], axis=0)
-    cuts = corners[1:] - corners[0]
-    return [_Side(p, n.sum(axis=0)) for p, n in zip(np.split(points, cuts), np.split(weighted, cuts), strict=True)]
-
-
-def _is_flat(points: NDArray[np.float64]) -> bool:
     around = points - points.mean(axis=0)
     normal = np.linalg.eigh(around.T @ around)[1][:, 0]
     return bool(np.abs(around @ normal).max() <= FLAT * np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def _around(sides: list[_Side], first: int, count: int) -> NDArray[np.float64]:
-    """Points of so many sides, with the end of the last."""
-    some = [sides[(first + k) % len(sides)].points for k in range(count)]
-    return np.concatenate([*some, sides[(first + count) % len(sides)].points[:1]])
+def flat_lid(loop: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+    """The lid of a loop in a plane: the points that it adds to the loop's, and triangles; None if it crosses itself."""
+    return _filled(loop, len(loop), [np.arange(len(loop))])
 
 
-def _runs(sides: list[_Side]) -> list[_Run]:
-    """The longest runs of two or more sides that lie in a plane and whose lid is not folded back over the surface."""
-    found = {}
-    for corner in range(len(sides)):
-        first, count = corner - 1, 2
-        while count < len(sides) - 1 and _is_flat(_around(sides, first, count + 1)):
-            count += 1
-        while count < len(sides) - 1 and _is_flat(_around(sides, first - 1, count + 1)):
-            first, count = first - 1, count + 1
-        first %= len(sides)
-        vector = area_vector(_around(sides, first, count))
-        normal = vector / max(float(np.linalg.norm(vector)), 1e-300)
-        surface = np.sum([sides[(first + k) % len(sides)].normal for k in range(count)], axis=0)
-        if normal @ surface > FOLDED * np.linalg.norm(surface) or not surface.any():
-            found[first, count] = _Run(first, count, normal)
-    return list(found.values())
+def creased(
+    loop: NDArray[np.float64], normals: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+    """The lid of flat faces that closes a rim, if there is one: the points that it adds to the rim's, and triangles.
+
+    Sides of the rim that lie in a plane are closed in that plane: by a straight crease, if what comes before them and
+    after them lies in one plane with their ends; three such runs by creases to the place where their planes meet. So
+    sides of a box come back with the edge or the corner where they met. No face is folded back over the surface. The
+    (n, 3) unit normals are those of the surface at the edges that begin at each point; 0 where they are not clear.
+    """
+    points, sides, polygons = loop, _sides(loop, normals), []
+    while len(sides) > 2:
+        rest = np.concatenate([side.points for side in sides])
+        if is_flat(points[rest]):
+            return _filled(points, len(loop), [*polygons, rest])
+        runs = _runs(points, sides)
+        peak = _peak(points, runs, len(sides))
+        if peak is not None:
+            pieces = [np.append(run.points, len(points)) for run in peak[1]]
+            return _filled(np.concatenate([points, peak[0][None]]), len(loop), [*polygons, *pieces])
+        run = _closed_by_a_crease(points, sides, runs)
+        if run is None:
+            return None
+        polygons.append(run.points)
+        kept = [sides[(run.first + run.count + k) % len(sides)] for k in range(len(sides) - run.count)]
+        sides = [_Side(run.points[:1], np.zeros(3)), *kept]
+    return None
 
 
-def _peak(sides: list[_Side], runs: list[_Run]) -> list[NDArray[np.float64]]:
-    """Three polygons that close a loop of three runs, up to where their planes meet; none if it is no such loop."""
+def _sides(loop: NDArray[np.float64], normals: NDArray[np.float64]) -> list[_Side]:
+    """Straight parts of a loop."""
+    corners = corners_of(loop)
+    weighted = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)[:, None] * normals
+    if not len(corners):
+        return []
+    order, cuts = np.roll(np.arange(len(loop)), -corners[0]), corners - corners[0]
+    sums = np.add.reduceat(weighted[order], cuts, axis=0)
+    return [_Side(places, total) for places, total in zip(np.split(order, cuts[1:]), sums, strict=True)]
+
+
+def _runs(points: NDArray[np.float64], sides: list[_Side]) -> list[_Run]:
+    """The longest runs of two or more sides that lie in a plane, the largest first; none if there are too many.
+
+    Those whose lid would be folded back over the surface are left out.
+    """
     n = len(sides)
+    starts = points[[side.points[0] for side in sides]]
+    ways = unit(np.roll(starts, -1, axis=0) - starts)
+    across = unit(np.cross(np.roll(ways, 1, axis=0), ways))
+    goes_on = np.abs((across * np.roll(ways, -1, axis=0)).sum(axis=1)) <= FLAT  # the side after next is in that plane
+    begins = np.flatnonzero(~np.roll(goes_on, 1))
+    if not 0 < len(begins) <= MOST_RUNS:
+        return []
+    runs = []
+    for corner, after in zip(begins, np.append(begins[1:], begins[0] + n), strict=True):
+        first, count = (int(corner) - 1) % n, min(int(after - corner) + 1, n - 1)
+        chosen = [sides[(first + k) % n] for k in range(count)]
+        places = np.concatenate([*(side.points for side in chosen), sides[(first + count) % n].points[:1]])
+        opening = area_vector(points[places])
+        surface = np.sum([side.normal for side in chosen], axis=0)
+        folded = opening @ surface <= FOLDED * np.linalg.norm(opening) * np.linalg.norm(surface)
+        if is_flat(points[places]) and not (folded and surface.any()):
+            runs.append(_Run(first, count, places, opening))
+    return sorted(runs, key=lambda run: -float(np.linalg.norm(run.opening)))
+
+
+def _peak(
+    points: NDArray[np.float64], runs: list[_Run], n_sides: int
+) -> tuple[NDArray[np.float64], tuple[_Run, _Run, _Run]] | None:
+    """Where the planes of three runs that make up a loop meet, near it, and the runs."""
     following = {run.first: run for run in runs}
     for one in runs:
-        two = following.get((one.first + one.count) % n)
-        three = following.get((two.first + two.count) % n) if two else None
-        if two is None or three is None or one.count + two.count + three.count != n:
+        two = following.get((one.first + one.count) % n_sides)
+        three = following.get((two.first + two.count) % n_sides) if two else None
+        if two is None or three is None or one.count + two.count + three.count != n_sides:
             continue
-        planes = np.stack([run.normal for run in (one, two, three)])
+        planes = unit(np.stack([run.opening for run in (one, two, three)]))
         if abs(np.linalg.det(planes)) < FLAT:
             continue
-        pieces = [_around(sides, run.first, run.count) for run in (one, two, three)]
-        at = np.linalg.solve(
-            planes, [normal @ piece.mean(axis=0) for normal, piece in zip(planes, pieces, strict=True)]
-        )
-        points = np.concatenate(pieces)
-        if np.linalg.norm(at - points.mean(axis=0)) < np.linalg.norm(np.ptp(points, axis=0)):
-            return [np.concatenate([piece, at[None]]) for piece in pieces]
-    return []
+        offsets = [float(normal @ points[run.points].mean(axis=0)) for normal, run in zip(planes, (one, two, three))]
+        peak = np.linalg.solve(planes, offsets)
+        corners = points[np.concatenate([run.points for run in (one, two, three)])]
+        if np.linalg.norm(peak - corners.mean(axis=0)) < np.linalg.norm(np.ptp(corners, axis=0)):
+            return peak, (one, two, three)
+    return None
 
 
-def _without_one(sides: list[_Side], runs: list[_Run], polygons: list[NDArray[np.float64]]) -> list[_Side] | None:
-    """The sides that are left when a run is closed by a crease; its polygon is added to others."""
+def _closed_by_a_crease(points: NDArray[np.float64], sides: list[_Side], runs: list[_Run]) -> _Run | None:
+    """The first run whose ends lie in a plane with the sides before and after it."""
     n = len(sides)
     for run in runs:
         if n - run.count < 2:
             continue
-        piece = _around(sides, run.first, run.count)
-        rest = [sides[(run.first + run.count + k) % n] for k in range(n - run.count)]
-        ends = np.concatenate([rest[-1].points, piece[[0, -1]], rest[0].points, rest[1 % len(rest)].points[:1]])
-        if _is_flat(ends):
-            polygons.append(piece)
-            return [_Side(piece[:1], np.zeros(3)), *rest]
+        before, after = sides[(run.first - 1) % n], sides[(run.first + run.count) % n]
+        beyond = sides[(run.first + run.count + 1) % n]
+        ends = np.concatenate([before.points, run.points[[0, -1]], after.points, beyond.points[:1]])
+        if is_flat(points[ends]):
+            return run
     return None
 
 
-def _lid(loop: NDArray[np.float64], polygons: list[NDArray[np.float64]]) -> Lid:
-    """The points of a loop, and triangles of polygons."""
-    vertices, faces, count = [loop], [], len(loop)
+def _filled(
+    points: NDArray[np.float64], n_rim: int, polygons: list[NDArray[np.int64]]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+    """Points after those of a rim, and the triangles of plane polygons; None if one crosses itself."""
+    vertices, faces, count = [points], [], len(points)
     for polygon in polygons:
-        vertices.append(polygon)
-        faces.append(count + least_triangles(polygon))
-        count += len(polygon)
-    return Lid(np.concatenate(vertices), np.concatenate(faces), len(loop))
+        corners = points[polygon]
+        frame = frame_of(corners)
+        found = spanned((corners - frame[0]) @ frame[1], np.empty((0, 2))) if frame else None
+        if found is None:
+            return None
+        added = found.rim(corners)[found.shares > 0]
+        vertices.append(added)
+        faces.append(np.concatenate([polygon, count + np.arange(len(added))])[found.balanced()])
+        count += len(added)
+    return np.concatenate(vertices)[n_rim:], np.concatenate(faces)

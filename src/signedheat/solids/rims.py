@@ -6,7 +6,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..compiled import compiled
+from ..geometry.components import grouped, sums_of
+from ..geometry.directions import axes_across, unit
 from ..geometry.edges import edge_table
+from ..geometry.meshes import area_vectors
 
 PLACES = 8
 """Places on an edge from which edges that run along it are searched for: nearer to each other than `ALONG`."""
@@ -15,6 +19,8 @@ ALONG = 0.1
 less than .05 apart where it has 16 or more."""
 OPPOSITE = -0.7
 """Cosine of their directions up to which they run in opposite directions; with 0, leaves that cross are one part."""
+STRAIGHT = 1e-5
+"""Angles between consecutive edges up to which the vertex between them is no corner, in radians."""
 
 
 def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -48,6 +54,133 @@ def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDAr
     return np.repeat(missing, np.abs(excess), axis=0), np.repeat(sides // n, np.abs(excess))
 
 
+def boundary(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(k, 2) tails and heads of the directed edges that faces lack: with them, each edge is balanced by opposite ones.
+
+    An edge that k more faces run along in one direction than in the other is listed k times.
+
+    Examples
+    --------
+    >>> boundary(np.array([[0, 1, 2], [2, 1, 3]])).tolist()
+    [[1, 0], [0, 2], [3, 1], [2, 3]]
+    """
+    table = edge_table(faces)
+    open_edges = np.flatnonzero(table.balance)
+    excess = table.balance[open_edges]
+    edges = table.vertices[open_edges]
+    return np.repeat(np.where(excess[:, None] > 0, edges[:, ::-1], edges), np.abs(excess), axis=0)
+
+
+def loops(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: NDArray[np.int64]
+) -> list[NDArray[np.int64]]:
+    """Closed loops around the gaps of faces, along all of their boundary edges; none passes a vertex twice.
+
+    Where several loops meet at a vertex, each edge that arrives there goes on along the edge at the other side of the
+    gap beside it. Where gaps hang together at vertices, loops come apart there, beginning far from the middle of all.
+
+    Examples
+    --------
+    >>> vertices = np.array([[0.0, 0, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 0]])
+    >>> faces = np.array([[0, 1, 2], [0, 3, 4]])
+    >>> [loop.tolist() for loop in loops(vertices, faces, boundary(faces))]
+    [[0, 4, 3], [2, 1, 0]]
+    """
+    if not len(edges):
+        return []
+    tails, heads = edges.T
+    n_edges, n = len(edges), len(vertices)
+    ends = np.concatenate([tails, heads])
+    crossing = np.zeros(n, dtype=bool)
+    crossing[np.bincount(tails, minlength=n) > 1] = True
+    angles = np.zeros(2 * n_edges)
+    around = np.flatnonzero(crossing[ends])
+    if len(around):
+        directions = vertices[np.concatenate([heads, tails])[around]] - vertices[ends[around]]
+        first, second = axes_across(_normals(vertices, faces[crossing[faces].any(axis=1)])[ends[around]])
+        angles[around] = np.arctan2((directions * second).sum(axis=1), (directions * first).sum(axis=1))
+    order = np.lexsort((angles, ends))
+    names = np.concatenate([np.arange(n_edges), -1 - np.arange(n_edges)])[order]
+    following = _across_gaps(grouped(ends, n)[0], names)
+    middles, lengths = vertices[edges].mean(axis=1), np.linalg.norm(vertices[heads] - vertices[tails], axis=1)
+    centre = np.average(middles, weights=lengths + np.finfo(float).tiny, axis=0)
+    farthest = np.argsort(-np.linalg.norm(middles - centre, axis=1), kind="stable")
+    walks, stops = _simple_loops(np.ascontiguousarray(tails), following, farthest, n)
+    return np.split(tails[walks], stops[:-1])
+
+
+def _normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(n, 3) unit normals at vertices: means over the faces there, by their angles."""
+    corners = vertices[faces]
+    ahead, back = unit(np.roll(corners, -1, axis=1) - corners), unit(np.roll(corners, 1, axis=1) - corners)
+    angles = np.arccos(np.clip((ahead * back).sum(axis=2), -1.0, 1.0))
+    normals = angles[..., None] * unit(area_vectors(corners))[:, None]
+    return unit(sums_of(normals.reshape(-1, 3), faces.ravel(), len(vertices)))
+
+
+@compiled
+def _across_gaps(starts: NDArray[np.int64], names: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The edge that follows each one, by the edges that leave each vertex and, as −1 − e, arrive, counterclockwise.
+
+    Gaps are nested as parentheses are: each begins at an edge that leaves, and ends at one that arrives.
+    """
+    following, waiting = np.full(len(names) // 2, -1), np.empty(len(names) // 2, dtype=np.int64)
+    for v in range(len(starts) - 1):
+        depth = 0
+        for turn in range(2):
+            for k in range(starts[v], starts[v + 1]):
+                if names[k] >= 0:
+                    if turn == 0:
+                        waiting[depth] = names[k]
+                        depth += 1
+                elif following[-1 - names[k]] < 0 and depth > 0:
+                    depth -= 1
+                    following[-1 - names[k]] = waiting[depth]
+    return following
+
+
+@compiled
+def _simple_loops(
+    tails: NDArray[np.int64], following: NDArray[np.int64], order: NDArray[np.int64], n_vertices: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Edges loop by loop, and where each loop stops; walks begin at the edges that come first in an order."""
+    n = len(tails)
+    place, walk, passed = np.full(n_vertices, -1), np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
+    edges, stops, count, n_loops = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), 0, 0
+    for first in order:
+        edge, depth = first, 0
+        while True:
+            begin = place[tails[edge]] if depth else -1
+            if begin >= 0:
+                for k in range(begin, depth):
+                    edges[count] = walk[k]
+                    place[tails[walk[k]]] = -1
+                    count += 1
+                stops[n_loops] = count
+                n_loops += 1
+                depth = begin
+            if passed[edge]:
+                break
+            passed[edge] = True
+            place[tails[edge]] = depth
+            walk[depth] = edge
+            depth += 1
+            edge = following[edge]
+    return edges, stops[:n_loops].copy()
+
+
+def corners_of(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(k,) which points of a closed loop are corners: the loop does not go straight on there.
+
+    Examples
+    --------
+    >>> corners_of(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 2, 0]])).tolist()
+    [0, 2, 3]
+    """
+    ahead = unit(np.roll(points, -1, axis=0) - points)
+    return np.flatnonzero(np.linalg.norm(ahead - np.roll(ahead, 1, axis=0), axis=1) > STRAIGHT)
+
+
 def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs of edges that run along each other in opposite directions, as where patches with other vertices meet.
 
@@ -73,38 +206,3 @@ def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray
     one, other = pairs[(ways[pairs[:, 0]] * ways[pairs[:, 1]]).sum(axis=1) < OPPOSITE].T
     same = (ends[one] == ends[other, ::-1]).all(axis=(1, 2))
     return one[~same], other[~same]
-
-
-def loops(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Closed loops of vertices, none of which passes a vertex twice, that run along all of the directed edges.
-
-    As many edges leave each vertex as arrive there.
-
-    Examples
-    --------
-    >>> [loop.tolist() for loop in loops(np.array([[0, 1], [1, 2], [2, 0], [0, 3], [3, 4], [4, 0]]))]
-    [[0, 1, 2], [0, 3, 4]]
-    """
-    if not len(edges):
-        return []
-    order = np.lexsort((edges[:, 1], edges[:, 0]))
-    tails, heads = edges[order].T
-    names, first = np.unique(tails, return_index=True)
-    following = {
-        int(v): heads[a:b].tolist()[::-1] for v, a, b in zip(names, first, [*first[1:], len(tails)], strict=True)
-    }
-    found = []
-    for start in names.tolist():
-        path, place = [start], {start: 0}
-        while following[path[-1]]:
-            onward = following[path[-1]].pop()
-            if onward in place:
-                cut = place[onward]
-                found.append(np.array(path[cut:]))
-                for vertex in path[cut + 1 :]:
-                    del place[vertex]
-                del path[cut + 1 :]
-            else:
-                place[onward] = len(path)
-                path.append(onward)
-    return found

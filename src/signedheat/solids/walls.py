@@ -1,4 +1,4 @@
-"""Ends of walls: strips between rims near each other, such as those of a bowl's outside and inside without its lip."""
+"""Strips between rims that run along each other: seams of patches with other vertices, and ends of walls."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..geometry.components import connected_components
 from ..geometry.directions import unit
-from ..geometry.meshes import face_areas
-from .lids import area_vector, cut_to_pieces
-from .parts import parts_of
-from .rims import loops, open_edges
+from .lids import cut_to_pieces
+from .rims import corners_of, meeting_edges
+from .spanning import area_vector
 
 NARROW = 0.3
 """Area of a strip at right angles to the surface at both rims, over that of flat lids on both, up to which it closes
@@ -24,38 +24,9 @@ LARGE = 0.1
 opening: holes two fifths as wide as a hollow ball have .04, a cup .2, a bowl .5."""
 
 
-def wall_ends(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(k, 3) vertices of triangles between rims that run opposite ways, near each other all around.
-
-    Examples
-    --------
-    >>> outside = np.array([[0, 0, 0], [9, 0, 0], [9, 9, 0], [0, 9, 0]])
-    >>> faces = np.array([[0, 1, 2], [0, 2, 3], [6, 5, 4], [7, 6, 4]])  # two sides of a plate
-    >>> len(wall_ends(np.concatenate([outside, outside - [0, 0, 1]]).astype(float), faces))
-    8
-    """
-    labels = parts_of(faces)
-    edges, owners = open_edges(faces, labels)
-    several = np.bincount(labels)[owners] > 1  # what scatters as single faces has no walls
-    edges, owners = edges[several], owners[several]
-    if not len(edges):
-        return edges.reshape(-1, 3)
-    areas = np.bincount(labels, face_areas(vertices[faces])).astype(np.float64)
-    keys = (faces * len(vertices) + np.roll(faces, -1, axis=1)).ravel()
-    order = np.argsort(keys)
-    rims = []
-    for part in np.unique(owners):
-        for loop in loops(edges[np.searchsorted(owners, part) : np.searchsorted(owners, part, side="right")]):
-            behind = np.searchsorted(keys, np.roll(loop, -1) * len(vertices) + loop, sorter=order)
-            face, side = np.divmod(order[np.minimum(behind, len(keys) - 1)], 3)
-            rims.append(_Rim.of(loop, vertices, vertices[faces[face, (side + 2) % 3]], int(part)))
-    strips = [strip(rims[i], rims[j]) for i, j in facing(rims, areas)]
-    return np.concatenate([np.zeros((0, 3), dtype=np.int64), *strips])
-
-
 @dataclass(frozen=True, eq=False)
-class _Rim:
-    """A closed loop where a part ends.
+class Rim:
+    """A closed loop where faces end.
 
     Attributes
     ----------
@@ -63,8 +34,8 @@ class _Rim:
         Its vertices.
     onward : (n, 3) float
         Unit vectors at its edges, along the surface and away from it.
-    part : int
-        What ends there.
+    parts : (n,) int
+        What ends at each edge: faces that hang together.
     centre, radius : (3,) float, float
         A ball around it.
     opening : (3,) float
@@ -74,24 +45,136 @@ class _Rim:
     ids: NDArray[np.int64]
     corners: NDArray[np.float64]
     onward: NDArray[np.float64]
-    part: int
+    parts: NDArray[np.int64]
     centre: NDArray[np.float64]
     radius: float
     opening: NDArray[np.float64]
 
     @classmethod
-    def of(cls, ids: NDArray[np.int64], vertices: NDArray[np.float64], behind: NDArray[np.float64], part: int) -> _Rim:
-        corners = vertices[ids]
+    def of(
+        cls,
+        ids: NDArray[np.int64],
+        corners: NDArray[np.float64],
+        behind: NDArray[np.float64],
+        parts: NDArray[np.int64],
+    ) -> Rim:
+        """The rim around a loop of vertices; behind each edge, the face's third corner lies."""
         along = np.roll(corners, -1, axis=0) - corners
         away = corners - behind
         away -= ((away * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-300))[:, None] * along
         centre = corners.mean(axis=0)
         radius = float(np.linalg.norm(corners - centre, axis=1).max())
-        return cls(ids, corners, unit(away), part, centre, radius, area_vector(corners))
+        return cls(ids, corners, unit(away), parts, centre, radius, area_vector(corners))
 
 
-def facing(rims: list[_Rim], areas: NDArray[np.float64]) -> list[tuple[int, int]]:
+def seams(rims: list[Rim]) -> list[NDArray[np.int64]]:
+    """(k, 3) vertices of the triangles of strips between stretches of rims that run along each other.
+
+    A stretch consists of whole straight sides. What lies between two of them must be a gap: where faces of one part
+    lie between, as in a bar between two holes, they are no seam.
+
+    Examples
+    --------
+    >>> one = Rim.of(np.arange(4), np.array([[0.0, 0, 0], [9, 0, 0], [9, -9, 0], [0, -9, 0]]), np.full((4, 3), 5.0), np.zeros(4))
+    >>> other = Rim.of(np.arange(4, 8), one.corners[::-1] * [1, -1, 1] + [0, 0.1, 0], np.full((4, 3), 5.0), np.ones(4))
+    >>> [len(strip) for strip in seams([one, other])]
+    [2]
+    """
+    if not rims:
+        return []
+    corners = [corners_of(rim.corners) for rim in rims]
+    counts = np.array([len(places) for places in corners])
+    first = np.cumsum(counts) - counts
+    owners, n = np.repeat(np.arange(len(rims)), counts), int(counts.sum())
+    following = np.arange(n) + 1
+    following[first + counts - 1] = first
+    starts = np.concatenate([rim.corners[places] for rim, places in zip(rims, corners, strict=True)])
+    onward = np.concatenate([rim.onward[places] for rim, places in zip(rims, corners, strict=True)])
+    parts = np.concatenate([rim.parts[places] for rim, places in zip(rims, corners, strict=True)])
+    ends = np.stack([starts, starts[following]], axis=1)
+    one, other = meeting_edges(ends)
+    middles = ends.mean(axis=1)
+    across = middles[other] - middles[one]
+    gap = (parts[one] != parts[other]) | (
+        ((across * onward[one]).sum(axis=1) >= 0) & ((across * onward[other]).sum(axis=1) <= 0)
+    )
+    one, other = one[gap], other[gap]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    strips, used = [], np.zeros(n, dtype=bool)
+    for pairs in _stretches(np.concatenate([one, other]), np.concatenate([other, one]), following, lengths):
+        free = pairs[~used[pairs].any(axis=1)]
+        runs = [_run(np.unique(sides), following) for sides in free.T]
+        if min(len(run) for run in runs) == 0 or np.isin(*runs).any():
+            continue
+        whole = [following[run[-1]] == run[0] for run in runs]
+        if whole[0] != whole[1]:
+            continue
+        used[np.concatenate(runs)] = True
+        places = [_places(rims[owners[run[0]]], corners[owners[run[0]]], run - first[owners[run[0]]]) for run in runs]
+        chosen = [rims[owners[run[0]]] for run in runs]
+        if whole[0]:
+            strips.append(strip(chosen[0], chosen[1]))
+            continue
+        points = [rim.corners[at] for rim, at in zip(chosen, places, strict=True)]
+        ids = [rim.ids[at] for rim, at in zip(chosen, places, strict=True)]
+        faces = _zipped(ids[0], points[0], ids[1][::-1], points[1][::-1])
+        strips.append(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
+    return strips
+
+
+def _stretches(
+    one: NDArray[np.int64], other: NDArray[np.int64], following: NDArray[np.int64], lengths: NDArray[np.float64]
+) -> list[NDArray[np.int64]]:
+    """(k, 2) pairs of sides that meet, each with its reverse, by stretches: from one to the next; the longest first."""
+    if not len(one):
+        return []
+    n = len(following)
+    preceding = np.empty(n, dtype=np.int64)
+    preceding[following] = np.arange(n)
+    keys = np.sort(one * n + other)
+    one, other = np.divmod(keys, n)
+    tails, heads = [], []
+    for e, f in ((following[one], other), (one, preceding[other]), (following[one], preceding[other])):
+        at = np.minimum(np.searchsorted(keys, e * n + f), len(keys) - 1)
+        linked = (keys[at] == e * n + f) & ((e != other) | (f != one))
+        tails.append(np.flatnonzero(linked))
+        heads.append(at[linked])
+    labels = connected_components(len(keys), np.concatenate(tails), np.concatenate(heads))
+    order = np.argsort(labels, kind="stable")
+    groups = np.split(np.stack([one, other], axis=1)[order], np.cumsum(np.bincount(labels))[:-1])
+    return sorted(groups, key=lambda pairs: -float(lengths[np.unique(pairs[:, 0])].sum()))
+
+
+def _run(sides: NDArray[np.int64], following: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Sides in the order in which they follow each other; none if they do not."""
+    begins = sides[~np.isin(sides, following[sides])]
+    if len(begins) > 1 or not len(sides):
+        return sides[:0]
+    run = [int(begins[0]) if len(begins) else int(sides[0])]
+    while len(run) < len(sides):
+        run.append(int(following[run[-1]]))
+    return np.array(run)
+
+
+def _places(rim: Rim, corners: NDArray[np.int64], sides: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Places around a rim of all vertices of some of its sides, one after another, with both ends."""
+    begin, stop = corners[sides[0]], corners[(sides[-1] + 1) % len(corners)]
+    count = (stop - begin) % len(rim.ids) or len(rim.ids)
+    return (begin + np.arange(count + 1)) % len(rim.ids)
+
+
+def wall_ends(rims: list[Rim], areas: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+    """(k, 3) vertices of the triangles of strips between whole rims that are near each other all around.
+
+    Such as those of a bowl's outside and inside without its lip. `areas` are those of the parts.
+    """
+    return [strip(rims[i], rims[j]) for i, j in facing(rims, areas)]
+
+
+def facing(rims: list[Rim], areas: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Pairs of rims that run opposite ways, of parts with these areas: the strip between them is narrow enough."""
+    if len(rims) < 2:
+        return []
     centres, widths = np.array([rim.centre for rim in rims]), []
     for i, near in enumerate(scipy.spatial.cKDTree(centres).query_ball_point(centres, [rim.radius for rim in rims])):
         one = rims[i]
@@ -100,7 +183,7 @@ def facing(rims: list[_Rim], areas: NDArray[np.float64]) -> list[tuple[int, int]
             if (other.radius, j) >= (one.radius, i) or one.opening @ other.opening >= 0:  # once, from the larger one
                 continue
             lids = float(np.linalg.norm(one.opening) + np.linalg.norm(other.opening))
-            if lids > LARGE * areas[np.unique([one.part, other.part])].sum():
+            if lids > LARGE * areas[np.unique(np.concatenate([one.parts, other.parts]))].sum():
                 (area, onward), (again, back) = _way(one, other), _way(other, one)
                 if area + again <= 2 * lids * (NARROW + (1 - NARROW) * (onward + back) / max(area + again, 1e-300)):
                     widths.append(((area + again) / lids, i, j))
@@ -113,11 +196,12 @@ def facing(rims: list[_Rim], areas: NDArray[np.float64]) -> list[tuple[int, int]
     return best
 
 
-def _way(rim: _Rim, other: _Rim) -> tuple[float, float]:
+def _way(rim: Rim, other: Rim) -> tuple[float, float]:
     """Area between a rim and another; how much of it goes straight on."""
     along = np.roll(rim.corners, -1, axis=0) - rim.corners
     lengths = np.linalg.norm(along, axis=1)
-    places = cut_to_pieces(other.corners)
+    edges, shares = cut_to_pieces(other.corners)
+    places = other.corners[edges] + shares[:, None] * (np.roll(other.corners, -1, axis=0) - other.corners)[edges]
     base = np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)
     steps = np.linalg.norm(base, axis=1)
     base /= np.maximum(steps, 1e-300)[:, None]
@@ -128,22 +212,28 @@ def _way(rim: _Rim, other: _Rim) -> tuple[float, float]:
     return float(lengths @ np.linalg.norm(way, axis=1)), float(lengths @ (way * rim.onward).sum(axis=1))
 
 
-def strip(one: _Rim, other: _Rim) -> NDArray[np.int64]:
-    """(n + m, 3) vertices of triangles between rims that run opposite ways.
-
-    From the nearest two corners on, each triangle has the shorter of the two diagonals that come next.
-    """
-    n, m = len(one.ids), len(other.ids)
+def strip(one: Rim, other: Rim) -> NDArray[np.int64]:
+    """(n + m, 3) vertices of triangles between rims that run opposite ways, from their nearest two corners on."""
     away, at = scipy.spatial.cKDTree(other.corners).query(one.corners)
     start = int(np.argmin(away))
-    i, j = (start + np.arange(n + 1)) % n, (at[start] - np.arange(m + 1)) % m
-    p, q = one.corners[i], other.corners[j]
+    i = (start + np.arange(len(one.ids) + 1)) % len(one.ids)
+    j = (at[start] - np.arange(len(other.ids) + 1)) % len(other.ids)
+    return _zipped(one.ids[i], one.corners[i], other.ids[j], other.corners[j])
+
+
+def _zipped(
+    one: NDArray[np.int64], points: NDArray[np.float64], other: NDArray[np.int64], across: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Triangles between two chains, along the first and against the other: the shorter diagonal that comes next."""
     a, b, faces = 0, 0, []
-    while a < n or b < m:
-        if b == m or (a < n and np.linalg.norm(p[a + 1] - q[b]) <= np.linalg.norm(p[a] - q[b + 1])):
-            faces.append((one.ids[i[a]], one.ids[i[a + 1]], other.ids[j[b]]))
+    while a < len(one) - 1 or b < len(other) - 1:
+        if b == len(other) - 1 or (
+            a < len(one) - 1
+            and np.linalg.norm(points[a + 1] - across[b]) <= np.linalg.norm(points[a] - across[b + 1])
+        ):
+            faces.append((one[a], one[a + 1], other[b]))
             a += 1
         else:
-            faces.append((one.ids[i[a]], other.ids[j[b + 1]], other.ids[j[b]]))
+            faces.append((one[a], other[b + 1], other[b]))
             b += 1
     return np.array(faces)

@@ -1,0 +1,197 @@
+"""Triangulate closed loops: in a plane, or where their shadows cross themselves, in a disc."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..geometry.components import connected_components
+from ..geometry.edges import edge_keys, edge_table
+
+GROWTH = 0.35
+"""How fast triangles grow with their distance from the rim, over that distance."""
+SPLITS = 16
+"""How often edges of a rim are halved at most until all are edges of its triangulation."""
+MOVED = 1e-9
+"""Over the size of a loop, how far points are moved to choose among equal triangles: rounding moves them by 1e-15."""
+Frame = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Origin and (3, 2) axes of a plane."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spanned:
+    """Triangles within a closed loop in the plane, whose edges were halved until all of them were edges of triangles.
+
+    Attributes
+    ----------
+    edges, shares : (r,) int, (r,) float
+        Each point of the rim, in order: the edge of the loop that it lies on, and the share of its length before it; 0
+        at the vertices of the loop.
+    inner : (k,) int
+        Which of the points inside are used.
+    faces : (m, 3) int
+        Counterclockwise; the points of the rim come first.
+    """
+
+    edges: NDArray[np.int64]
+    shares: NDArray[np.float64]
+    inner: NDArray[np.int64]
+    faces: NDArray[np.int64]
+
+    def rim(self, loop: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(r, d) positions of the points of the rim on a loop of that many vertices."""
+        ways = np.roll(loop, -1, axis=0) - loop
+        points: NDArray[np.float64] = loop[self.edges] + self.shares[:, None] * ways[self.edges]
+        return points
+
+    def balanced(self) -> NDArray[np.int64]:
+        """(p, 3) faces whose boundary is the loop: triangles without area close the seams along edges that were halved.
+
+        The vertices of the loop come first, then the other points of the rim, then those inside.
+        """
+        whole = self.shares == 0
+        n, r = int(whole.sum()), len(self.edges)
+        number = np.empty(r + len(self.inner), dtype=np.int64)
+        number[:r][whole] = np.arange(n)
+        number[:r][~whole] = np.arange(n, r)
+        number[r:] = np.arange(r, len(number))
+        added = np.flatnonzero(~whole)
+        onward = np.where(whole[(added + 1) % r], (self.edges[added] + 1) % n, number[(added + 1) % r])
+        fans = np.stack([self.edges[added], onward, number[added]], axis=1)
+        return np.concatenate([number[self.faces], fans])
+
+
+def frame_of(rim: NDArray[np.float64]) -> Frame | None:
+    """The plane of a loop's area, in which it runs counterclockwise; None if it has none."""
+    normal = area_vector(rim)
+    length = np.linalg.norm(normal)
+    if not length > 1e-6 * np.linalg.norm(np.ptp(rim, axis=0)) ** 2:
+        return None
+    normal /= length
+    around = rim - rim.mean(axis=0)
+    around -= np.outer(around @ normal, normal)
+    reach = np.linalg.norm(around, axis=1)
+    first = around[np.argmax(reach > (1 - 1e-9) * reach.max())]  # turns with the rim
+    first = first / np.linalg.norm(first)
+    return rim[0], np.stack([first, np.cross(normal, first)], axis=1)
+
+
+def area_vector(loop: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,) the area that a closed loop encloses, along its normal."""
+    around = loop - loop.mean(axis=0)
+    vector: NDArray[np.float64] = 0.5 * np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
+    return vector
+
+
+def spanned(loop: NDArray[np.float64], inner: NDArray[np.float64]) -> Spanned | None:
+    """Delaunay triangles of a polygon in the plane with points inside; None if it crosses itself.
+
+    Points that are not inside are left out.
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    >>> found = spanned(square, np.array([[0.5, 0.5], [2.0, 0.5]]))
+    >>> len(found.faces), found.inner.tolist()
+    (4, [0])
+    """
+    count = len(loop)
+    edges, shares = np.arange(count), np.zeros(count)
+    for _ in range(SPLITS):
+        n = len(edges)
+        rim = loop[edges] + shares[:, None] * (np.roll(loop, -1, axis=0) - loop)[edges]
+        points = np.concatenate([rim, inner])
+        faces = counterclockwise(points)
+        after = (np.arange(n) + 1) % n
+        missing = ~np.isin(edge_keys(np.arange(n), after), edge_keys(faces.ravel(), np.roll(faces, -1, axis=1).ravel()))
+        if not missing.any():
+            kept = _to_the_left(faces, n)
+            if kept is None:
+                return None
+            used = np.unique(kept[kept >= n])
+            number = np.zeros(len(points), dtype=np.int64)
+            number[:n], number[used] = np.arange(n), n + np.arange(len(used))
+            return Spanned(edges, shares, used - n, number[kept])
+        split = np.flatnonzero(missing)
+        ends = np.where(shares[after[split]] == 0, 1.0, shares[after[split]])
+        middles = 0.5 * (shares[split] + ends)
+        edges, shares = np.insert(edges, split + 1, edges[split]), np.insert(shares, split + 1, middles)
+    return None
+
+
+def _to_the_left(faces: NDArray[np.int64], n: int) -> NDArray[np.int64] | None:
+    """Those of the triangles of a plane that a loop around points 0 to n − 1 encloses; None if it crosses itself."""
+    table = edge_table(faces)
+    tails, heads = table.vertices.T
+    ahead = (tails < n) & (heads == (tails + 1) % n)
+    back = (heads < n) & (tails == (heads + 1) % n)
+    wall = ahead | back
+    open_pairs = table.pairs[~wall[table.face_edges.ravel()[table.pairs[:, 0]]]] // 3
+    labels = connected_components(len(faces), *open_pairs.T)
+    at_rim = wall[table.face_edges]
+    leftward = at_rim & (ahead[table.face_edges] == table.forward)
+    left, right = labels[leftward.any(axis=1)], labels[(at_rim & ~leftward).any(axis=1)]
+    if int(leftward.sum()) != n or np.isin(left, right).any():
+        return None
+    kept: NDArray[np.int64] = faces[np.isin(labels, left)]
+    return kept
+
+
+def counterclockwise(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Delaunay triangles of points in the plane; where four lie on a circle, no rounding chooses: points are moved."""
+    numbers = np.arange(len(points))[:, None]
+    moves = (numbers * 0.5 * (5**0.5 - 1) * np.array([1.0, 2**0.5])) % 1.0 - 0.5
+    size = float(np.ptp(points, axis=0).max())
+    moved = points + MOVED * size * moves
+    faces = scipy.spatial.Delaunay(moved).simplices.astype(np.int64)
+    a, b, c = moved[faces].transpose(1, 0, 2)
+    clockwise = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) < (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    faces[clockwise] = faces[clockwise][:, ::-1]
+    return faces
+
+
+def points_inside(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points within a polygon of few sides, as dense as its corners at its rim, the less dense the farther from it."""
+    steps = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1)
+    size = float(np.quantile(steps, 0.9))
+    low, high = polygon.min(axis=0), polygon.max(axis=0)
+    tree = scipy.spatial.cKDTree(polygon)
+    layers = [np.zeros((0, 2))]
+    begin = 0.75 * size
+    while begin < 0.5 * float((high - low).max()):
+        step = size if len(layers) == 1 else GROWTH * begin + size
+        end = begin + 2.0 * step
+        rows = np.arange(low[1], high[1] + step, step * 0.75**0.5)
+        columns = np.arange(low[0], high[0] + step, step)
+        shifted = np.add.outer(0.5 * step * (np.arange(len(rows)) % 2), columns)
+        points = np.stack([shifted.ravel(), np.repeat(rows, len(columns))], axis=1)
+        away = tree.query(points)[0]
+        layers.append(points[(away >= begin) & (away < end)])
+        begin = end + 0.5 * step
+    points = np.concatenate(layers)
+    return points[_inside(points, polygon)]
+
+
+def _inside(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(k,) whether points lie inside a polygon: by the parity of crossings."""
+    x, y = points.T
+    (ax, ay), (bx, by) = polygon.T[..., None], np.roll(polygon, -1, axis=0).T[..., None]
+    rise = np.where(by == ay, 1.0, by - ay)  # what is level is not crossed
+    crosses = ((ay > y) != (by > y)) & (x < ax + (y - ay) * (bx - ax) / rise)
+    inside: NDArray[np.bool_] = np.logical_xor.reduce(crosses, axis=0)
+    return inside
+
+
+def points_in_disc(n: int) -> NDArray[np.float64]:
+    """Points within the unit circle, as dense at its rim as n points around it, the less dense the farther from it."""
+    rings, radius, step, turn = [np.zeros((1, 2))], 1.0, 2 * np.pi / n, 0.0
+    while (radius := radius - step * 0.87) >= step:
+        count = max(int(np.ceil(2 * np.pi * radius / step)), 5)
+        turn += np.pi / count
+        angles = turn + 2 * np.pi * np.arange(count) / count
+        rings.append(radius * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+        step *= 1 + GROWTH
+    return np.concatenate(rings)
