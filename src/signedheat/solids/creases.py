@@ -15,7 +15,7 @@ FLAT = 0.01
 """Distance from a plane, over their size, up to which points lie in it."""
 FOLDED = -0.8
 """Cosine between the normals of a lid and of the surface at its rim up to which it is folded back over the surface."""
-MOST_RUNS = 64
+MOST_RUNS = 16
 """Stretches of a rim in one plane each from which on it has no flat lid."""
 
 
