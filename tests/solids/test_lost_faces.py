@@ -5,7 +5,8 @@ import pytest
 
 from signedheat import samples
 from signedheat.geometry.edges import edge_table
-from signedheat.solids.lost_faces import MOST_SIDES, lost_faces
+from signedheat.solids.closing import small_lids
+from signedheat.solids.lost_faces import MOST_SIDES
 
 
 def unordered(faces):
@@ -26,7 +27,7 @@ def ring_with_lid_missing(n, height):
 def test_faces_lost_at_random_are_found_but_for_diagonals(share):
     sphere = samples.sphere(4)
     lost = np.random.default_rng(1).random(sphere.n_faces) < share
-    found = lost_faces(sphere.vertices, sphere.faces[~lost])
+    found = small_lids(sphere.vertices, sphere.faces[~lost])
     assert len(found) == lost.sum()
     again = unordered(found) & unordered(sphere.faces[lost])
     assert len(again) >= 0.85 * lost.sum()
@@ -38,7 +39,7 @@ def test_faces_lost_at_random_are_found_but_for_diagonals(share):
 def test_one_lost_face_of_each_kind():
     sphere = samples.sphere(2)
     for k in (0, 17, 99):
-        assert unordered(lost_faces(sphere.vertices, np.delete(sphere.faces, k, axis=0))) == unordered(
+        assert unordered(small_lids(sphere.vertices, np.delete(sphere.faces, k, axis=0))) == unordered(
             sphere.faces[[k]]
         )
 
@@ -48,7 +49,7 @@ def test_holes_that_touch_at_a_vertex_are_two():
     first = sphere.faces[0]
     touching = (sphere.faces == first[0]).any(axis=1) & (np.isin(sphere.faces, first).sum(axis=1) == 1)
     lost = np.array([0, np.flatnonzero(touching)[0]])
-    found = lost_faces(sphere.vertices, np.delete(sphere.faces, lost, axis=0))
+    found = small_lids(sphere.vertices, np.delete(sphere.faces, lost, axis=0))
     assert unordered(found) == unordered(sphere.faces[lost])
 
 
@@ -58,11 +59,11 @@ def test_a_small_hole_is_closed_where_the_surface_goes_on_across_it(height):
     for n in (6, 8, MOST_SIDES + 1):
         vertices, faces = ring_with_lid_missing(n, height)
         goes_on = height < 1 and n <= MOST_SIDES
-        assert len(lost_faces(vertices, faces)) == (n - 2 if goes_on else 0)
+        assert len(small_lids(vertices, faces)) == (n - 2 if goes_on else 0)
 
 
 def test_faces_and_strips_that_hang_on_nothing_get_no_back():
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.2], [2, 1, 0.5], [5, 5, 5], [6, 5, 5], [5, 6, 5]])
     faces = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4], [5, 6, 7]])
-    assert not len(lost_faces(vertices, faces))
-    assert not len(lost_faces(vertices, faces[:0]))
+    assert not len(small_lids(vertices, faces))
+    assert not len(small_lids(vertices, faces[:0]))

@@ -149,9 +149,7 @@ def small_lids(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArr
     if not chosen:
         return np.concatenate(triangles)
     rims = [loop[places] for loop, places in zip(chosen, corners, strict=True)]
-    normals = [
-        surface.normals[surface.behind(loop)[0][places]] for loop, places in zip(chosen, corners, strict=True)
-    ]
+    normals = [surface.normals[surface.behind(loop)[0][places]] for loop, places in zip(chosen, corners, strict=True)]
     touching = np.zeros(len(surface.vertices), dtype=bool)
     touching[np.concatenate(rims)] = True
     edges = edge_table(surface.faces).vertices
@@ -197,9 +195,7 @@ def _rims(surface: _Surface) -> list[walls.Rim]:
     return rims
 
 
-def _lid(
-    surface: _Surface, loop: NDArray[np.int64], bent: bool
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _lid(surface: _Surface, loop: NDArray[np.int64], bent: bool) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """The lid of a loop: the points that it adds to the loop's, and triangles."""
     corners = surface.vertices[loop]
     if len(loop) == 3:

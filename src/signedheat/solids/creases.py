@@ -149,14 +149,15 @@ def _peak(
         three = following.get((two.first + two.count) % n_sides) if two else None
         if two is None or three is None or one.count + two.count + three.count != n_sides:
             continue
-        planes = unit(np.stack([run.opening for run in (one, two, three)]))
+        around = (one, two, three)
+        planes = unit(np.stack([run.opening for run in around]))
         if abs(np.linalg.det(planes)) < FLAT:
             continue
-        offsets = [float(normal @ points[run.points].mean(axis=0)) for normal, run in zip(planes, (one, two, three))]
-        peak = np.linalg.solve(planes, offsets)
-        corners = points[np.concatenate([run.points for run in (one, two, three)])]
+        middles = np.stack([points[run.points].mean(axis=0) for run in around])
+        peak = np.linalg.solve(planes, (planes * middles).sum(axis=1))
+        corners = points[np.concatenate([run.points for run in around])]
         if np.linalg.norm(peak - corners.mean(axis=0)) < np.linalg.norm(np.ptp(corners, axis=0)):
-            return peak, (one, two, three)
+            return peak, around
     return None
 
 

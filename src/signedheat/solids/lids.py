@@ -325,5 +325,3 @@ def running_mean(values: NDArray[np.float64], reach: int) -> NDArray[np.float64]
     """(n,) values along a loop, each the mean of those up to so many places away."""
     window = np.ones(2 * reach + 1) / (2 * reach + 1)
     return np.convolve(np.concatenate([values[len(values) - reach :], values, values[:reach]]), window, mode="valid")
-
-

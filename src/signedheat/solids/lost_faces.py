@@ -63,7 +63,8 @@ def _least_bent(
     """Triangles, by places in their loops, and whether each loop's bend at its rim at most by an angle.
 
     `cost[i, j]` is how much the best lid between the i-th and the j-th corner bends, but for the edge that joins the
-    two; `rims[i, j]` the sum of lengths times squared angles at the rim, `across[i, j]` the normal of its triangle there.
+    two; `rims[i, j]` the sum of lengths times squared angles at the rim, `across[i, j]` the normal of its triangle
+    there.
     """
     n_loops = len(starts) - 1
     faces, closed = np.empty((len(corners) - 2 * n_loops, 3), dtype=np.int64), np.zeros(n_loops, dtype=np.bool_)

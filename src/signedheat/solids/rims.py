@@ -71,9 +71,7 @@ def boundary(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.repeat(np.where(excess[:, None] > 0, edges[:, ::-1], edges), np.abs(excess), axis=0)
 
 
-def loops(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: NDArray[np.int64]
-) -> list[NDArray[np.int64]]:
+def loops(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     """Closed loops around the gaps of faces, along all of their boundary edges; none passes a vertex twice.
 
     Where several loops meet at a vertex, each edge that arrives there goes on along the edge at the other side of the

@@ -13,7 +13,7 @@ from ..geometry.edges import edge_keys, edge_table
 
 GROWTH = 0.35
 """How fast triangles grow with their distance from the rim, over that distance."""
-SPLITS = 16
+SPLITS = 8
 """How often edges of a rim are halved at most until all are edges of its triangulation."""
 MOVED = 1e-9
 """Over the size of a loop, how far points are moved to choose among equal triangles: rounding moves them by 1e-15."""

@@ -75,9 +75,10 @@ def seams(rims: list[Rim]) -> list[NDArray[np.int64]]:
 
     Examples
     --------
-    >>> one = Rim.of(np.arange(4), np.array([[0.0, 0, 0], [9, 0, 0], [9, -9, 0], [0, -9, 0]]), np.full((4, 3), 5.0), np.zeros(4))
-    >>> other = Rim.of(np.arange(4, 8), one.corners[::-1] * [1, -1, 1] + [0, 0.1, 0], np.full((4, 3), 5.0), np.ones(4))
-    >>> [len(strip) for strip in seams([one, other])]
+    >>> square, behind = np.array([[0.0, 0, 0], [9, 0, 0], [9, -9, 0], [0, -9, 0]]), np.full((4, 3), 5.0)
+    >>> rim = Rim.of(np.arange(4), square, behind, np.zeros(4, dtype=int))
+    >>> beside = Rim.of(np.arange(4, 8), square[::-1] * [1, -1, 1] + [0, 0.1, 0], behind, np.ones(4, dtype=int))
+    >>> [len(strip) for strip in seams([rim, beside])]
     [2]
     """
     if not rims:
@@ -228,8 +229,7 @@ def _zipped(
     a, b, faces = 0, 0, []
     while a < len(one) - 1 or b < len(other) - 1:
         if b == len(other) - 1 or (
-            a < len(one) - 1
-            and np.linalg.norm(points[a + 1] - across[b]) <= np.linalg.norm(points[a] - across[b + 1])
+            a < len(one) - 1 and np.linalg.norm(points[a + 1] - across[b]) <= np.linalg.norm(points[a] - across[b + 1])
         ):
             faces.append((one[a], one[a + 1], other[b]))
             a += 1
