@@ -89,7 +89,10 @@ def calls_of_errors():
 
 
 def test_every_error_says_what_it_is_about_or_what_to_do():
-    assert [where for where, _, given in calls_of_errors() if not given & {"element", "remedy", "path"}] == []
+    """Readers of files leave the path to `reading`, in which they run."""
+    readers = {path.name for path in (Path(sh.__file__).parent / "io").glob("*.py")}
+    found = [where for where, _, given in calls_of_errors() if not given & {"element", "remedy", "path"}]
+    assert len(KINDS) > 10 and [where for where in found if where.split(":")[0] not in readers] == []
 
 
 def test_no_remedy_hides_in_a_cause():

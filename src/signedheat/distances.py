@@ -29,6 +29,7 @@ from .lowering.area_elements import bounds_around
 from .orientations.orient import orient
 from .progress import Progress
 from .solids.distance import distance_to_shapes
+from .solids.solid import Solid
 from .solver import SignedHeatSolver, as_list
 
 
@@ -123,10 +124,10 @@ def signed_distance(
     Parameters
     ----------
     source : shape, curves or polylines; or a sequence of them
-        In space `TriangleMesh`, `PolygonMesh`, `TetMesh` or `PointCloud`, with normals or without; objects of trimesh,
-        PyVista, meshio and Open3D and pairs (vertices, faces) are taken wherever a shape is. On a surface `Curve` and
-        `SurfacePoints`, or lists of (element, barycentric coordinates), as potpourri3d has them. In the plane
-        `Polyline`.
+        In space `Solid`, `TriangleMesh`, `PolygonMesh`, `TetMesh` or `PointCloud`, with normals or without; objects of
+        trimesh, PyVista, meshio and Open3D and pairs (vertices, faces) are taken wherever a shape is. On a surface
+        `Curve` and `SurfacePoints`, or lists of (element, barycentric coordinates), as potpourri3d has them. In the
+        plane `Polyline`.
     domain : Grid, TetMesh or surface, optional
         Where to measure: by default a grid of cubic cells around the shape or drawing. Curves need their surface: a
         `TriangleMesh`, `PolygonMesh`, `PointCloud`, `DigitalSurface` or `IntrinsicTriangulation`.
@@ -178,8 +179,7 @@ def signed_distance(
     --------
     Two balls that overlap, and are united:
 
-    >>> import numpy as np
-    >>> import signedheat as sh
+    >>>     >>> import signedheat as sh
     >>> from signedheat import samples
     >>> ball, other = samples.sphere(3), samples.sphere(3, center=(1.0, 0, 0))
     >>> field = sh.signed_distance(samples.union(ball, other), resolution=32)
@@ -209,6 +209,22 @@ def signed_distance(
     return measure(source, domain, **options)
 
 
+def distance_to_solid(
+    solid: Solid,
+    domain: Grid | TetMesh | None = None,
+    *,
+    resolution: int = 128,
+    spacing: ArrayLike | None = None,
+    padding: float | None = None,
+    band: float | None = None,
+    progress: Progress | None = None,
+) -> GridField | TetField:
+    """Signed distance to a solid: see `signed_distance`. On tets, and around walls, to its boundary."""
+    if domain is None or (isinstance(domain, Grid) and domain.mask is None):
+        return solid.field(resolution, spacing=spacing, padding=padding, grid=domain, band=band, progress=progress)
+    return distance_to_shapes(solid.boundary, domain, band=band, as_oriented=True, progress=progress)
+
+
 def plain_distance(
     shape: Any,
     domain: Grid | TetMesh,
@@ -234,6 +250,10 @@ def grid_around(
 def _measure(source: object, domain: Domain | None) -> Callable[..., Field]:
     """How distance is measured to a source on a domain."""
     listed = as_shapes(source)
+    if isinstance(domain, Grid):
+        _refuse_other_dimension(listed, domain)
+    if isinstance(source, Solid) and (domain is None or isinstance(domain, Grid | TetMesh)):
+        return distance_to_solid
     in_plane = bool(listed) and all(isinstance(each, Polyline) for each in listed)
     if domain is None:
         if any(isinstance(each, Curve | SurfacePoints) for each in listed):
@@ -248,3 +268,15 @@ def _measure(source: object, domain: Domain | None) -> Callable[..., Field]:
     if isinstance(domain, Grid):
         return distance_to_shapes if domain.dimension == 3 else distance_to_lines
     return distance_to_shapes if isinstance(domain, TetMesh) else distance_to_curves
+
+
+def _refuse_other_dimension(sources: Sequence[Any], grid: Grid) -> None:
+    """Raise if a source does not lie in as many dimensions as a grid has axes."""
+    for index, source in enumerate(sources):
+        dimension = source.bounds.shape[1] if hasattr(source, "bounds") else grid.dimension
+        if dimension != grid.dimension:
+            raise SourceError(
+                f"the grid has {grid.dimension} axes, and source {index}, a {type(source).__name__}, has {dimension}",
+                remedy="pass a grid with one axis for each dimension, or leave it out",
+                element=f"source {index}",
+            )

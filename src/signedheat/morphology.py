@@ -28,7 +28,15 @@ from .domains.polyline import Polyline
 from .domains.tet_mesh import TetMesh
 from .domains.triangle_mesh import TriangleMesh
 from .domains.validation import finite_number, positive_number
-from .errors import GeometryError, SignedHeatError, SourceError, UnsupportedTypeError
+from .errors import (
+    GeometryError,
+    InexactWarning,
+    OutsideError,
+    SignedHeatError,
+    SourceError,
+    UnsupportedTypeError,
+    warn_user,
+)
 from .fields.arithmetic import smooth_difference, smooth_intersection, smooth_union
 from .fields.grid_field import GridField
 from .fields.to_field import Field
@@ -228,7 +236,7 @@ def closing(
 
 
 def offset(
-    shape: Shapes | Solid,
+    shape: Shapes,
     distance: float | ArrayLike | Reach,
     *,
     corners: Literal["round", "mitre", "sharp"] = "round",
@@ -276,7 +284,7 @@ def offset(
     """
     if corners not in LIMITS:
         raise SignedHeatError(f"corners are {', '.join(LIMITS)}, not {corners!r}", element="corners")
-    solid = shape if isinstance(shape, Solid) else complete(shape)
+    solid = complete(shape)
     reach: float | Reach
     if callable(distance):
         reach = checked_reach(distance)
@@ -307,7 +315,8 @@ def shell(
 ) -> TriangleMesh:
     """The solid between two offsets of a shape, ``inner ≤ φ ≤ outer``: a wall, in which holes of the shape are closed.
 
-    Cavities smaller than a ball as wide as the wall is thick are filled.
+    Cavities smaller than a ball as wide as the wall is thick are filled. Where no place of the shape is as deep as the
+    wall is thick nothing is hollowed, with an `InexactWarning`.
 
     Parameters
     ----------
@@ -369,12 +378,17 @@ def shell(
             raise SourceError(
                 "`measure` returned no distance to a solid with faces", remedy="leave out measure or keep_outside"
             )
-        outside = solid.surface(keep_faces=True, spacing=grid.spacing)
-        inside = solid.surface(inner, spacing=grid.spacing)
-        wall = TriangleMesh(
-            *concatenated([(outside.vertices, outside.faces), (inside.vertices, inside.faces[:, ::-1])])
-        )
+        wall = solid.surface(keep_faces=True, spacing=grid.spacing)
+        try:
+            inside = solid.surface(inner, spacing=grid.spacing)
+        except OutsideError:
+            _warn_not_hollow(inner)
+        else:
+            both = [(wall.vertices, wall.faces), (inside.vertices, inside.faces[:, ::-1])]
+            wall = TriangleMesh(*concatenated(both))
     else:
+        if not (field.values < inner).any():
+            _warn_not_hollow(inner)
         wall = GridField(grid, np.maximum(inner - field.values, field.values - outer)).offset(0.0)
     wall = _without_crumbs(wall, outer - inner)
     return wall if hole is None else _drained(wall, hole, float(grid.spacing.max()))
@@ -438,7 +452,7 @@ def thicken(
     return GridField(grid, depth).offset(0.0)
 
 
-def _linear(shape: Shapes | Solid, values: NDArray[np.float64]) -> Reach:
+def _linear(shape: Shapes, values: NDArray[np.float64]) -> Reach:
     """The function that has values at the vertices of a mesh, or at the points of a cloud, and is linear on faces."""
     mesh = shape.source if isinstance(shape, Solid) else as_shape(shape)  # type: ignore[arg-type]
     if not isinstance(mesh, TriangleMesh | PolygonMesh | DigitalSurface | PointCloud):
@@ -468,6 +482,14 @@ def _linear(shape: Shapes | Solid, values: NDArray[np.float64]) -> Reach:
         return (weights_in(vertices[ids], found.places) * values[ids]).sum(axis=1)
 
     return interpolated
+
+
+def _warn_not_hollow(inner: float) -> None:
+    warn_user(
+        f"nothing is hollowed: no place of the shape is {-inner:g} deep, to a cell of the grid. A wall is thinner than "
+        "half of the part",
+        InexactWarning,
+    )
 
 
 def _without_crumbs(wall: TriangleMesh, thickness: float) -> TriangleMesh:

@@ -5,6 +5,6 @@ from .diagnostics import Diagnostics
 from .fields.solid_queries import Closest
 from .orientations.meshes import Orientation
 from .solids.deviation import Deviation
-from .solids.sampling import Samples
+from .solids.sample_set import Samples
 
 __all__ = ["Closest", "CurveOrientation", "Deviation", "Diagnostics", "Orientation", "Samples"]

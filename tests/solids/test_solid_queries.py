@@ -103,5 +103,3 @@ def test_files_that_hold_no_solid_are_refused(tmp_path):
         sh.io.load(tmp_path / "later.npz")
     with refused(sh.errors.FileFormatError, file="short.npz"):
         sh.io.load(tmp_path / "short.npz")
-    with refused(sh.errors.FileFormatError, file="solid.stl"):
-        solid.save(tmp_path / "solid.stl")

@@ -24,7 +24,8 @@ from ..io.shapes import read, save
 from ..io.voxels import LABEL_FORMATS, read_labels
 from ..solids.complete import complete
 from ..solids.distance import distance_to_shapes
-from ..solids.sampling import WIDTHS, Layout, sample
+from ..solids.sample_set import Layout
+from ..solids.sampling import WIDTHS, sample
 from ..solids.training import training_points
 from ..solids.watertight import closed_surface, figures_of
 from .inputs import Input

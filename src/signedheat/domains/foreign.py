@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from os import PathLike, fspath
@@ -23,6 +24,15 @@ Thing = TypeVar("Thing")
 
 PACKAGES = frozenset({"meshio", "open3d", "pyvista", "trimesh"})
 """Packages whose objects are taken, by the name with which the modules of their classes begin."""
+
+
+class Represented(ABC):
+    """What has a surface, and is taken wherever a shape is: solids, images of labels."""
+
+    @property
+    @abstractmethod
+    def boundary(self) -> TriangleMesh:
+        """Its surface."""
 
 
 class HasVertices(Protocol):
@@ -65,8 +75,10 @@ SurfaceShape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud
 """The kinds of shapes that most file formats support."""
 Shape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh
 """What a file of a shape may hold. In space points need normals, and volumes are refused: give their boundary."""
-ForeignShape: TypeAlias = HasVertices | HasGeometry | HasPointData | HasTriangles | tuple[ArrayLike, ArrayLike]
-"""Objects of trimesh, PyVista, meshio and Open3D, and pairs (vertices, faces)."""
+ForeignShape: TypeAlias = (
+    Represented | HasVertices | HasGeometry | HasPointData | HasTriangles | tuple[ArrayLike, ArrayLike]
+)
+"""Solids, images, objects of trimesh, PyVista, meshio and Open3D, and pairs (vertices, faces)."""
 TAKEN = "a shape of signedheat, trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces)"
 """What is taken for a shape, for messages."""
 
@@ -117,16 +129,16 @@ def is_pair(thing: object) -> bool:
 
 
 def as_shape(thing: Shape | ForeignShape) -> Shape:
-    """The shape that an object of another package, or a pair of arrays, describes; a shape as it is.
+    """The shape that an object of another package, a pair of arrays, a solid or an image describes; a shape as it is.
 
-    Every function that takes a shape does this by itself.
+    Every function that takes a shape does this by itself. Of a `Solid` it is the ``boundary``.
 
     Faces keep their number, order and defects. A shape without faces becomes a `PointCloud`, one of triangles alone a
     `TriangleMesh`, any other a `PolygonMesh`; tets become a `TetMesh`.
 
     Parameters
     ----------
-    thing : shape, object of trimesh, PyVista, meshio or Open3D, or (vertices, faces)
+    thing : shape, Solid, LabelImage, object of trimesh, PyVista, meshio or Open3D, or (vertices, faces)
         Vertices are (n, 3) float, faces (m, 3) int or rows of ids of any length.
 
     Returns
@@ -154,7 +166,9 @@ def as_shape(thing: Shape | ForeignShape) -> Shape:
 
 
 def converted(thing: Thing) -> Thing:
-    """A shape of another package as one of ours; everything else, such as curves, as it is."""
+    """A shape of another package, a solid or an image as a shape; everything else, such as curves, as it is."""
+    if isinstance(thing, Represented):
+        return cast("Thing", thing.boundary)
     package = "numpy" if is_pair(thing) else package_of(thing)
     return thing if package is None else cast("Thing", shape_of(ELEMENTS_OF[package](thing)))
 

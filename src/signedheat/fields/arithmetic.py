@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -41,6 +41,14 @@ class SolidField(HasValues, Protocol):
 
     def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
         """The field whose values a rule makes of the values of two, wherever both have one."""
+
+
+@runtime_checkable
+class HasFields(Protocol):
+    """What distance can be computed to where a field has it, such as a `Solid`."""
+
+    def field_on(self, field: Any) -> Any:
+        """Distance at the nodes that a field has."""
 
 
 AnyField = TypeVar("AnyField", bound=HasValues)
@@ -211,13 +219,13 @@ def combined(
     Parameters
     ----------
     a, b : GridField, TetField or VertexField
-        On the same domain; the result is NaN where one of them is.
+        On the same domain, or a field on a grid in space and a solid; the result is NaN where one of them is.
     takes_first : callable
         From the values of both, where those of `a` are taken.
     bulge : float
         Width of the transition: negative adds to the inside, positive takes from it.
     """
-    _checked(a, b)
+    b = _checked(a, b)
 
     def rule(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
         values = np.where(takes_first(one, other), one, other)
@@ -238,6 +246,8 @@ def _checked(a: Solid, b: Solid) -> Solid:
             remedy="compute both on one whole grid, without a band",
             element=type(a).__name__,
         )
+    if isinstance(b, HasFields) and isinstance(a.domain, Grid):
+        b = b.field_on(a)
     if type(a) is not type(b):
         raise UnsupportedTypeError(
             f"a field of type {type(a).__name__} cannot be combined with {type(b).__name__}",

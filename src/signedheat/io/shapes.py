@@ -10,6 +10,7 @@ from ..domains.foreign import ForeignShape, as_shape, elements, shape_of
 from ..domains.kinds import Shape
 from ..domains.tet_mesh import TetMesh
 from ..memory import refuse_beyond_memory
+from ..solids.solid import Solid
 from .files import PathLike, format_for, reading, replacing
 from .meshes import read_obj, read_off, read_stl, write_obj, write_off, write_pc, write_stl
 from .ply import read_ply, write_ply
@@ -118,8 +119,8 @@ def save(shape: Shape | ForeignShape, path: PathLike) -> None:
 
     Parameters
     ----------
-    shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh
-        The shape.
+    shape : TriangleMesh, PolygonMesh, PointCloud, TetMesh or Solid
+        The shape; of a solid its surface, or in ``.npz`` itself: `Solid.save`.
     path : str or path
         The file.
 
@@ -138,6 +139,8 @@ def save(shape: Shape | ForeignShape, path: PathLike) -> None:
     ...     read(f"{folder}/two.xyz").n_points
     2
     """
+    if isinstance(shape, Solid):
+        return shape.save(path)
     shape = as_shape(shape)
     if isinstance(shape, TetMesh):
         return store_cells(shape.to_meshio(), path)

@@ -8,12 +8,13 @@ import numpy as np
 
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError
-from ..solids.sampling import Layout, Samples
+from ..solids.sample_set import Layout, Samples
 from ..solids.solid import Solid
 from ..solids.winding import Windings
 from .arrays import read_npz, write_npz
 from .fields import CONVENTION
-from .files import PathLike, ensure_writable, format_for
+from .files import PathLike, ensure_writable, extension, format_for
+from .shapes import SHAPE_FORMATS, save
 
 VERSION = 1
 """Of the archive: what a later one writes is refused."""
@@ -23,8 +24,10 @@ _SOURCE = ("source_vertices", "source_faces")
 
 
 def save_solid(solid: Solid, path: PathLike) -> None:
-    """Write a solid."""
-    ensure_writable(path, SOLID_FORMATS, "a solid")
+    """Write a solid; to formats of shapes its surface."""
+    ensure_writable(path, SOLID_FORMATS | SHAPE_FORMATS, "a solid")
+    if extension(path) not in SOLID_FORMATS:
+        return save(solid.surface(keep_faces=True), path)
     source: dict[str, Any] = {}
     if solid.source is not None:
         source = dict(zip(_SOURCE, (solid.source.vertices, solid.source.faces), strict=True))

@@ -71,7 +71,7 @@ def complete(
     ----------
     shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh; or several meshes
         Broken or not; points with normals or without. Objects of trimesh, PyVista, meshio and Open3D and pairs
-        (vertices, faces) are taken wherever a shape is.
+        (vertices, faces) are taken wherever a shape is. A `Solid` is returned as it is.
     completion : {"lids", "heat"}
         What closes meshes: lids, or the zero set of φ where no face is, as in the paper (Feng & Crane 2024).
     as_oriented : bool
@@ -103,6 +103,8 @@ def complete(
     >>> solid.distance([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]).round(1).tolist()
     [-1.0, 1.0]
     """
+    if isinstance(shape, Solid):
+        return shape
     if completion not in ("lids", "heat"):
         raise SignedHeatError(f'completion must be "lids" or "heat", not {completion!r}', element="completion")
     as_oriented, keep_overlaps = flag(as_oriented, "as_oriented"), flag(keep_overlaps, "keep_overlaps")

@@ -27,7 +27,6 @@ from ..geometry.welding import welded_vertices
 from ..packages import lazy_module
 from ..progress import Progress
 from .complete import complete
-from .solid import Solid
 
 pictures: Any = lazy_module("signedheat.view.deviations", "pictures")
 
@@ -148,7 +147,7 @@ class Deviation(Frozen):
 
 
 def deviation(
-    scan: ShapeLike | NDArray[np.floating], nominal: ShapeLike | Solid, progress: Progress | None = None
+    scan: ShapeLike | NDArray[np.floating], nominal: ShapeLike, progress: Progress | None = None
 ) -> Deviation:
     """Signed deviations of a scan from a nominal part, at the scan's points or vertices.
 
@@ -161,7 +160,7 @@ def deviation(
 
     Parameters
     ----------
-    scan : shape, or (n, 3) points
+    scan : shape or Solid, or (n, 3) points
         Mesh or points.
     nominal : shape or Solid
         What it should be; completed here, unless it is a solid already.
@@ -191,7 +190,7 @@ def deviation(
         shape = shape.boundary
     if not isinstance(shape, PointCloud | TriangleMesh | PolygonMesh):
         raise SourceError(f"a {type(shape).__name__} is no scan", remedy="pass a mesh or points", element="scan")
-    solid = nominal if isinstance(nominal, Solid) else complete(nominal, progress=progress)
+    solid = complete(nominal, progress=progress)
     points = shape.points if isinstance(shape, PointCloud) else shape.vertices
     if points.shape[1] != 3:
         raise SourceError("the scan lies in the plane", remedy="pass a shape in space", element="scan")

@@ -54,16 +54,13 @@ def given_surface(
     GeometryError
         If there are no such triangles, or they do not join with the contour either.
     """
-    triangles, windings = solid.triangles, solid.windings
-    size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
-    behind, ahead = windings.sides(triangles)
-    bounds = behind != ahead
-    turned = np.where(ahead[:, None, None], triangles[:, ::-1], triangles)[bounds]
+    windings = solid.windings
+    size = float(np.ptp(solid.triangles.reshape(-1, 3), axis=0).max())
+    turned, _ = outward(solid)
     if not len(turned):
         raise GeometryError(
             "nothing of the shape bounds a solid", remedy="thicken it, or take the surface at a distance above zero"
         )
-    turned = turned[~_covered(turned, _parts(solid)[bounds], TOGETHER * size)]
     found: tuple[int, TriangleMesh, Boxes | None] | None = None
     boxes: Boxes | None = None
     bad: list[NDArray[np.float64]] = []
@@ -93,6 +90,19 @@ def given_surface(
     return (whole, np.zeros((0, 3))) if boxes is None else (_without_crumbs(whole, boxes), boxes.middles)
 
 
+def outward(solid: Evaluated) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """(k, 3, 3) triangles with the inside on one side, turned to have it behind them, and which ones these are.
+
+    Of those that lie in each other, where bodies overlap, one is taken.
+    """
+    behind, ahead = solid.windings.sides(solid.triangles)
+    chosen = np.flatnonzero(behind != ahead)
+    turned = np.where(ahead[chosen, None, None], solid.triangles[chosen, ::-1], solid.triangles[chosen])
+    size = float(np.ptp(solid.triangles.reshape(-1, 3), axis=0).max())
+    once = ~covered(turned, _parts(solid)[chosen], TOGETHER * size)
+    return turned[once], chosen[once]
+
+
 def unjoined(places: NDArray[np.float64]) -> str:
     """Where a contour was taken, for messages."""
     x, y, z = places[0]
@@ -113,8 +123,10 @@ def _parts(solid: Evaluated) -> NDArray[np.int64]:
     return np.where(solid.origins >= 0, given[solid.origins], given.max() + 1)
 
 
-def _covered(triangles: NDArray[np.float64], parts: NDArray[np.int64], tolerance: float) -> NDArray[np.bool_]:
+def covered(triangles: NDArray[np.float64], parts: NDArray[np.int64], tolerance: float) -> NDArray[np.bool_]:
     """(m,) which triangles lie in triangles of a part that comes before theirs, and face the same way."""
+    if not len(triangles):
+        return np.zeros(0, dtype=bool)
     a, b, c = triangles.transpose(1, 0, 2)
     normals = unit(area_vectors(triangles))
     centres = triangles.mean(axis=1)
@@ -127,8 +139,8 @@ def _covered(triangles: NDArray[np.float64], parts: NDArray[np.int64], tolerance
         np.abs(((centres[own] - a[near]) * normals[near]).sum(axis=1)) <= tolerance
     )
     for tail, head in ((a, b), (b, c), (c, a)):
-        across = np.cross(normals[near], head[near] - tail[near])
-        inside &= ((centres[own] - tail[near]) * across).sum(axis=1) > 0
+        across = unit(np.cross(normals[near], head[near] - tail[near]))
+        inside &= ((centres[own] - tail[near]) * across).sum(axis=1) >= -tolerance
     result = np.zeros(len(triangles), dtype=bool)
     result[own[inside]] = True
     return result

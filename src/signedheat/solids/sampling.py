@@ -3,122 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from os import PathLike
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.kinds import Shapes
 from ..domains.validation import finite_number, whole_number
 from ..errors import OutsideError, SignedHeatError, SourceError
 from ..fields.grid_field import GridField
 from ..geometry.meshes import face_areas
 from ..memory import refuse_beyond_memory
-from ..packages import lazy_module
-
-files: Any = lazy_module("signedheat.io.solids", "files")
+from .complete import complete
+from .sample_set import Samples
 
 WIDTHS = (0.05, 0.0158)
 """Widths of the noise by default, over the radius of the shape: variances of .0025 and .00025 (Park et al. 2019)."""
 BYTES_PER_SAMPLE = 165
 """At the most, with what finding its nearest face takes."""
-Layout = Literal["arrays", "deepsdf"]
-"""How samples are kept in a file: an array for each attribute, or ``pos`` and ``neg`` with x, y, z and distance."""
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """Points with the signed distances to a shape.
-
-    Attributes
-    ----------
-    points : (n, 3) float
-        Positions: those near the surface first, width by width, then those spread over the cube.
-    distances : (n,) float
-        Signed distances to the shape, negative inside: exact where it is there, to the completed surface elsewhere.
-    gradients : (n, 3) float
-        Of the distance; of length 1.
-    near : (n,) bool
-        Whether a point was taken near the surface.
-    completed : (n,) bool
-        Whether the nearest place of the surface is one that had to be completed.
-    center : (3,) float
-        Centre of the box around the surface.
-    radius : float
-        Distance of the farthest place of the surface from there.
-
-    Examples
-    --------
-    >>> from signedheat import samples, signed_distance
-    >>> taken = sample(signed_distance(samples.sphere(2, radius=5.0), resolution=24), 1000, near=0.8)
-    >>> taken
-    Samples(1000 points, 800 near the surface, distances from -3.82 to 3.07)
-    >>> bool(np.abs(taken.normalized().points).max() < 1.3)
-    True
-    """
-
-    points: NDArray[np.float64]
-    distances: NDArray[np.float64]
-    gradients: NDArray[np.float64]
-    near: NDArray[np.bool_]
-    completed: NDArray[np.bool_]
-    center: NDArray[np.float64]
-    radius: float
-
-    def normalized(self) -> Samples:
-        """The same of the shape moved and scaled into the unit sphere; `center` and `radius` stay those it had."""
-        points, distances = (self.points - self.center) / self.radius, self.distances / self.radius
-        return replace(self, points=points, distances=distances)
-
-    @property
-    def figures(self) -> dict[str, float | list[float]]:
-        """A summary of the samples, ready for JSON."""
-        return {
-            "samples": len(self.points),
-            "near": int(self.near.sum()),
-            "inside_share": float((self.distances < 0).mean()),
-            "completed_share": float(self.completed.mean()),
-            "center": [float(x) for x in self.center],
-            "radius": self.radius,
-        }
-
-    def save(self, path: str | PathLike[str], layout: Layout = "arrays") -> None:
-        """Write to an ``.npz`` file.
-
-        Parameters
-        ----------
-        path : str or path
-            The file. An existing one survives a failure.
-        layout : "arrays" or "deepsdf"
-            An array for each attribute, with every bit; or ``pos`` and ``neg``, (k, 4) in single precision: x, y, z,
-            distance of the points outside and inside, as DeepSDF reads them.
-
-        Raises
-        ------
-        FileFormatError
-            If the name does not end with ``.npz``, or the file cannot be written.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from signedheat import samples, signed_distance
-        >>> taken = sample(signed_distance(samples.sphere(2), resolution=16), 10)
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     taken.save(f"{folder}/ball.npz")
-        ...     np.load(f"{folder}/ball.npz")["points"].shape
-        (10, 3)
-        """
-        files.save_samples(self, path, layout)
-
-    def __repr__(self) -> str:
-        low, high = self.distances.min(), self.distances.max()
-        count = f"{len(self.points)} points, {int(self.near.sum())} near the surface"
-        return f"Samples({count}, distances from {low:.3g} to {high:.3g})"
 
 
 def sample(
-    field: GridField, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = WIDTHS, seed: int = 0
+    shape: GridField | Shapes, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = WIDTHS, seed: int = 0
 ) -> Samples:
     """Points with distances and gradients, near the surface of a shape and all around it.
 
@@ -128,8 +33,8 @@ def sample(
 
     Parameters
     ----------
-    field : GridField
-        Distance in space, from `signed_distance` or ``sharpen(field, shape)``.
+    shape : GridField, Solid or shape
+        Distance in space, from `signed_distance` or ``sharpen(field, shape)``; or a solid; or a shape, completed here.
     n : int
         Number of points.
     near : float
@@ -147,7 +52,7 @@ def sample(
     Raises
     ------
     SourceError
-        If the field does not know its surface: it was read from a file, or not sharpened to a shape.
+        If the field does not know its solid: it was not sharpened to a shape, or arithmetic has changed it.
     MemoryLimitError
         If so many samples do not fit.
     SignedHeatError
@@ -168,12 +73,14 @@ def sample(
         raise SignedHeatError(f"the share near the surface is {near:g}", remedy="choose it from 0 to 1")
     scales = [finite_number(width, "the width of the noise", least=0) for width in widths]
     n_near = round(near * n) if scales else 0
-    if field.solid is None:
+    solid = shape.solid if isinstance(shape, GridField) else complete(shape)
+    if solid is None:
         raise SourceError(
             "the field does not know the solid that it is the distance to",
-            remedy="take it from signed_distance or Solid.field, not from a file",
+            remedy="take it from signed_distance or Solid.field, or pass the solid",
+            element="field",
         )
-    triangles = field.solid.triangles
+    triangles = solid.triangles
     if not len(triangles):
         raise OutsideError("the field has no zero set to sample", remedy="compute it on a finer grid", element="field")
     lower, upper = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
@@ -186,7 +93,7 @@ def sample(
         places, _ = evenly_on(triangles, stop - start, random)
         points[start:stop] = places + random.normal(scale=width * radius, size=places.shape)
     points[n_near:] = center + radius * random.uniform(-1.0, 1.0, (n - n_near, 3))
-    found = field.solid.closest(points)
+    found = solid.closest(points)
     is_near = np.arange(n) < n_near
     return Samples(points, found.distances, found.gradients, is_near, found.completed, center, radius)
 

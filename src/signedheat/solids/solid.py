@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics
+from ..domains.exchange import Displayed
+from ..domains.foreign import Represented
 from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_number, flag, positive_number, query_points, shaped
@@ -21,20 +24,28 @@ from ..frozen import Frozen
 from ..geometry.box_tree import order_in_space
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree, NearestFaces
+from ..geometry.meshes import area_vectors, face_areas
 from ..geometry.nearest import weights_in
 from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..progress import Progress
-from ..reprs import ShortRepr
+from ..reprs import short
 from .contouring import sharp_surface
 from .fields import band_field, dense_field
-from .keeping import given_surface, unjoined
-from .offsets import Offset
+from .keeping import given_surface, outward, unjoined
+from .offsets import Offset, Reach
+from .sample_set import Samples
 from .simplification import simplified
 from .stores import Scheduler
 from .winding import Windings
 
+booleans: Any = lazy_module("signedheat.solids.booleans", "solids")
 files: Any = lazy_module("signedheat.io.solids", "files")
+morphology: Any = lazy_module("signedheat.morphology", "solids")
+sampling: Any = lazy_module("signedheat.solids.sampling", "solids")
+
+if TYPE_CHECKING:
+    import pyvista
 
 MANY = 1 << 18
 """Points that are put in order together."""
@@ -45,10 +56,15 @@ SLANT = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Solid(Frozen, ShortRepr):
+class Solid(Displayed, Represented, Frozen):
     """A shape completed: the faces that were given, and what closes them.
 
     `complete` makes it. Distance is to the nearest of all triangles; inside is where the winding number is above ½.
+    It is taken wherever a shape is, and nothing is completed again.
+
+    ``a | b``, ``a & b`` and ``a - b`` are union, intersection and difference of two solids, as solids: their triangles
+    are cut where they cross, and kept where they bound the result; open sheets take no part. With a `GridField` in
+    place of one solid they are fields on its grid, no longer exact between nodes.
 
     Attributes
     ----------
@@ -75,6 +91,9 @@ class Solid(Frozen, ShortRepr):
     [-1.0, 2.0]
     >>> solid.inside([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]]).tolist()
     [True, False]
+    >>> half = solid - complete(samples.sphere(3, center=(0.0, 0.0, 1.0)))
+    >>> half.inside([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]]).tolist(), half.volume < solid.volume
+    ([True, False], True)
     """
 
     triangles: NDArray[np.float64]
@@ -108,6 +127,30 @@ class Solid(Frozen, ShortRepr):
         """(2, 3) corners of the box around all triangles."""
         points = self.triangles.reshape(-1, 3)
         return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    @cached_property
+    def outward(self) -> NDArray[np.float64]:
+        """(k, 3, 3) triangles that bound the inside, each once, corners counter-clockwise as seen from outside."""
+        return outward(self)[0]
+
+    @property
+    def volume(self) -> float:
+        """Of the inside, in cubic units; 0 of sheets.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> ball = complete(samples.sphere(5))
+        >>> round(ball.volume, 2), round(ball.area, 2)
+        (4.18, 12.56)
+        """
+        corners = self.outward - self.bounds.mean(axis=0)
+        return float(np.einsum("ij,ij->", corners[:, 0], area_vectors(corners)) / 3)
+
+    @property
+    def area(self) -> float:
+        """Of the surface around the inside, in square units; sheets do not count."""
+        return float(face_areas(self.outward).sum())
 
     @property
     def faces(self) -> TriangleMesh:
@@ -346,8 +389,103 @@ class Solid(Frozen, ShortRepr):
             return sharp_surface(Offset(self, height), where, progress)
         return dense_field(self, where, progress).contour(height)
 
+    def offset(
+        self,
+        distance: float | ArrayLike | Reach,
+        *,
+        corners: Literal["round", "mitre", "sharp"] = "round",
+        resolution: int = 128,
+        spacing: ArrayLike | None = None,
+        progress: Progress | None = None,
+    ) -> TriangleMesh:
+        """The surface at a distance, which may vary, with round or with mitred edges: `signedheat.offset` of this.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> complete(samples.sphere(4)).offset(0.5, resolution=32).bounds.round(1).tolist()
+        [[-1.5, -1.5, -1.5], [1.5, 1.5, 1.5]]
+        """
+        surface: TriangleMesh = morphology.offset(
+            self, distance, corners=corners, resolution=resolution, spacing=spacing, progress=progress
+        )
+        return surface
+
+    def sample(
+        self, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = (0.05, 0.0158), seed: int = 0
+    ) -> Samples:
+        """Points with distances and gradients, near the surface and all around it: `signedheat.sample` of this.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> complete(samples.sphere(2)).sample(100, near=0.5)
+        Samples(100 points, 50 near the surface, distances from -0.825 to 0.654)
+        """
+        taken: Samples = sampling.sample(self, n, near=near, widths=widths, seed=seed)
+        return taken
+
+    @overload
+    def __or__(self, other: Solid) -> Solid: ...
+    @overload
+    def __or__(self, other: GridField[Literal[3]]) -> GridField[Literal[3]]: ...
+    def __or__(self, other: Solid | GridField[Literal[3]]) -> Solid | GridField[Literal[3]]:
+        """Union: what lies in one of the two or in both."""
+        if isinstance(other, GridField):
+            return self.field_on(other) | other
+        return booleans.union(self, other) if isinstance(other, Solid) else NotImplemented
+
+    @overload
+    def __and__(self, other: Solid) -> Solid: ...
+    @overload
+    def __and__(self, other: GridField[Literal[3]]) -> GridField[Literal[3]]: ...
+    def __and__(self, other: Solid | GridField[Literal[3]]) -> Solid | GridField[Literal[3]]:
+        """Intersection: what lies in both."""
+        if isinstance(other, GridField):
+            return self.field_on(other) & other
+        return booleans.intersection(self, other) if isinstance(other, Solid) else NotImplemented
+
+    @overload
+    def __sub__(self, other: Solid) -> Solid: ...
+    @overload
+    def __sub__(self, other: GridField[Literal[3]]) -> GridField[Literal[3]]: ...
+    def __sub__(self, other: Solid | GridField[Literal[3]]) -> Solid | GridField[Literal[3]]:
+        """Difference: what lies in this and not in the other."""
+        if isinstance(other, GridField):
+            return self.field_on(other) - other
+        return booleans.difference(self, other) if isinstance(other, Solid) else NotImplemented
+
+    def field_on(self, field: GridField[Literal[3]]) -> GridField[Literal[3]]:
+        """Distance at the nodes that a field has, in a band or everywhere."""
+        return self.field(grid=field.grid, band=None if field.blocks is None else field.width)
+
+    def to_pyvista(self) -> pyvista.PolyData:
+        """As a `pyvista.PolyData`: `boundary`."""
+        return self.boundary.to_pyvista()
+
+    def __repr__(self) -> str:
+        areas, made = face_areas(self.triangles), self.origins < 0
+        low, high = (", ".join(short(float(x)) for x in corner) for corner in self.bounds)
+        share = float(areas[made].sum() / max(float(areas.sum()), np.finfo(float).tiny))
+        notes = "; ".join(str(note) for note in self.diagnostics.important)
+        return (
+            f"Solid({len(self.triangles)} triangles, {share:.1%} of their area completed,\n"
+            f"      box from ({low}) to ({high}),\n"
+            f"      {notes or 'as it was given'})"
+        )
+
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a ``.npz`` file, without notes; `signedheat.io.load` reads it, and nothing is completed again.
+        """Write to a file: ``.npz`` has the solid itself, other formats its surface.
+
+        `signedheat.io.load` reads the first, without notes, and nothing is completed again. Formats of shapes, such as
+        ``.stl``, have ``surface(keep_faces=True)``: the faces that were given and what completes them, closed.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is unknown, or the file cannot be written.
+        GeometryError
+            If a surface is to be written, and nothing is inside.
 
         Examples
         --------

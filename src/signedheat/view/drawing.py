@@ -68,7 +68,7 @@ def save_row(path: PathLike, *panels: tuple[Any, ...]) -> None:
 
 def html_of(thing: object) -> str:
     """A line of text and, where there is something to see and matplotlib is installed, a picture of it."""
-    text = f"<code>{html.escape(repr(thing))}</code>"
+    text = f"<code>{html.escape(repr(thing))}</code>".replace("\n", "<br>")
     try:
         figure = new_figure(SIDE * 1.25, SIDE)
         drawn = draw(thing, figure.add_subplot())

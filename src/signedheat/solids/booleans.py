@@ -1,0 +1,82 @@
+"""Unions, intersections and differences of solids, by adding winding numbers.
+
+Where w is 1 inside a solid and 0 outside, ``w(a) − w(b)`` is 1 in a without b and at most 0 elsewhere, and
+``w(a) + w(b) − 1`` is 1 in both only. So each combination is what lies behind triangles of the two, turned where they
+are subtracted, across which such a sum passes ½; a box around both, turned inside out, is the − 1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..diagnostics import Diagnostics
+from ..domains.joining import concatenated
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import SourceError
+from ..geometry.cut_faces import cut_faces
+from ..geometry.welding import same_positions
+from .keeping import TOGETHER, covered, outward
+from .solid import Solid
+from .winding import Windings
+
+BOX = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+"""Corners of the sides of a box, counter-clockwise as seen from outside; corner 4 i + 2 j + k is at (i, j, k)."""
+
+
+def union(a: Solid, b: Solid) -> Solid:
+    """What lies in one of two solids or in both."""
+    return _combination(a, b, turned=False)
+
+
+def difference(a: Solid, b: Solid) -> Solid:
+    """What lies in the first solid and not in the second."""
+    return _combination(a, b, turned=True)
+
+
+def intersection(a: Solid, b: Solid) -> Solid:
+    """What lies in both solids."""
+    bounds = np.stack([np.minimum(a.bounds[0], b.bounds[0]), np.maximum(a.bounds[1], b.bounds[1])])
+    room = float(np.ptp(bounds, axis=0).max())
+    lower, upper = bounds[0] - room, bounds[1] + room
+    corners = np.where(np.array(list(np.ndindex(2, 2, 2))) > 0, upper, lower)
+    inwards = np.concatenate([BOX[:, [0, 2, 1]], BOX[:, [0, 3, 2]]])
+    return _combination(a, b, turned=False, around=corners[inwards])
+
+
+def _combination(a: Solid, b: Solid, turned: bool, around: NDArray[np.float64] | None = None) -> Solid:
+    """The solid whose winding number is that of two, of which the second may be turned, and of triangles around them.
+
+    Raises
+    ------
+    SourceError
+        If nothing is inside.
+    """
+    first, of_first = outward(a)
+    second, of_second = outward(b)
+    triangles = np.concatenate([first, second[:, ::-1] if turned else second])
+    if not len(triangles):
+        raise SourceError("neither encloses anything", remedy="combine solids, not sheets", element="solid")
+    chain = triangles if around is None else np.concatenate([triangles, around])
+    ids = same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)
+    pieces, parents, _ = cut_faces(triangles, ids, triangles, ids)
+    windings = Windings(chain)
+    behind, ahead = windings.sides(pieces)
+    kept = behind & ~ahead
+    if not kept.any():
+        raise SourceError("nothing is inside the result", remedy="check that the solids overlap", element="solid")
+    pieces, parents = pieces[kept], parents[kept]
+    size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+    once = ~covered(pieces, (parents >= len(first)).astype(np.int64), TOGETHER * size)
+    pieces, parents = pieces[once], parents[once]
+    count = a.source.n_faces if a.source is not None else int(a.origins.max()) + 1
+    origins = np.concatenate(
+        [a.origins[of_first], np.where(b.origins[of_second] < 0, -1, b.origins[of_second] + count)]
+    )
+    confidence = np.concatenate([a.confidence[of_first], b.confidence[of_second]])
+    source = None
+    if a.source is not None and b.source is not None:
+        source = TriangleMesh(*concatenated([(mesh.vertices, mesh.faces) for mesh in (a.source, b.source)]))
+    notes = Diagnostics(notes=(*a.diagnostics.notes, *b.diagnostics.notes))
+    bounding = np.ones(len(pieces), dtype=np.bool_)
+    return Solid(pieces, origins[parents], confidence[parents], bounding, windings, source, notes)

@@ -1,0 +1,107 @@
+"""Sets of points with the signed distances to a shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from os import PathLike
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..packages import lazy_module
+
+files: Any = lazy_module("signedheat.io.solids", "files")
+
+Layout = Literal["arrays", "deepsdf"]
+"""How samples are kept in a file: an array for each attribute, or ``pos`` and ``neg`` with x, y, z and distance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Points with the signed distances to a shape.
+
+    Attributes
+    ----------
+    points : (n, 3) float
+        Positions: those near the surface first, width by width, then those spread over the cube.
+    distances : (n,) float
+        Signed distances to the shape, negative inside: exact where it is there, to the completed surface elsewhere.
+    gradients : (n, 3) float
+        Of the distance; of length 1.
+    near : (n,) bool
+        Whether a point was taken near the surface.
+    completed : (n,) bool
+        Whether the nearest place of the surface is one that had to be completed.
+    center : (3,) float
+        Centre of the box around the surface.
+    radius : float
+        Distance of the farthest place of the surface from there.
+
+    Examples
+    --------
+    >>> from signedheat import sample, samples, signed_distance
+    >>> taken = sample(signed_distance(samples.sphere(2, radius=5.0), resolution=24), 1000, near=0.8)
+    >>> taken
+    Samples(1000 points, 800 near the surface, distances from -3.82 to 3.07)
+    >>> bool(np.abs(taken.normalized().points).max() < 1.3)
+    True
+    """
+
+    points: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    gradients: NDArray[np.float64]
+    near: NDArray[np.bool_]
+    completed: NDArray[np.bool_]
+    center: NDArray[np.float64]
+    radius: float
+
+    def normalized(self) -> Samples:
+        """The same of the shape moved and scaled into the unit sphere; `center` and `radius` stay those it had."""
+        points, distances = (self.points - self.center) / self.radius, self.distances / self.radius
+        return replace(self, points=points, distances=distances)
+
+    @property
+    def figures(self) -> dict[str, float | list[float]]:
+        """A summary of the samples, ready for JSON."""
+        return {
+            "samples": len(self.points),
+            "near": int(self.near.sum()),
+            "inside_share": float((self.distances < 0).mean()),
+            "completed_share": float(self.completed.mean()),
+            "center": [float(x) for x in self.center],
+            "radius": self.radius,
+        }
+
+    def save(self, path: str | PathLike[str], layout: Layout = "arrays") -> None:
+        """Write to an ``.npz`` file.
+
+        Parameters
+        ----------
+        path : str or path
+            The file. An existing one survives a failure.
+        layout : "arrays" or "deepsdf"
+            An array for each attribute, with every bit; or ``pos`` and ``neg``, (k, 4) in single precision: x, y, z,
+            distance of the points outside and inside, as DeepSDF reads them.
+
+        Raises
+        ------
+        FileFormatError
+            If the name does not end with ``.npz``, or the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from signedheat import sample, samples, signed_distance
+        >>> taken = sample(signed_distance(samples.sphere(2), resolution=16), 10)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     taken.save(f"{folder}/ball.npz")
+        ...     np.load(f"{folder}/ball.npz")["points"].shape
+        (10, 3)
+        """
+        files.save_samples(self, path, layout)
+
+    def __repr__(self) -> str:
+        low, high = self.distances.min(), self.distances.max()
+        count = f"{len(self.points)} points, {int(self.near.sum())} near the surface"
+        return f"Samples({count}, distances from {low:.3g} to {high:.3g})"
