@@ -32,7 +32,7 @@ FLOORS = [
     ("operators   linear", "sparse matrices, matrix-free stencils, factorisations, Krylov", "#c9dcee"),
     ("geometry", "arrays in, arrays out: intrinsic meshes, geodesics, flips, clipping", "#bccfe8"),
     (
-        "cache compiled diagnostics errors frozen memory packages jobs parallel progress reprs",
+        "cache compiled diagnostics errors frozen memory packages jobs parallel processes progress reprs",
         "used by all",
         "#d9d9e3",
     ),

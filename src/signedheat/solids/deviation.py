@@ -27,6 +27,7 @@ from ..geometry.welding import welded_vertices
 from ..packages import lazy_module
 from ..progress import Progress
 from .complete import complete
+from .solid import Solid
 
 pictures: Any = lazy_module("signedheat.view.deviations", "pictures")
 
