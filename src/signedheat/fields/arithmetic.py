@@ -28,6 +28,9 @@ class HasValues(Protocol):
     def _mapped(self: AnyField, change: Change) -> AnyField:
         """The field with changed values."""
 
+    def _scaled(self: AnyField, factor: float) -> AnyField:
+        """The field times a number."""
+
 
 class SolidField(HasValues, Protocol):
     """What a field has to be for its solid to be combined with others: a `GridField`, `TetField` or `VertexField`."""
@@ -59,7 +62,8 @@ class Arithmetic:
     """A field of which ``-field``, ``2 * field``, ``field / 2`` and ``field + 1`` are fields, and ``numpy.asarray`` φ.
 
     So ``field - 0.1`` is the offset by 0.1, and ``-field`` the field of the other side. NumPy's functions take fields
-    for arrays of their values.
+    for arrays of their values. A `GridField` that is exact between its nodes, as it holds its solid, stays so when it
+    is negated or multiplied, and when 0 is added; sums, unions, intersections and differences are interpolated.
 
     Examples
     --------
@@ -77,22 +81,29 @@ class Arithmetic:
         return np.array(self.values, dtype=dtype, copy=copy)
 
     def __neg__(self: AnyField) -> AnyField:
-        return self._mapped(np.negative)
+        return self._scaled(-1.0)
 
     def __mul__(self: AnyField, factor: Number) -> AnyField:
-        return self._mapped(lambda phi: phi * factor) if isinstance(factor, NUMBERS) else NotImplemented
+        return self._scaled(float(factor)) if isinstance(factor, NUMBERS) else NotImplemented
 
     def __truediv__(self: AnyField, divisor: Number) -> AnyField:
-        return self._mapped(lambda phi: phi / divisor) if isinstance(divisor, NUMBERS) else NotImplemented
+        if not isinstance(divisor, NUMBERS):
+            return NotImplemented
+        return self._scaled(1.0 / float(divisor)) if divisor else self._mapped(lambda phi: phi / divisor)
 
     def __add__(self: AnyField, summand: Number) -> AnyField:
-        return self._mapped(lambda phi: phi + summand) if isinstance(summand, NUMBERS) else NotImplemented
+        if not isinstance(summand, NUMBERS):
+            return NotImplemented
+        return self._mapped(lambda phi: phi + summand) if summand else self._scaled(1.0)
 
     def __sub__(self: AnyField, level: Number) -> AnyField:
-        return self._mapped(lambda phi: phi - level) if isinstance(level, NUMBERS) else NotImplemented
+        return self + -float(level) if isinstance(level, NUMBERS) else NotImplemented
 
     def __rsub__(self: AnyField, level: Number) -> AnyField:
         return self._mapped(lambda phi: level - phi) if isinstance(level, NUMBERS) else NotImplemented
+
+    def _scaled(self: AnyField, factor: float) -> AnyField:
+        return self._mapped(lambda phi: phi * factor)
 
     __radd__ = __add__
     __rmul__ = __mul__
@@ -131,7 +142,7 @@ class Combinable(Arithmetic):
 
     def __invert__(self: Solid) -> Solid:
         """Complement: inside and outside exchanged."""
-        return self._mapped(np.negative)
+        return self._scaled(-1.0)
 
     def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
         """The field whose values a rule makes of those of two fields on one domain."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Generic, Literal, cast, overload
@@ -28,7 +28,7 @@ from ..packages import lazy_module
 from ..parallel import in_chunks
 from .arithmetic import Combinable, Rule
 from .levels import on_level, refuse_beyond_walls
-from .solid_queries import Closest, SolidQueries
+from .solid_queries import Closest, SolidQueries, scaled
 
 files: Any = lazy_module("signedheat.io.fields", "files")
 ply: Any = lazy_module("signedheat.io.ply", "files")
@@ -55,7 +55,8 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         From 0 to 1: how far the surface that is nearest to each node was there (1), or had to be completed (less, the
         farther from any face), where the field was sharpened to a shape.
     solid : Solid, optional
-        What the values are distances to: calls are exact then, and contours lie on their level exactly.
+        What the values are distances to: calls are exact then, and contours lie on their level exactly. ``.npz`` files,
+        negation and multiplication keep it; ``repr`` says whether it is there.
     blocks : Blocks, optional
         Blocks of 8³ nodes that have values, those of a band around the surface; by default all nodes have. Values and
         confidence are then (n, 8, 8, 8), in single and half precision, NaN at nodes of the last blocks beyond the grid.
@@ -443,6 +444,19 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         values = np.asarray(rule(self.values, other.values), dtype=self.values.dtype)
         return GridField(self.grid, values, blocks=self.blocks, coarse=coarse, width=self.width)
 
+    def _scaled(self, factor: float) -> GridField[Dimension]:
+        """The field times a number; exact as this one is, if it is neither 0 nor infinite."""
+        solid = None if self.solid is None or not factor or not math.isfinite(factor) else scaled(self.solid, factor)
+        coarse = None if self.coarse is None else self.coarse._scaled(factor)
+        return replace(
+            self,
+            values=self.values * factor,
+            diagnostics=Diagnostics(),
+            solid=solid,
+            coarse=coarse,
+            width=abs(factor) * self.width,
+        )
+
     def to_pyvista(self) -> pyvista.ImageData:
         """As a `pyvista.ImageData` with point data ``signed_distance``, and ``confidence`` where there is one.
 
@@ -560,7 +574,8 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return slopes
 
     def __repr__(self) -> str:
+        how = "interpolated" if self.solid is None else "exact"
         if self.blocks is not None:
-            return f"GridField({self.grid!r}, {len(self.blocks)} blocks, {self.width:g} on either side)"
+            return f"GridField({how} between nodes, {self.grid!r}, {len(self.blocks)} blocks, {self.width:g} on either side)"
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
-        return f"GridField({self.grid!r}, values from {low:.4g} to {high:.4g})"
+        return f"GridField({how} between nodes, {self.grid!r}, values from {low:.4g} to {high:.4g})"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -67,3 +67,45 @@ class SolidQueries(Protocol):
 
     def closest(self, points: ArrayLike) -> Closest:
         """The nearest place for each of (..., 3) points."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scaled:
+    """The distance to a solid times a number, which is not 0.
+
+    Attributes
+    ----------
+    solid : SolidQueries
+        The solid.
+    factor : float
+        What its distance is multiplied by; where it is negative inside and outside are exchanged.
+    """
+
+    solid: SolidQueries
+    factor: float
+
+    @property
+    def triangles(self) -> NDArray[np.float64]:
+        """(m, 3, 3) corners of all that distance is measured to."""
+        return self.solid.triangles
+
+    def distance(self, points: ArrayLike) -> NDArray[np.float64]:
+        """(...) values at (..., 3) points."""
+        return self.factor * self.solid.distance(points)
+
+    def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """(...) whether points are where the values are negative."""
+        found = self.solid.inside(points)
+        return found if self.factor > 0 else ~found
+
+    def closest(self, points: ArrayLike) -> Closest:
+        """The nearest place for each of (..., 3) points, with the values and their gradients."""
+        found = self.solid.closest(points)
+        return replace(found, distances=self.factor * found.distances, gradients=self.factor * found.gradients)
+
+
+def scaled(solid: SolidQueries, factor: float) -> SolidQueries:
+    """The distance to a solid times a number; the solid itself, where that is 1."""
+    if isinstance(solid, Scaled):
+        solid, factor = solid.solid, solid.factor * factor
+    return solid if factor == 1 else Scaled(solid, factor)

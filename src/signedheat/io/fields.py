@@ -19,20 +19,25 @@ from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError
 from ..fields.grid_field import GridField
+from ..fields.solid_queries import Scaled, SolidQueries, scaled
 from ..fields.tet_field import TetField
 from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField, on_simple_surface
 from ..lowering.grid.discretization import refuse_large_grid
 from ..operators.grid.blocks import SIDE, Blocks
+from ..solids.solid import Solid
 from .arrays import names_in_npz, read_npz, write_npz
 from .files import PathLike, contents, damaged, ensure_writable, extension, format_for, reading, replacing
 from .images import CONFIDENCE, read_image, write_nrrd
 from .meshes import write_obj
 from .ply import read_ply, write_ply
+from .solid_arrays import NEEDED, SOURCE, arrays_of, solid_of
 from .tets import TET_FIELD_FORMATS, load_cells, store_cells
 from .vdb import write_vdb
 from .vtk_xml import read_vtp, write_vti, write_vtp
 
+PREFIX = "solid_"
+"""Of the names of the arrays of a solid, in the archive of a field that holds it."""
 CONVENTION = (
     "signed distance, positive on the side that the normals point to (negative inside an outward-oriented shape); "
     "values[i, j, k] at origin + (i, j, k) * spacing, axes x, y, z, in the units of the shape"
@@ -106,7 +111,8 @@ def load_field(path: PathLike) -> Field:
     Returns
     -------
     GridField, TetField or VertexField
-        The field; its diagnostics are empty.
+        The field; its diagnostics are empty. From ``.npz`` it has the solid that it was the distance to, and is exact
+        between nodes as before; from all other formats it is interpolated.
 
     Raises
     ------
@@ -143,7 +149,8 @@ def load_field(path: PathLike) -> Field:
         if image.values.dtype == bool:
             raise FileFormatError("the values are no real numbers but bool: it holds no field")
         grid = _made(Grid, image.origin, image.spacing, image.values.shape, image.mask)
-        return _made(GridField, grid, np.ascontiguousarray(image.values), confidence=image.confidence)
+        solid = _held_solid(path) if extension(path) == ".npz" else None
+        return _made(GridField, grid, np.ascontiguousarray(image.values), confidence=image.confidence, solid=solid)
 
 
 def _made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
@@ -194,7 +201,7 @@ def _load_band(path: PathLike) -> GridField:
         blocks = Blocks.of(found["places"], grid.shape)
         if not np.array_equal(blocks.places, found["places"]):
             raise damaged("its blocks are not in order", element="places")
-        options = {"blocks": blocks, "coarse": coarse, "width": float(found["width"])}
+        options = {"blocks": blocks, "coarse": coarse, "width": float(found["width"]), "solid": _held_solid(path)}
         return _made(GridField, grid, found["values"], confidence=found.get(CONFIDENCE), **options)
 
 
@@ -206,7 +213,22 @@ def _write_npz(field: GridField, path: Path) -> None:
         arrays |= {"places": field.blocks.places, "shape": field.grid.shape, "width": field.width}
         arrays |= {"coarse_values": field.whole.values, "coarse_spacing": field.whole.grid.spacing}
         arrays["convention"] = OF_BANDS
+    solid = field.solid.solid if isinstance(field.solid, Scaled) else field.solid
+    if isinstance(solid, Solid):
+        arrays["solid_factor"] = field.solid.factor if isinstance(field.solid, Scaled) else 1.0
+        arrays |= {PREFIX + name: array for name, array in arrays_of(solid).items()}
     write_npz(path, **arrays)
+
+
+def _held_solid(path: PathLike) -> SolidQueries | None:
+    """The solid that a field in an archive is the distance to, if it holds one."""
+    if "solid_factor" not in names_in_npz(path):
+        return None
+    found = read_npz(path, [PREFIX + name for name in SOURCE], ["solid_factor", *(PREFIX + name for name in NEEDED)])
+    factor = found.pop("solid_factor")
+    if factor.shape or not np.isfinite(factor) or not factor:
+        raise damaged("its solid is scaled by no number", element="solid_factor")
+    return scaled(solid_of({name.removeprefix(PREFIX): array for name, array in found.items()}), float(factor))
 
 
 def _write_npy(field: GridField, path: Path) -> None:

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from ..domains.triangle_mesh import TriangleMesh
-from ..errors import FileFormatError, GeometryError
+from ..errors import FileFormatError
 from ..solids.sample_set import Layout, Samples
 from ..solids.solid import Solid
-from ..solids.winding import Windings
 from .arrays import read_npz, write_npz
 from .fields import CONVENTION
-from .files import PathLike, ensure_writable, extension, format_for
+from .files import PathLike, ensure_writable, extension, format_for, reading
 from .shapes import SHAPE_FORMATS, save
+from .solid_arrays import NEEDED, SOURCE, arrays_of, solid_of
 
-VERSION = 1
-"""Of the archive: what a later one writes is refused."""
+VERSION = 2
+"""Of the archive: what another one has written is refused."""
 SOLID_FORMATS = SAMPLE_FORMATS = frozenset({".npz"})
-_NEEDED = ("triangles", "origins", "confidence", "bounding", "closing")
-_SOURCE = ("source_vertices", "source_faces")
 
 
 def save_solid(solid: Solid, path: PathLike) -> None:
@@ -28,19 +23,7 @@ def save_solid(solid: Solid, path: PathLike) -> None:
     ensure_writable(path, SOLID_FORMATS | SHAPE_FORMATS, "a solid")
     if extension(path) not in SOLID_FORMATS:
         return save(solid.surface(keep_faces=True), path)
-    source: dict[str, Any] = {}
-    if solid.source is not None:
-        source = dict(zip(_SOURCE, (solid.source.vertices, solid.source.faces), strict=True))
-    write_npz(
-        path,
-        solid_version=VERSION,
-        triangles=solid.triangles,
-        origins=solid.origins,
-        confidence=solid.confidence,
-        bounding=solid.bounding,
-        closing=solid.windings.triangles,
-        **source,
-    )
+    write_npz(path, solid_version=VERSION, **arrays_of(solid))
 
 
 def load(path: PathLike) -> Solid:
@@ -59,7 +42,7 @@ def load(path: PathLike) -> Solid:
     Raises
     ------
     FileFormatError
-        If the file is missing, truncated or damaged, has no solid, or was written by a later version.
+        If the file is missing, truncated or damaged, has no solid, was changed, or was written by another version.
 
     Examples
     --------
@@ -75,32 +58,11 @@ def load(path: PathLike) -> Solid:
     version = read_npz(path, ("solid_version",)).get("solid_version", np.zeros(1))
     if version.shape or int(version) <= 0:
         raise FileFormatError("it has no solid", remedy="read fields by `load_field`, shapes by `read`", path=path)
-    if int(version) > VERSION:
-        cause, remedy = f"a later version wrote it ({int(version)})", "install a later version of signedheat"
-        raise FileFormatError(cause, remedy=remedy, path=path)
-    found = read_npz(path, _SOURCE, _NEEDED)
-    triangles, closing = found["triangles"], found["closing"]
-    n = len(triangles)
-    alike = triangles.shape == (n, 3, 3) and closing.shape == (len(closing), 3, 3) and n > 0
-    alike &= all(found[name].shape == (n,) for name in ("origins", "confidence", "bounding"))
-    if not alike or not (np.isfinite(triangles).all() and np.isfinite(closing).all()):
-        raise FileFormatError(
-            "its arrays do not fit to each other, or are not finite", remedy="write it again", path=path
-        )
-    try:
-        source = TriangleMesh(*(found[name] for name in _SOURCE)) if all(name in found for name in _SOURCE) else None
-    except GeometryError as error:
-        raise FileFormatError(error.cause, remedy="write it again", element=error.element, path=path) from error
-    if source is not None and int(found["origins"].max()) >= source.n_faces:
-        raise FileFormatError("it names faces that are not there", remedy="write it again", path=path)
-    return Solid(
-        triangles.astype(np.float64),
-        found["origins"].astype(np.int64),
-        found["confidence"].astype(np.float32),
-        found["bounding"].astype(np.bool_),
-        Windings(closing.astype(np.float64)),
-        source,
-    )
+    if int(version) != VERSION:
+        remedy = "install a later version of signedheat" if int(version) > VERSION else "complete the shape again"
+        raise FileFormatError(f"another version wrote it ({int(version)}, not {VERSION})", remedy=remedy, path=path)
+    with reading(path):
+        return solid_of(read_npz(path, SOURCE, NEEDED))
 
 
 def save_samples(samples: Samples, path: PathLike, layout: Layout) -> None:

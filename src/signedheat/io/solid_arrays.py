@@ -1,0 +1,89 @@
+"""Solids as arrays of an archive: of their own, and of the fields that hold them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cache import fingerprint
+from ..domains.triangle_mesh import TriangleMesh
+from ..domains.validation import refuse_extreme
+from ..errors import FileFormatError, GeometryError
+from ..geometry.meshes import area_vectors, face_areas
+from ..solids.solid import Solid
+from ..solids.winding import Windings
+
+NEEDED = ("triangles", "origins", "confidence", "bounding", "closing", "key")
+SOURCE = ("source_vertices", "source_faces")
+NET = 0.01
+"""Net area of what closes a solid, over all of it, beyond which it is not closed; the zero set of φ leaves .00004."""
+
+
+def arrays_of(solid: Solid) -> dict[str, NDArray[Any]]:
+    """What a solid is made of, with a key that tells whether it has been changed."""
+    arrays: dict[str, NDArray[Any]] = {
+        "triangles": solid.triangles,
+        "origins": solid.origins,
+        "confidence": solid.confidence,
+        "bounding": solid.bounding,
+        "closing": solid.windings.triangles,
+    }
+    if solid.source is not None:
+        arrays |= dict(zip(SOURCE, (solid.source.vertices, solid.source.faces), strict=True))
+    return {**arrays, "key": _key(arrays)}
+
+
+def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
+    """The solid that `arrays_of` gave these of; without notes.
+
+    Raises
+    ------
+    FileFormatError
+        If sizes, indices, numbers or the surface that they make are not those of a solid, or arrays were changed.
+    """
+    triangles, closing, origins = arrays["triangles"], arrays["closing"], arrays["origins"]
+    confidence, bounding, n = arrays["confidence"], arrays["bounding"], len(triangles) if triangles.ndim else 0
+    kinds = (triangles, "f", (n, 3, 3)), (closing, "f", (len(closing) if closing.ndim else 0, 3, 3))
+    kinds += (origins, "iu", (n,)), (confidence, "f", (n,)), (bounding, "b", (n,))  # type: ignore[assignment]
+    if not n or any(array.dtype.kind not in kind or array.shape != shape for array, kind, shape in kinds):
+        raise _damaged("its arrays do not fit to each other")
+    if not all(np.isfinite(array).all() for array in (triangles, closing, confidence)):
+        raise _damaged("its arrays are not finite")
+    source = None
+    try:
+        for corners in (triangles.reshape(-1, 3), closing.reshape(-1, 3)):
+            refuse_extreme(corners.min(axis=0, initial=0.0), corners.max(axis=0, initial=0.0), "triangles")
+        if all(name in arrays for name in SOURCE):
+            source = TriangleMesh(*(arrays[name] for name in SOURCE))
+    except GeometryError as error:
+        raise FileFormatError(error.cause, remedy=error.remedy, element=error.element) from error
+    last = int(origins.max()) if source is None else source.n_faces - 1
+    if origins.min() < -1 or origins.max() > last or confidence.min() < 0 or confidence.max() > 1:
+        raise _damaged("it names faces that are not there, or its confidence is not from 0 to 1")
+    if not face_areas(triangles).any():
+        raise _damaged("none of its triangles has an area")
+    net = float(np.linalg.norm(area_vectors(closing).sum(axis=0)))
+    if net > NET * float(face_areas(closing).sum()) or (bounding.any() and not face_areas(closing).any()):
+        raise _damaged("what closes it is not closed")
+    if not np.array_equal(arrays["key"], _key({name: arrays[name] for name in arrays if name != "key"})):
+        raise _damaged("its arrays were changed after it was written")
+    return Solid(
+        np.ascontiguousarray(triangles, dtype=np.float64),
+        origins.astype(np.int64),
+        confidence.astype(np.float32),
+        bounding.astype(np.bool_),
+        Windings(np.ascontiguousarray(closing, dtype=np.float64)),
+        source,
+    )
+
+
+def _key(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:
+    held = (arrays[name] for name in (*NEEDED, *SOURCE) if name in arrays)
+    return np.frombuffer(fingerprint(*held), dtype=np.uint8)
+
+
+def _damaged(cause: str) -> FileFormatError:
+    return FileFormatError(cause, remedy="write the solid again", element="solid")
