@@ -179,7 +179,8 @@ def signed_distance(
     --------
     Two balls that overlap, and are united:
 
-    >>>     >>> import signedheat as sh
+    >>> import numpy as np
+    >>> import signedheat as sh
     >>> from signedheat import samples
     >>> ball, other = samples.sphere(3), samples.sphere(3, center=(1.0, 0, 0))
     >>> field = sh.signed_distance(samples.union(ball, other), resolution=32)

@@ -576,6 +576,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     def __repr__(self) -> str:
         how = "interpolated" if self.solid is None else "exact"
         if self.blocks is not None:
-            return f"GridField({how} between nodes, {self.grid!r}, {len(self.blocks)} blocks, {self.width:g} on either side)"
+            band = f"{len(self.blocks)} blocks, {self.width:g} on either side"
+            return f"GridField({how} between nodes, {self.grid!r}, {band})"
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
         return f"GridField({how} between nodes, {self.grid!r}, values from {low:.4g} to {high:.4g})"

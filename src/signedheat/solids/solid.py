@@ -142,7 +142,7 @@ class Solid(Displayed, Represented, Frozen):
         >>> from signedheat import complete, samples
         >>> ball = complete(samples.sphere(5))
         >>> round(ball.volume, 2), round(ball.area, 2)
-        (4.18, 12.56)
+        (4.19, 12.56)
         """
         corners = self.outward - self.bounds.mean(axis=0)
         return float(np.einsum("ij,ij->", corners[:, 0], area_vectors(corners)) / 3)
@@ -420,7 +420,7 @@ class Solid(Displayed, Represented, Frozen):
         --------
         >>> from signedheat import complete, samples
         >>> complete(samples.sphere(2)).sample(100, near=0.5)
-        Samples(100 points, 50 near the surface, distances from -0.825 to 0.654)
+        Samples(100 points, 50 near the surface, distances from -0.6 to 0.489)
         """
         taken: Samples = sampling.sample(self, n, near=near, widths=widths, seed=seed)
         return taken
