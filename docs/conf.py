@@ -8,12 +8,15 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
 from sphinx_gallery.scrapers import figure_rst
 
 import signedheat
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "examples"))
+sys.path[:0] = [str(ROOT / "examples"), str(ROOT / "tests")]
+
+from public_names import methods  # noqa: E402  of the tests
 
 project = "signedheat"
 author = copyright = "The signedheat developers"
@@ -49,9 +52,8 @@ myst_enable_extensions = ["amsmath", "dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3
 autodoc_typehints = "none"  # numpydoc's sections name types in words
 autosummary_generate = True
-numpydoc_show_class_members = True
-numpydoc_show_inherited_class_members = False
-numpydoc_class_members_toctree = False
+numpydoc_show_class_members = False  # each has an anchor of its own
+numpydoc_attributes_as_param_list = True
 default_role = "code"  # names in docstrings
 suppress_warnings = ["config.cache"]
 
@@ -72,9 +74,18 @@ def escape(app: object, what: str, name: str, thing: object, options: object, li
     lines[:] = [line.replace("(*", "(\\*") for line in lines]
 
 
+def check_anchors(app: Sphinx, error: Exception | None) -> None:
+    """Fail if a public method has no anchor, by which others can link to it."""
+    anchors = app.env.get_domain("py").objects
+    missing = [name for name, _ in methods() if f"signedheat.{name}" not in anchors]
+    if error is None and missing:
+        raise ExtensionError(f"the reference has no anchor for {', '.join(missing)}")
+
+
 def setup(app: Sphinx) -> None:
-    """Connect what is done before numpydoc reads docstrings."""
+    """Connect what is done before numpydoc reads docstrings, and after all pages are written."""
     app.connect("autodoc-process-docstring", escape, priority=400)
+    app.connect("build-finished", check_anchors)
 
 
 sphinx_gallery_conf = {
@@ -82,8 +93,7 @@ sphinx_gallery_conf = {
     "gallery_dirs": ["gallery"],
     "backreferences_dir": "gallery/backreferences",
     "doc_module": ("signedheat",),
-    "filename_pattern": r"\.py$",
-    "ignore_pattern": "__init__" if find_spec("torch") else "__init__|fit_to_distances",
+    "filename_pattern": r"\.py$" if find_spec("torch") else r"/(?!fit_to_distances)\w+\.py$",  # run; others are shown
     "image_scrapers": [scrape],
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,

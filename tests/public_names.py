@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+
 import signedheat as sh
 
 ERRORS = [name for name, thing in vars(sh.errors).items() if isinstance(thing, type) and issubclass(thing, Exception)]
@@ -15,3 +17,14 @@ PUBLIC += [
     for name in names or getattr(sh, module).__all__
     if name not in sh.__all__
 ]
+
+
+def methods() -> list[tuple[str, object]]:
+    """Every public method and class method of the public classes, by its full name; those of base classes, too."""
+    found = []
+    for name, thing in PUBLIC:
+        for method, function in inspect.getmembers(thing) if isinstance(thing, type) else ():
+            is_ours = (getattr(function, "__module__", None) or "").startswith("signedheat.")
+            if inspect.isroutine(function) and is_ours and not method.startswith("_"):
+                found.append((f"{name}.{method}", function))
+    return found

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
+import inspect
 import re
 from pathlib import Path
 
 import pytest
 
 import signedheat
-from public_names import PUBLIC
+from public_names import PUBLIC, methods
 from signedheat.io import shapes
 
 ROOT = Path(__file__).parents[1]
@@ -98,3 +99,15 @@ def test_docstrings_hold_no_substitutions(thing):
     """Docutils takes |x| outside of literals for a substitution, of which there is none."""
     text = re.sub(r"``.*?``|`.*?`", "", thing.__doc__ or "")
     assert not re.search(r"\|[^\s|][^|\n]*[^\s|]\||\|[^\s|]\|", text)
+
+
+@pytest.mark.parametrize(("name", "method"), methods(), ids=[name for name, _ in methods()])
+def test_methods_say_what_they_take_and_return(name, method):
+    """With an example; `make docs` checks that each has an anchor."""
+    text, signature = inspect.getdoc(method) or "", inspect.signature(method)
+    sections = re.findall(r"^(\w+)\n-+$", text, re.M)
+    parameters = [parameter for parameter in signature.parameters if parameter != "self"]
+    described = re.findall(r"^\*{0,2}(\w[^:\n]*?) : ", text, re.M) + re.findall(r"^\*(\w+) : ", text, re.M)
+    assert set(parameters) <= {word for names in described for word in names.split(", ")}, name
+    assert "Examples" in sections, name
+    assert "Returns" in sections or signature.return_annotation in ("None", "NoReturn"), name

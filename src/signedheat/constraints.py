@@ -38,6 +38,29 @@ class Free:
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
+        """Integrate without a constraint; φ is shifted to mean 0 on the source.
+
+        Parameters
+        ----------
+        integration : Integration
+            Solves Eq. 7 of the paper with constraints, on one domain.
+        divergence : (n,) float
+            Right-hand side: the integrated divergence of the unit vectors.
+        source : SourceTerm
+            Where φ is known, with weights and components.
+
+        Returns
+        -------
+        (n,) float
+            φ, a length.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
+        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.Free())([0.5, 0.5]).item(), 2)
+        0.5
+        """
         return integration.solve(divergence, source)
 
 
@@ -66,6 +89,29 @@ class ZeroSet:
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
+        """Integrate with φ constant on the source, and 0 there.
+
+        Parameters
+        ----------
+        integration : Integration
+            Solves Eq. 7 of the paper with constraints, on one domain.
+        divergence : (n,) float
+            Right-hand side: the integrated divergence of the unit vectors.
+        source : SourceTerm
+            Where φ is known, with weights and components.
+
+        Returns
+        -------
+        (n,) float
+            φ, a length.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
+        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.ZeroSet())([0.5, 0.5]).item(), 2)
+        0.5
+        """
         levels = Levels(np.zeros(len(source.weights)))
         return (integration.fit_exactly if self.hard else integration.fit)(divergence, source, levels)
 
@@ -92,6 +138,29 @@ class EachComponent:
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
+        """Integrate with φ constant on each connected component of the source.
+
+        Parameters
+        ----------
+        integration : Integration
+            Solves Eq. 7 of the paper with constraints, on one domain.
+        divergence : (n,) float
+            Right-hand side: the integrated divergence of the unit vectors.
+        source : SourceTerm
+            Where φ is known, with weights and components.
+
+        Returns
+        -------
+        (n,) float
+            φ, a length.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
+        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.EachComponent())([0.5, 0.5]).item(), 2)
+        0.5
+        """
         levels = Levels(np.zeros(len(source.weights)), source.components)
         return (integration.fit_exactly if self.hard else integration.fit)(divergence, source, levels)
 
@@ -132,6 +201,34 @@ class LevelValues(ShortRepr):
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
+        """Integrate with the given value of φ on each source or component.
+
+        Parameters
+        ----------
+        integration : Integration
+            Solves Eq. 7 of the paper with constraints, on one domain.
+        divergence : (n,) float
+            Right-hand side: the integrated divergence of the unit vectors.
+        source : SourceTerm
+            Where φ is known, with weights and components.
+
+        Returns
+        -------
+        (n,) float
+            φ, a length.
+
+        Raises
+        ------
+        ConstraintError
+            If there are neither as many levels as sources nor as many as connected components.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
+        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.LevelValues([2.0]))([0.5, 0.5]).item(), 2)
+        2.5
+        """
         n_sources, n_components = int(source.source_ids.max()) + 1, int(source.components.max()) + 1
         if len(self.values) == n_sources:
             index = source.source_ids
@@ -177,5 +274,28 @@ class Soft:
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
+        """Integrate with a penalty on φ² along the source.
+
+        Parameters
+        ----------
+        integration : Integration
+            Solves Eq. 7 of the paper with constraints, on one domain.
+        divergence : (n,) float
+            Right-hand side: the integrated divergence of the unit vectors.
+        source : SourceTerm
+            Where φ is known, with weights and components.
+
+        Returns
+        -------
+        (n,) float
+            φ, a length.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
+        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.Soft(1.0))([0.5, 0.5]).item(), 2)
+        0.5
+        """
         weight = integration.soft_weight if self.weight is None else self.weight
         return integration.penalize(divergence, source, weight)

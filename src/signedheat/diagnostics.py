@@ -74,11 +74,37 @@ class Diagnostics(ShortRepr):
         return [note for note in self.notes if note.important]
 
     def note(self, kind: type[AnyNote]) -> AnyNote | None:
-        """The note of a given type, or None."""
+        """The note of a given type, or None.
+
+        Parameters
+        ----------
+        kind : type
+            A class of `signedheat.results`, such as ``TetsTurned``.
+
+        Returns
+        -------
+        Note or None
+            The one of this type among `notes`.
+
+        Examples
+        --------
+        >>> Diagnostics(notes=(TetsTurned(3),)).note(TetsTurned)
+        TetsTurned(tets_turned=3)
+        """
         return next((note for note in self.notes if isinstance(note, kind)), None)
 
     def noting(self, *notes: Note) -> Diagnostics:
         """The same with further notes, each replacing an older one of the same type.
+
+        Parameters
+        ----------
+        *notes : Note
+            In the order in which they are to be read.
+
+        Returns
+        -------
+        Diagnostics
+            A copy; this one stays as it is.
 
         Examples
         --------

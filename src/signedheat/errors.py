@@ -61,7 +61,23 @@ class SignedHeatError(ValueError):
         return ": ".join(printable(part) for part in (self.path, self.cause, self.remedy) if part is not None)
 
     def at(self: AnyError, path: str | os.PathLike[str]) -> AnyError:
-        """The same error, about a file."""
+        """The same error, about a file.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+
+        Returns
+        -------
+        SignedHeatError
+            Of the same class, with this `path`.
+
+        Examples
+        --------
+        >>> str(SignedHeatError("no face has an area").at("part.stl"))
+        'part.stl: no face has an area'
+        """
         return type(self)(self.cause, remedy=self.remedy, element=self.element, path=path)
 
 

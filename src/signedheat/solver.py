@@ -103,6 +103,16 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     def with_diffusion(self, diffusion: Diffusion | None) -> SignedHeatSolver[AnyDomain]:
         """The same solver with another τ; shares everything that does not depend on τ, such as the factor of C.
 
+        Parameters
+        ----------
+        diffusion : float, Extrapolated or None
+            As for the class.
+
+        Returns
+        -------
+        SignedHeatSolver
+            On the same domain.
+
         Examples
         --------
         >>> import signedheat as sh

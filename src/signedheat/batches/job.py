@@ -143,7 +143,23 @@ class Job:
         return "_samples.npz" if self.volume == ".npz" else ".npz"
 
     def refuse_shared_names(self, shapes: Iterable[Input]) -> None:
-        """Raise `FileFormatError` if results of two shapes would have one name: one would replace the other."""
+        """Refuse shapes of which two would have results of one name.
+
+        Parameters
+        ----------
+        shapes : iterable of Input
+            Files, and the names of their results.
+
+        Raises
+        ------
+        FileFormatError
+            If one result would replace another.
+
+        Examples
+        --------
+        >>> from signedheat.batches.inputs import expand
+        >>> Job(volume=".npz").refuse_shared_names(expand(["a.stl", "b.stl"]))
+        """
         endings = [f"_{name}{self.surfaces}" for name in distinct_names(self.offsets)]
         endings += [] if self.volume is None else [self.volume]
         endings += [] if self.samples is None else [self._of_samples]

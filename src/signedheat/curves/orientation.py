@@ -47,7 +47,26 @@ class CurveOrientation(Frozen, ShortRepr):
     agreement: NDArray[np.float64]
 
     def agreeing(self, least: float) -> list[CurveOrPoints]:
-        """The curves that agree with others at least that well."""
+        """The curves that agree with the others at least that well.
+
+        Parameters
+        ----------
+        least : float
+            Agreement, from 0 to 1.
+
+        Returns
+        -------
+        list of Curve or SurfacePoints
+            Those of `curves` with at least this `agreement`.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.samples.sphere(2)
+        >>> equator = mesh.level_set(mesh.vertices[:, 2])
+        >>> len(sh.curve_orientation(equator, mesh).agreeing(0.5))
+        1
+        """
         return [curve for curve, found in zip(self.curves, self.agreement, strict=True) if found >= least]
 
 

@@ -99,6 +99,11 @@ class Curve(Frozen):
     def reversed(self) -> Curve:
         """The curve in opposite direction: left and right are exchanged; given normals stay the same.
 
+        Returns
+        -------
+        Curve
+            With the same points from last to first.
+
         Examples
         --------
         >>> curve = Curve([0, 0], [[1, 0, 0], [0, 1, 0]])

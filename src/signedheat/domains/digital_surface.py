@@ -149,14 +149,47 @@ class DigitalSurface(Displayed, Surface):
         return self.squares.triangulation
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the vertices of `triangulation`, from values at the vertices of the surface."""
+        """Values at the vertices of `triangulation`, from values at the vertices of the surface.
+
+        Parameters
+        ----------
+        values : (n,) float
+            One for each vertex.
+
+        Returns
+        -------
+        (m,) float
+            One for each vertex of the triangulation.
+
+        Examples
+        --------
+        >>> cube = DigitalSurface(np.ones((1, 1, 1), dtype=bool))
+        >>> cube.on_triangulation(np.ones(cube.n_vertices)).max().item()
+        1.0
+        """
         return self.squares.on_triangulation(values)
 
     def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         return self.squares._triangle_mask(face_mask)
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """As a `pyvista.PolyData`: the faces of the voxels."""
+        """Convert the faces of the voxels to PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            Squares.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> DigitalSurface(np.ones((1, 1, 1), dtype=bool)).to_pyvista().n_cells
+        6
+        """
         return self.squares.to_pyvista()
 
     def __repr__(self) -> str:

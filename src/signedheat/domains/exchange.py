@@ -59,10 +59,20 @@ class Displayed:
         Fields have the colours of all pictures here: blue for negative distance, orange for positive, light at zero;
         the surface or line of distance zero is drawn too. Of shapes, outer sides are light and inner sides red.
 
+        Returns
+        -------
+        pyvista.Plotter
+            Not shown yet.
+
         Raises
         ------
         MissingPackageError
             If PyVista is not installed (``pip install pyvista``).
+
+        Examples
+        --------
+        >>> from signedheat import samples
+        >>> samples.sphere(1).plotter().export_html("ball.html")  # doctest: +SKIP
         """
         return windows.plotter_of(self)
 
@@ -78,6 +88,11 @@ class Displayed:
         ------
         MissingPackageError
             If PyVista is not installed (``pip install pyvista``).
+
+        Examples
+        --------
+        >>> from signedheat import samples
+        >>> samples.broken_duck().plot()  # doctest: +SKIP
         """
         return self.plotter().show()
 
@@ -180,57 +195,227 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         raise NotImplementedError
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file, in the format given by its extension: see `signedheat.save`."""
+        """Write to a file, in the format given by its extension: see `signedheat.save`.
+
+        Parameters
+        ----------
+        path : str or path
+            ``.stl``, ``.obj``, ``.ply``, ``.off`` or ``.vtp``; points also ``.xyz`` and ``.pc``.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is another, has no place for such a shape, or the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     sh.samples.sphere(1).save(f"{folder}/ball.ply")
+        ...     sh.read(f"{folder}/ball.ply")
+        TriangleMesh(42 vertices, 80 faces)
+        """
         shapes.save(self, path)
 
     @classmethod
     def from_trimesh(cls: type[Kind], thing: object) -> Kind:
-        """From a `trimesh.Trimesh`, `trimesh.PointCloud` or the meshes of a `trimesh.Scene`, in their places.
+        """Convert a mesh, a cloud or a scene of trimesh.
+
+        Parameters
+        ----------
+        thing : object
+            `trimesh.Trimesh`, `trimesh.PointCloud`, or a `trimesh.Scene`, whose meshes are taken in their places.
+
+        Returns
+        -------
+        TriangleMesh, PolygonMesh or PointCloud
+            Of the class that this was called on.
 
         Raises
         ------
         SignedHeatError
             If it holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles.
+
+        Examples
+        --------
+        >>> import trimesh
+        >>> import signedheat as sh
+        >>> sh.TriangleMesh.from_trimesh(trimesh.creation.box())
+        TriangleMesh(8 vertices, 12 faces)
         """
         return cls._of(from_trimesh(thing))
 
     def to_trimesh(self) -> Trimesh:
-        """As a `trimesh.Trimesh`, not processed, or `trimesh.PointCloud`; polygons raise `GeometryError`."""
+        """Convert to trimesh.
+
+        Returns
+        -------
+        trimesh.Trimesh or trimesh.PointCloud
+            Not processed: vertices and faces keep their order.
+
+        Raises
+        ------
+        MissingPackageError
+            If trimesh is not installed.
+        GeometryError
+            If it has polygons of more than three corners.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.samples.sphere(1).to_trimesh().is_watertight
+        True
+        """
         return to_trimesh(self._elements)
 
     @classmethod
     def from_pyvista(cls: type[Kind], thing: object) -> Kind:
-        """From a `pyvista.PolyData`, or the faces, or else the boundary of the tets, of a `pyvista.UnstructuredGrid`.
+        """Convert a surface of PyVista, or the boundary of tets.
 
         Point data ``Normals`` are the normals of points; the parts of a `pyvista.MultiBlock` become one shape.
+
+        Parameters
+        ----------
+        thing : object
+            `pyvista.PolyData`, `pyvista.UnstructuredGrid`, or a `pyvista.MultiBlock` of them.
+
+        Returns
+        -------
+        TriangleMesh, PolygonMesh or PointCloud
+            Of the class that this was called on.
 
         Raises
         ------
         SignedHeatError
-            If it holds nothing of this kind, such as cells of a volume other than tets.
+            If it holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles.
+
+        Examples
+        --------
+        >>> import pyvista
+        >>> import signedheat as sh
+        >>> sh.PolygonMesh.from_pyvista(pyvista.Cube())
+        PolygonMesh(8 vertices, 6 polygons)
         """
         return cls._of(from_pyvista(thing))
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """As a `pyvista.PolyData`; the normals of points are point data ``Normals``."""
+        """Convert to PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            The normals of points are point data ``Normals``.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.samples.sphere(1).to_pyvista().n_cells
+        80
+        """
         return to_pyvista(self._elements)
 
     @classmethod
     def from_meshio(cls: type[Kind], thing: object) -> Kind:
-        """From the triangles, quadrilaterals and polygons, or the points, of a `meshio.Mesh`."""
+        """Convert the triangles, quadrilaterals and polygons, or the points, of a mesh of meshio.
+
+        Parameters
+        ----------
+        thing : object
+            A `meshio.Mesh`.
+
+        Returns
+        -------
+        TriangleMesh, PolygonMesh or PointCloud
+            Of the class that this was called on.
+
+        Raises
+        ------
+        SignedHeatError
+            If it holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles.
+
+        Examples
+        --------
+        >>> import meshio
+        >>> import signedheat as sh
+        >>> cells = [("triangle", [[0, 1, 2]])]
+        >>> sh.TriangleMesh.from_meshio(meshio.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], cells))
+        TriangleMesh(3 vertices, 1 faces)
+        """
         return cls._of(from_meshio(thing, as_points=not cls._has_faces))
 
     def to_meshio(self) -> meshio.Mesh:
-        """As a `meshio.Mesh`; the normals of points are point data ``nx``, ``ny``, ``nz``."""
+        """Convert to meshio.
+
+        Returns
+        -------
+        meshio.Mesh
+            The normals of points are point data ``nx``, ``ny``, ``nz``.
+
+        Raises
+        ------
+        MissingPackageError
+            If meshio is not installed.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.samples.sphere(1).to_meshio().cells[0].type
+        'triangle'
+        """
         return to_meshio(self._elements)
 
     @classmethod
     def from_open3d(cls: type[Kind], thing: object) -> Kind:
-        """From a `TriangleMesh` or `PointCloud` of Open3D, of ``open3d.geometry`` or ``open3d.t.geometry``."""
+        """Convert a mesh or a cloud of Open3D.
+
+        Parameters
+        ----------
+        thing : object
+            `TriangleMesh` or `PointCloud` of ``open3d.geometry`` or ``open3d.t.geometry``.
+
+        Returns
+        -------
+        TriangleMesh, PolygonMesh or PointCloud
+            Of the class that this was called on.
+
+        Raises
+        ------
+        SignedHeatError
+            If it holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles.
+
+        Examples
+        --------
+        >>> import open3d  # doctest: +SKIP
+        >>> sh.TriangleMesh.from_open3d(open3d.io.read_triangle_mesh("scan.ply"))  # doctest: +SKIP
+        """
         return cls._of(from_open3d(thing))
 
     def to_open3d(self) -> open3d.geometry.Geometry:
-        """As a `TriangleMesh` or `PointCloud` of ``open3d.geometry``; polygons raise `GeometryError`."""
+        """Convert to Open3D.
+
+        Returns
+        -------
+        open3d.geometry.TriangleMesh or open3d.geometry.PointCloud
+            In double precision.
+
+        Raises
+        ------
+        MissingPackageError
+            If Open3D is not installed.
+        GeometryError
+            If it has polygons of more than three corners.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.samples.sphere(1).to_open3d()  # doctest: +SKIP
+        """
         return to_open3d(self._elements)
 
 

@@ -144,6 +144,11 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         spacing : (d,) float or float, optional
             Distance between nodes; if given, the resolution is ignored.
 
+        Returns
+        -------
+        Grid
+            With nodes on every side of the box.
+
         Raises
         ------
         GeometryError
@@ -206,7 +211,17 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """(n,) whether each of the (n, d) points lies within the bounding box of the nodes.
+        """Whether points lie within the bounding box of the nodes.
+
+        Parameters
+        ----------
+        points : (n, d) float
+            Positions, in the units of the grid.
+
+        Returns
+        -------
+        (n,) bool
+            True on the boundary, too.
 
         Examples
         --------
@@ -217,7 +232,25 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         return np.all((positions >= self.origin) & (positions <= self.upper), axis=-1)
 
     def to_pyvista(self) -> pyvista.ImageData:
-        """As a `pyvista.ImageData`, with boolean point data ``solid`` if nodes are; a grid in the plane has z = 0."""
+        """Convert to an image of PyVista.
+
+        Returns
+        -------
+        pyvista.ImageData
+            With boolean point data ``solid`` if nodes are; a grid in the plane has z = 0.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+        GeometryError
+            If the grid has other than two or three axes.
+
+        Examples
+        --------
+        >>> Grid((0, 0, 0), 0.5, (3, 3, 2)).to_pyvista().dimensions
+        (3, 3, 2)
+        """
         if self.dimension not in (2, 3):
             raise GeometryError(
                 f"PyVista has grids in the plane and in space, and this one has {self.dimension} axes",

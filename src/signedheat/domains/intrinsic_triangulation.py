@@ -151,7 +151,27 @@ class IntrinsicTriangulation(Displayed, Frozen):
         )
 
     def in_space(self, faces: NDArray[np.int64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(p, 3) positions of points given on the mesh."""
+        """Positions of points that are given on the mesh.
+
+        Parameters
+        ----------
+        faces : (p,) int
+            Faces of the mesh.
+        barycentric : (p, 3) float
+            Barycentric coordinates of the points in these faces.
+
+        Returns
+        -------
+        (p, 3) float
+            Positions, in the units of the mesh.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> better.in_space(np.array([0]), np.array([[0.0, 0.5, 0.5]])).tolist()
+        [[9.0, 0.5, 0.0]]
+        """
         positions = np.einsum("pk,pkd->pd", barycentric, self.mesh.vertices[self.mesh.faces[faces]])
         lost = np.flatnonzero(np.asarray(faces) < 0)
         positions[lost] = self.mesh.vertices[lost]
@@ -159,6 +179,20 @@ class IntrinsicTriangulation(Displayed, Frozen):
 
     def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Faces and barycentric coordinates, on the triangulation, of points given by those on the mesh.
+
+        Parameters
+        ----------
+        faces : (p,) int
+            Faces of the mesh.
+        barycentric : (p, 3) float
+            Barycentric coordinates of the points in these faces.
+
+        Returns
+        -------
+        faces : (p,) int
+            Faces of the triangulation.
+        barycentric : (p, 3) float
+            Barycentric coordinates in them.
 
         Raises
         ------
@@ -168,7 +202,8 @@ class IntrinsicTriangulation(Displayed, Frozen):
         Examples
         --------
         >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-        >>> faces, barycentric = intrinsic_delaunay(strip, refine=True).locate([0], [[0.5, 0.25, 0.25]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> faces, barycentric = better.locate([0], [[0.5, 0.25, 0.25]])
         >>> faces.shape, float(barycentric.sum().round(9))
         ((1,), 1.0)
         """
@@ -185,13 +220,58 @@ class IntrinsicTriangulation(Displayed, Frozen):
     def gradient(
         self, values: NDArray[np.float64], faces: NDArray[np.int64], barycentric: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """(p, 3) gradients in space, at points given on the mesh, of a function linear on these triangles."""
+        """Gradients in space of a function that is linear on these triangles.
+
+        Parameters
+        ----------
+        values : (n_vertices,) float
+            The function at the vertices of the triangulation.
+        faces : (p,) int
+            Faces of the mesh.
+        barycentric : (p, 3) float
+            Barycentric coordinates of the points in these faces.
+
+        Returns
+        -------
+        (p, 3) float
+            Gradients at the points, in units of the values over a length.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> better.gradient(better.vertices[:, 0], np.array([0]), np.array([[0.2, 0.3, 0.5]])).round(9)[:, :2].tolist()
+        [[1.0, 0.0]]
+        """
         return self.gradient_of_corners(values[self.faces], faces, barycentric)
 
     def gradient_of_corners(
         self, corners: NDArray[np.float64], faces: NDArray[np.int64], barycentric: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """The same of a function that may jump between these triangles, from its values (m, 3) at their corners."""
+        """Gradients in space of a function that may jump between these triangles.
+
+        Parameters
+        ----------
+        corners : (n_faces, 3) float
+            The function at the corners of each triangle.
+        faces : (p,) int
+            Faces of the mesh.
+        barycentric : (p, 3) float
+            Barycentric coordinates of the points in these faces.
+
+        Returns
+        -------
+        (p, 3) float
+            Gradients at the points.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> corners = better.vertices[better.faces, 0]
+        >>> better.gradient_of_corners(corners, np.array([0]), np.array([[0.2, 0.3, 0.5]])).round(9)[:, :2].tolist()
+        [[1.0, 0.0]]
+        """
         sides = np.broadcast_to([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]], (len(faces), 2, 3))
         found, _, moves = self._forward(faces, barycentric, sides)
         rises = np.einsum("psk,pk->ps", moves, corners[found])
@@ -206,15 +286,35 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return found, weights / weights.sum(axis=1, keepdims=True), moved
 
     def level_set(self, values: NDArray[np.float64], level: float = 0.0) -> list[Curve]:
-        """Level set of a function given at the vertices, linear on these triangles, as curves on the mesh.
+        """Level set of a function that is linear on these triangles, as curves on the mesh.
 
         Larger values are to its left; values equal to the level count as larger. On inconsistently oriented meshes
         it is that of the values at the vertices of the mesh.
+
+        Parameters
+        ----------
+        values : (n_vertices,) float
+            The function at the vertices of the triangulation.
+        level : float
+            Its value on the curves.
+
+        Returns
+        -------
+        list of Curve
+            On the mesh.
 
         Raises
         ------
         SourceError
             If there is not one value per vertex.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> [line] = better.level_set(better.vertices[:, 0], 4.5)
+        >>> strip.positions(line)[:, 0].round(9).min().item()
+        4.5
         """
         if values.shape != (self.n_vertices,):
             raise SourceError(
@@ -228,11 +328,45 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return without_repeats(self.mesh, curves)
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the vertices of the triangles, from values at the vertices of the domain: the same."""
+        """Values at the vertices of `triangulation`, from values at the vertices of the triangles.
+
+        Parameters
+        ----------
+        values : (n,) float
+            One for each vertex.
+
+        Returns
+        -------
+        (m,) float
+            One for each vertex of the triangulation: the same.
+
+        Examples
+        --------
+        >>> from signedheat import samples
+        >>> better = intrinsic_delaunay(samples.sphere(1))
+        >>> better.on_triangulation(np.ones(better.n_vertices)).shape == (better.n_vertices,)
+        True
+        """
         return values
 
     def edge_lines(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Edges as polylines on the mesh: for every straight part the id of the edge, and start and end in space."""
+        """Edges as polylines on the mesh.
+
+        Returns
+        -------
+        edges : (s,) int
+            The edge that each straight part belongs to.
+        starts, ends : (s, 3) float
+            Where the part starts and ends in space.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> edges, starts, ends = better.edge_lines()
+        >>> starts.shape == ends.shape == (len(edges), 3)
+        True
+        """
         lines = self.history.edges_before()
         starts = self.in_space(*self.refinement.pull_back(lines.faces, lines.starts))
         return lines.owners, starts, self.in_space(*self.refinement.pull_back(lines.faces, lines.ends))
@@ -244,7 +378,26 @@ class IntrinsicTriangulation(Displayed, Frozen):
     def transfer(
         self, source: CurveOrPoints | CurveSegments | Sequence[CurveOrPoints | CurveSegments]
     ) -> CurveSegments | list[CurveSegments]:
-        """Transfer a source given on the mesh to these triangles."""
+        """Transfer a source that is given on the mesh to these triangles.
+
+        Parameters
+        ----------
+        source : Curve, SurfacePoints, CurveSegments, or sequence of them
+            On the mesh.
+
+        Returns
+        -------
+        CurveSegments or list of CurveSegments
+            Segments, each within one triangle of the triangulation.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> line = strip.polyline([[4.0, 0.0, 0.0], [4.0, 1.0, 0.0]])
+        >>> len(better.transfer([line]))
+        1
+        """
         if isinstance(source, Sequence):
             return [self.transfer(part) for part in source]
         seen = segments_of(source, self.base, self.mesh.vertices)
@@ -253,7 +406,24 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return transfer_segments(seen, self.refinement, self.history, self.base)
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """As a `pyvista.PolyData` of the mesh."""
+        """Convert the mesh to PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            The triangles of the mesh, not those of the triangulation.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> from signedheat import samples
+        >>> intrinsic_delaunay(samples.sphere(1)).to_pyvista().n_points
+        42
+        """
         return self.mesh.to_pyvista()
 
     def __repr__(self) -> str:

@@ -186,7 +186,25 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         return TriangleMesh(self.points, ids[found.faces])
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the vertices of `triangulation`, which are the points: the same."""
+        """Values at the vertices of `triangulation`, from values at the vertices of the cloud.
+
+        Parameters
+        ----------
+        values : (n,) float
+            One for each vertex.
+
+        Returns
+        -------
+        (m,) float
+            One for each vertex of the triangulation: the same.
+
+        Examples
+        --------
+        >>> from signedheat import samples
+        >>> cloud = PointCloud(samples.sphere(1).vertices)
+        >>> cloud.on_triangulation(cloud.points[:, 2]).shape == cloud.points.shape[:1]
+        True
+        """
         return values
 
     @cached_property

@@ -148,7 +148,24 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         return TriangleMesh(np.concatenate([self.vertices, refinement.virtual_vertices]), refinement.faces)
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the vertices of `triangulation`, from values at the vertices of the mesh."""
+        """Values at the vertices of `triangulation`, from values at the vertices of the mesh.
+
+        Parameters
+        ----------
+        values : (n,) float
+            One for each vertex.
+
+        Returns
+        -------
+        (m,) float
+            One for each vertex of the triangulation.
+
+        Examples
+        --------
+        >>> square = PolygonMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+        >>> square.on_triangulation(np.array([0.0, 1.0, 1.0, 0.0])).max().item()
+        1.0
+        """
         return self.refinement.prolongation @ values
 
     def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

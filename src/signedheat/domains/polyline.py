@@ -76,6 +76,11 @@ class Polyline(Displayed, Frozen):
         origin, spacing : (2,) float
             Position of the first pixel, and distance between pixels.
 
+        Returns
+        -------
+        list of Polyline
+            Closed lines, the region to their right.
+
         Raises
         ------
         GeometryError
@@ -133,11 +138,38 @@ class Polyline(Displayed, Frozen):
         return float(0.5 * (x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum())
 
     def reversed(self) -> Polyline:
-        """The polyline in opposite direction, for which φ has the opposite sign."""
+        """The polyline in opposite direction, for which φ has the opposite sign.
+
+        Returns
+        -------
+        Polyline
+            With the same points from last to first.
+
+        Examples
+        --------
+        >>> Polyline([[0, 0], [1, 0]]).reversed().points.tolist()
+        [[1.0, 0.0], [0.0, 0.0]]
+        """
         return Polyline(self.points[::-1], self.closed)
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """As a `pyvista.PolyData`, a line with z = 0."""
+        """Convert to a line of PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            A line with z = 0.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> Polyline([[0, 0], [1, 0], [1, 1]]).to_pyvista().n_points
+        3
+        """
         points = np.column_stack([self.points, np.zeros(self.n_points)])
         return pyvista.lines_from_points(points, close=self.closed)
 

@@ -46,6 +46,11 @@ class Surface(Frozen):
         oriented : bool
             Whether the curve has a positive and a negative side.
 
+        Returns
+        -------
+        Curve
+            On this surface.
+
         Raises
         ------
         SourceError
@@ -68,6 +73,11 @@ class Surface(Frozen):
         vertices : int or (n,) int
             Vertex ids.
 
+        Returns
+        -------
+        SurfacePoints
+            On this surface.
+
         Raises
         ------
         SourceError
@@ -82,7 +92,17 @@ class Surface(Frozen):
         return SurfacePoints(*self._at_vertices(vertices, "point"))
 
     def positions(self, points: Curve | SurfacePoints) -> NDArray[np.float64]:
-        """(n, 3) positions in space of the points of a curve, or of isolated points.
+        """Positions in space of the points of a curve, or of isolated points.
+
+        Parameters
+        ----------
+        points : Curve or SurfacePoints
+            On this surface.
+
+        Returns
+        -------
+        (n, 3) float
+            Positions, in the units of the surface.
 
         Raises
         ------

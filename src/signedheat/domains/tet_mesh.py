@@ -126,31 +126,128 @@ class TetMesh(Displayed, Frozen):
         return used_bounds(self.vertices, self.tets)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a ``.mesh``, ``.msh``, ``.vtu``, ``.vtk``, or ``.node`` and ``.ele`` file."""
+        """Write to a file, in the format given by its extension.
+
+        Parameters
+        ----------
+        path : str or path
+            ``.mesh``, ``.msh``, ``.vtu``, ``.vtk``, or ``.node``, beside which a ``.ele`` file is written.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is another, or the file cannot be written.
+        MissingPackageError
+            If meshio is not installed.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]).save(f"{folder}/one.vtu")
+        ...     sh.read(f"{folder}/one.vtu").n_tets
+        1
+        """
         shapes.save(self, path)
 
     @classmethod
     def from_meshio(cls, mesh: meshio.Mesh) -> TetMesh:
-        """From the tets of a `meshio.Mesh`; cells of other kinds are ignored.
+        """Convert the tets of a mesh of meshio; cells of other kinds are ignored.
+
+        Parameters
+        ----------
+        mesh : meshio.Mesh
+            With cells ``"tetra"``.
+
+        Returns
+        -------
+        TetMesh
+            Its points, and its tets.
 
         Raises
         ------
         GeometryError
             If it has no tets, or tets of other than four corners.
+
+        Examples
+        --------
+        >>> tet = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+        >>> TetMesh.from_meshio(tet.to_meshio()).n_tets
+        1
         """
         return cls(mesh.points, tets_of_meshio(mesh))
 
     def to_meshio(self, point_data: Mapping[str, NDArray[np.float64]] | None = None) -> meshio.Mesh:
-        """As a `meshio.Mesh`, with `point_data`, arrays at the vertices by name."""
+        """Convert to meshio.
+
+        Parameters
+        ----------
+        point_data : mapping, optional
+            Arrays at the vertices, by name.
+
+        Returns
+        -------
+        meshio.Mesh
+            With cells ``"tetra"``.
+
+        Raises
+        ------
+        MissingPackageError
+            If meshio is not installed.
+
+        Examples
+        --------
+        >>> TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]).to_meshio().cells[0].type
+        'tetra'
+        """
         return meshio.Mesh(self.vertices, [("tetra", self.tets)], point_data=point_data)
 
     @classmethod
     def from_pyvista(cls, grid: pyvista.UnstructuredGrid) -> TetMesh:
-        """From the tets of a `pyvista.UnstructuredGrid`; cells of other kinds are ignored."""
+        """Convert the tets of a grid of PyVista; cells of other kinds are ignored.
+
+        Parameters
+        ----------
+        grid : pyvista.UnstructuredGrid
+            With cells of the type ``TETRA``.
+
+        Returns
+        -------
+        TetMesh
+            Its points, and its tets.
+
+        Raises
+        ------
+        GeometryError
+            If it has no tets.
+
+        Examples
+        --------
+        >>> tet = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+        >>> TetMesh.from_pyvista(tet.to_pyvista()).n_tets
+        1
+        """
         return cls(grid.points, tets_of_pyvista(grid))
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
-        """As a `pyvista.UnstructuredGrid`."""
+        """Convert to PyVista.
+
+        Returns
+        -------
+        pyvista.UnstructuredGrid
+            Of tets.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]).to_pyvista().n_cells
+        1
+        """
         return pyvista.UnstructuredGrid({10: np.array(self.tets)}, np.array(self.vertices))
 
     def __repr__(self) -> str:

@@ -111,7 +111,23 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
         return self
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the vertices of `triangulation`, from values at the vertices of the domain: the same."""
+        """Values at the vertices of `triangulation`, from values at the vertices of the mesh.
+
+        Parameters
+        ----------
+        values : (n,) float
+            One for each vertex.
+
+        Returns
+        -------
+        (m,) float
+            One for each vertex of the triangulation: the same.
+
+        Examples
+        --------
+        >>> TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).on_triangulation(np.arange(3.0)).tolist()
+        [0.0, 1.0, 2.0]
+        """
         return values
 
     def __repr__(self) -> str:

@@ -145,7 +145,28 @@ class Combinable(Arithmetic):
         return self._scaled(-1.0)
 
     def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
-        """The field whose values a rule makes of those of two fields on one domain."""
+        """The field whose values a rule makes of those of two fields on one domain.
+
+        Parameters
+        ----------
+        other : Combinable
+            On the same domain.
+        rule : callable
+            Takes two arrays of values and returns one, such as `np.minimum`.
+
+        Returns
+        -------
+        Combinable
+            With the values of the rule.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> tet = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+        >>> phi = sh.TetField(tet, [0.0, 1.0, 2.0, 3.0])
+        >>> phi.combined_with(3.0 - phi, np.minimum).values.tolist()
+        [0.0, 1.0, 1.0, 0.0]
+        """
         return self.with_values(rule(self.values, other.values))
 
     def _mapped(self: Solid, change: Change) -> Solid:

@@ -363,6 +363,11 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     def dense(self) -> GridField[Dimension]:
         """The field at all nodes of its grid, those beyond a band interpolated from the coarse ones.
 
+        Returns
+        -------
+        GridField
+            Without a band; this field itself if it has none.
+
         Examples
         --------
         >>> from signedheat import complete, samples
@@ -420,16 +425,51 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return self.contour(distance)
 
     def with_values(self, values: NDArray[np.float64]) -> GridField[Dimension]:
-        """Other values on the same grid, without the diagnostics, confidence and solid of these."""
+        """Other values on the same grid, without what belongs to these.
+
+        Parameters
+        ----------
+        values : (n,) float
+            Of the shape of `values`.
+
+        Returns
+        -------
+        GridField
+            Without diagnostics, confidence and solid.
+
+        Examples
+        --------
+        >>> line = GridField(Grid([0.0], 1.0, [2]), np.array([0.0, 1.0]))
+        >>> line.with_values(line.values**2).values.tolist()
+        [0.0, 1.0]
+        """
         return GridField(self.grid, values)
 
     def combined_with(self, other: GridField[Dimension], rule: Rule) -> GridField[Dimension]:
-        """The field whose values a rule makes of those of two fields; bands must be the same.
+        """The field whose values a rule makes of those of two fields on one grid.
+
+        Parameters
+        ----------
+        other : GridField
+            On the same domain.
+        rule : callable
+            Takes two arrays of values and returns one, such as `np.minimum`.
+
+        Returns
+        -------
+        GridField
+            With the values of the rule.
 
         Raises
         ------
         GeometryError
-            If they are not.
+            If they are fields in different bands.
+
+        Examples
+        --------
+        >>> line = GridField(Grid([0.0], 1.0, [2]), np.array([0.0, 1.0]))
+        >>> line.combined_with(1.0 - line, np.minimum).values.tolist()
+        [0.0, 0.0]
         """
         if self.blocks is None and other.blocks is None:
             return self.with_values(rule(self.values, other.values))
@@ -458,9 +498,24 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         )
 
     def to_pyvista(self) -> pyvista.ImageData:
-        """As a `pyvista.ImageData` with point data ``signed_distance``, and ``confidence`` where there is one.
+        """Convert to an image of PyVista.
 
         A field in the plane has z = 0; of one in a band it is the coarse field, and ``dense()`` has all nodes.
+
+        Returns
+        -------
+        pyvista.ImageData
+            With point data ``signed_distance``, and ``confidence`` where there is one.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> GridField(Grid((0, 0), 1.0, (2, 2)), np.zeros((2, 2))).to_pyvista().array_names
+        ['signed_distance']
         """
         if self.blocks is not None:
             return self.whole.to_pyvista()
@@ -515,6 +570,16 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a file, in the format given by its extension; `signedheat.load_field` reads it.
+
+        Parameters
+        ----------
+        path : str or path
+            ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` or ``.vdb``; in a band ``.npz`` or ``.vdb``.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is another, or the file cannot be written.
 
         Examples
         --------

@@ -111,7 +111,26 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         return PiecewiseField(self.domain, self.surface, change(self.values), self.triangles, self.is_cut)
 
     def gradient(self, points: SurfacePoints) -> NDArray[np.float64]:
-        """(n, 3) ∇φ in the triangles that contain the points; see `__call__`."""
+        """∇φ in the triangles that contain the points.
+
+        Parameters
+        ----------
+        points : SurfacePoints
+            As for calling the field.
+
+        Returns
+        -------
+        (n, 3) float
+            Gradients; of length about 1, since φ is a distance.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> ball = sh.samples.sphere(2)
+        >>> phi = sh.piecewise_distance(ball, ball.level_set(ball.vertices[:, 2]))
+        >>> phi.gradient(ball.points_at([0, 1])).shape
+        (2, 3)
+        """
         places = locate_points(self.triangles, points.faces, points.barycentric)
         return self.face_gradients[places.faces]
 
@@ -165,6 +184,19 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         """The same field on a mesh whose vertices are doubled along the cut, for viewers and for contours.
 
         Away from the cut, the values of all corners at a vertex are averaged. Faces keep their ids.
+
+        Returns
+        -------
+        VertexField
+            On that mesh.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> ball = sh.samples.sphere(2)
+        >>> phi = sh.piecewise_distance(ball, ball.level_set(ball.vertices[:, 2]))
+        >>> phi.split().domain.n_faces == ball.n_faces
+        True
         """
         owner, vertices = self.split_vertices
         count = np.bincount(owner)
@@ -180,15 +212,75 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         return owner, self.surface.faces.ravel()[first]
 
     def contour(self, level: float = 0.0) -> list[Curve]:
-        """The level set φ = level as curves on the surface, with greater values to their left; they end at the cut."""
+        """Level set as curves on the surface, with greater values to their left; they end at the cut.
+
+        Parameters
+        ----------
+        level : float
+            The value of φ on them, a length.
+
+        Returns
+        -------
+        list of Curve
+            On the mesh of `split`.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> ball = sh.samples.sphere(2)
+        >>> phi = sh.piecewise_distance(ball, ball.level_set(ball.vertices[:, 2]))
+        >>> len(phi.contour(0.2))
+        1
+        """
         return self.split().contour(level)
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """As a `pyvista.PolyData` with point data ``signed_distance`` on `split`, so that the jumps show."""
+        """Convert `split` to PyVista, so that the jumps show.
+
+        Returns
+        -------
+        pyvista.PolyData
+            With point data ``signed_distance``.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> ball = sh.samples.sphere(2)
+        >>> phi = sh.piecewise_distance(ball, ball.level_set(ball.vertices[:, 2]))
+        >>> phi.to_pyvista().array_names
+        ['signed_distance']
+        """
         return self.split().to_pyvista()
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the field on `split`, so that viewers show the jump, in the format given by the extension."""
+        """Write the field on `split`, so that viewers show the jump, in the format given by the extension.
+
+        Parameters
+        ----------
+        path : str or path
+            As for `VertexField.save`.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is none of these, or the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> ball = sh.samples.sphere(2)
+        >>> phi = sh.piecewise_distance(ball, ball.level_set(ball.vertices[:, 2]))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     phi.save(f"{folder}/phi.ply")
+        ...     sh.load_field(f"{folder}/phi.ply").domain.n_faces == ball.n_faces
+        True
+        """
         self.split().save(path)
 
     def __repr__(self) -> str:

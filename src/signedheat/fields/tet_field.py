@@ -199,15 +199,72 @@ class TetField(Displayed, Combinable, Frozen):
         return self.contour(distance)
 
     def with_values(self, values: NDArray[np.float64]) -> TetField:
-        """Other values on the same mesh, without the diagnostics and the source of these."""
+        """Other values on the same mesh, without what belongs to these.
+
+        Parameters
+        ----------
+        values : (n,) float
+            Of the shape of `values`.
+
+        Returns
+        -------
+        TetField
+            Without diagnostics and source.
+
+        Examples
+        --------
+        >>> phi = TetField(TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]), [0.0, 1.0, 2.0, 3.0])
+        >>> phi.with_values(2 * phi.values).values.tolist()
+        [0.0, 2.0, 4.0, 6.0]
+        """
         return TetField(self.mesh, values)
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
-        """As a `pyvista.UnstructuredGrid` with point data ``signed_distance``."""
+        """Convert to PyVista.
+
+        Returns
+        -------
+        pyvista.UnstructuredGrid
+            With point data ``signed_distance``.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> phi = TetField(TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]), [0.0, 1.0, 2.0, 3.0])
+        >>> phi.to_pyvista().array_names
+        ['signed_distance']
+        """
         return with_values(self.mesh.to_pyvista(), self.values)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write mesh and values to a ``.vtu``, ``.vtk`` or ``.msh`` file; `signedheat.load_field` reads it."""
+        """Write mesh and values to a file; `signedheat.load_field` reads it.
+
+        Parameters
+        ----------
+        path : str or path
+            ``.vtu``, ``.vtk`` or ``.msh``.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is another, or the file cannot be written.
+        MissingPackageError
+            If meshio is not installed.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from signedheat import load_field
+        >>> phi = TetField(TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]), [0.0, 1.0, 2.0, 3.0])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     phi.save(f"{folder}/phi.vtu")
+        ...     load_field(f"{folder}/phi.vtu").values.tolist()
+        [0.0, 1.0, 2.0, 3.0]
+        """
         files.write_field(self, path)
 
     @cached_property

@@ -116,7 +116,17 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return cast("VertexField[SurfaceDomain]", finer)
 
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
-        """(..., 3) ∇φ in space at points, in the triangles on which φ is linear; for `points` see `__call__`.
+        """∇φ in space at points, in the triangles on which φ is linear.
+
+        Parameters
+        ----------
+        points : Curve, SurfacePoints, or (..., 3) float
+            As for calling the field: on the surface, or positions that are projected onto it.
+
+        Returns
+        -------
+        (..., 3) float
+            Gradients; of length about 1, since φ is a distance.
 
         Examples
         --------
@@ -184,11 +194,51 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return field.domain.level_set(field.values, level)
 
     def with_values(self, values: NDArray[np.float64]) -> VertexField[Surface]:
-        """Other values on the same surface, without the diagnostics and the source of these."""
+        """Other values on the same surface, without what belongs to these.
+
+        Parameters
+        ----------
+        values : (n,) float
+            Of the shape of `values`.
+
+        Returns
+        -------
+        VertexField
+            Without diagnostics and source.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> phi = VertexField(mesh, np.array([0.0, 1.0, 2.0]))
+        >>> phi.with_values(2 * phi.values).values.tolist()
+        [0.0, 2.0, 4.0]
+        """
         return VertexField(self.domain, values)
 
     def combined_with(self, other: VertexField[Surface], rule: Rule) -> VertexField[Surface]:
-        """The field whose values a rule makes of those of two, also on the finer triangles of one of them."""
+        """The field whose values a rule makes of those of two, also on the finer triangles of one of them.
+
+        Parameters
+        ----------
+        other : VertexField
+            On the same domain.
+        rule : callable
+            Takes two arrays of values and returns one, such as `np.minimum`.
+
+        Returns
+        -------
+        VertexField
+            With the values of the rule.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> phi = VertexField(mesh, np.array([0.0, 1.0, 2.0]))
+        >>> phi.combined_with(2.0 - phi, np.minimum).values.tolist()
+        [0.0, 1.0, 0.0]
+        """
         result = self.with_values(rule(self.values, other.values))
         finer = [field.finer for field in (self, other) if field.finest is field.finer]
         if not finer:
@@ -209,7 +259,26 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return values
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """As a `pyvista.PolyData` with point data ``signed_distance``: triangles, polygons or points."""
+        """Convert to PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            Triangles, polygons or points with point data ``signed_distance``.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> phi = VertexField(mesh, np.array([0.0, 1.0, 2.0]))
+        >>> phi.to_pyvista().array_names
+        ['signed_distance']
+        """
         simple = on_simple_surface(self)
         return with_values(simple.domain.to_pyvista(), simple.values)
 
@@ -249,6 +318,11 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     def restrict(self) -> VertexField[EmbeddedSurface]:
         """On an intrinsic triangulation: φ at the vertices of its mesh. On any other domain: the field itself.
 
+        Returns
+        -------
+        VertexField
+            On the mesh.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -265,6 +339,11 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
 
         Where φ was computed on an intrinsic triangulation of the mesh (`finer`), these are the polygons of their
         `common_subdivision`, whose first vertices are those of the mesh; elsewhere the field is returned as it is.
+
+        Returns
+        -------
+        VertexField
+            On triangles or polygons in space.
 
         Examples
         --------

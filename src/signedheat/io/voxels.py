@@ -91,10 +91,21 @@ class LabelImage:
         label : number, optional
             Which; may be left out where the image has zeros and one other label.
 
+        Returns
+        -------
+        TriangleMesh
+            Closed and manifold.
+
         Raises
         ------
         GeometryError
             If no voxel has it, or it is left out and there are several.
+
+        Examples
+        --------
+        >>> image = LabelImage(np.pad(np.full((2, 2, 2), 7), 1), axes=2.0 * np.eye(3), origin=np.zeros(3))
+        >>> image.surface(7).bounds.tolist() == image.surface().bounds.tolist()
+        True
         """
         if label is None:
             found = np.unique(self.labels)
@@ -114,7 +125,24 @@ class LabelImage:
         return DigitalSurface(inside, self.spacing).smooth_surface
 
     def to_world(self, surface: Mesh) -> Mesh:
-        """A mesh along the axes of the image, moved to its place in the world; outside stays outside."""
+        """Move a mesh along the axes of the image to its place in the world; outside stays outside.
+
+        Parameters
+        ----------
+        surface : TriangleMesh or PolygonMesh
+            As `surface` returns it.
+
+        Returns
+        -------
+        TriangleMesh or PolygonMesh
+            In the world.
+
+        Examples
+        --------
+        >>> image = LabelImage(np.pad(np.full((2, 2, 2), 7), 1), axes=2.0 * np.eye(3), origin=np.zeros(3))
+        >>> image.to_world(image.surface(7)).n_vertices == image.surface(7).n_vertices
+        True
+        """
         return cast("Mesh", transform(surface, self.matrix))
 
     def save(self, field: GridField, path: PathLike) -> None:
@@ -132,6 +160,14 @@ class LabelImage:
         ------
         FileFormatError
             If the format has no place for turned axes, or for the space of the image, or the file cannot be written.
+
+        Examples
+        --------
+        >>> image = LabelImage(np.pad(np.full((2, 2, 2), 7), 1), axes=2.0 * np.eye(3), origin=np.zeros(3))
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     image.save(sh.signed_distance(image.surface(7), image.grid), f"{folder}/distance.nrrd")
         """
         self.ensure_writable(path)
         first = self.matrix[:3, :3] @ field.grid.origin + self.origin
@@ -146,7 +182,23 @@ class LabelImage:
             save_field(GridField(Grid(first, field.grid.spacing, field.grid.shape), field.values), path)
 
     def ensure_writable(self, path: PathLike) -> None:
-        """Check before a long computation that a field can be written."""
+        """Check before a long computation that a field can be written into the place of the image.
+
+        Parameters
+        ----------
+        path : str or path
+            As for `save`.
+
+        Raises
+        ------
+        FileFormatError
+            If the format has no place for turned axes, or for the space of the image, or the file cannot be written.
+
+        Examples
+        --------
+        >>> image = LabelImage(np.pad(np.full((2, 2, 2), 7), 1), axes=2.0 * np.eye(3), origin=np.zeros(3))
+        >>> image.ensure_writable("distance.nrrd")
+        """
         if extension(path) in NIFTI:
             require(*NIBABEL)
             ensure_writable(path, {extension(path)}, "a field")

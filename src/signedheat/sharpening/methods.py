@@ -138,7 +138,36 @@ class Geodesic:
         source: SourceTerm | None,
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
-        """Distances with the signs of φ."""
+        """Distances to the nearest place of the zero set, with the signs of given values.
+
+        Parameters
+        ----------
+        discretization : Discretization
+            Of the domain.
+        elements : LinearElements
+            On which φ is linear.
+        values : (n,) float
+            φ at the vertices, to begin with.
+        source : SourceTerm, optional
+            Where φ is known.
+        progress : callable, optional
+            Called as ``progress(fraction, text)``.
+
+        Returns
+        -------
+        values : (n,) float
+            Sharpened.
+        notes : tuple of Note
+            What to know about them.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> ball = sh.samples.sphere(2)
+        >>> phi = sh.SignedHeatSolver(ball).distance(ball.points_at(0))
+        >>> len(sh.sharpen(phi, method=sh.Geodesic()).values) == ball.n_vertices
+        True
+        """
         return distance_to_nearest(discretization, values, source, None, self.tolerance, progress)
 
 
@@ -187,7 +216,41 @@ class Convex:
         source: SourceTerm | None,
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
-        """The maximiser of Eq. 18, starting from φ⁰ = `values`."""
+        """The maximiser of Eq. 18 of the paper, starting from given values.
+
+        Parameters
+        ----------
+        discretization : Discretization
+            Of the domain.
+        elements : LinearElements
+            On which φ is linear.
+        values : (n,) float
+            φ at the vertices, to begin with.
+        source : SourceTerm, optional
+            Where φ is known.
+        progress : callable, optional
+            Called as ``progress(fraction, text)``.
+
+        Returns
+        -------
+        values : (n,) float
+            Sharpened.
+        notes : tuple of Note
+            What to know about them.
+
+        Raises
+        ------
+        SourceError
+            If the field comes without its source.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> ball = sh.samples.sphere(2)
+        >>> phi = sh.SignedHeatSolver(ball).distance(ball.points_at(0))
+        >>> len(sh.sharpen(phi, method=sh.Convex()).values) == ball.n_vertices
+        True
+        """
         if source is None or source.interpolation.shape[1] != len(values):
             raise SourceError(
                 "the convex method holds φ at the source, and this field comes without one, or from one "

@@ -103,15 +103,75 @@ class Deviation(Frozen):
         return float(np.percentile(np.abs(self.of_surface), EXTREME))
 
     def within(self, tolerance: float) -> float:
-        """Share of the points that are as near to the part as a tolerance, on either side."""
+        """Share of the points that are as near to the part as a tolerance, on either side.
+
+        Parameters
+        ----------
+        tolerance : float
+            A length.
+
+        Returns
+        -------
+        float
+            From 0 to 1.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> scan, part = sh.samples.sphere(2, radius=1.1), sh.samples.sphere(4)
+        >>> off = sh.deviation(scan, part)
+        >>> off.within(0.2)
+        1.0
+        """
         return float((np.abs(self.of_surface) <= tolerance).mean())
 
     def percentiles(self, percents: ArrayLike = PERCENTILES) -> NDArray[np.float64]:
-        """Deviations that so many per cent of the points are below."""
+        """Deviations that so many per cent of the points are below.
+
+        Parameters
+        ----------
+        percents : (k,) float
+            From 0 to 100.
+
+        Returns
+        -------
+        (k,) float
+            Signed distances to the part, positive outside.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> scan, part = sh.samples.sphere(2, radius=1.1), sh.samples.sphere(4)
+        >>> off = sh.deviation(scan, part)
+        >>> off.percentiles([50]).round(2).tolist()
+        [0.1]
+        """
         return np.asarray(np.percentile(self.of_surface, np.asarray(percents, dtype=np.float64)))
 
     def histogram(self, bins: int = BINS) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """(bins,) numbers of points and (bins + 1,) limits; what is beyond `extreme` counts in the first or last."""
+        """Numbers of points by deviation; those beyond `extreme` count in the first or last bin.
+
+        Parameters
+        ----------
+        bins : int
+            How many.
+
+        Returns
+        -------
+        counts : (bins,) int
+            Numbers of points.
+        limits : (bins + 1,) float
+            Between the bins, lengths.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> scan, part = sh.samples.sphere(2, radius=1.1), sh.samples.sphere(4)
+        >>> off = sh.deviation(scan, part)
+        >>> counts, limits = off.histogram(10)
+        >>> bool(counts.sum() == len(off.of_surface))
+        True
+        """
         reach = self.extreme if self.extreme > 0 else 1.0
         inside = np.clip(self.of_surface, -reach, reach)
         counts, limits = np.histogram(inside, bins, (-reach, reach))
@@ -130,15 +190,28 @@ class Deviation(Frozen):
         }
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file: ``.ply`` has the scan in colours, blue below the part and orange above.
+        """Write to a file, in the format given by its extension.
 
-        A picture (``.png``, ``.pdf``, ``.svg`` or ``.jpg``) has the scan in colours and the histogram. A ``.csv`` has a
-        line for each point: position, deviation, the nearest place.
+        Parameters
+        ----------
+        path : str or path
+            ``.ply``: the scan in colours, blue below the part and orange above. ``.png``, ``.pdf``, ``.svg``, ``.jpg``:
+            a picture of it with the histogram. ``.csv``: a line for each point with its position, deviation and nearest
+            place.
 
         Raises
         ------
         FileFormatError
             If the format is another, or the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> scan, part = sh.samples.sphere(2, radius=1.1), sh.samples.sphere(4)
+        >>> off = sh.deviation(scan, part)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     off.save(f"{folder}/off.csv")
         """
         pictures.save_deviation(self, path)
 

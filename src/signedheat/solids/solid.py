@@ -201,6 +201,16 @@ class Solid(Displayed, Represented, Frozen):
     def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
         """(...) whether (..., 3) points are inside.
 
+        Parameters
+        ----------
+        points : (..., 3) float
+            Positions, in the units of the shape.
+
+        Returns
+        -------
+        (...) bool
+            True inside.
+
         Examples
         --------
         >>> from signedheat import complete, samples
@@ -212,6 +222,16 @@ class Solid(Displayed, Represented, Frozen):
 
     def closest(self, points: ArrayLike) -> Closest:
         """The nearest place for each of (..., 3) points.
+
+        Parameters
+        ----------
+        points : (..., 3) float
+            Positions, in the units of the shape.
+
+        Returns
+        -------
+        Closest
+            Places, distances, gradients, faces and confidence, an array of the shape (...) or (..., 3) each.
 
         Raises
         ------
@@ -486,6 +506,16 @@ class Solid(Displayed, Represented, Frozen):
             If the format is unknown, or the file cannot be written.
         GeometryError
             If a surface is to be written, and nothing is inside.
+
+        Parameters
+        ----------
+        path : str or path
+            ``.npz``.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is another, or the file cannot be written.
 
         Examples
         --------
