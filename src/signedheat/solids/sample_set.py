@@ -57,7 +57,20 @@ class Samples:
     radius: float
 
     def normalized(self) -> Samples:
-        """The same of the shape moved and scaled into the unit sphere; `center` and `radius` stay those it had."""
+        """The same of the shape moved and scaled into the unit sphere; `center` and `radius` stay those it had.
+
+        Returns
+        -------
+        Samples
+            With points and distances in units of the radius.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> taken = sh.complete(sh.samples.sphere(2, radius=5.0)).sample(10)
+        >>> bool(np.abs(taken.normalized().points).max() < 2 < np.abs(taken.points).max())
+        True
+        """
         points, distances = (self.points - self.center) / self.radius, self.distances / self.radius
         return replace(self, points=points, distances=distances)
 

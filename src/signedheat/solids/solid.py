@@ -420,6 +420,29 @@ class Solid(Displayed, Represented, Frozen):
     ) -> TriangleMesh:
         """The surface at a distance, which may vary, with round or with mitred edges: `signedheat.offset` of this.
 
+        Parameters
+        ----------
+        distance : float, (n,) float, or callable
+            Positive outside, in the units of the shape; as for `signedheat.offset`.
+        corners : "round", "mitre" or "sharp"
+            What becomes of edges that the surface moves away from.
+        resolution : int
+            Nodes along the longest side.
+        spacing : float or (3,) float, optional
+            Distance between nodes, instead of a resolution.
+        progress : callable, optional
+            Called as ``progress(fraction, text)``.
+
+        Returns
+        -------
+        TriangleMesh
+            Closed and manifold.
+
+        Raises
+        ------
+        GeometryError
+            If nothing of the solid is left at this distance.
+
         Examples
         --------
         >>> from signedheat import complete, samples
@@ -435,6 +458,22 @@ class Solid(Displayed, Represented, Frozen):
         self, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = (0.05, 0.0158), seed: int = 0
     ) -> Samples:
         """Points with distances and gradients, near the surface and all around it: `signedheat.sample` of this.
+
+        Parameters
+        ----------
+        n : int
+            Number of points.
+        near : float
+            Share of them near the surface.
+        widths : sequence of float
+            Standard deviations of the noise, over the radius of the shape.
+        seed : int
+            Of the random numbers.
+
+        Returns
+        -------
+        Samples
+            The same for the same seed.
 
         Examples
         --------
@@ -476,11 +515,46 @@ class Solid(Displayed, Represented, Frozen):
         return booleans.difference(self, other) if isinstance(other, Solid) else NotImplemented
 
     def field_on(self, field: GridField[Literal[3]]) -> GridField[Literal[3]]:
-        """Distance at the nodes that a field has, in a band or everywhere."""
+        """Distance at the nodes that a field has, in a band or everywhere.
+
+        Parameters
+        ----------
+        field : GridField
+            In space.
+
+        Returns
+        -------
+        GridField
+            With a value at the same nodes.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> ball, cube = complete(samples.sphere(2)), complete(samples.sphere(1, radius=0.5))
+        >>> ball.field_on(cube.field(resolution=8)).grid.shape
+        (8, 8, 8)
+        """
         return self.field(grid=field.grid, band=None if field.blocks is None else field.width)
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """As a `pyvista.PolyData`: `boundary`."""
+        """Convert `boundary` to PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            Triangles.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> complete(samples.sphere(1)).to_pyvista().n_cells
+        80
+        """
         return self.boundary.to_pyvista()
 
     def __repr__(self) -> str:
