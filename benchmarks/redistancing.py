@@ -39,24 +39,13 @@ def shapes(n: int, dimension: int, rng: np.random.Generator) -> dict[str, tuple[
 
 
 def around(n: int, dimension: int, rng: np.random.Generator) -> dict[str, tuple[Array, Array, bool]]:
-    """Arrays with walls or on periodic axes, their distances, and whether axes are periodic."""
+    """Arrays on periodic axes, their distances, and whether axes are periodic."""
     axes = [np.arange(n) - (n - 1) // 2] * dimension
     points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).astype(float)
     middle = rng.uniform(-0.5, 0.5, dimension) * n
     ball = np.linalg.norm((points - middle + n / 2) % n - n / 2, axis=-1) - 0.2 * n
-    beside = np.zeros(dimension)
-    beside[:2] = -0.25 * n + rng.uniform(-0.5, 0.5), -0.2 * n
-    flat = np.linalg.norm(points[..., :2] - beside[:2], axis=-1)  # the same along the third axis
-    wall = (points[..., 0] == 0) & (points[..., 1] <= 0)
-    corner, far = np.array([[-0.5, 0.5], [0.5, 0.5]]), points[..., 0] > 0
-    seen = (0.5 - beside[1]) * (points[..., 0] - beside[0]) < (points[..., 1] - beside[1]) * (-0.5 - beside[0])
-    past = np.linalg.norm(points[..., :2] - corner[1], axis=-1) + 1.0
-    steep = (points[..., 1] - 0.5) > 0  # over the first corner only
-    bent = np.where(steep, np.linalg.norm(points[..., :2] - corner[0], axis=-1), past)
-    way = np.where(far & ~seen, bent + np.linalg.norm(corner[0] - beside[:2]), flat) - 0.1 * n
     return {
         "ball, periodic": (ball, ball, True),
-        "cylinder, around a wall": (np.ma.masked_array(way, wall), way, False),
     }
 
 

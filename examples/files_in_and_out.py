@@ -1,14 +1,13 @@
 """Files in and out
 ================
 
-A shape, a mask, a drawing, curves on a surface, an image of labels: each is read from its file, and what is made of it
+A shape, a drawing, curves on a surface, an image of labels: each is read from its file, and what is made of it
 is written again.
 """
 
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 import signedheat as sh
 from signedheat import samples, view
@@ -26,12 +25,9 @@ def main(folder: Path) -> float:
     sh.io.write_vdb(sdf, folder / "ball.vdb")
     view.save_scene(ball, folder / "ball.png")
 
-    image = np.full((60, 80), 255, dtype=np.uint8)
-    image[15:45, 30:34] = image[:10, 60:64] = 0
-    Image.fromarray(image).save(folder / "walls.png")
-    line = sh.Polyline([[5.0, 55.0], [5.0, 5.0]])
-    sh.io.write_polylines(folder / "line.svg", line)
-    round_walls = sh.signed_distance(sh.io.read_polylines(folder / "line.svg"), sh.io.read_mask(folder / "walls.png"))
+    square = sh.Polyline([[5.0, 55.0], [5.0, 5.0], [55.0, 5.0], [55.0, 55.0]], closed=True)
+    sh.io.write_polylines(folder / "square.svg", square)
+    from_square = sh.signed_distance(sh.io.read_polylines(folder / "square.svg"), resolution=64)
 
     globe = samples.sphere(3)
     (folder / "coast.csv").write_text(
@@ -48,7 +44,7 @@ def main(folder: Path) -> float:
     view.save_row(
         folder / "files_in_and_out.png",
         ("ball.ply, in millimetres", sdf, {"across": (1,), "levels": [2.54]}),
-        ("walls.png", round_walls, {"shape": line}),
+        ("square.svg", from_square, {"shape": square}),
         ("coast.csv", along, {"sources": coast, "view": np.array([0.9, -0.4, 0.2])}),
         ("labels.npy", organ.to_world(organ.surface(3))),
     )

@@ -1,7 +1,8 @@
 """A floor plan: distance round walls
 ==================================
 
-A floor plan: distance of every point from the north wall of a hall, through doors and around their posts.
+A floor plan: distance of every point from the north wall of a hall, through doors and around their posts. The floor is
+a surface in the plane: squares where there is no wall.
 """
 
 from pathlib import Path
@@ -24,26 +25,31 @@ X.......X...........X...X
 X.......X...........X...X
 XXXXXXXXXXXXXXXXXXXXXXXXX
 """
-METRE = 8
-"""Nodes along a letter of the plan, which stands for a square of one metre."""
-NORTH = 10.0 - 0.5 / METRE
-"""Where the last nodes before the north wall are."""
-EXPECTED = (NORTH - 6.0 + np.hypot(1.5, 4.5), 0.1)
+NORTH = 9.9
+"""Where the line along the north wall is, in metres; a letter of the plan is a square of one metre."""
+EXPECTED = (NORTH - 6.0 + np.hypot(1.5, 4.5), 0.001)
 """Straight from the wall to the post of the middle door, at (11, 6), and on to a place in a corner of the room."""
 
 
 def main(folder: Path) -> float:
     """Write the field and a picture; return the distance of a place in the middle room, in metres."""
     rows = np.array([list(row) for row in PLAN.split()])
-    walls = np.kron(rows[::-1].T == "X", np.ones((METRE, METRE), dtype=bool))
-    grid = sh.Grid(origin=(0.5 / METRE, 0.5 / METRE), spacing=1 / METRE, shape=walls.shape, mask=walls)
-    north = sh.Polyline([[24.0, NORTH], [1.0, NORTH]])  # westward, so that the rooms lie to its left
+    floor = squares(np.kron(rows[::-1].T != "X", np.ones((4, 4), dtype=bool)), 0.25)
+    north = floor.polyline([[24.0, NORTH, 0], [1.0, NORTH, 0]])  # westward, so that the rooms lie to its left
 
-    phi = sh.signed_distance(north, grid)
+    phi = sh.signed_distance(north, floor)
 
-    phi.save(folder / "floor_plan.npz")
-    view.save_slices(phi, folder / "floor_plan.png", north)
-    return float(phi([[9.5, 1.5]])[0])
+    phi.save(folder / "floor_plan.ply")
+    above = {"sources": [north], "view": np.array([0.0, 0.0, 1.0])}
+    view.save_row(folder / "floor_plan.png", ("distance from the north wall, in metres", phi, above))
+    return float(phi([[9.5, 1.5, 0]])[0])
+
+
+def squares(is_free: np.ndarray, side: float) -> sh.PolygonMesh:
+    """The free ones of some squares in the plane as a mesh."""
+    corners = np.argwhere(is_free)[:, None] + [[0, 0], [1, 0], [1, 1], [0, 1]]
+    points, ids = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+    return sh.PolygonMesh(np.pad(side * points, ((0, 0), (0, 1))), ids.reshape(-1, 4))
 
 
 if __name__ == "__main__":

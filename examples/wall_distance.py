@@ -25,19 +25,25 @@ def main(folder: Path) -> float:
 
     walls = sh.Polyline.from_mask(solid, spacing=grid.spacing)
     to_walls = ~sh.signed_distance([line.reversed() for line in walls], grid)
-    inlet = sh.Polyline([[0.05, 1.1], [0.05, 0.1]])
-    from_inlet = sh.signed_distance(inlet, sh.Grid(grid.origin, grid.spacing, grid.shape, mask=solid))
-
-    figure = view.new_figure(9.0, 7.0)
     free = sh.GridField(grid, np.where(solid, np.nan, np.abs(to_walls.values)))
-    for k, (title, field) in enumerate(
-        [("to the nearest wall", free), ("from the inlet, round the blocks", from_inlet)]
-    ):
-        axes = figure.add_subplot(2, 1, k + 1)
-        view.draw_plane(field, axes, inlet if k else None)
-        axes.set_title(title)
-    figure.savefig(folder / "wall_distance.png")
+
+    channel = squares(~solid[::4, ::4], 0.05)
+    inlet = channel.polyline([[0.05, 1.1, 0.0], [0.05, 0.15, 0.0]])
+    from_inlet = sh.signed_distance(inlet, channel)
+
+    view.save_row(
+        folder / "wall_distance.png",
+        ("to the nearest wall", free),
+        ("from the inlet, round the blocks", from_inlet, {"sources": [inlet], "view": np.array([0.0, 0.0, 1.0])}),
+    )
     return float(np.nanmax(free.values[x < 0.6]))
+
+
+def squares(is_free: np.ndarray, side: float) -> sh.PolygonMesh:
+    """The free ones of some squares in the plane as a mesh."""
+    corners = np.argwhere(is_free)[:, None] + [[0, 0], [1, 0], [1, 1], [0, 1]]
+    points, ids = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+    return sh.PolygonMesh(np.pad(side * points, ((0, 0), (0, 1))), ids.reshape(-1, 4))
 
 
 if __name__ == "__main__":

@@ -143,16 +143,6 @@ def grid_around_balls(n):
     return sh.Grid((-1.6, -1.6, -1.6), 0.1, (33 + 40 * (n - 1), 33, 33))
 
 
-def walled_grid_around_balls(n):
-    """Solid corners, behind which nothing lies, and solid walls between copies."""
-    whole = grid_around_balls(n)
-    x, y, z = positions(whole).T
-    from_middle = np.abs((x + APART / 2) % APART - APART / 2)
-    corners = (np.minimum(np.abs(y), np.abs(z)) > 1.15) & (from_middle > 1.15)
-    solid = corners | (from_middle > 1.75)
-    return sh.Grid(whole.origin, whole.spacing, whole.shape, solid.reshape(whole.shape))
-
-
 def moved_mesh(domain, scale, shift):
     cells = {sh.TriangleMesh: "faces", sh.PolygonMesh: "polygons", sh.TetMesh: "tets"}[type(domain)]
     return type(domain)(scale * domain.vertices @ TURN.T + shift, getattr(domain, cells))
@@ -168,9 +158,8 @@ def moved_voxels(domain, scale, shift):
 
 
 def moved_grid(domain, scale, shift):
-    mask = None if domain.mask is None else np.moveaxis(domain.mask, 0, 2)
     shape = (*domain.shape[1:], domain.shape[0])
-    return sh.Grid(scale * domain.origin @ TURN.T + shift, scale * domain.spacing, shape, mask)
+    return sh.Grid(scale * domain.origin @ TURN.T + shift, scale * domain.spacing, shape)
 
 
 def mixed_mesh(domain, rng):
@@ -193,5 +182,4 @@ KINDS = {
     "voxels": Surface(voxels_of_balls, moved_voxels),
     "tets": Space(tets_around_balls, moved_mesh, mixed_mesh),
     "grid": Space(grid_around_balls, moved_grid, deviation=0.015),
-    "walled grid": Space(walled_grid_around_balls, moved_grid, deviation=0.015),
 }

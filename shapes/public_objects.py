@@ -15,8 +15,6 @@ BALL = samples.sphere(1)
 RING = BALL.level_set(BALL.vertices[:, 2], 0.1)
 BOX = boxes((2, 2, 2), 1.0)
 INNER = sh.TriangleMesh(0.4 * BALL.vertices + 1, BALL.faces)
-WALL = np.zeros((9, 9, 9), dtype=bool)
-WALL[0] = True
 
 
 def triangles() -> sh.TriangleMesh:
@@ -53,10 +51,6 @@ def grid() -> sh.Grid:
     return sh.Grid((-2, -2, -2), 0.5, (9, 9, 9))
 
 
-def walled_grid() -> sh.Grid:
-    return sh.Grid((-2, -2, -2), 0.5, (9, 9, 9), WALL)
-
-
 def triangulation() -> sh.IntrinsicTriangulation:
     return sh.intrinsic_delaunay(BALL, keep=RING, refine=True)
 
@@ -89,7 +83,6 @@ SOLVERS: dict[str, Callable[[], sh.SignedHeatSolver]] = {
     "voxels": lambda: used(voxels(), curve_on(voxels())),
     "tets": lambda: used(tets(), INNER),
     "grid": lambda: used(grid(), BALL),
-    "walled grid": lambda: used(walled_grid(), BALL),
 }
 
 SOURCES: dict[str, Callable[[], object]] = {
@@ -101,7 +94,6 @@ SOURCES: dict[str, Callable[[], object]] = {
     "voxels": lambda: curve_on(voxels()),
     "tets": lambda: INNER,
     "grid": lambda: BALL,
-    "walled grid": lambda: BALL,
 }
 
 OBJECTS: dict[str, Callable[[], object]] = {
@@ -111,7 +103,6 @@ OBJECTS: dict[str, Callable[[], object]] = {
     "voxels": voxels,
     "tets": tets,
     "grid": grid,
-    "walled grid": walled_grid,
     "triangulation": triangulation,
     "polyline": lambda: sh.Polyline([[0, 0], [1, 0], [1, 1]]),
     "curve": lambda: RING[0],
@@ -121,7 +112,6 @@ OBJECTS: dict[str, Callable[[], object]] = {
     "triangulation's field": lambda: sh.SignedHeatSolver(triangulation()).distance(RING),
     "tet field": lambda: sh.SignedHeatSolver(BOX).distance(INNER),
     "grid field": lambda: sh.SignedHeatSolver(grid()).distance(BALL),
-    "walled grid's field": lambda: sh.SignedHeatSolver(walled_grid()).distance(BALL),
     "solid": lambda: sh.signed_distance(BALL, resolution=16),
     "piecewise field": lambda: sh.piecewise_distance(BALL, BALL.path([0, 5])),
     "orientation": lambda: sh.orientation(BALL),

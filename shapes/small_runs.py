@@ -49,10 +49,6 @@ def runs() -> dict[str, np.ndarray]:
     field = sh.SignedHeatSolver(tets).distance(broken)
     found["tets"] = field.values
     found["sharpened tets"] = sh.sharpen(field).values
-    walls = np.zeros((9, 9), dtype=bool)
-    walls[4, :6] = True
-    line = sh.Polyline([[0.5, 0.2], [0.2, 7.5]])
-    found["walls"] = sh.SignedHeatSolver(sh.Grid((0, 0), 1.0, (9, 9), walls)).distance(line).values
     return {name: np.asarray(values, dtype=np.float64).ravel() for name, values in found.items()}
 
 

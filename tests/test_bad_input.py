@@ -332,7 +332,6 @@ VOLUME = [
     ("arc.csv -o out.npz --origin 0 --spacing 1 --shape 5 5", 2, "--origin: 2"),
     ("arc.csv -o out.npz --origin 0 0 --spacing 1 --shape 5", 2, "--shape: 2"),
     ("ball.ply -o out.vtu --tets --spacing 0.1", 2, "--tets"),
-    ("ball.ply -o out.vtu --tets --mask x.npy", 2, "--mask"),
     ("ball.ply -o out.vtu --tets ball.ply", 1, "holds no tets"),
 ]
 OTHERS = [

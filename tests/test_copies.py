@@ -103,7 +103,7 @@ def test_copies_of_used_solvers_compute_the_same(name, way):
     np.testing.assert_array_equal(twin.distance(sources).values, solver.distance(sources).values)
 
 
-@pytest.mark.parametrize("name", ["triangles", "tets", "walled grid"])
+@pytest.mark.parametrize("name", ["triangles", "tets"])
 def test_the_discretization_of_a_used_solver_can_be_pickled(name):
     discretization = SOLVERS[name]().discretization
     twin = pickle.loads(pickle.dumps(discretization))

@@ -31,7 +31,6 @@ USES = {
     "matplotlib": lambda folder: save_scene(CUBE, folder / "scene.png"),
     "svgpathtools": lambda folder: sh.io.read_polylines(folder / "line.svg"),
     "nrrd": lambda folder: sh.load_field(folder / "phi.nrrd"),
-    "PIL": lambda folder: sh.io.read_mask(folder / "walls.png"),
     "skimage": lambda folder: sh.GridField(sh.Grid([0, 0], 1, [3, 3]), np.eye(3) - 0.5).contour(0.0),
 }
 """What needs each package that may be missing."""
@@ -51,7 +50,7 @@ FILES = {
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "line.svg").write_text(SVG)
-    for name in ("phi.nrrd", "walls.png", "labels.nii", *FILES):
+    for name in ("phi.nrrd", "labels.nii", *FILES):
         (tmp_path / name).write_bytes(b"anything but empty")
     return tmp_path
 

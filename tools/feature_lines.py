@@ -28,7 +28,6 @@ FEATURES: dict[str, tuple[str, ...]] = {
     "distance that jumps (piecewise)": ("curves.piecewise", "curves.jumps", "fields.piecewise_field"),
     "point clouds": ("domains.point_cloud.PointCloud", "io.points", "orientations.points"),
     "voxels and labels": ("domains.digital_surface.DigitalSurface", "io.voxels", "operators.surface_nets"),
-    "grids with walls": ("lowering.grid.masked", "operators.grid.walls"),
     "drawings in the plane": ("domains.polyline.Polyline", "curves.plane", "io.polylines"),
     "polygon meshes": ("domains.polygon_mesh.PolygonMesh", "geometry.virtual_refinement"),
     "morphology": ("morphology",),

@@ -533,7 +533,7 @@ def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
 
 def _field(shape: Sources, domain: Domain) -> Field:
     """The distance whose level sets are the offsets: that to a solid, where the domain is a grid in space."""
-    if isinstance(domain, Grid) and domain.dimension == 3 and domain.mask is None:
+    if isinstance(domain, Grid) and domain.dimension == 3:
         return signed_distance(shape, domain)
     return _sided(domain, shape)
 

@@ -193,40 +193,6 @@ def test_close_completes_curves(ball, capsys):
     assert "no such file" in fail(capsys, "close", ball / "ball.ply", ball / "none.csv", "-o", out)
 
 
-def test_walls_come_from_pictures_and_volumes(tmp_path, capsys):
-    """A room of 40 by 30 pixels with a wall from below, y upwards; and the same wall in space."""
-    from PIL import Image
-
-    picture = np.full((30, 40), 255, dtype=np.uint8)
-    picture[10:, 20] = 0  # rows run downwards
-    Image.fromarray(picture).save(tmp_path / "room.png")
-    sh.io.write_polylines(tmp_path / "line.csv", sh.Polyline([[5.0, 29.0], [5.0, 0.0]]))
-    flat = ("volume", tmp_path / "line.csv", "--mask", tmp_path / "room.png", "-o", tmp_path / "phi.npz")
-    succeed(capsys, *flat, "--preview", tmp_path / "room.preview.png")
-    phi = sh.load_field(tmp_path / "phi.npz")
-    assert (np.isnan(phi.values) == phi.grid.mask).all()
-    assert phi.grid.mask.sum() == 20 and phi.grid.mask[20, :20].all()
-    assert phi([[30.0, 28.0]])[0] == pytest.approx(25, abs=0.3)
-    assert phi([[29.0, 1.0]])[0] == pytest.approx(15.5 + np.hypot(8.5, 18.5), abs=1.5)  # over the end of the wall
-    succeed(capsys, *flat, "--origin", "1", "2", "--spacing", "0.5")
-    assert sh.load_field(tmp_path / "phi.npz").grid.upper == pytest.approx([20.5, 16.5])
-
-    solid = np.zeros((12, 10, 8), dtype=np.uint8)
-    solid[6, :5] = 1
-    np.save(tmp_path / "room.npy", solid)
-    wall = sh.TriangleMesh([[2.3, -1, -1], [2.3, 20, -1], [2.3, -1, 20]], [[0, 1, 2]])
-    wall.save(tmp_path / "wall.stl")
-    succeed(capsys, "offset", tmp_path / "wall.stl", "4.4", "--mask", tmp_path / "room.npy", "-o", tmp_path / "at.stl")
-    assert sh.read(tmp_path / "at.stl").n_faces > 0
-    message = fail(capsys, *flat, "--resolution", "9", code=2)
-    assert "--mask" in message and "--resolution" in message
-    message = fail(capsys, "volume", tmp_path / "wall.stl", "--mask", tmp_path / "room.png", "-o", tmp_path / "x.vti")
-    assert "room.png" in message or "wall.stl" in message
-    (tmp_path / "bad.png").write_bytes(b"no picture")
-    message = fail(capsys, "volume", tmp_path / "line.csv", "--mask", tmp_path / "bad.png", "-o", tmp_path / "x.npz")
-    assert "bad.png" in message
-
-
 def test_intrinsic_triangles_for_meshes_with_large_angles(tmp_path, capsys):
     mesh = stretched_square(80, 30.0)
     mesh.save(tmp_path / "square.ply")

@@ -1,4 +1,4 @@
-"""Distance to the zero set of arrays: closed forms, rates, symmetries, walls, and arrays of nothing but signs."""
+"""Distance to the zero set of arrays: closed forms, rates, symmetries, and arrays of nothing but signs."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def test_edges_are_as_the_contour_has_them(dimension):
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 @pytest.mark.parametrize(("kind", "slack"), [("smooth", 0.03), ("noise", 0.35), ("signs", 0.35), ("integers", 0.35)])
 def test_symmetries(dimension, kind, slack):
-    """In rough arrays marching cubes has a preferred direction, and the nearest triangle may be missed."""
+    """In rough arrays marching cubes has a preferred direction."""
     rng = np.random.default_rng(dimension)
     values = rng.normal(size=(7, 9, 6)[:dimension])
     if kind == "smooth":
@@ -123,37 +123,12 @@ def test_a_periodic_axis_has_no_end():
     assert sh.redistance(np.roll(exact, 5, axis=0)).max() > sh.redistance(exact).max() + 3
 
 
-@pytest.mark.parametrize("masked", [True, False])
-def test_distance_leads_around_walls(masked):
-    """The wall is a cell thick, and ways bend at nodes beside its end: half a cell's diagonal off it."""
-    x, y = points = nodes(41, 2, 0.05)
-    values, wall = ball(points, 0.2, [-0.6, 0.0]), (np.abs(x) < 0.01) & (y > -0.51)
-    end = np.array([0.025, -0.525])
-    exact = np.hypot(0.6 - end[0], end[1]) - 0.2 + 2 * end[0] + np.hypot(x - end[0], y - end[1])
-    hidden = (x > 0.04) & (y > -0.5 * x / 0.6)
-    given = np.ma.masked_array(values, wall) if masked else np.where(wall, np.nan, values)
-    found = sh.redistance(given, 0.05)
-    assert isinstance(found, np.ma.MaskedArray) == masked
-    lost = found.mask if masked else np.isnan(found)
-    np.testing.assert_array_equal(lost, wall)
-    assert np.abs(np.asarray(found) - exact)[hidden].max() < np.sqrt(2) / 2 * 0.05
-    np.testing.assert_allclose(np.asarray(found)[x < -0.04], values[x < -0.04], atol=1e-3)
-
-
-def test_walls_without_a_way_around_part_what_is_known():
-    values = np.ma.masked_array([[1.0, 1.0, 5.0, 1.0, -1.0]], [[False, False, True, False, False]])
-    found = sh.redistance(values)
-    assert found.mask.tolist() == [[True, True, True, False, False]]
-    assert found.compressed().tolist() == [0.5, -0.5]
-    with refused(sh.errors.OutsideError):
-        sh.redistance(np.ma.masked_array([1.0, 0.0, -1.0], [False, True, False]))
-
-
 @pytest.mark.parametrize(("values", "options"), [
     ([1.0, 2.0], {}), ([[True, False]], {}), (np.ones((2,) * 5), {}), (3.0, {}), ([-1.0], {}), ([], {}),
     ([-1.0, np.inf], {}), ([-1.0, 1j], {}), (["a", "b"], {}), ([np.nan, np.nan], {}), ([-1.0, 1.0], {"spacing": 0.0}),
     ([-1.0, 1.0], {"spacing": [1.0, 1.0]}), ([-1.0, 1.0], {"periodic": [True, True]}),
-    ([-1.0, 1.0], {"periodic": "yes"}), ([-1.0, np.nan, 1.0, 1.0], {"periodic": True}),
+    ([-1.0, 1.0], {"periodic": "yes"}), ([-1.0, np.nan, 1.0, 1.0], {}),
+    (np.ma.masked_array([-1.0, 0.0, 1.0], [False, True, False]), {}),
 ])  # fmt: skip
 def test_what_has_no_distance_is_refused(values, options):
     with refused(sh.errors.SignedHeatError):
@@ -183,4 +158,7 @@ def test_periodic_arrays_are_like_repeated_ones(shape):
     steps = 0.5 + 0.25 * np.arange(len(shape))
     thrice = sh.redistance(np.tile(values, [3] * len(shape)), steps)
     middle = thrice[tuple(slice(n, 2 * n) for n in shape)]
-    np.testing.assert_allclose(sh.redistance(values, steps, periodic=True), middle, atol=1e-9)
+    # where two places are equally near, either may be taken, and the touching circles there differ a little
+    found = sh.redistance(values, steps, periodic=True)
+    np.testing.assert_allclose(found, middle, atol=0.05 * steps.min())
+    assert np.mean(np.abs(found - middle) < 1e-9) > 0.99

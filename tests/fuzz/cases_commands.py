@@ -49,7 +49,7 @@ PLAIN = ("0.1", "0.25", "1", "2", "3", "-0.2", "1e-6", "1e6", "0.5")
 NAMES = ("shape", "a shape", "-shape", "größe", "形", "100%", "{x}", "a'b\"c", "x" * 200, "+1", "a.b", "[1-3]*", "#")
 SIZES = (1.0, 1.0, 1.0, 1e-9, 1e9, 1e-3, 1e3, 1e-30, 1e30)
 PLACES = (0.0, 0.0, 0.0, 1.0, 1e7, -1e12)
-RARE = ("help", "scheduler", "version", "workers", "tiles", "label", "mask", "transform", "units", "shape", "origin")
+RARE = ("help", "scheduler", "version", "workers", "tiles", "label", "transform", "units", "shape", "origin")
 VALUES: dict[str, tuple[str, ...]] = {
     "resolution": ("2", "3", "8", "12", "16", "1", "1000000", "8.0"),
     "samples": ("1", "2", "50", "100"),
@@ -70,7 +70,6 @@ VALUES: dict[str, tuple[str, ...]] = {
     "preview": ("picture.png", "picture.xyz", "missing/picture.png", "picture"),
     "tets": ("", "tets.mesh", "missing.mesh"),
     "curves": ("curves.csv", "missing.json"),
-    "mask": ("mask.npy", "missing.npy", "shape.stl"),
     "tiles": ("tiles", "missing/tiles", "curves.csv"),
     "seed": ("0", "1", "-1", "9999999999999999999999"),
 }  # fmt: skip
@@ -213,7 +212,6 @@ def _files_beside(random: Random, folder: Path) -> None:
     plane = sh.Grid([0.0, 0.0], 1.0, [4, 5])
     sh.GridField(plane, random.normal(size=(4, 5))).save(folder / "plane.npz")
     sh.VertexField(ball, ball.vertices[:, 0]).save(folder / "on_ball.npz")
-    np.save(folder / "mask.npy", random.random((4, 4, 4)) < 0.3)
     sh.TetMesh(np.eye(4)[:, :3], [[0, 1, 2, 3]]).save(folder / "tets.mesh")
 
 

@@ -232,15 +232,6 @@ def read_labelled(path: Path) -> sh.io.LabelImage:
 
 
 @cache
-def masks() -> list[Files]:
-    """Pictures."""
-    from PIL import Image
-
-    pixels = np.random.default_rng(1).integers(0, 2, (12, 9), dtype=np.uint8) * 255
-    return [written(Image.fromarray(pixels).save, f"mask.{ending}") for ending in ("png", "bmp", "tif")]
-
-
-@cache
 def lines() -> list[Files]:
     """Polylines in the plane."""
     square = sh.Polyline([[0, 0], [0, 1], [1, 1], [1, 0]], closed=True)
@@ -273,7 +264,6 @@ KINDS: dict[str, tuple[Callable[[Path], Any], Callable[[], list[Files]]]] = {
     "tet fields": (sh.load_field, lambda: [f for f in tets() if b"signed_distance" in next(iter(f.values()))]),
     "fields": (sh.load_field, fields),
     "volumes": (sh.read, volumes),
-    "masks": (sh.io.read_mask, masks),
     "labels": (read_labelled, labels),
     "lines": (sh.io.read_polylines, lines),
     "curves": (lambda path: sh.io.read_curves(path, BALL), curves),

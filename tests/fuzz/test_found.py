@@ -93,8 +93,6 @@ FOUND = [
     ("commands", 1130, 4932), ("commands", 1130, 5694),
     # parts of a surface far smaller than the width over which jumps are smoothed
     ("surface piecewise", 1145, 3772),
-    # a picture of 230 bytes that announces 75 million pixels
-    ("files masks", 20261122, 753),
     # arguments that are quoted, compared or counted
     ("arguments", 100, 6), ("arguments", 100, 88), ("arguments", 100, 152), ("arguments", 100, 211),
     ("arguments", 206, 22), ("arguments", 108, 89), ("arguments", 102, 126), ("arguments", 103, 15),

@@ -136,13 +136,6 @@ def test_what_cannot_fit_is_refused_before_it_is_allocated():
         complete(SHAPES["brick"]()).field(resolution=30_000)
 
 
-def test_grids_with_walls_are_refused():
-    mask = np.zeros((4, 4, 4), dtype=bool)
-    mask[0] = True
-    with pytest.raises(sh.errors.UnsupportedTypeError):
-        complete(SHAPES["brick"]()).field(grid=sh.Grid((0, 0, 0), 0.1, (4, 4, 4), mask))
-
-
 def assert_same_nodes(band, whole):
     """Where a band has a node, it has the value of the whole grid; and all nodes as near as its width are there."""
     held = np.full(whole.grid.shape, np.nan)

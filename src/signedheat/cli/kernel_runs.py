@@ -58,15 +58,9 @@ def reports() -> None:
 
 
 def plane() -> None:
-    """Lines in the plane, with and without walls."""
+    """Lines in the plane."""
     line = Polyline([[0.5, 0.2], [0.2, 7.5]])
-    walls = np.zeros((9, 9), dtype=bool)
-    walls[4, :6] = True
-    signed_distance(line, Grid((0, 0), 1.0, (9, 9), walls))
     signed_distance(line, Grid((0, 0), 1.0, (9, 9))).contour(0.0)
-    solid_walls = np.zeros((7, 7, 7), dtype=bool)
-    solid_walls[3, :5] = True
-    signed_distance(samples.sphere(1, 2.0, (3, 3, 3)), Grid((0, 0, 0), 1.0, (7, 7, 7), solid_walls))
 
 
 def curves() -> None:

@@ -36,7 +36,7 @@ UNITS = ("micron", "mm", "millimeter", "cm", "centimeter", "inch", "foot", "m", 
 CONSTRAINTS = ("free", "zero-set", "hard", "each-component")
 """Names of the constraints that have no number."""
 ABSENT: Mapping[str, Any] = {
-    **dict.fromkeys(("origin", "grid_shape", "mask", "spacing", "padding", "resolution", "band", "preview")),
+    **dict.fromkeys(("origin", "grid_shape", "spacing", "padding", "resolution", "band", "preview")),
     **dict.fromkeys(("tiles", "workers", "scheduler", "label", "units", "transform")),
     **dict.fromkeys(("as_oriented", "keep_overlaps", "plain"), False),
     "constraint": "zero-set",
@@ -170,7 +170,7 @@ def group(title: str, *options: Option) -> Group:
     return Group(title, options)
 
 
-INPUTS = ("shape", "mesh", "field", "file", "files", "inputs", "curves", "scan", "nominal", "mask", "tets")
+INPUTS = ("shape", "mesh", "field", "file", "files", "inputs", "curves", "scan", "nominal", "tets")
 """Arguments that may name a file that is read."""
 
 
@@ -341,12 +341,6 @@ GRID = group(
         dest="grid_shape",
         help="its nodes: NX NY NZ, or NX NY",
     ),
-    option(
-        "--mask",
-        metavar="FILE",
-        help="a grid with walls, which distance goes around (it is not sharpened then): .npy .nrrd .vti, solid where "
-        "not 0; in the plane also .png .bmp .tif, solid where dark",
-    ),
 )
 REPAIR = group(
     "steps (all taken by default)",
@@ -439,14 +433,13 @@ def check_grid(arguments: Namespace) -> None:
     ):
         if numbers is not None and len(numbers) not in counts:
             error(f"argument {name}: {' or '.join(map(str, counts))} numbers, not {len(numbers)}")
-    refuse_together(arguments, "--mask", "--resolution", "--padding", "--shape", "--band")
     refuse_together(arguments, "--origin", "--resolution", "--padding")
     refuse_together(arguments, "--spacing", "--resolution")
     refuse_together(arguments, "--band", "--plain")
     refuse_together(arguments, "--scheduler", "--workers")
     if arguments.band is not None and dimension == 2:
         error("--band is for shapes in space")
-    if arguments.mask is None and (arguments.origin, arguments.grid_shape) != (None, None) and None in own:
+    if (arguments.origin, arguments.grid_shape) != (None, None) and None in own:
         error("a grid of your own needs all of --origin, --spacing and --shape")
 
 

@@ -33,7 +33,6 @@ from ..io import (
     ensure_writable,
     load_field,
     read,
-    read_mask,
     read_polylines,
     save,
     write_polylines,
@@ -133,9 +132,6 @@ def grid_for(shape: Any, arguments: Namespace, reach: float | None = None, image
     spacing = arguments.spacing
     if spacing is not None and len(spacing) == 1:
         spacing = spacing[0]
-    if arguments.mask is not None:
-        with prefix_errors(arguments.mask):
-            return read_mask(arguments.mask, origin=arguments.origin, spacing=spacing)
     if arguments.origin is not None:
         return Grid(arguments.origin, spacing, arguments.grid_shape)
     if image is not None and (arguments.resolution, spacing, arguments.padding) == (None, None, None):

@@ -52,7 +52,7 @@ DISTANCES = {
 
 def check_volume(arguments: Namespace) -> None:
     """Reject options that contradict each other."""
-    refuse_together(arguments, "--tets", "--spacing", "--origin", "--shape", "--mask", "--band")
+    refuse_together(arguments, "--tets", "--spacing", "--origin", "--shape", "--band")
     if arguments.tets:  # a mesh of one's own
         refuse_together(arguments, "--tets", "--resolution", "--padding")
     check_tiles(arguments)

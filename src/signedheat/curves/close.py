@@ -174,8 +174,7 @@ def beyond_the_rim(triangles: IntrinsicMesh, values: NDArray[np.float64]) -> Non
         """Sum of the signs at the other ends of edges from each row."""
         tail, head = np.concatenate([edges, edges[:, ::-1]]).T
         out = in_row[tail] & ~zero[head]
-        sums: NDArray[np.float64] = np.bincount(row[tail[out]], np.sign(values[head[out]]), len(values)).astype(float)
-        return sums
+        return np.bincount(row[tail[out]], np.sign(values[head[out]]), len(values)).astype(float)
 
     beyond, nearby = neighbor_signs(rim), neighbor_signs(ends)
     long = np.bincount(row[in_row], minlength=len(values)) > 1

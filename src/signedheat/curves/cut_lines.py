@@ -77,8 +77,7 @@ def without_twigs(edges: NDArray[np.int64], high: NDArray[np.bool_]) -> NDArray[
         chains = assemble_polylines(once[left, 0], once[left, 1], directed=False)
         low = [chain for chain, _, _ in chains if not keeps[left[chain]].any()]
         if not low:
-            result: NDArray[np.bool_] = np.isin(which.ravel(), left)
-            return result
+            return np.isin(which.ravel(), left)
         left = np.delete(left, np.concatenate(low))
 
 
@@ -110,8 +109,7 @@ def is_continuous(
 def gradients(triangles: IntrinsicMesh, at_corners: NDArray[np.float64]) -> NDArray[np.complex128]:
     """(m,) gradients of functions that are linear in every face, in its layout."""
     opposite = 1j * np.roll(triangles.edge_vectors, -1, axis=1)
-    result: NDArray[np.complex128] = (at_corners * opposite).sum(axis=1) / (2.0 * triangles.areas_as_divisors)
-    return result
+    return (at_corners * opposite).sum(axis=1) / (2.0 * triangles.areas_as_divisors)
 
 
 def smoothed(

@@ -90,8 +90,7 @@ class Pieces:
 
     def curves(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Numbers of the curves that make up the strokes chosen by (k,) bool."""
-        result: NDArray[np.int64] = self.numbers[chosen[self.stroke]]
-        return result
+        return self.numbers[chosen[self.stroke]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,5 +274,4 @@ def smooth_signs(strokes: Strokes, movable: NDArray[np.bool_]) -> NDArray[np.flo
     given = given / strokes.lengths.mean()
     weights = np.block([[agreed, given[:, None]], [given[None], np.zeros((1, 1))]])
     signs = best_signs(weights, np.ones(len(weights)))
-    result: NDArray[np.float64] = signs[:-1] * signs[-1]
-    return result
+    return signs[:-1] * signs[-1]

@@ -276,8 +276,7 @@ def conforming(
 def corner_slopes(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
     """(m, 3) ``Y_f · (q_k − centroid)``: φ at the corners, if it were zero at the centroid (constraint of Eq. 16)."""
     centroid = triangles.corner_positions.mean(axis=1, keepdims=True)
-    result: NDArray[np.float64] = (np.conj(directions)[:, None] * (triangles.corner_positions - centroid)).real
-    return result
+    return (np.conj(directions)[:, None] * (triangles.corner_positions - centroid)).real
 
 
 def jump_problem(
@@ -311,8 +310,7 @@ def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> N
         along = part.edges >= 0
         touched[triangles.edges.vertices[part.edges[along]]] = True
         touched[triangles.corner_vertices[part.faces[~along]]] = True
-    guarded: NDArray[np.bool_] = np.any(touched[triangles.edges.vertices], axis=1)
-    return guarded
+    return np.any(touched[triangles.edges.vertices], axis=1)
 
 
 def centered(
@@ -339,5 +337,4 @@ def centered(
     for here in np.split(order, 1 + np.flatnonzero(np.diff(label[face[order]]))):
         total = np.cumsum(weight[here])
         shift[label[face[here[0]]]] = height[here[np.searchsorted(total, 0.5 * total[-1])]]
-    result: NDArray[np.float64] = values - shift[label][:, None]
-    return result
+    return values - shift[label][:, None]

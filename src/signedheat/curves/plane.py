@@ -54,7 +54,7 @@ def distance_to_lines(
 
     Strokes are turned until they bound something together, and those left out that do not; the signed heat method
     decides the sides, and its zero set completes the lines. It runs on a grid around the drawing, however much or
-    little of it is asked for. On grids with solid nodes, and in other dimensions than two, lines are taken as they are,
+    little of it is asked for. In other dimensions than two, lines are taken as they are,
     and φ is returned as the method gives it.
     """
     if isinstance(constraint, EachComponent | LevelValues):
@@ -66,7 +66,7 @@ def distance_to_lines(
     if domain is None:
         domain = Grid.around(bounds_around(listed), resolution, padding, spacing)
     as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
-    if domain.mask is not None or domain.dimension != 2:
+    if domain.dimension != 2:
         return SignedHeatSolver(domain, diffusion, progress).distance(listed, constraint)
     note = None
     if not as_oriented and all(isinstance(line, Polyline) for line in listed):

@@ -121,8 +121,7 @@ class Strokes:
         middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
         halves = np.abs(corners.mean(axis=1, keepdims=True) - middles)
         total = np.bincount(triangles.edges.face_edges.ravel(), halves.ravel(), triangles.n_edges)
-        result: NDArray[np.float64] = STAIRS * total.astype(np.float64)
-        return result
+        return STAIRS * total.astype(np.float64)
 
     @cached_property
     def agreed(self) -> NDArray[np.float64]:
@@ -143,8 +142,7 @@ class Strokes:
             right = np.asfortranarray(fluxes[begin : begin + BLOCK].T.toarray())
             sides = surface.integration.factor.solve(right)
             result[:, begin : begin + BLOCK] = fluxes @ blur.solve(np.asfortranarray(masses @ sides))
-        symmetric: NDArray[np.float64] = 0.5 * (result + result.T)
-        return symmetric
+        return 0.5 * (result + result.T)
 
     def inside(self, signs: NDArray[np.float64]) -> Inside:
         """The sides of least energy for strokes with these directions, 0 if one is left out: a minimum cut."""

@@ -19,7 +19,6 @@ from .exchange import Displayed
 from .foreign import ForeignShape, Shape, as_shapes
 from .polyline import Polyline
 from .validation import (
-    array_of,
     coordinates,
     finite_number,
     frozen,
@@ -59,16 +58,11 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         Distance between neighbouring nodes along each axis, in the units of the shape.
     shape : (d,) int
         Number of nodes along each axis. Arrays on the grid are indexed ``[i, j, k]`` ↔ x, y, z.
-    mask : (*shape) bool, optional
-        Solid nodes: True where distance must not pass. Each is a box of one cell around the node, and distance is
-        measured around these boxes. Neighbouring free nodes along an axis are connected, diagonal ones are not: a wall
-        is tight if its nodes are connected along the axes, or, in the plane, diagonally.
 
     Raises
     ------
     GeometryError
-        If the spacing is not positive and finite, an axis has fewer than two nodes, or the mask is not boolean, has
-        another shape or leaves no node free.
+        If the spacing is not positive and finite, or an axis has fewer than two nodes.
 
     Examples
     --------
@@ -82,7 +76,6 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
     origin: NDArray[np.float64]
     spacing: NDArray[np.float64]
     shape: tuple[int, ...]
-    mask: NDArray[np.bool_] | None
 
     @overload
     def __init__(
@@ -90,7 +83,6 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         origin: ArrayLike,
         spacing: ArrayLike,
         shape: tuple[int, int, int],
-        mask: ArrayLike | None = None,
     ) -> None: ...
     @overload
     def __init__(
@@ -98,13 +90,10 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         origin: ArrayLike,
         spacing: ArrayLike,
         shape: tuple[int, int],
-        mask: ArrayLike | None = None,
     ) -> None: ...
     @overload
-    def __init__(
-        self: Grid[int], origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike, mask: ArrayLike | None = None
-    ) -> None: ...
-    def __init__(self, origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike, mask: ArrayLike | None = None) -> None:
+    def __init__(self: Grid[int], origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike) -> None: ...
+    def __init__(self, origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike) -> None:
         corner = np.atleast_1d(numbers(origin, "origin"))
         counts = np.atleast_1d(whole_numbers(shape, "shape"))
         if corner.ndim != 1 or not len(corner) or not np.isfinite(corner).all():
@@ -120,8 +109,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         refuse_extreme(np.minimum(corner, last), last, "nodes")
         refuse_lost_spacing(steps, corner, last)
         nodes = tuple(int(n) for n in counts)
-        solid = None if mask is None else _solid_nodes(mask, nodes)
-        vars(self).update(origin=frozen(corner), spacing=steps, shape=nodes, mask=solid)
+        vars(self).update(origin=frozen(corner), spacing=steps, shape=nodes)
 
     @classmethod
     def around(
@@ -237,7 +225,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         Returns
         -------
         pyvista.ImageData
-            With boolean point data ``solid`` if nodes are; a grid in the plane has z = 0.
+            A grid in the plane has z = 0.
 
         Raises
         ------
@@ -258,17 +246,13 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
                 element="grid",
             )
         flat = (0,) * (3 - self.dimension)
-        image = pyvista.ImageData(
+        return pyvista.ImageData(
             dimensions=(*self.shape, *(1 for _ in flat)), spacing=(*self.spacing, *flat), origin=(*self.origin, *flat)
         )
-        if self.mask is not None:
-            image.point_data["solid"] = self.mask.ravel(order="F")
-        return image
 
     def __repr__(self) -> str:
-        solid = "" if self.mask is None else f", {int(self.mask.sum())} solid nodes"
         step = self.spacing[0] if np.ptp(self.spacing) <= 1e-12 * self.spacing[0] else self.spacing
-        return f"Grid(origin={short(self.origin)}, spacing={short(step)}, shape={self.shape}{solid})"
+        return f"Grid(origin={short(self.origin)}, spacing={short(step)}, shape={self.shape})"
 
 
 def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = ROOM) -> float:
@@ -281,19 +265,6 @@ def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = ROOM) -> f
     """
     lower, upper = np.asarray(bounds, dtype=np.float64)
     return share * float((upper - lower).max()) + 1.05 * reach
-
-
-def _solid_nodes(mask: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    solid = np.array(array_of(mask, "mask"))
-    if solid.dtype != np.bool_ or solid.shape != shape:
-        raise GeometryError(
-            f"the mask must be boolean, of shape {shape}, not {solid.dtype} of shape {solid.shape}", element="mask"
-        )
-    if solid.all():
-        raise GeometryError(
-            "all nodes of the grid are solid: True in the mask means that no way leads through", element="mask"
-        )
-    return frozen(solid)
 
 
 def _box(bounds: Any) -> Any:

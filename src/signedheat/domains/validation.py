@@ -162,8 +162,7 @@ def shaped(values: NDArray[Scalar], shape: tuple[int, ...]) -> NDArray[Scalar]:
     >>> shaped(np.zeros((6, 4)), (2, 3)).shape, shaped(np.ones((1, 4)), ()), float(shaped(np.ones(1), ()))
     ((2, 3, 4), array([1., 1., 1., 1.]), 1.0)
     """
-    result: NDArray[Scalar] = values.reshape((*shape, *values.shape[1:]))[()]
-    return result
+    return values.reshape((*shape, *values.shape[1:]))[()]
 
 
 def refuse_lost_spacing(steps: NDArray[np.float64], first: NDArray[np.float64], last: NDArray[np.float64]) -> None:

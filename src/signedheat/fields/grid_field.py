@@ -47,8 +47,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         Where the nodes are.
     values : (*grid.shape) float
         φ at the nodes, in the units of the grid: ``values[i, j, k]`` at ``grid.points[i, j, k]``. Positive on the
-        side that the source normals point to, so negative inside a shape with outward normals. NaN at solid nodes, and
-        on parts of the grid that solid nodes separate from every source.
+        side that the source normals point to, so negative inside a shape with outward normals.
     diagnostics : Diagnostics
         Timings, diffusion time, and notes on the computation.
     confidence : (*grid.shape) float, optional
@@ -249,7 +248,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
         In space, a surface: closed, manifold, with normals pointing to greater φ. Where it leaves the grid, as the
         completion of an open shape may do, it is closed along the box of the grid (1 % of a cell outside); where it
-        meets solid nodes, or others without a value, it is closed along the last nodes before them.
+        meets nodes without a value, it is closed along the last nodes before them.
 
         In the plane, polylines, one for each connected component, open or closed, with greater φ to their left. Open
         ones end at the box of the grid, and at nodes without a value.

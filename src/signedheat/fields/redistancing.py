@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..domains.validation import flag, numbers, positive_steps
 from ..errors import GeometryError, OutsideError
-from ..operators.grid.walls import distances_around_walls
-from ..operators.grid.wavefront import padded_shape
-from ..operators.grid.zero_contour import distances_to_contour, moved, nearest_crossings, smoothed_signs, zero_contour
+from ..operators.grid.zero_contour import distances_to, smoothed_signs, zero_contour
 
 
 def redistance(
@@ -22,14 +19,12 @@ def redistance(
 
     Where the zero set is smooth, distance is of second order, and exact for planes and spheres; at its edges it is
     that to the contour of values that are linear between nodes. An array of two opposite values has the side of each
-    node and nothing else: of the contours that separate them so, a smooth one is taken. In rough arrays the nearest
-    piece of the zero set may be missed, and distance be up to a third of a cell too large.
+    node and nothing else: of the contours that separate them so, a smooth one is taken.
 
     Parameters
     ----------
     values : array with one to four axes
-        Positive on one side, negative on the other; zero is on the zero set. Masked nodes, and NaN, are walls, each a
-        box of one cell around its node: distance is measured around them, along ways that bend at nodes.
+        Positive on one side, negative on the other; zero is on the zero set.
     spacing : float, or one for each axis
         Distance between neighbouring nodes.
     periodic : bool, or one for each axis
@@ -38,14 +33,14 @@ def redistance(
     Returns
     -------
     array of the same shape
-        Distances, with the signs of the values. Masked, or NaN, at walls and where no way leads to the zero set.
+        Distances, with the signs of the values.
 
     Raises
     ------
     OutsideError
-        If the array has no zero set: one sign everywhere, or walls between the two.
+        If the array has no zero set: one sign everywhere.
     GeometryError
-        If the array has no axis or more than four, or infinite values, or there are walls on a periodic grid.
+        If the array has no axis or more than four, or values that are masked or not finite.
 
     See Also
     --------
@@ -58,34 +53,28 @@ def redistance(
     >>> redistance([[-8.0, -2.0, 4.0], [-8.0, -2.0, 4.0]], [2, 3]).round(9)
     array([[-4., -1.,  2.],
            [-4., -1.,  2.]])
-    >>> redistance([0.0, 2.0, np.nan, 1.0])
-    array([ 0.,  1., nan, nan])
     """
-    masked = isinstance(values, np.ma.MaskedArray)
-    given = numbers(np.ma.getdata(values) if masked else values, "values")
+    if np.ma.is_masked(values):
+        raise GeometryError(
+            "distance does not go round masked nodes",
+            remedy="fill them in, or use scikit-fmm, whose distance does",
+            element="values",
+        )
+    given = numbers(np.ma.getdata(values), "values")
     if not 1 <= given.ndim <= 4 or given.size < 2:
         raise GeometryError(f"values must have one to four axes, and two nodes, not {given.shape}", element="values")
     if np.asanyarray(values).dtype == np.bool_:
         raise GeometryError("booleans have no sign", remedy="pass numpy.where(inside, -1.0, 1.0)", element="values")
-    walls = np.isnan(given) | (np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else False)
     steps, again = positive_steps(spacing, given.ndim), _axes(periodic, given.ndim)
-    if walls.all() or np.isinf(given[~walls]).any():
-        raise GeometryError(
-            "values must be numbers somewhere, and finite there", remedy="mask others", element="values"
-        )
-    if walls.any() and any(again):
-        raise GeometryError(
-            "distance around walls is not measured on periodic grids",
-            remedy="repeat the array along its periodic axes, or fill in what is masked",
-            element="periodic",
-        )
+    if not np.isfinite(given).all():
+        raise GeometryError("values must be finite", remedy="fill in those that are not", element="values")
+    largest = float(np.abs(given).max())
+    scaled = given / largest if largest > 0 else given
     pads = np.where(again, np.array(given.shape) // 2 + 2, 0)
-    whole = np.pad(_filled(given, walls), np.stack([pads, pads], axis=1), mode="wrap")
+    whole = np.pad(scaled, np.stack([pads, pads], axis=1), mode="wrap")
     wide = np.array(whole.shape) > 1
-    around = walls.squeeze() if walls.any() else None
-    distances = _distances(whole.squeeze(), steps[wide], around, pads[wide]).reshape(given.shape)
-    result, lost = np.where(given == 0, 0.0, np.copysign(distances, given)), walls | np.isinf(distances)
-    return np.ma.masked_array(np.where(lost, 0.0, result), lost) if masked else np.where(lost, np.nan, result)
+    distances = _distances(whole.squeeze(), steps[wide], pads[wide]).reshape(given.shape)
+    return np.where(given == 0, 0.0, np.copysign(distances, given))
 
 
 def _axes(periodic: bool | Sequence[bool], count: int) -> list[bool]:
@@ -96,29 +85,17 @@ def _axes(periodic: bool | Sequence[bool], count: int) -> list[bool]:
     return [flag(one, "periodic") for one in each]
 
 
-def _filled(values: NDArray[np.float64], walls: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Values from −1 to 1, at walls those of the nearest node that has one."""
-    if walls.any():
-        nearest = scipy.ndimage.distance_transform_edt(walls, return_distances=False, return_indices=True)
-        values = values[tuple(nearest)]
-    largest = float(np.abs(values).max())
-    return values / largest if largest > 0 else values
-
-
 def _distances(
-    values: NDArray[np.float64],
-    spacing: NDArray[np.float64],
-    walls: NDArray[np.bool_] | None,
-    pads: NDArray[np.int64],
+    values: NDArray[np.float64], spacing: NDArray[np.float64], pads: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Distance of each node that is no padding, infinite where no way leads; axes have at least two nodes."""
+    """Distance of each node that is no padding; axes have at least two nodes."""
     signs = values.ndim > 1 and bool((np.abs(values) == 1).all())
     if signs:
         values = smoothed_signs(values)
-    shape, scale = padded_shape(values.shape), float(spacing.max())
-    steps = np.concatenate([np.ones(4 - values.ndim), spacing / scale])
-    contour = zero_contour(values, steps, walls)
-    if not len(contour.points):
+    scale, unused = float(spacing.max()), 4 - values.ndim
+    steps = np.concatenate([np.ones(unused), spacing / scale])
+    contour = zero_contour(values, steps)
+    if not len(contour.points) and not len(contour.zeros):
         raise OutsideError(
             "the values have one sign everywhere, so there is no zero set to measure distance to",
             remedy="subtract a level; of an image of 0 and 1, for instance, pass 0.5 - image",
@@ -126,12 +103,6 @@ def _distances(
         )
     if signs and values.ndim < 4:  # which say nothing of how the zero set bends
         contour = contour._replace(smooth=np.zeros_like(contour.smooth))
-    nearest = nearest_crossings(contour, shape, steps)
-    if pads.any():
-        first = np.concatenate([np.zeros(4 - values.ndim, dtype=np.int64), pads])
-        inner = tuple(slice(pad, n - pad) for pad, n in zip(first, shape, strict=True))
-        nearest, contour = np.ascontiguousarray(nearest[inner]), moved(contour, -first * steps)
-    distances = distances_to_contour(contour, nearest, steps)
-    if walls is not None:
-        distances_around_walls(contour, nearest, distances, walls.reshape(shape), steps)
-    return distances * scale
+    inner = [np.arange(pad, n - pad) * step for pad, n, step in zip(pads, values.shape, steps[unused:], strict=True)]
+    places = np.stack(np.meshgrid(*[np.zeros(1)] * unused, *inner, indexing="ij"), axis=-1)
+    return scale * distances_to(contour, places.reshape(-1, 4))

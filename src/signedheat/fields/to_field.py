@@ -16,7 +16,6 @@ from ..domains.point_cloud import PointCloud
 from ..errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..geometry.components import connected_components
 from ..lowering.grid.discretization import GridDiscretization
-from ..lowering.grid.masked import MaskedGridDiscretization, MaskedSource
 from ..lowering.grid.source import GridSource
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..lowering.surface.source import SurfaceSource, joined
@@ -47,28 +46,6 @@ def _(
     discretization: GridDiscretization, values: NDArray[np.float64], source: GridSource, diagnostics: Diagnostics
 ) -> GridField:
     return GridField(discretization.grid, values, diagnostics.noting(sampled(source)))
-
-
-@to_field.register
-def _(
-    discretization: MaskedGridDiscretization,
-    values: NDArray[np.float64],
-    source: MaskedSource,
-    diagnostics: Diagnostics,
-) -> GridField:
-    """φ at the nodes of the grid, NaN at solid ones."""
-    grid, ids = discretization.grid, discretization.nodes.ids
-    everywhere = np.full(grid.n_nodes, np.nan)
-    everywhere[ids] = values
-    unreached = ids[np.isnan(values)]
-    if len(unreached):
-        warn_user(
-            f"{len(unreached)} of {len(values)} free nodes are cut off from every source by solid ones: the "
-            "distance there is NaN",
-            UnreachedWarning,
-        )
-    noted = replace(diagnostics, unreached=unreached).noting(sampled(source))
-    return GridField(grid, everywhere.reshape(grid.shape), noted)
 
 
 @to_field.register

@@ -41,8 +41,7 @@ class Triangles(Protocol):
 
 def area_vectors(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     """(m, 3) of (m, 3, 3) triangles: their normals, as long as their areas."""
-    vectors: NDArray[np.float64] = 0.5 * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return vectors
+    return 0.5 * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
 
 def face_areas(triangles: NDArray[np.float64]) -> NDArray[np.float64]:

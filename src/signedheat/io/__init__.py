@@ -9,7 +9,7 @@ from .shapes import SHAPE_FORMATS, read, save
 from .solids import SAMPLE_FORMATS, load
 from .tets import TET_FIELD_FORMATS
 from .vdb import write_vdb
-from .voxels import LabelImage, read_labels, read_mask, read_volume
+from .voxels import LabelImage, read_labels, read_volume
 
 __all__ = [
     "CURVE_FORMATS",
@@ -28,7 +28,6 @@ __all__ = [
     "read",
     "read_curves",
     "read_labels",
-    "read_mask",
     "read_polylines",
     "read_step",
     "read_volume",

@@ -148,7 +148,7 @@ def load_field(path: PathLike) -> Field:
     with reading(path):
         if image.values.dtype == bool:
             raise FileFormatError("the values are no real numbers but bool: it holds no field")
-        grid = _made(Grid, image.origin, image.spacing, image.values.shape, image.mask)
+        grid = _made(Grid, image.origin, image.spacing, image.values.shape)
         solid = _held_solid(path) if extension(path) == ".npz" else None
         return _made(GridField, grid, np.ascontiguousarray(image.values), confidence=image.confidence, solid=solid)
 
@@ -208,7 +208,7 @@ def _load_band(path: PathLike) -> GridField:
 def _write_npz(field: GridField, path: Path) -> None:
     """Of a band its blocks, and the coarse field around them."""
     arrays: dict[str, Any] = {"values": field.values, "origin": field.grid.origin, "spacing": field.grid.spacing}
-    arrays |= {"mask": field.grid.mask, CONFIDENCE: field.confidence, "convention": CONVENTION}
+    arrays |= {CONFIDENCE: field.confidence, "convention": CONVENTION}
     if field.blocks is not None:
         arrays |= {"places": field.blocks.places, "shape": field.grid.shape, "width": field.width}
         arrays |= {"coarse_values": field.whole.values, "coarse_spacing": field.whole.grid.spacing}

@@ -11,8 +11,6 @@ import os
 import secrets
 import shutil
 import stat
-import tempfile
-import threading
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, suppress
@@ -123,29 +121,6 @@ def parsed_by_others(parse: Callable[[], T], size: int) -> T:
         warnings.simplefilter("ignore")  # about files that are not closed, odd fields, and the like
         result: T = run_limited(quietly, 10.0 + size / 1e5)
     return result
-
-
-def with_messages(job: Callable[[], T]) -> tuple[T, str]:
-    """The result of code in another language, and what it writes to standard error by its number meanwhile.
-
-    One thread at a time; what others write to standard error then is taken for its messages, too.
-    """
-    with _one_at_a_time, tempfile.TemporaryFile() as messages:
-        try:
-            standard = os.dup(2)
-        except OSError:  # it is closed
-            return job(), ""
-        os.dup2(messages.fileno(), 2)
-        try:
-            result = job()
-        finally:
-            os.dup2(standard, 2)
-            os.close(standard)
-        messages.seek(0)
-        return result, messages.read().decode("utf-8", errors="replace")
-
-
-_one_at_a_time = threading.Lock()
 
 
 def contents(path: PathLike) -> bytes:

@@ -1,7 +1,7 @@
-"""Images: values on a lattice, and where that lies; all formats of fields on grids, voxels, labels and masks.
+"""Images: values on a lattice, and where that lies; all formats of fields on grids, voxels and labels.
 
 NRRD headers are parsed by pynrrd and NIfTI by nibabel; data are read here, so that no more is read or unpacked than a
-header announces. Pictures are read by Pillow.
+header announces.
 """
 
 from __future__ import annotations
@@ -33,22 +33,17 @@ from .files import (
     parsed_numbers,
     reading,
     unpacked,
-    with_messages,
 )
 from .vtk_xml import read_vti
 
 NIBABEL = ("nibabel", "NIfTI files")
 nibabel: Any = lazy_module(*NIBABEL)
 nrrd: Any = lazy_module("nrrd", "NRRD files")
-Pillow: Any = lazy_module("PIL.Image", "pictures as masks")
 
 CONFIDENCE = "confidence"
 NIFTI = (".nii", ".nii.gz")
-PICTURES = (".bmp", ".png", ".tif", ".tiff")
 SHORT = {"RAS": "right-anterior-superior", "LPS": "left-posterior-superior", "LAS": "left-anterior-superior"}
 """Spaces by their short names in NRRD files."""
-MOST_PACKED = 1 << 14
-"""Bytes that a byte of a picture may stand for: pages without a mark, line by line, some thousands."""
 _CODES = {
     name: code
     for names, code in (
@@ -81,7 +76,7 @@ class Image:
         The first place.
     space : str, optional
         What the axes of the world are, as in NRRD files: ``"left-posterior-superior"``.
-    mask, confidence : (n₁, …, n_d), optional
+    confidence : (n₁, …, n_d), optional
         What a field has in addition to its values.
     """
 
@@ -89,7 +84,6 @@ class Image:
     axes: NDArray[np.float64]
     origin: NDArray[np.float64]
     space: str | None = None
-    mask: NDArray[Any] | None = None
     confidence: NDArray[Any] | None = None
 
     @property
@@ -130,7 +124,7 @@ def _read_npy(path: PathLike) -> Image:
 
 
 def _read_npz(path: PathLike) -> Image:
-    found = read_npz(path, ("mask", CONFIDENCE), needed=("values", "origin", "spacing"))
+    found = read_npz(path, (CONFIDENCE,), needed=("values", "origin", "spacing"))
     return _aligned(found.pop("values"), found.pop("origin"), found.pop("spacing"), **found)
 
 
@@ -243,30 +237,10 @@ def _read_nifti(path: PathLike) -> Image:
     return Image(values, affine[:3, :3], affine[:3, 3], "right-anterior-superior")
 
 
-def _read_picture(path: PathLike) -> Image:
-    """Brightness from 0 to 1; the first pixel is the lower left one. Transparent pixels count as white."""
-    data = contents(path)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about pictures that are large: they are compared with the memory
-        opened = Pillow.open(io.BytesIO(data))
-        n_pixels = opened.width * opened.height
-        covered = sum((right - left) * (upper - lower) for _, (left, lower, right, upper), *_ in opened.tile)
-        if covered < n_pixels or n_pixels > 8 * MOST_PACKED * len(data):  # parts, or bytes in whatever packing
-            raise damaged(f"it announces {opened.width} × {opened.height} pixels, and has fewer")
-        ensure_fits(16 * n_pixels, path)
-        picture, messages = with_messages(lambda: opened.convert("RGBA"))
-    if messages.strip() and opened.format == "TIFF":  # libtiff goes on after errors, with what it makes of the rest
-        raise damaged(f"it is damaged ({messages.splitlines()[0]:.200})")
-    white = Pillow.new("RGBA", picture.size, "white")
-    brightness = np.asarray(Pillow.alpha_composite(white, picture).convert("L")) / 255
-    return _aligned(brightness[::-1].T, np.zeros(2), np.ones(2))
-
-
 READERS: dict[str, Callable[[PathLike], Image]] = {
     ".npy": _read_npy,
     ".npz": _read_npz,
     ".nrrd": _read_nrrd,
     ".vti": _read_vti,
     **dict.fromkeys(NIFTI, _read_nifti),
-    **dict.fromkeys(PICTURES, _read_picture),
 }

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..domains.digital_surface import DigitalSurface
 from ..domains.exchange import NAME
@@ -20,7 +20,7 @@ from ..fields.grid_field import GridField
 from ..packages import require
 from .fields import CONVENTION, ensure_field_writable, save_field
 from .files import PathLike, ensure_writable, extension, reading, replacing
-from .images import NIBABEL, NIFTI, PICTURES, nibabel, read_image, write_nrrd
+from .images import NIBABEL, NIFTI, nibabel, read_image, write_nrrd
 
 Mesh = TypeVar("Mesh", TriangleMesh, PolygonMesh)
 
@@ -308,49 +308,6 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
             raise FileFormatError(f"the image has {image.values.ndim} axes, and a volume has 3")
         inside = image.values if level is None else image.values > level
         return DigitalSurface(inside, image.spacing, image.origin, radius)
-
-
-def read_mask(
-    path: PathLike, level: float = 0.5, origin: ArrayLike | None = None, spacing: ArrayLike | None = None
-) -> Grid:
-    """Read a grid with walls from an image: every voxel or pixel becomes a node, solid or free.
-
-    Parameters
-    ----------
-    path : str or path
-        ``.npy``, ``.nrrd`` or ``.vti`` in the plane or in space, as for `read_volume`; pictures (``.png``, ``.bmp``,
-        ``.tif``), whose first node is the lower left pixel, with y pointing up.
-    level : float
-        Voxels with larger values are solid. In pictures, pixels darker than this are, with 0 black and 1 white.
-    origin, spacing : (d,) float, optional
-        Position of the first node, and distance between nodes, instead of those in the file; for pictures by default 0
-        and 1.
-
-    Returns
-    -------
-    Grid
-        With solid nodes.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is missing, of unknown format, truncated or damaged.
-    GeometryError
-        If all nodes are solid, or origin or spacing are invalid.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     np.save(f"{folder}/wall.npy", np.array([[0, 0, 0], [0, 1, 1]]))
-    ...     read_mask(f"{folder}/wall.npy", spacing=0.5)
-    Grid(origin=[0, 0], spacing=0.5, shape=(2, 3), 2 solid nodes)
-    """
-    image = read_image(path, (*VOLUME_FORMATS, *PICTURES), "a mask")
-    with reading(path):
-        solid = image.values < level if extension(path) in PICTURES else image.values > level
-        first = image.origin if origin is None else origin
-        return Grid(first, image.spacing if spacing is None else spacing, solid.shape, solid)
 
 
 def _listed(labels: NDArray[Any]) -> str:

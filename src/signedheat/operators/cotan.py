@@ -38,8 +38,7 @@ def divergence(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> 
     facing = np.roll(triangles.corner_vertices, 1, axis=1)  # edge k faces corner k + 2
     starts, shape = np.arange(0, facing.size + 1, 3), (triangles.n_vertices, triangles.n_faces)
     edges = sparse.csc_array((triangles.edge_vectors.ravel(), facing.ravel(), starts), shape)
-    fluxes: NDArray[np.float64] = -0.5 * (edges @ np.conj(directions)).imag
-    return fluxes
+    return -0.5 * (edges @ np.conj(directions)).imag
 
 
 def assemble(

@@ -28,9 +28,8 @@ def _(field: GridField, source: object, method: Method | None, progress: Progres
         )
     if not np.isfinite(field.values).all():
         raise GeometryError(
-            "a field around solid nodes, or with parts that no source reaches, cannot be sharpened: straight lines to "
-            "its zero set would pass through what is solid",
-            remedy="use it as it is",
+            "a field with values that are not finite cannot be sharpened",
+            remedy="fill them in, or use it as it is",
             element="field",
         )
     run = partial(distance_to_nearest, field.grid, field.values, None, None, 0.0, progress)

@@ -41,7 +41,7 @@ def distance_to_shapes(
 ) -> GridField | TetField:
     """Signed distance to shapes in space: see `signed_distance`, which calls this.
 
-    On tets, and on grids with solid nodes, distance is along paths around walls, with the signs of φ.
+    On tets, distance is along paths around walls, with the signs of φ.
     """
     joined = joined_shape(shape)
     if domain is None:
@@ -51,7 +51,7 @@ def distance_to_shapes(
         raise UnsupportedTypeError(
             f"distance to a shape in space is measured on a Grid or a TetMesh, not on a {kind}", element="domain"
         )
-    in_space = isinstance(domain, Grid) and domain.dimension == 3 and domain.mask is None
+    in_space = isinstance(domain, Grid) and domain.dimension == 3
     if band is not None and not in_space:
         raise UnsupportedTypeError(
             "a band is computed around solids, on a grid in space without walls", remedy="leave out the band"

@@ -207,10 +207,10 @@ def blocks_that_fit(store: str | PathLike[str] | None) -> int:
 
 
 def refuse_walls(grid: Grid) -> None:
-    """Raise if a grid is not one in space, or has solid nodes."""
-    if grid.dimension != 3 or grid.mask is not None:
+    """Raise if a grid is not one in space."""
+    if grid.dimension != 3:
         raise UnsupportedTypeError(
-            "distance to a solid is measured on grids in space without walls", remedy="leave out the mask"
+            "distance to a solid is measured on grids in space", remedy="give it three axes", element="grid"
         )
 
 

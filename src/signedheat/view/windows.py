@@ -55,10 +55,7 @@ def _(line: Polyline, plotter: Any) -> None:
 
 @add.register
 def _(grid: Grid, plotter: Any) -> None:
-    image = grid.to_pyvista()
-    plotter.add_mesh(image.outline(), color=LINE)
-    if grid.mask is not None:
-        plotter.add_mesh(image.threshold(0.5, scalars="solid"), color="#b9b9b9", show_scalar_bar=False)
+    plotter.add_mesh(grid.to_pyvista().outline(), color=LINE)
 
 
 @add.register

@@ -202,16 +202,10 @@ def test_sources_of_the_wrong_dimension_are_refused():
 
 
 @pytest.mark.parametrize(("diffusion", "least", "most"), [(1.0, 0.01, 0.04), (10.0, 0.04, 0.07), (100.0, 0.13, 0.19)])
-def test_long_diffusion_rounds_corners_as_the_exact_solution_does(diffusion, least, most):
-    """A grid without solid nodes is solved on a pyramid by sweeps, one with an empty mask by factorisation."""
+def test_long_diffusion_rounds_corners(diffusion, least, most):
     gap, ends = 0.4, np.roll(SQUARE.points, -1, axis=0)
     along = (ends - SQUARE.points) / 2
     sides = [sh.Polyline([a + gap * t, b - gap * t]) for a, b, t in zip(SQUARE.points, ends, along, strict=True)]
-    plain = sh.Grid((-1.5, -1.5), 3 / 120, (121, 121))
-    masked = sh.Grid(plain.origin, plain.spacing, plain.shape, np.zeros(plain.shape, dtype=bool))
-    cuts = []
-    for grid in (plain, masked):
-        [line] = sh.SignedHeatSolver(grid, diffusion=diffusion).distance(sides).contour(0.0)
-        cuts.append(np.linalg.norm(line.points - [1, 1], axis=1).min())
-    assert cuts[0] == pytest.approx(cuts[1], abs=0.02, rel=0.15)
-    assert least < cuts[0] < most
+    grid = sh.Grid((-1.5, -1.5), 3 / 120, (121, 121))
+    [line] = sh.SignedHeatSolver(grid, diffusion=diffusion).distance(sides).contour(0.0)
+    assert least < np.linalg.norm(line.points - [1, 1], axis=1).min() < most

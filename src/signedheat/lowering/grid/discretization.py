@@ -19,15 +19,12 @@ from ...operators.grid.stencil import divergence
 from ...operators.grid.wavefront import padded_shape
 from ..area_elements import sample_on_grid
 from .integration import GridIntegration
-from .masked import MaskedGridDiscretization
 from .source import GridSource
 
 BYTES_PER_NODE, BYTES_PER_AREA = {1: 42, 2: 42, 3: 25, 4: 42}, 930
 """Measured peak memory of a distance computation, by dimension; and what each square cell of surface adds in space."""
 MOST_PER_NODE = 22
 """What surface adds for each node where it is everywhere."""
-BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
-"""The same on grids with solid nodes, by dimension."""
 ROOM = 1.08
 """By how much the suggested spacing is larger than it must be: what is free changes from run to run."""
 
@@ -43,7 +40,7 @@ def memory_estimate(grid: Grid, per_node: float | None = None, extra: float = 0.
     True
     """
     if per_node is None:
-        per_node = (BYTES_PER_NODE if grid.mask is None else BYTES_AROUND_SOLIDS)[grid.dimension]
+        per_node = BYTES_PER_NODE[grid.dimension]
     return int(per_node * grid.n_nodes + extra) + libraries()
 
 
@@ -133,10 +130,8 @@ class GridDiscretization(DiffusesEach):
 
 
 @discretize.register
-def _(domain: Grid) -> GridDiscretization | MaskedGridDiscretization:
+def _(domain: Grid) -> GridDiscretization:
     if domain.dimension > 4:
         raise SourceError(f"grids have up to 4 dimensions here, not {domain.dimension}", element="domain")
     refuse_large_grid(domain)
-    if domain.mask is not None:
-        return MaskedGridDiscretization(domain)
     return GridDiscretization(domain)

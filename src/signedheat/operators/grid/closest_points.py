@@ -1,8 +1,8 @@
 """Closest points on the zero set of a grid function.
 
-The zero set is known by its crossings with the edges of the grid, its normals and its curvature there; every node finds
-its nearest crossing. Positions are in units of length from the grid's origin. Arrays have four axes and vectors four
-components, of which the first ones are unused in fewer dimensions.
+The zero set is known by its crossings with the edges of the grid, its normals and its curvature there. Positions are in
+units of length from the grid's origin. Arrays have four axes and vectors four components, of which the first ones are
+unused in fewer dimensions.
 """
 
 from __future__ import annotations
@@ -142,73 +142,6 @@ def crossings_at(
                 result[e, at] = 0.5 * (bend[d, f] + bend[f, d])
                 at += 1
     return result
-
-
-@compiled
-def seed_edge_ends(
-    nearest: NDArray[np.int32],
-    squares: NDArray[np.float32],
-    edges: NDArray[np.int32],
-    points: NDArray[np.float32],
-    steps: NDArray[np.float64],
-    first: int,
-) -> None:
-    """Give both ends of each crossed edge its crossing as a candidate: a point from `first` on."""
-    for e in range(len(edges)):
-        p = first + e
-        for end in range(2):
-            i, j, k, m = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
-            axis = edges[e, 4]
-            if end == 1:
-                i, j, k, m = i + (axis == 0), j + (axis == 1), k + (axis == 2), m + (axis == 3)
-            square = (points[p, 0] - i * steps[0]) ** 2 + (points[p, 1] - j * steps[1]) ** 2
-            square += (points[p, 2] - k * steps[2]) ** 2 + (points[p, 3] - m * steps[3]) ** 2
-            if square < squares[i, j, k, m]:
-                squares[i, j, k, m] = square
-                nearest[i, j, k, m] = p
-
-
-@compiled
-def nearest_tiles(
-    nearest: NDArray[np.int32],
-    squares: NDArray[np.float32],
-    points: NDArray[np.float32],
-    steps: NDArray[np.float64],
-    tiles: NDArray[np.int64],
-) -> None:
-    """Take over nearer crossings from neighbouring lines already visited, and along each line in both directions."""
-    n0, n1, n2, n = nearest.shape
-    step = np.float32(steps[3])
-    for tile in tiles:
-        for i in range(tile[0], tile[1], tile[2]):
-            for j in range(tile[3], tile[4], tile[5]):
-                for k in range(tile[6], tile[7], tile[8]):
-                    own, square = nearest[i, j, k], squares[i, j, k]
-                    x, y, z = np.float32(i * steps[0]), np.float32(j * steps[1]), np.float32(k * steps[2])
-                    for side in range(1, 8):
-                        a = i - (tile[2] if side & 4 else 0)
-                        b = j - (tile[5] if side & 1 else 0)
-                        c = k - (tile[8] if side & 2 else 0)
-                        if not (0 <= a < n0 and 0 <= b < n1 and 0 <= c < n2):
-                            continue
-                        other = nearest[a, b, c]
-                        for m in range(n):
-                            p = other[m]
-                            if p >= 0 and p != own[m]:
-                                w = m * step - points[p, 3]
-                                s = (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2 + w * w
-                                if s < square[m]:
-                                    square[m], own[m] = s, p
-                    for way in range(2):
-                        p = np.int32(-1)
-                        for count in range(n):
-                            m = count if way == 0 else n - 1 - count
-                            if p >= 0 and p != own[m]:
-                                w = m * step - points[p, 3]
-                                s = (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2 + w * w
-                                if s < square[m]:
-                                    square[m], own[m] = s, p
-                            p = own[m]
 
 
 @compiled
