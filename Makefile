@@ -4,7 +4,10 @@ BIN := $(VENV)/bin
 unexport PYTHONDONTWRITEBYTECODE  # each of a hundred processes of the tests would compile the package again
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary=:all:
 
-.PHONY: blender demo docs test fuzz lint types conformance coverage matrix dist clean
+.PHONY: help blender demo docs test fuzz lint types conformance coverage matrix dist clean
+
+help:  # what there is to make
+	@sed -nE 's/^([a-z]+):[^#]*(# )?(.*)/  \1  \3/p' $(MAKEFILE_LIST) | awk '{name = $$1; $$1 = ""; printf "  make %-12s%s\n", name, $$0}'
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -17,21 +20,21 @@ $(VENV)/.installed-test: $(VENV)/.installed
 	$(PIP) --no-build-isolation --editable .[test]
 	touch $@
 
-demo: $(VENV)/.installed
+demo: $(VENV)/.installed  # the main job on a shape that comes along: files and a picture in demo/
 	$(BIN)/signedheat demo --output demo
 
-test: $(VENV)/.installed-test
+test: $(VENV)/.installed-test  # the whole suite
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
-fuzz: $(VENV)/.installed-test  # CASES="1000 --seed 3" runs these
+fuzz: $(VENV)/.installed-test  # 10,000 cases of every family of bad input; CASES="1000 --seed 3" runs these
 	cd tests && PYTHONPATH=.. ../$(BIN)/python -m fuzz --cases $(or $(CASES),10000)
 	$(BIN)/python -m pytest -m slow
 
-lint: $(VENV)/.installed-test
+lint: $(VENV)/.installed-test  # ruff: rules and format
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: $(VENV)/.installed-test
+types: $(VENV)/.installed-test  # mypy, on the code of the first pages too
 	$(BIN)/python tools/check_types.py
 
 $(VENV)/.installed-docs: $(VENV)/.installed
@@ -41,10 +44,14 @@ $(VENV)/.installed-docs: $(VENV)/.installed
 docs: $(VENV)/.installed-docs  # into docs/_build/html, without a warning; runs every example of the gallery
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 
-conformance: $(VENV)/.installed-test  # PEERS=FOLDER with checkouts of other packages, which must be installed too
+$(VENV)/.installed-conformance: $(VENV)/.installed-test
+	$(PIP) --no-build-isolation --editable .[conformance]
+	touch $@
+
+conformance: $(VENV)/.installed-conformance  # tests of other packages with our functions; PEERS=FOLDER with their checkouts
 	$(BIN)/python tools/conformance $(PEERS)
 
-coverage: $(VENV)/.installed-test
+coverage: $(VENV)/.installed-test  # the suite with coverage; TESTS=tests/io for some of it
 	$(BIN)/python -m coverage run -m pytest $(TESTS)
 	$(BIN)/python -m coverage report
 
@@ -52,17 +59,17 @@ $(VENV)/.installed-matrix: $(VENV)/.installed
 	$(PIP) uv
 	touch $@
 
-matrix: $(VENV)/.installed-matrix  # ROWS="3.10-lowest 3.13-highest" runs these rows alone
+matrix: $(VENV)/.installed-matrix  # lowest and highest versions, and more; ROWS="3.10-lowest first-pages" for some of it
 	$(BIN)/python .ci/matrix $(ROWS)
 
 blender:  # the add-on, to be installed from disk in Blender 4.2 and later
 	mkdir -p dist
 	cd blender/signedheat_blender && $(PYTHON) -m zipfile -c ../../dist/signedheat-blender.zip blender_manifest.toml __init__.py protocol.py
 
-dist: $(VENV)/.installed
+dist: $(VENV)/.installed  # a wheel and a source archive in dist/
 	rm -rf dist
 	$(BIN)/python -m hatchling build
 
-clean:
+clean:  # remove everything that these make
 	rm -rf $(VENV) .venv-matrix demo dist docs/_build docs/api docs/gallery htmlcov .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find src tests benchmarks examples -name __pycache__ -prune -exec rm -rf {} +

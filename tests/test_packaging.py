@@ -31,6 +31,7 @@ def test_the_recipe_needs_what_the_wheel_needs():
 
 def test_one_version():
     assert f'version: "{sh.__version__}"' in RECIPE.read_text(encoding="utf-8")
+    assert f"version: {sh.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     assert re.search(rf"^## {re.escape(sh.__version__)}\b", changes, re.MULTILINE)
 
