@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import ClassVar, TypeVar
 
 import numpy as np
@@ -18,7 +18,10 @@ SMALL = 0.005
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Note(Frozen, ShortRepr):
-    """A note on a computation; ``str(note)`` is its text, in which `text` names values of the note."""
+    """A note on a computation; ``str(note)`` is its text, in which `text` names values of the note.
+
+    Its values are numbers and lists: ``json.dumps(dataclasses.asdict(note))``.
+    """
 
     text: ClassVar[str] = ""
 
@@ -30,10 +33,15 @@ class Note(Frozen, ShortRepr):
         """Whether it should be read before the result is trusted: commands print it."""
         return False
 
+    def __post_init__(self) -> None:
+        for entry in fields(self):  # counts and areas are often scalars of NumPy
+            value = getattr(self, entry.name)
+            if isinstance(value, np.generic):
+                object.__setattr__(self, entry.name, value.item())
+
     def as_dict(self) -> dict[str, object]:
         """The values of the note by name, ready for JSON."""
-        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
-        return {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in values.items()}
+        return asdict(self)
 
 
 AnyNote = TypeVar("AnyNote", bound=Note)
@@ -132,8 +140,8 @@ class SampledSource(Note):
 class OutsideMesh(Note):
     """Sources that leave the tet mesh: their indices, and the fraction of the area of each that is dropped."""
 
-    sources_outside: NDArray[np.int64]
-    area_left_out: NDArray[np.float64]
+    sources_outside: list[int]
+    area_left_out: list[float]
 
     def __str__(self) -> str:
         shares = zip(self.sources_outside, self.area_left_out, strict=True)
@@ -254,7 +262,7 @@ class CompletedArea(Note):
 
     completed_area: float
     completed_share: float
-    where: NDArray[np.float64]
+    where: list[list[list[float]]]
 
     @property
     def important(self) -> bool:
@@ -308,7 +316,7 @@ class LargeAngles(Note):
 class WithoutLength(Note):
     """Curves that were left out, by number, since all points of each coincide: a click where a stroke was meant."""
 
-    without_length: NDArray[np.int64]
+    without_length: list[int]
 
     def __str__(self) -> str:
         return f"curves without length left out: {', '.join(map(str, self.without_length))}"
@@ -343,7 +351,7 @@ class PointsLeftOut(Note):
     """Points of a cloud that coincide with earlier ones, and points without a triangle."""
 
     duplicate_points: int
-    points_without_triangles: NDArray[np.int64]
+    points_without_triangles: list[int]
 
     def __str__(self) -> str:
         return f"{self.duplicate_points} duplicate points; {len(self.points_without_triangles)} without triangles"

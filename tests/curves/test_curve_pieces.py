@@ -32,7 +32,7 @@ def pieces(mesh) -> list[sh.Curve]:
 
 def taken(field: sh.VertexField) -> tuple[list[int], list[int]]:
     note = field.diagnostics.note(CurvesTaken)
-    return ([], []) if note is None else (note.turned.tolist(), note.left_out.tolist())
+    return ([], []) if note is None else (note.turned, note.left_out)
 
 
 def test_turned_pieces_make_no_difference(mesh, pieces):

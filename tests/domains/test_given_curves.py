@@ -91,7 +91,7 @@ def test_positions_of_curves():
 def test_a_click_among_strokes_is_left_out_with_a_note(measure, click):
     alone, with_click = measure(BALL, [RING]), measure(BALL, [RING, click])
     np.testing.assert_array_equal(alone.values, with_click.values)
-    assert with_click.diagnostics.note(WithoutLength).without_length.tolist() == [1]
+    assert with_click.diagnostics.note(WithoutLength).without_length == [1]
     assert alone.diagnostics.note(WithoutLength) is None
     with refused(sh.errors.SourceError):
         measure(BALL, click)

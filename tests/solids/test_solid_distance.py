@@ -92,7 +92,7 @@ def test_half_a_sphere_is_carried_on():
     assert error(field, radius - 1) < 0.5 * 100 * np.sqrt(np.mean((flat - radius + 1) ** 2)) / np.ptp(radius)
     told = field.diagnostics.note(CompletedArea)
     assert 0.25 < told.completed_share < 0.6
-    assert told.where[0, 1, 0] > 0.3  # it is where nothing is
+    assert told.where[0][1][0] > 0.3  # it is where nothing is
 
 
 def test_half_a_bar_is_closed_where_it_ends():

@@ -219,5 +219,5 @@ def _with_pieces(field: sh.VertexField, summary: dict[str, Any], text: str) -> s
     note = field.diagnostics.note(distance.CurvesTaken)
     if note is None:
         return text
-    summary |= {"turned": note.turned.tolist(), "left_out": note.left_out.tolist()}
+    summary |= {"turned": note.turned, "left_out": note.left_out}
     return f"{text}; {note}"

@@ -46,8 +46,8 @@ class CurvesTaken(Note):
         Curves that bound nothing together with the others.
     """
 
-    turned: NDArray[np.int64]
-    left_out: NDArray[np.int64]
+    turned: list[int]
+    left_out: list[int]
 
     @property
     def important(self) -> bool:
@@ -92,7 +92,7 @@ def distance_to_pieces(
     field = distance_unwarned(once, taken, constraint)
     turn[left_out] = False
     if turn.any() or len(left_out):
-        note = CurvesTaken(np.flatnonzero(turn), left_out)
+        note = CurvesTaken(np.flatnonzero(turn).tolist(), left_out.tolist())
         field = replace(field, diagnostics=field.diagnostics.noting(note))
     reason = guess(decision, field, listed)
     if reason:

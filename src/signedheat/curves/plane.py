@@ -114,7 +114,7 @@ def strokes_that_agree(
     note = field.diagnostics.note(CurvesTaken)
     if note is None:
         return list(lines), None
-    turned, left_out = set(note.turned.tolist()), set(note.left_out.tolist())
+    turned, left_out = set(note.turned), set(note.left_out)
     return [line.reversed() if k in turned else line for k, line in enumerate(lines) if k not in left_out], note
 
 

@@ -161,6 +161,8 @@ def as_shape(thing: Shape | ForeignShape) -> Shape:
     """
     shape = converted(thing)
     if not isinstance(shape, TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh):
+        if isinstance(thing, tuple | list):
+            refuse_arrays(thing)
         raise UnsupportedTypeError(f"a {type(thing).__name__} is no shape", remedy=what_to_pass(thing))
     return shape
 
@@ -179,6 +181,28 @@ def shape_of(elements: Elements) -> TriangleMesh | PolygonMesh | PointCloud | Te
         return TetMesh(elements.points, elements.tets)
     kinds = {kind.__name__: kind for kind in (TriangleMesh, PolygonMesh, PointCloud)}
     return kinds[elements.kind]._of(elements)
+
+
+def refuse_arrays(things: Sequence[object]) -> None:
+    """Raise if things are arrays that were meant for a shape, and say what is wrong with them."""
+    arrays = [np.asarray(thing) for thing in things if _like_array(thing)]
+    if not arrays or len(arrays) < len(things) or any(array.dtype.kind not in "biuf" for array in arrays):
+        return
+    if len(arrays) != 2 or any(array.ndim != 2 for array in arrays):
+        raise UnsupportedTypeError(
+            "arrays of numbers alone are no shape",
+            remedy="pass sh.PointCloud(points), or a pair (vertices, faces)",
+            element="shape",
+        )
+    vertices, faces = arrays
+    if vertices.dtype.kind in "iu" and faces.dtype.kind == "f" and vertices.max(initial=-1) < len(faces):
+        cause, remedy = "the faces come before the vertices", "pass (vertices, faces)"
+    elif vertices.shape[1] != 3:
+        cause = f"vertices have {vertices.shape[1]} coordinates each, and lie in space with 3"
+        remedy = "add z = 0; for drawings in the plane pass sh.Polyline"
+    else:
+        cause, remedy = f"faces are rows of vertex numbers, not of {faces.dtype}", "pass faces.astype(int)"
+    raise UnsupportedTypeError(cause, remedy=remedy, element="shape")
 
 
 def as_shapes(things: Thing | Sequence[Thing]) -> list[Thing]:

@@ -76,7 +76,7 @@ def given_curves(domain: object, sources: list[Any]) -> tuple[list[Any], Without
     lengthless = [k for k, source in enumerate(taken) if isinstance(source, Curve) and _is_point(domain, source)]
     if not lengthless or len(lengthless) == len(taken):
         return taken, None
-    return [source for k, source in enumerate(taken) if k not in lengthless], WithoutLength(np.array(lengthless))
+    return [source for k, source in enumerate(taken) if k not in lengthless], WithoutLength(lengthless)
 
 
 def _converted(domain: Surface, source: object) -> object:

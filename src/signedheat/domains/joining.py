@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import SourceError
 from .curves import Curve, SurfacePoints
-from .foreign import SurfaceShape, as_shape, as_shapes
+from .foreign import SurfaceShape, as_shape, as_shapes, refuse_arrays
 from .kinds import ShapeLike
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
@@ -40,6 +40,7 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
                 element="source 0",
             )
         return whole
+    refuse_arrays(shapes)
     meshes = []
     for index, each in enumerate(shapes):
         if not isinstance(each, TriangleMesh | PolygonMesh):

@@ -75,7 +75,9 @@ def heights_above(values: NDArray[np.float64], spacing: NDArray[np.float64], lev
     if not low < 0 < high:
         raise OutsideError(
             f"level {level:g} is outside the values of the grid, {low + level:g} to {high + level:g}",
-            remedy="choose another level or a larger grid",
+            remedy="choose another level, or smaller cells if the shape is thinner than they are"
+            if low > 0
+            else "choose another level, or a larger grid",
             element=f"level {level:g}",
         )
     least = CLEARANCE * float(spacing.min())

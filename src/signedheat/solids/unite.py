@@ -118,7 +118,7 @@ def _notes(
     if made.any():
         area, corners = float(areas[made].sum()), triangles[made].reshape(-1, 3)
         box = np.stack([corners.min(axis=0), corners.max(axis=0)])
-        notes.append(CompletedArea(area, area / float(areas[kept].sum()), box[None]))
+        notes.append(CompletedArea(area, area / float(areas[kept].sum()), [box.tolist()]))
     idle = given & kept & ~bounds
     if float(areas[idle].sum()) > 1e-6 * total:
         notes.append(BoundsNothing(float(areas[idle].sum()) / total))

@@ -42,7 +42,7 @@ def test_distance_from_a_plane_is_exact(cube, constraint):
     shape, exact = tilted()
     phi = distance(cube, shape, constraint)
     assert np.abs(phi.values - exact(cube.vertices)).max() < 5e-6  # of a cube of side 2; hard rows are near dependent
-    assert phi.diagnostics.note(OutsideMesh).sources_outside.tolist() == [0]
+    assert phi.diagnostics.note(OutsideMesh).sources_outside == [0]
 
 
 @pytest.mark.parametrize("sizes", [(0, 0), (10**9, 10**9)], ids=["conjugate gradients", "direct"])

@@ -320,7 +320,7 @@ def _(domain: PointCloud) -> SurfaceDiscretization:
     used = np.zeros(domain.n_points, dtype=bool)
     used[mesh.faces] = True
     duplicates = int((domain.representatives != np.arange(domain.n_points)).sum())
-    notes = (PointsLeftOut(duplicates, np.flatnonzero(~used[domain.representatives])),)
+    notes = (PointsLeftOut(duplicates, np.flatnonzero(~used[domain.representatives]).tolist()),)
     spacing = float(mesh.edge_lengths.mean())
     return replace(lowered_mesh(mesh), domain=domain, restriction=domain.representatives, spacing=spacing, notes=notes)
 

@@ -126,7 +126,7 @@ def tet_source(
         weights=np.concatenate(weights),
         components=np.unique(np.concatenate(members), return_inverse=True)[1],
         source_ids=np.repeat(np.arange(len(weights)), [len(found) for found in weights]),
-        notes=(OutsideMesh(leaving, outside[leaving]),) if len(leaving) else (),
+        notes=(OutsideMesh(leaving.tolist(), outside[leaving].tolist()),) if len(leaving) else (),
     )
 
 

@@ -1,0 +1,65 @@
+"""The commonest mistakes in passing a shape: what is wrong is said, and what to pass instead."""
+
+import pytest
+
+import signedheat as sh
+from refusals import refused
+from shapes.bodies import box
+from signedheat import samples
+
+BALL = samples.sphere(2)
+V, F = BALL.vertices, BALL.faces
+MISTAKES = {
+    "float faces": ((V, F.astype(float)), "integers"),
+    "faces first": ((F, V), "(vertices, faces)"),
+    "vertices in the plane": ((V[:, :2], F), "z = 0"),
+    "points alone": ([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], "PointCloud"),
+    "an array of points": (V, "PointCloud"),
+}
+CALLS = {
+    "complete": sh.complete,
+    "signed_distance": lambda shape: sh.signed_distance(shape, resolution=8),
+    "as_shape": sh.as_shape,
+}
+
+
+@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("name", MISTAKES)
+def test_arrays_that_are_no_shape_say_what_is_wrong(name, call):
+    shape, word = MISTAKES[name]
+    with refused(sh.SignedHeatError) as caught:
+        CALLS[call](shape)
+    if name != "float faces":
+        assert word in str(caught.value)
+    else:
+        assert "int" in str(caught.value)
+
+
+@pytest.mark.parametrize("source", [BALL, sh.complete(BALL), (V, F)], ids=["mesh", "solid", "pair"])
+def test_grids_of_another_dimension(source):
+    with refused(sh.SourceError, element="source 0") as caught:
+        sh.signed_distance(source, sh.Grid((0, 0), 1, (3, 3)))
+    assert "2" in caught.value.cause and "3" in caught.value.cause
+    line = sh.Polyline([[0, 0], [0, 1], [1, 1], [1, 0]], closed=True)
+    with refused(sh.SourceError, element="source 0"):
+        sh.signed_distance(line, sh.Grid((0, 0, 0), 1, (3, 3, 3)))
+
+
+def test_thin_parts_need_smaller_cells():
+    plate = sh.complete(box((-10, -10, -0.1), (10, 10, 0.1)))
+    with pytest.raises(sh.OutsideError) as caught:
+        plate.field(grid=sh.Grid((-14, -14, -4.5), 1.0, (29, 29, 10))).contour()
+    assert "smaller cells" in caught.value.remedy
+    with pytest.raises(sh.OutsideError) as caught:
+        sh.complete(BALL).field(16).contour(50.0)
+    assert "larger grid" in caught.value.remedy
+
+
+@pytest.mark.parametrize("options", [{}, {"keep_outside": True}])
+def test_a_shell_deeper_than_the_part_says_that_nothing_is_hollow(options):
+    cube = box((0, 0, 0), (2, 2, 2))
+    with pytest.warns(sh.InexactWarning, match="hollow"):
+        full = sh.morphology.shell(cube, -1.5, 0.0, resolution=32, **options)
+    assert full.to_trimesh().volume == pytest.approx(8, rel=0.06)  # contours cut edges off
+    hollow = sh.morphology.shell(cube, -0.5, 0.0, resolution=32, **options)
+    assert hollow.to_trimesh().volume == pytest.approx(7, rel=0.06)
