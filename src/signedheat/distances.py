@@ -220,7 +220,7 @@ def distance_to_solid(
     band: float | None = None,
     progress: Progress | None = None,
 ) -> GridField | TetField:
-    """Signed distance to a solid: see `signed_distance`. On tets, and around walls, to its boundary."""
+    """Signed distance to a solid: see `signed_distance`. On tets, to its boundary."""
     if domain is None or isinstance(domain, Grid):
         return solid.field(resolution, spacing=spacing, padding=padding, grid=domain, band=band, progress=progress)
     return distance_to_shapes(solid.boundary, domain, band=band, as_oriented=True, progress=progress)

@@ -84,7 +84,7 @@ def _(shape: PolygonMesh, linear: NDArray[np.float64], move: NDArray[np.float64]
 
 @_transformed.register
 def _(shape: DigitalSurface, linear: NDArray[np.float64], move: NDArray[np.float64]) -> PolygonMesh:
-    return transform(shape.squares, np.column_stack([linear, move]))  # type: ignore[assignment]
+    return transform(shape.squares, np.column_stack([linear, move]))  # type: ignore[return-value]
 
 
 @_transformed.register
