@@ -8,13 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.directions import unit
+from .lids import SmoothRim
 from .rims import corners_of
-from .spanning import area_vector, frame_of, spanned
+from .spanning import area_vector, frame_of, points_inside, spanned
 
 FLAT = 0.01
 """Distance from a plane, over their size, up to which points lie in it."""
 FOLDED = -0.8
 """Cosine between the normals of a lid and of the surface at its rim up to which it is folded back over the surface."""
+MANY = 256
+"""Corners of a flat lid from which on points inside keep its triangles from being many slivers, slow to find."""
 MOST_RUNS = 16
 """Stretches of a rim in one plane each from which on it has no flat lid."""
 
@@ -183,10 +186,15 @@ def _filled(
     for polygon in polygons:
         corners = points[polygon]
         frame = frame_of(corners)
-        found = spanned((corners - frame[0]) @ frame[1], np.empty((0, 2))) if frame else None
+        if frame is None:
+            return None
+        plane, inner = (corners - frame[0]) @ frame[1], np.empty((0, 2))
+        if len(corners) > MANY:
+            inner = points_inside((SmoothRim.of(corners).points - frame[0]) @ frame[1])
+        found = spanned(plane, inner)
         if found is None:
             return None
-        added = found.rim(corners)[found.shares > 0]
+        added = np.concatenate([found.rim(corners)[found.shares > 0], frame[0] + inner[found.inner] @ frame[1].T])
         vertices.append(added)
         faces.append(np.concatenate([polygon, count + np.arange(len(added))])[found.balanced()])
         count += len(added)

@@ -196,10 +196,12 @@ def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray
     at = (np.arange(PLACES) + 0.5) / PLACES
     places = (ends[:, :1] + at[:, None] * along[:, None]).reshape(-1, 3)
     owners = np.repeat(np.arange(len(ends)), PLACES)
-    tree = scipy.spatial.cKDTree(places)
-    found = tree.query_ball_point(places, ALONG * lengths[owners], workers=-1)
-    one = np.repeat(owners, [len(each) for each in found])
-    other = owners[np.concatenate([np.asarray(each, dtype=np.int64) for each in found])] if len(one) else one
+    tree, reach = scipy.spatial.cKDTree(places), ALONG * lengths[owners]
+    counts = tree.query_ball_point(places, reach, return_length=True)
+    crowded = np.flatnonzero(counts > 1)  # each place finds itself
+    near = tree.query_ball_point(places[crowded], reach[crowded]) if len(crowded) else []
+    one = np.repeat(owners[crowded], counts[crowded])
+    other = owners[np.concatenate([np.asarray(numbers, dtype=np.int64) for numbers in near])] if len(one) else one
     pairs = np.unique(np.sort(np.stack([one, other], axis=1)), axis=0)
     one, other = pairs[(ways[pairs[:, 0]] * ways[pairs[:, 1]]).sum(axis=1) < OPPOSITE].T
     same = (ends[one] == ends[other, ::-1]).all(axis=(1, 2))
