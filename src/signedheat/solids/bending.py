@@ -28,7 +28,7 @@ DIVIDED = 1 << 20
 slots .0012 to .1 as wide as they are long are 430,000 to 140,000."""
 STIFF = 0.03
 """Depth of a wall, over that strip's, whose bending counts by half."""
-AGREEMENT = 0.4
+AGREEMENT = 0.35
 """Ratio of how far a surface bends and how far it would have to, or of the latter and the former, up to which its lid
 does not bend; from twice that on it is clamped. 1 on a ball."""
 NARROWEST = 1e-9

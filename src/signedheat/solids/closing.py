@@ -159,11 +159,14 @@ def small_lids(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArr
         chosen, corners, least_bent(surface.vertices, rims, np.concatenate(normals), taken), strict=True
     ):
         if len(lid):
-            triangles.append(lid)
-            if len(places) < len(loop):
-                along = [np.arange(a, b + 1) for a, b in zip(places, [*places[1:], places[0] + len(loop)], strict=True)]
-                triangles += [_fan(loop[side % len(loop)]) for side in along if len(side) > 2]
+            triangles.append(_with_sides(loop, places, lid))
     return np.concatenate(triangles)
+
+
+def _with_sides(loop: NDArray[np.int64], places: NDArray[np.int64], lid: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Triangles between the corners of a loop, at these places, and those without area along its straight sides."""
+    along = [np.arange(a, b + 1) for a, b in zip(places, [*places[1:], places[0] + len(loop)], strict=True)]
+    return np.concatenate([lid, *(_fan(loop[side % len(loop)]) for side in along if len(side) > 2)])
 
 
 def _fan(points: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -228,7 +231,12 @@ def _spanned(
         normals, curvatures, held = bending.continuation(flat, near, ends, width)
         plate = lids.plate(flat, normals, curvatures, held, width) if held.any() else None
     if plate is None:
-        lid = creases.creased(corners, surface.normals[behind])
+        normals = surface.normals[behind]
+        lid = creases.creased(corners, normals)
         if lid is not None:
             return lid
+        places = corners_of(corners)
+        if len(places) <= MOST_SIDES:
+            lid = least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[0]
+            return np.empty((0, 3)), _with_sides(np.arange(len(loop)), places, lid)
     return lids.draped(corners, rim.starts, frame, plate or flat)

@@ -25,6 +25,7 @@ def least_bent(
     loops: list[NDArray[np.int64]],
     normals: NDArray[np.float64],
     taken: NDArray[np.int64],
+    most: float = BENT,
 ) -> list[NDArray[np.int64]]:
     """(n − 2, 3) triangles on the vertices of each loop of n; none where they do not continue the surface around it.
 
@@ -38,12 +39,14 @@ def least_bent(
         Unit normals of the faces behind the edges that begin at them, loop after loop.
     taken : (e,) int
         Sorted `edge_keys` of edges that may not be made, since they are there already.
+    most : float
+        Root mean square of the angles at the rim up to which they continue it.
     """
     starts = np.concatenate([[0], np.cumsum([len(loop) for loop in loops], dtype=np.int64)])
     if not len(loops):
         return []
     every = np.concatenate(loops)
-    faces, closed = _least_bent(vertices[every], every, np.ascontiguousarray(normals), starts, taken, BENT)
+    faces, closed = _least_bent(vertices[every], every, np.ascontiguousarray(normals), starts, taken, most)
     begins = starts - 2 * np.arange(len(starts))
     return [
         every[a + faces[b:c]] if closes else np.empty((0, 3), dtype=np.int64)
