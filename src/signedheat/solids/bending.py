@@ -19,9 +19,9 @@ REACH = 0.25
 """Share of an opening's width in which the surface behind its rim is looked at."""
 SHARP = 0.7
 """Cosine between the normals of two faces below which the edge between them is sharp."""
-SAMPLES = 8
+SAMPLES = 16
 """Samples across that strip."""
-MOST = 16384
+MOST = 32768
 """Samples around a rim at most, or nearly."""
 DIVIDED = 1 << 20
 """Triangles behind a rim that are made by division at most, of which `MOST` are taken: those of a flat side behind

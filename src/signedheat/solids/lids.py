@@ -22,8 +22,8 @@ SMOOTH = 1 / 48
 ROUNDS = 3
 """How often a film is solved for, each time with the lengths of the last."""
 AT_REST, MOVES = 1e-3, 64
-"""Share of the diagonal of its rim that a plate has still to move, by how its moves shrink, when it has come to rest, and
-how often it moves at most. Nearly all do in 5 to 40 moves."""
+"""Share of the diagonal of its rim that a plate has still to move, by how its moves shrink, when it has come to rest,
+and how often it moves at most. Nearly all do in 5 to 40 moves."""
 CLOSE = 0.5
 """Distance from the rim, over that of its points on average, up to which points of the smooth lid are left out."""
 PLANE = 1e-12
