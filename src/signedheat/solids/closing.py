@@ -180,7 +180,7 @@ def strips(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[n
     chain = np.concatenate([faces, *walls.seams(_rims(surface))])
     surface = _Surface(vertices, chain)
     rims = _rims(surface)
-    areas = np.bincount(surface.parts, surface.areas) if rims else np.zeros(0)
+    areas = np.bincount(surface.parts, surface.areas).astype(np.float64) if rims else np.zeros(0)
     return np.concatenate([chain, *walls.wall_ends(rims, areas)])[len(faces) :]
 
 
@@ -237,6 +237,6 @@ def _spanned(
             return lid
         places = corners_of(corners)
         if len(places) <= MOST_SIDES:
-            lid = least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[0]
-            return np.empty((0, 3)), _with_sides(np.arange(len(loop)), places, lid)
+            triangles = least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[0]
+            return np.empty((0, 3)), _with_sides(np.arange(len(loop)), places, triangles)
     return lids.draped(corners, rim.starts, frame, plate or flat)

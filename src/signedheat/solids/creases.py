@@ -86,7 +86,8 @@ def creased(
     sides of a box come back with the edge or the corner where they met. No face is folded back over the surface. The
     (n, 3) unit normals are those of the surface at the edges that begin at each point; 0 where they are not clear.
     """
-    points, sides, polygons = loop, _sides(loop, normals), []
+    points, sides = loop, _sides(loop, normals)
+    polygons: list[NDArray[np.int64]] = []
     while len(sides) > 2:
         rest = np.concatenate([side.points for side in sides])
         if is_flat(points[rest]):

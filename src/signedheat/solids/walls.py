@@ -105,7 +105,7 @@ def seams(rims: list[Rim]) -> list[NDArray[np.int64]]:
     for pairs in _stretches(np.concatenate([one, other]), np.concatenate([other, one]), following, lengths):
         free = pairs[~used[pairs].any(axis=1)]
         runs = [_run(np.unique(sides), following) for sides in free.T]
-        if min(len(run) for run in runs) == 0 or np.isin(*runs).any():
+        if min(len(run) for run in runs) == 0 or np.isin(runs[0], runs[1]).any():
             continue
         whole = [following[run[-1]] == run[0] for run in runs]
         if whole[0] != whole[1]:
