@@ -25,6 +25,7 @@ from .fields.grid_field import GridField
 from .fields.tet_field import TetField
 from .fields.to_field import Field
 from .fields.vertex_field import VertexField
+from .geometry.outlines import FillRule
 from .lowering.area_elements import bounds_around
 from .orientations.orient import orient
 from .progress import Progress
@@ -59,6 +60,7 @@ def signed_distance(
     padding: float | None = None,
     constraint: Constraint | None = None,
     diffusion: Diffusion | None = None,
+    fill: FillRule = "nonzero",
     as_oriented: bool = False,
     every_piece: bool = False,
     progress: Progress | None = None,
@@ -116,10 +118,11 @@ def signed_distance(
 ) -> Field:
     """Signed distance to a shape, however broken: exact where the shape is there, completed where it is missing.
 
-    Shapes in space are completed (`complete`), and distance is measured to what was given and to its completion. Of
-    curves on a surface, and of drawings in the plane, strokes are turned until they bound something together, and those
-    that bound nothing are left out; the zero set of the signed heat method stands where curves are missing, and
-    distance is measured along the surface. The method alone is `SignedHeatSolver`.
+    Shapes in space are completed (`complete`), and distance is measured to what was given and to its completion. Closed
+    outlines in the plane are filled. Of curves on a surface, and of other drawings in the plane, strokes are turned
+    until they bound something together, and those that bound nothing are left out; the zero set of the signed heat
+    method stands where curves are missing, and distance is measured along the surface. The method alone is
+    `SignedHeatSolver`.
 
     Parameters
     ----------
@@ -145,8 +148,11 @@ def signed_distance(
         Imposed on φ, where it is computed, at the source; `ZeroSet` by default.
     diffusion : float
         τ in ``t = τ h²``, likewise; larger values close gaps along rounder lines.
+    fill : {"nonzero", "evenodd"}
+        In the plane: which places closed outlines fill, as in SVG: those around which they run a number of times that
+        is not zero, or that is odd.
     as_oriented : bool
-        Turn nothing; leave no curve out.
+        Turn nothing, fill nothing; leave no curve out.
     keep_overlaps : bool
         In space: count what lies inside other bodies as surface.
     every_piece : bool
@@ -159,8 +165,8 @@ def signed_distance(
     Returns
     -------
     GridField, TetField or VertexField
-        Negative inside a shape, and to the right of curves and lines; around sheets that bound nothing positive on
-        both sides. ``diagnostics.notes`` say what was turned, left out and completed.
+        Negative inside shapes and filled outlines, and to the right of curves and strokes; around sheets that bound
+        nothing positive on both sides. ``diagnostics.notes`` say what was turned, left out and completed.
 
     Raises
     ------

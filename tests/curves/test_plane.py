@@ -9,6 +9,7 @@ from shapes import strokes
 from shapes.bodies import distance_to_box
 from signedheat import samples
 from signedheat.curves.distance import CurvesTaken
+from signedheat.curves.plane import OutlinesFilled
 from signedheat.errors import InexactWarning
 
 SQUARE = np.array([[-1.0, -1], [-1, 1], [1, 1], [1, -1]])
@@ -26,8 +27,82 @@ def test_a_whole_drawing_is_exact(resolution):
     field = sh.signed_distance(square, resolution=resolution)
     np.testing.assert_allclose(field.values, distance_to_box(field.grid.points, (-1, -1), (1, 1)), atol=1e-12)
     back = sh.signed_distance(sh.Polyline(SQUARE[::-1], closed=True), field.grid)
+    np.testing.assert_allclose(back.values, field.values, atol=1e-12)
+    turned = sh.signed_distance(sh.Polyline(SQUARE[::-1], closed=True), field.grid, as_oriented=True)
     away = np.abs(field.values) > 1e-9
-    np.testing.assert_allclose(back.values[away], -field.values[away], atol=1e-12)
+    np.testing.assert_allclose(turned.values[away], -field.values[away], atol=1e-12)
+    points = np.random.default_rng(0).uniform(-3, 3, (50, 4, 2))
+    np.testing.assert_allclose(field(points), distance_to_box(points, (-1, -1), (1, 1)), atol=1e-12)
+
+
+def crossings(points, outline):
+    """How often outlines, (n, 2), run around each of (k, 2) points, and how often a ray from it meets them."""
+    a, b = outline, np.roll(outline, -1, axis=0)
+    x, y = points[:, None].transpose(2, 0, 1)
+    side = (b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (b[:, 1] - a[:, 1]) * (x - a[:, 0])
+    up, down = (a[:, 1] <= y) & (b[:, 1] > y) & (side > 0), (b[:, 1] <= y) & (a[:, 1] > y) & (side < 0)
+    return (up.astype(int) - down).sum(axis=1), (up | down).sum(axis=1)
+
+
+def stars(rng, count, turned):
+    """Outlines around random places, many of which cross themselves and each other."""
+    outlines = []
+    for _ in range(count):
+        n = rng.integers(3, 12)
+        angles = np.sort(rng.uniform(0, 2 * np.pi, n)) * rng.integers(1, 3)
+        around = rng.uniform(0.2, 1, (n, 1)) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        step = rng.choice([-1, 1]) if turned else np.sign(sh.Polyline(around, closed=True).signed_area).astype(int)
+        outlines.append((around + rng.uniform(-1, 1, 2))[::step])
+    return outlines
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("fill", ["nonzero", "evenodd"])
+def test_closed_outlines_are_filled(seed, fill):
+    rng = np.random.default_rng(seed)
+    outlines, points = stars(rng, rng.integers(1, 7), fill == "evenodd"), rng.uniform(-2, 2, (3000, 2))
+    place = rng.choice([0.0, 1e3])
+    field = sh.signed_distance([sh.Polyline(o + place, closed=True) for o in outlines], resolution=16, fill=fill)
+
+    def is_filled(places):
+        windings, meetings = np.array([crossings(places, outline) for outline in outlines]).transpose(1, 0, 2)
+        return (windings != 0).any(axis=0) if fill == "nonzero" else meetings.sum(axis=0) % 2 == 1
+
+    found = field.closest(points + place)
+    np.testing.assert_array_equal(found.distances < 0, is_filled(points))
+    angles = 2 * np.pi * np.arange(90) / 90
+    ring = 1e-5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    around = is_filled((found.points[:100, None] - place + ring).reshape(-1, 2)).reshape(-1, 90)
+    assert np.mean(around.any(axis=1) & ~around.all(axis=1)) > 0.75  # but at spikes
+    nearer = points + rng.uniform(0, 0.7, points.shape) * found.distances[:, None]
+    np.testing.assert_array_equal(is_filled(nearer), is_filled(points))
+    np.testing.assert_allclose(np.linalg.norm(points + place - found.points, axis=1), np.abs(found.distances))
+
+
+def test_outlines_unite_whichever_way_they_run():
+    moves = np.array([[0, 0], [0.5, 0.3], [-0.3, 0.9], [4, 0]])
+    outlines = [(SQUARE + move)[::step] for move, step in zip(moves, (1, -1, 1, -1), strict=True)]
+    outlines.append(0.25 * SQUARE[::-1])
+    points = np.random.default_rng(0).uniform(-2, 6, (2000, 2))
+    inside = np.array([distance_to_box(points, o.min(axis=0), o.max(axis=0)) < 0 for o in outlines])
+    united = inside[:4].any(axis=0) & ~(inside[4] & (inside[:4].sum(axis=0) < 2))  # the last one is a hole in the first
+    for _ in range(2):
+        field = sh.signed_distance([sh.Polyline(o, closed=True) for o in outlines], resolution=32)
+        np.testing.assert_array_equal(field(points) < 0, united)
+        outlines = [o[::-1] for o in outlines[::-1]]
+
+
+def test_a_drawing_filled_says_what_lies_inside():
+    field = sh.signed_distance([sh.Polyline(s * SQUARE, closed=True) for s in (1, 0.5)], resolution=16)
+    note = field.diagnostics.note(OutlinesFilled)
+    assert note.important and note.length_inside == pytest.approx(1 / 3)
+    with refused(sh.errors.SignedHeatError, "fill"):
+        sh.signed_distance(sh.Polyline(SQUARE, closed=True), fill="odd")
+
+
+def test_offsets_of_a_drawing_are_exact():
+    [outline] = sh.signed_distance(sh.Polyline(SQUARE, closed=True), resolution=33).offset(0.25)
+    np.testing.assert_allclose(distance_to_box(outline.points, (-1, -1), (1, 1)), 0.25, atol=1e-4)
 
 
 def test_a_drawing_with_gaps_is_exact_where_it_is_there():

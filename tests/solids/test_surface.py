@@ -234,7 +234,6 @@ def test_faces_cannot_be_kept_elsewhere_or_of_sheets():
 
 @pytest.mark.parametrize("name", ["box", "torus with holes", "two bodies"])
 def test_simplified_surfaces_are_closed_and_within_the_tolerance(name):
-    pytest.importorskip("manifold3d")
     solid = complete(SHAPES[name]())
     plain, simple = solid.surface(resolution=40), solid.surface(resolution=40, tolerance=0.01)
     assert_closed_manifold(simple)
@@ -265,7 +264,6 @@ def test_distances_between_surfaces_are_proven_whichever_way_they_are_divided():
 
 
 def test_surfaces_that_are_not_simplified_are_returned_with_a_warning(monkeypatch):
-    pytest.importorskip("manifold3d")
     monkeypatch.setattr(simplification, "ATTEMPTS", 0)  # as where none of them succeeds
     surface = samples.sphere(2)
     with pytest.warns(sh.errors.InexactWarning, match="as it was"):

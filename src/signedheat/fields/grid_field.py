@@ -279,10 +279,10 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         (True, 0.75)
         """
         grid, level = self.grid, finite_number(level, "level")
+        refine = self._refined(level)
         if grid.dimension == 2:
             lines = level_lines(self.values, grid.origin, grid.spacing, level)
-            return [Polyline(points, closed) for points, closed in lines]
-        refine = self._refined(level)
+            return [Polyline(points if refine is None else refine(points), closed) for points, closed in lines]
         if self.blocks is None:
             vertices, faces = closed_surface(self.values, grid.origin, grid.spacing, level, refine)
         else:

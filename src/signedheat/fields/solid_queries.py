@@ -60,13 +60,13 @@ class SolidQueries(Protocol):
         """(m, 3, 3) corners of all that distance is measured to."""
 
     def distance(self, points: ArrayLike) -> NDArray[np.float64]:
-        """(...) signed distances of (..., 3) points, negative inside."""
+        """(...) signed distances of (..., d) points, negative inside."""
 
     def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
         """(...) whether points are inside."""
 
     def closest(self, points: ArrayLike) -> Closest:
-        """The nearest place for each of (..., 3) points."""
+        """The nearest place for each of (..., d) points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class Scaled:
         return self.solid.triangles
 
     def distance(self, points: ArrayLike) -> NDArray[np.float64]:
-        """(...) values at (..., 3) points."""
+        """(...) values at (..., d) points."""
         return self.factor * self.solid.distance(points)
 
     def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
@@ -99,7 +99,7 @@ class Scaled:
         return found if self.factor > 0 else ~found
 
     def closest(self, points: ArrayLike) -> Closest:
-        """The nearest place for each of (..., 3) points, with the values and their gradients."""
+        """The nearest place for each of (..., d) points, with the values and their gradients."""
         found = self.solid.closest(points)
         return replace(found, distances=self.factor * found.distances, gradients=self.factor * found.gradients)
 

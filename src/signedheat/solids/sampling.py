@@ -74,7 +74,7 @@ def sample(
     scales = [finite_number(width, "the width of the noise", least=0) for width in widths]
     n_near = round(near * n) if scales else 0
     solid = shape.solid if isinstance(shape, GridField) else complete(shape)
-    if solid is None:
+    if solid is None or solid.triangles.shape[-1] != 3:
         raise SourceError(
             "the field does not know the solid that it is the distance to",
             remedy="take it from signed_distance or Solid.field, or pass the solid",

@@ -40,8 +40,6 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
     ------
     GeometryError
         If the surface is not closed and manifold.
-    MissingPackageError
-        If manifold3d is not installed.
     """
     given = manifold3d.Manifold(
         manifold3d.Mesh64(np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.uint64))

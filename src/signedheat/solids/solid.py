@@ -368,8 +368,6 @@ class Solid(Displayed, Represented, Frozen):
         GeometryError
             If faces are to be kept and do not join with a contour either; it says where. Or if a surface whose bodies
             touch along edges is to be simplified.
-        MissingPackageError
-            If it is to be simplified, and manifold3d is not installed.
         SignedHeatError
             If faces are to be kept at another level than 0.
         MemoryLimitError

@@ -1,0 +1,81 @@
+"""Closed outlines in the plane, and what they fill."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SignedHeatError
+from ..packages import lazy_module
+
+manifold3d: Any = lazy_module("manifold3d", "drawings of closed outlines")
+
+FillRule: TypeAlias = Literal["nonzero", "evenodd"]
+"""Which places closed outlines fill: those around which they run a number of times that is not zero, or that is odd."""
+SIZE = 2.0**30
+"""Size to which outlines are scaled for manifold3d, which rounds coordinates to 1e-8."""
+LEAST_SHARE = 1e-9
+"""Of an area or a length, below which it is rounding."""
+
+
+def filled_outlines(outlines: Sequence[NDArray[np.float64]], rule: FillRule) -> list[NDArray[np.float64]]:
+    """Outlines, (n, 2) each, of what closed outlines fill: clockwise around it, counter-clockwise around its holes.
+
+    They do not cross, but may touch at vertices. What is filled without having an area is left out. By the rule
+    "nonzero" an outline within another one is a hole where it runs the other way; otherwise it does not matter which
+    way outlines run, so that those that cross are united.
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0], [4, 0], [4, 4], [0, 4]])
+    >>> [len(filled_outlines([square, 1 + square / 2], rule)) for rule in ("nonzero", "evenodd")]
+    [1, 2]
+    >>> [len(filled_outlines([square, inner[::-1]], "nonzero")) for inner in (1 + square / 2, 2 + square)]
+    [2, 1]
+    """
+    if rule not in ("nonzero", "evenodd"):
+        raise SignedHeatError(f'fill must be "nonzero" or "evenodd", not {rule!r}', element="fill")
+    points = np.concatenate([np.empty((0, 2)), *outlines])
+    if not len(points):
+        return []
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    center = 0.5 * (lower + upper)
+    scale = float(np.ldexp(SIZE, -int(np.frexp((upper - lower).max())[1])))
+    scaled = [scale * (outline - center) for outline in outlines]
+    if rule == "evenodd":
+        region = manifold3d.CrossSection(scaled, manifold3d.FillRule.EvenOdd)
+    else:
+        region = _united(scaled)
+    return [polygon[::-1] / scale + center for polygon in region.to_polygons()]
+
+
+def _united(outlines: list[NDArray[np.float64]]) -> Any:
+    """What outlines fill by the rule "nonzero", after those in no other one are turned alike, with all within them."""
+    nonzero = manifold3d.FillRule.NonZero
+    parts = [manifold3d.CrossSection([outline], nonzero) for outline in outlines]
+    boxes = np.array([[outline.min(axis=0), outline.max(axis=0)] for outline in outlines])
+    runs_back = np.array([_doubled_area(outline) < 0 for outline in outlines])
+    areas, outermost = np.array([part.area() for part in parts]), np.arange(len(parts))
+    by_size = np.argsort(-areas, kind="stable")
+    for place, inner in enumerate(by_size) if runs_back.any() and not runs_back.all() else ():
+        larger = by_size[:place][areas[by_size[:place]] > (1 + LEAST_SHARE) * areas[inner]]
+        around = ((boxes[larger, 0] <= boxes[inner, 0]) & (boxes[larger, 1] >= boxes[inner, 1])).all(axis=1)
+        for outer in larger[around]:
+            if (parts[inner] - parts[outer]).area() <= LEAST_SHARE * areas[inner]:
+                outermost[inner] = outermost[outer]
+                break
+    turned = runs_back != runs_back[outermost]
+    polygons = [
+        polygon[:: -1 if turn else 1]
+        for part, turn in zip(parts, turned, strict=True)
+        for polygon in part.to_polygons()
+    ]
+    return manifold3d.CrossSection(polygons, nonzero)
+
+
+def _doubled_area(outline: NDArray[np.float64]) -> float:
+    x, y = (outline - outline[0]).T
+    return float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
