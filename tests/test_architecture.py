@@ -41,7 +41,7 @@ FLOORS = [
 ]
 """From the ground up: a module may import what is on its own floor or below. docs/architecture.md shows the same."""
 
-SLOW_TO_IMPORT = ("numba", "matplotlib", "trimesh", "meshio", "skimage", "svgpathtools", "nrrd")
+SLOW_TO_IMPORT = ("numba", "matplotlib", "trimesh", "meshio", "skimage", "nibabel")
 
 
 def test_no_circle_of_imports():

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from shapes import small_runs
 from signedheat.compiled import compiled
@@ -39,3 +40,31 @@ def test_kernels_call_kernels_and_themselves():
 
     assert bits(1000) == 10
     assert bits.__name__ == "bits"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signal to one process")
+def test_ctrl_c_within_a_kernel_is_a_keyboard_interrupt():
+    """Numba makes a SystemError of it; that of another process, so that this one is not stopped by a slip."""
+    code = (
+        "import os, signal, threading, numpy as np\n"
+        "from signedheat.compiled import compiled\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "def busy(a, n):\n"
+        "    b = np.zeros_like(a)\n"
+        "    for k in range(n):\n"
+        "        for i in range(len(a)):\n"
+        "            b[i] += a[i] * k\n"
+        "    return b\n"
+        "busy = compiled(busy)\n"
+        "a = np.ones(1000)\n"
+        "busy(a, 2)\n"
+        "for wait in (0.05, 0.06):\n"
+        "    threading.Timer(wait, lambda: os.kill(os.getpid(), signal.SIGINT)).start()\n"
+        "    try:\n"
+        "        while True:\n"
+        "            busy(a, 20_000)\n"
+        "    except KeyboardInterrupt:\n"
+        "        print('stopped')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert done.stdout.split() == ["stopped", "stopped"], done.stderr

@@ -69,6 +69,8 @@ class Kernel(Generic[Parameters, Returned]):
         try:
             return self.dispatcher(*arguments, **named)
         except Exception as error:
+            if isinstance(error.__cause__, KeyboardInterrupt):  # which Numba makes a SystemError of
+                raise error.__cause__ from None
             if not Kernel.is_kept or not any(isinstance(each, DAMAGE) for each in _chain(error)):
                 raise
             logger.warning("the cache of compiled kernels is not used any more: %s", error)

@@ -7,6 +7,7 @@ top of the modules that use them.
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.util import find_spec
 from types import ModuleType
 from typing import Any
 
@@ -15,8 +16,8 @@ from .errors import MissingPackageError
 REMEDIES = {
     "OCP": "pip install cadquery-ocp",
     "PIL": "pip install pillow",
+    "collada": "pip install pycollada",
     "mpl_toolkits": "pip install matplotlib",
-    "nrrd": "pip install pynrrd",
     "skimage": "pip install scikit-image",
     "sksparse": "conda install -c conda-forge scikit-sparse",
 }
@@ -66,9 +67,29 @@ def require(name: str, purpose: str) -> ModuleType:
         return import_module(name)
     except ImportError as error:
         package = name.partition(".")[0]
-        missing = isinstance(error, ModuleNotFoundError) and error.name == package
-        cause = "is not installed" if missing else f"cannot be imported ({error})"
-        remedy = REMEDIES.get(package, f"pip install {package}")
-        raise MissingPackageError(
-            f"{purpose} need the package {package}, which {cause}", remedy=remedy, element=package
-        ) from error
+        is_missing = isinstance(error, ModuleNotFoundError) and error.name == package
+        cause = "is not installed" if is_missing else f"cannot be imported ({error})"
+        raise missing_package(package, purpose, cause) from error
+
+
+def ensure_installed(package: str, purpose: str) -> None:
+    """Raise `MissingPackageError` if a package is not installed, without importing it.
+
+    Examples
+    --------
+    >>> ensure_installed("json", "examples")
+    """
+    if find_spec(package) is None:
+        raise missing_package(package, purpose)
+
+
+def missing_package(package: str, purpose: str, cause: str = "is not installed") -> MissingPackageError:
+    """The error for a package that something needs.
+
+    Examples
+    --------
+    >>> print(missing_package("PIL", "pictures"))
+    pictures need the package PIL, which is not installed: pip install pillow
+    """
+    remedy = REMEDIES.get(package, f"pip install {package}")
+    return MissingPackageError(f"{purpose} need the package {package}, which {cause}", remedy=remedy, element=package)

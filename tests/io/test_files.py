@@ -23,7 +23,6 @@ from signedheat import samples
 from signedheat.geometry import nearest
 from signedheat.io import files
 from signedheat.io.files import ensure_writable, replacing
-from signedheat.jobs import run_limited
 
 BALL = samples.sphere(1)
 posix = pytest.mark.skipif(os.name != "posix", reason="pipes and permissions of POSIX")
@@ -255,14 +254,6 @@ def test_damaged_tetgen_files(tmp_path, content):
     with pytest.raises(sh.errors.SignedHeatError) as caught:
         sh.read(tmp_path / "bad.ele")
     assert caught.value.path and caught.value.path.endswith(("bad.node", "bad.ele"))
-
-
-@pytest.mark.parametrize("name", ["tets.mesh", "lines.svg"])
-def test_a_file_on_which_a_parser_takes_too_long_is_refused(tmp_path, monkeypatch, name):
-    monkeypatch.setattr(files, "run_limited", lambda job, seconds: run_limited(lambda: time.sleep(0.2), 0.01))
-    (tmp_path / name).write_bytes(b"<svg/>")
-    with refused(sh.errors.FileFormatError, file=name):
-        (sh.io.read_polylines if name.endswith(".svg") else sh.read)(tmp_path / name)
 
 
 def test_concurrent_writers_of_one_file(tmp_path):

@@ -1,8 +1,10 @@
 """Fields of solids: one function, at the nodes of any grid."""
 
+import errno
 import multiprocessing
 import pickle
 import re
+import shutil
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
@@ -234,3 +236,27 @@ def test_progress_goes_up_and_cancels():
 
     with pytest.raises(KeyboardInterrupt):
         complete(SHAPES["brick"]()).field(resolution=40, progress=stop)
+
+
+def test_a_store_has_its_room_before_anything_is_computed(tmp_path, monkeypatch):
+    """Pages of mapped files for which the disk has no room end the process; a store that is whole needs no more."""
+    solid, options = complete(SHAPES["ball"]()), {"resolution": 60, "band": 0.05}
+    band = solid.field(**options, store=tmp_path / "whole")
+    for name in ("values", "confidence"):
+        file = (tmp_path / "whole" / f"{name}.npy").stat()
+        assert 512 * file.st_blocks >= file.st_size
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr("shutil.disk_usage", lambda path: usage._replace(free=0))
+    again = solid.field(**options, store=tmp_path / "whole")
+    np.testing.assert_array_equal(again.values, band.values)
+    with refused(sh.errors.MemoryLimitError):
+        solid.field(**options, store=tmp_path / "other")
+    monkeypatch.setattr("shutil.disk_usage", lambda path: usage)
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.posix_fallocate", full)
+    with refused(sh.errors.FileFormatError):
+        solid.field(**options, store=tmp_path / "full")
+    assert not list((tmp_path / "full").iterdir())

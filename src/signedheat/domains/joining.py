@@ -70,3 +70,16 @@ def concatenated(bodies: Sequence[Body]) -> Body:
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
     faces = [own + start for (_, own), start in zip(bodies, starts, strict=False)]
     return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
+
+
+def placed(body: Body, matrix: NDArray[np.float64]) -> Body:
+    """A body moved by a (4, 3) matrix that multiplies rows from the right; what is mirrored keeps its outside.
+
+    Examples
+    --------
+    >>> mirror = np.vstack([np.diag([-1.0, 1, 1]), [5, 0, 0]])
+    >>> placed((np.eye(3), np.array([[0, 1, 2]])), mirror)[0][0].tolist()
+    [4.0, 0.0, 0.0]
+    """
+    vertices, faces = body
+    return vertices @ matrix[:3] + matrix[3], faces if np.linalg.det(matrix[:3]) >= 0 else faces[:, ::-1]

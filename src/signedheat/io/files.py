@@ -6,15 +6,14 @@ file. Whatever is written is written next to it, with the permissions that it wi
 
 from __future__ import annotations
 
+import codecs
 import errno
 import os
 import secrets
 import shutil
 import stat
-import warnings
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stderr, suppress
-from io import StringIO
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from traceback import walk_tb
 from typing import Any, BinaryIO, TypeVar
@@ -23,9 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError
-from ..jobs import run_limited
 from ..memory import available_memory
-from ..packages import require
 
 PathLike = str | os.PathLike[str]
 T = TypeVar("T")
@@ -33,10 +30,8 @@ PACKAGE = f"{__package__.partition('.')[0]}."
 TAKEN = {".off": 14, ".stl": 5, ".xyz": 4, ".ply": 2}
 """Bytes that a shape takes while it is read for each byte of its file, measured with some hundred thousand faces; less
 where files may hold more than positions and faces. Of other formats the parts that are read first say more."""
-NEEDED = {".nrrd": ("nrrd", "NRRD files")}
-"""Packages by which formats are written."""
-READING_MODULES = f"{__package__}.", run_limited.__module__, f"{PACKAGE}packages"
-"""Modules that read, and those by which they call parsers of other packages."""
+READING_MODULES = f"{__package__}.", f"{PACKAGE}packages"
+"""Modules that read, and that by which they call other packages."""
 
 
 def extension(path: PathLike) -> str:
@@ -108,19 +103,6 @@ def _is_ours(error: BaseException) -> bool:
     names = [str(frame.f_globals.get("__name__")) for frame, _ in walk_tb(error.__traceback__)]
     ours = [name for name in names if name.startswith(PACKAGE)]
     return bool(ours) and not ours[-1].startswith(READING_MODULES)
-
-
-def parsed_by_others(parse: Callable[[], T], size: int) -> T:
-    """Parse a file of `size` bytes by code of another package, without its warnings and within a limit of time."""
-
-    def quietly() -> T:
-        with np.errstate(all="ignore"):
-            return parse()
-
-    with warnings.catch_warnings(), redirect_stderr(StringIO()):  # to which meshio prints
-        warnings.simplefilter("ignore")  # about files that are not closed, odd fields, and the like
-        result: T = run_limited(quietly, 10.0 + size / 1e5)
-    return result
 
 
 def contents(path: PathLike) -> bytes:
@@ -204,15 +186,19 @@ def _no_file(path: PathLike, mode: int) -> FileFormatError:
 
 
 def text(path: PathLike) -> str:
-    """A file as text; bytes that are not UTF-8, for instance in material names, become replacement characters."""
-    return contents(path).decode("utf-8", errors="replace")
+    """A file as text in lines that end in ``\\n``, without a byte order mark.
+
+    Bytes that are not UTF-8, for instance in material names, become replacement characters; with its mark, UTF-16 is
+    read, too. Other characters that end lines elsewhere, such as form feeds, do not end any.
+    """
+    data = contents(path)
+    encoding = "utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
+    return data.decode(encoding, errors="replace").replace("\r\n", "\n").replace("\r", "\n")
 
 
 def ensure_writable(path: PathLike, formats: Collection[str], purpose: str) -> None:
     """Check before a long computation that its result can be written."""
     format_for(path, dict.fromkeys(formats), purpose)
-    if extension(path) in NEEDED:
-        require(*NEEDED[extension(path)])
     with writing(path):
         os.unlink(_new_file(path))
 

@@ -1,7 +1,6 @@
 """Images: values on a lattice, and where that lies; all formats of fields on grids, voxels and labels.
 
-NRRD headers are parsed by pynrrd and NIfTI by nibabel; data are read here, so that no more is read or unpacked than a
-header announces.
+No more is read or unpacked than a header announces. NIfTI is read by nibabel.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ import bz2
 import io
 import json
 import math
-import warnings
+import re
 import zlib
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError
-from ..packages import lazy_module, require
+from ..packages import lazy_module
 from .arrays import read_npy, read_npz
 from .files import (
     PathLike,
@@ -34,16 +33,20 @@ from .files import (
     reading,
     unpacked,
 )
+from .sandbox import parsed
 from .vtk_xml import read_vti
 
 NIBABEL = ("nibabel", "NIfTI files")
 nibabel: Any = lazy_module(*NIBABEL)
-nrrd: Any = lazy_module("nrrd", "NRRD files")
 
 CONFIDENCE = "confidence"
 NIFTI = (".nii", ".nii.gz")
 SHORT = {"RAS": "right-anterior-superior", "LPS": "left-posterior-superior", "LAS": "left-anterior-superior"}
 """Spaces by their short names in NRRD files."""
+JOINED = {"datafile": "data file", "lineskip": "line skip", "byteskip": "byte skip", "centerings": "centers"}
+"""Other names of fields of NRRD files."""
+PACKED = 4000
+"""Memory that a NIfTI file may take for each of its bytes: gzip packs a thousand into one."""
 _CODES = {
     name: code
     for names, code in (
@@ -135,38 +138,56 @@ def _read_vti(path: PathLike) -> Image:
 
 def _read_nrrd(path: PathLike) -> Image:
     """A file that the header names must lie in the same folder or below it."""
-    data = contents(path)
-    file = io.BytesIO(data)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about fields that nobody needs
-        header = dict(nrrd.read_header(file))
-    rest = data[file.tell() :]
-    companion = header.get("data file", header.get("datafile"))
+    header, rest = _nrrd_header(contents(path))
+    companion = header.get("data file")
     if companion is not None:
         if companion.startswith("LIST") or "%" in companion:
             raise FileFormatError("its data are in several files", remedy="save it as one")
         rest = companion_contents(path, companion)
-    sizes = [int(n) for n in header["sizes"]]
-    code = _CODES.get(header["type"])
-    if code is None or len(sizes) != header["dimension"] or min(sizes, default=0) < 1:
+    sizes = parsed_numbers(header["sizes"].split(), "sizes", int).tolist()
+    code = _CODES.get(header["type"].lower())
+    if code is None or [str(len(sizes))] != header["dimension"].split() or min(sizes, default=0) < 1:
         raise damaged(f"its type '{header['type']}', dimension {header['dimension']} and sizes {sizes} make no image")
     dtype = np.dtype(code).newbyteorder(">" if header.get("endian") == "big" else "<")
-    for _ in range(header.get("line skip") or header.get("lineskip") or 0):
+    for _ in range(int(header.get("line skip", 0))):
         rest = rest.partition(b"\n")[2]
         if not rest:
             break
     values = _nrrd_values(rest, header, math.prod(sizes), dtype, path).reshape(sizes, order="F")
-    spacings = np.nan_to_num(np.asarray(header.get("spacings", np.ones(values.ndim)), dtype=np.float64), nan=1.0)
-    steps = np.atleast_2d(np.asarray(header.get("space directions", np.diag(spacings)), dtype=np.float64))
-    origin = np.asarray(header.get("space origin", np.zeros(values.ndim)), dtype=np.float64)
+    spacings = np.nan_to_num(parsed_numbers(header.get("spacings", "1 " * values.ndim).split(), "spacings"), nan=1.0)
+    steps = _nrrd_vectors(header["space directions"]) if "space directions" in header else np.diag(spacings)
+    origin = _nrrd_vectors(header.get("space origin", f"({','.join('0' * values.ndim)})"))[0]
     space = header.get("space")
-    return Image(values, steps.T, origin, None if space is None else SHORT.get(str(space), str(space).lower()))
+    return Image(values, steps.T, origin, None if space is None else SHORT.get(space, space.lower()))
 
 
-def _nrrd_values(data: bytes, header: dict[str, Any], count: int, dtype: np.dtype[Any], path: PathLike) -> NDArray[Any]:
+def _nrrd_header(data: bytes) -> tuple[dict[str, str], bytes]:
+    """Fields by name in lower case, of which some may be written without a space, and what follows the header."""
+    if not data.startswith(b"NRRD"):
+        raise damaged("it does not begin with NRRD")
+    fields: dict[str, str] = {}
+    lines = io.BytesIO(data)
+    for line in lines:
+        name, separator, value = line.decode("utf-8", errors="replace").strip().partition(": ")
+        if not name:
+            break
+        if separator and not name.startswith("#"):
+            fields[JOINED.get(name.lower(), name.lower())] = value.strip()
+    return fields, data[lines.tell() :]
+
+
+def _nrrd_vectors(text: str) -> NDArray[np.float64]:
+    """(n, d) vectors like ``(1,0,0) (0,1,0)``; those of axes outside of space, ``none``, are NaN."""
+    words = re.findall(r"\([^)]*\)|none", text)
+    rows = [[math.nan] if word == "none" else word.strip("()").split(",") for word in words]
+    width = max(map(len, rows))
+    return parsed_numbers([row if len(row) == width else width * [math.nan] for row in rows], "vectors")
+
+
+def _nrrd_values(data: bytes, header: dict[str, str], count: int, dtype: np.dtype[Any], path: PathLike) -> NDArray[Any]:
     """The values in a row; they are `count`."""
-    encoding, size = str(header["encoding"]).lower(), count * dtype.itemsize
-    skip = header.get("byte skip", header.get("byteskip", 0))
+    encoding, size = header["encoding"].lower(), count * dtype.itemsize
+    skip = int(header.get("byte skip", 0))
     if encoding in ("ascii", "text", "txt"):
         words = data[max(skip, 0) :].split()
         if len(words) < count:
@@ -198,40 +219,32 @@ def write_nrrd(
     **keys: str,
 ) -> None:
     """Write values, indexed [x, y, z]; the columns of `axes` are the steps along x, y, z. `keys` go into the header."""
+    data = np.asfortranarray(values).astype(values.dtype.newbyteorder("<"), copy=False)
     header = {
+        "type": next(name for name, code in _CODES.items() if code == data.dtype.str[1:]),
+        "dimension": values.ndim,
         **({"space dimension": values.ndim} if space is None else {"space": space}),
-        "space directions": axes.T,
-        "space origin": origin,
-        "kinds": ["domain"] * values.ndim,
+        "sizes": " ".join(map(str, values.shape)),
+        "space directions": " ".join(map(_nrrd_vector, axes.T.tolist())),
+        "kinds": " ".join(["domain"] * values.ndim),
+        "endian": "little",
         "encoding": "raw",
-        **keys,
+        "space origin": _nrrd_vector(origin.tolist()),
     }
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # pynrrd 1.1 dates its files by a function that will go
-        nrrd.write(str(path), values, header, index_order="F")
+    fields = [f"{name}: {value}" for name, value in header.items()]
+    fields += [f"{name}{': ' if name == 'content' else ':='}{value}" for name, value in keys.items()]
+    with open(path, "wb") as file:
+        file.write("\n".join(["NRRD0005", *fields, "", ""]).encode())
+        file.write(data.tobytes(order="F"))
+
+
+def _nrrd_vector(numbers: list[float]) -> str:
+    return f"({','.join(map(repr, numbers))})"
 
 
 def _read_nifti(path: PathLike) -> Image:
-    data = contents(path)
-    require(*NIBABEL)
-    packed = data[:2] == b"\x1f\x8b"
-    head = unpacked(data, zlib.decompressobj(zlib.MAX_WBITS | 16), 540) if packed else data[:540]
-    second = 540 in (int.from_bytes(head[:4], "little"), int.from_bytes(head[:4], "big"))
-    kind = nibabel.Nifti2Image if second else nibabel.Nifti1Image
-    logger = nibabel.imageglobals.logger
-    was, logger.disabled = logger.disabled, True  # what it mends in headers it would write to standard error
-    try:
-        header = kind.header_class.from_fileobj(io.BytesIO(head), check=False)
-        size = int(header["vox_offset"]) + int(np.prod(header.get_data_shape())) * header.get_data_dtype().itemsize
-        ensure_fits(size, path)
-        if packed:
-            data = unpacked(data, zlib.decompressobj(zlib.MAX_WBITS | 16), size)
-        if len(data) < size:
-            raise _truncated(len(data), size)
-        image = kind.from_bytes(data)
-        values, affine = np.asarray(image.dataobj), np.asarray(image.affine, dtype=np.float64)
-    finally:
-        logger.disabled = was
+    found = parsed("nifti", path, *NIBABEL, bytes_per_byte=PACKED)
+    values, affine = found["values"], found["affine"]
     while values.ndim > 3 and values.shape[-1] == 1:
         values = values[..., 0]
     return Image(values, affine[:3, :3], affine[:3, 3], "right-anterior-superior")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Callable, Iterator
 from itertools import islice
@@ -18,6 +19,15 @@ from ..geometry.welding import distinct_rows, same_positions
 from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers, reading, refuse_kind, text
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+FACET_WORDS = 15
+"""Words from the beginning of a facet to its end, at least: a loop of three vertices with three numbers each."""
+KEYWORDS = frozenset(
+    "v vt vn vp f fo l p o g s mg lod mtllib usemtl maplib usemap cstype deg bmat step curv curv2 surf parm trim hole "
+    "scrv sp end con bevel c_interp d_interp shadow_obj trace_obj ctech stech call csh bsp bzp cdc cdp res".split()
+)
+"""What lines of OBJ files begin with."""
+NUMBERS = re.compile(r"[-+.eE\d/ ]+")
+"""What data look like, whatever their keyword."""
 BYTES = 400
 """Measured: what each line of an OBJ file takes while it is read."""
 MOVED = 1e-4
@@ -30,7 +40,7 @@ def read_stl(path: PathLike) -> TriangleMesh:
 
     Corners with exactly the same coordinates become one vertex: STL has no other way to express that facets meet.
     """
-    data = contents(path)
+    data = contents(path).removeprefix(codecs.BOM_UTF8)
     announced = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else 0
     is_text = data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:1000].lower()
     if is_text and len(data) != _HEADER + 50 * announced:
@@ -76,13 +86,26 @@ def warn_of_rounding(points: NDArray[np.float64], rounded: NDArray[np.float64]) 
 
 
 def _text_corners(data: bytes) -> NDArray[np.float64]:
-    words = data.lower().split()
-    if words.count(b"solid") and b"endsolid" not in words[-40:]:
-        raise damaged("the last solid has no end: the file is truncated")
-    at = [k for k, word in enumerate(words) if word == b"vertex"]
-    if len(at) % 3 or (at and at[-1] + 3 >= len(words)):
-        raise damaged("a facet has fewer than 3 vertices: the file is truncated or damaged")
-    return parsed_numbers([words[k + 1 : k + 4] for k in at], "vertices").reshape(-1, 3)
+    """(3 m, 3) corners of the facets of all solids, each of which must have three."""
+    ends = len(re.findall(rb"(?mi)^[ \t]*endsolid\b", data))
+    words = re.sub(rb"(?mi)^[ \t]*(end)?solid\b[^\r\n]*", b"", data).lower().split()  # names may be any words
+    places: dict[bytes, list[int]] = {b"facet": [], b"endfacet": [], b"vertex": []}
+    for place, word in enumerate(words):
+        if word in places:
+            places[word].append(place)
+    begins, stops, corners = places.values()
+    if not ends or len(begins) != len(stops):
+        raise damaged(
+            f"{len(begins)} facets begin, {len(stops)} and {ends} solids end: the file is truncated or damaged"
+        )
+    counts = np.searchsorted(corners, stops) - np.searchsorted(corners, begins)
+    rooms = np.array(stops) - np.array(begins)
+    wrong = np.flatnonzero((counts != 3) | (rooms < FACET_WORDS))
+    if len(wrong) or len(corners) != 3 * len(begins):
+        number = int(wrong[0]) if len(wrong) else len(begins)
+        cause = f"facet {number} has {counts[number] if len(wrong) else 'other'} corners, and facets of STL have 3"
+        raise FileFormatError(cause, remedy="export it again, as triangles", element=f"facet {number}")
+    return parsed_numbers([words[k + 1 : k + 4] for k in corners], "vertices").reshape(-1, 3)
 
 
 def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:
@@ -151,11 +174,17 @@ def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
     lines: dict[str, list[list[Any]]] = {"v": [], "vn": [], "f": [], "l": [], "p": []}
     content = text(path)
     ensure_fits(BYTES * sum(content.count(f"\n{keyword} ") for keyword in lines), path)
-    for line in re.sub(r"\\[ \t]*\r?\n", " ", content).splitlines():
+    for number, line in enumerate(re.sub(r"\\[ \t]*\n", " ", content).split("\n"), start=1):
         words: list[Any] = line.partition("#")[0].split()
         if words and words[0] in lines:
             lines[words[0]].append(words)
             words[0] = len(lines["v"])
+        elif words and words[0] not in KEYWORDS and NUMBERS.fullmatch(" ".join(words[1:])):
+            raise FileFormatError(
+                f"line {number} begins with '{words[0]:.20}', which OBJ does not know: later lines may count it",
+                remedy="mend or remove it",
+                element=f"line {number}",
+            )
     if not lines["v"]:
         raise FileFormatError("there is no line 'v x y z': this holds no shape in OBJ format")
     return {keyword: rest for keyword, rest in lines.items() if rest}
@@ -185,7 +214,7 @@ def _elements(words: list[list[Any]]) -> tuple[NDArray[np.int64], NDArray[np.int
 
 def read_off(path: PathLike) -> Elements:
     """The faces of an OFF file (also COFF, NOFF, STOFF, …), or its points if it has none."""
-    rows = [row for line in text(path).splitlines() if (row := line.partition("#")[0].split())]
+    rows = [row for line in text(path).split("\n") if (row := line.partition("#")[0].split())]
     kind = rows[0][0].upper() if rows else ""
     if not kind.endswith("OFF") or "BINARY" in [word.upper() for word in rows[0]]:
         raise FileFormatError("it does not begin with OFF as text: this is no file that can be read as OFF")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -144,7 +145,7 @@ def write_parts(parts: Iterator[tuple[NDArray[np.float64], NDArray[np.int64]]], 
 
 def _tables(path: PathLike) -> dict[str, dict[str, Any]]:
     """The columns of each element."""
-    form, elements, body = _header(contents(path))
+    form, elements, body = _header(contents(path).removeprefix(codecs.BOM_UTF8))
     read_element = _text_reader(body) if form == "ascii" else _BinaryReader(body, form).read
     return {element.name: read_element(element) for element in elements}
 
@@ -171,8 +172,8 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
     if end < 0 or newline < 0:
         raise damaged("the header has no end: the file is truncated")
     form, elements = "", []
-    for line in data[:end].decode("ascii", errors="replace").splitlines()[1:]:
-        words = line.split()
+    for line in data[:end].splitlines()[1:]:
+        words = line.decode("ascii", errors="replace").split()
         try:
             match words[:1]:
                 case ["format"]:
@@ -184,7 +185,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
                 case ["property"]:
                     elements[-1].add(words[2], _TYPES[words[1]])
         except (IndexError, KeyError, ValueError):
-            raise damaged(f"the header line '{line}' makes no sense: the file is damaged") from None
+            raise damaged(f"the header line '{' '.join(words)}' makes no sense: the file is damaged") from None
     if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
         raise damaged(f"the format '{form}' is none that PLY has: the file is damaged")
     return form, elements, data[newline + 1 :]
@@ -296,7 +297,7 @@ class _BinaryReader:
 
 
 def _text_reader(body: bytes) -> Any:
-    lines = iter([line for line in body.decode("ascii", errors="replace").splitlines() if line.strip()])
+    lines = iter([line.decode("ascii", errors="replace") for line in body.splitlines() if line.strip()])
 
     def read(element: _Element) -> dict[str, Any]:
         if not element.properties:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import codecs
+import re
 import struct
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 from xml.parsers import expat
 
 import numpy as np
@@ -14,32 +14,40 @@ from numpy.typing import NDArray
 from ..domains.exchange import Elements
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from ..packages import lazy_module, require
-from .files import PathLike, contents, damaged, ensure_fits, parsed_by_others, reading, refuse_kind, size_of, text
+from ..packages import ensure_installed
+from .files import PathLike, contents, damaged, extension, reading, refuse_kind, text
+from .sandbox import parsed
 
-SEPARATORS = str.maketrans(",;", "  ")
+SEPARATORS, DECIMAL_COMMAS = str.maketrans(",;", "  "), str.maketrans(",;", ". ")
+"""What commas and semicolons mean in a table."""
+WITH_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 NUMBERS = {"F": "f", "I": "i", "U": "u"}
 """Types of fields, and their letters for NumPy."""
-laspy: Any = lazy_module("laspy", ".las and .laz files")
-pye57: Any = lazy_module("pye57", ".e57 files")
-
+PACKED = 1000
+"""Memory that a LAZ file may take for each of its bytes."""
 CHECKSUM = 4
 """Bytes at the end of each page of an E57 file."""
 SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance "
 """Namespace of the attributes by which XML names schemas."""
-BYTES = 60
-"""Measured: what each point takes at most while a file is read."""
 
 
 def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[NDArray[np.float64]]:
     """Numbers of each block of lines, between empty lines: all lines have as many, one of `widths`.
 
-    They are separated by commas, semicolons, tabs or spaces. What follows ``#`` and a header line are skipped.
+    They are separated by commas, semicolons, tabs or spaces; where all commas stand between digits, and something else
+    separates the numbers, they are decimal commas. What follows ``#`` and a header line are skipped.
+
+    Raises
+    ------
+    FileFormatError
+        If a line has other numbers, or there is no line of numbers.
     """
     blocks: list[list[list[float]]] = [[]]
     columns = 0
-    for number, line in enumerate(text(path).removeprefix("\ufeff").splitlines(), start=1):
-        words = line.partition("#")[0].translate(SEPARATORS).split()
+    content = text(path)
+    meaning = DECIMAL_COMMAS if _has_decimal_commas(content) else SEPARATORS
+    for number, line in enumerate(content.split("\n"), start=1):
+        words = line.partition("#")[0].translate(meaning).split()
         if not words:
             if not line.strip():
                 blocks.append([])
@@ -61,6 +69,15 @@ def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[NDArray[np.float6
     if not columns:
         raise FileFormatError("there is no point in it", remedy=f"give {' or '.join(map(str, widths))} numbers a line")
     return [np.array(block) for block in blocks if block]
+
+
+def _has_decimal_commas(content: str) -> bool:
+    """Whether each line of numbers has several, apart from one another by other characters than their commas."""
+    if "," not in content:
+        return False
+    lines = (line.partition("#")[0].replace(";", " ").split() for line in content.split("\n"))
+    rows = [words for words in lines if words and words[0][0] in "+-0123456789,."]
+    return bool(rows) and all(len(words) > 1 and all(map(WITH_COMMA.fullmatch, words)) for words in rows)
 
 
 def read_point_lists(path: PathLike, dimension: int) -> list[tuple[NDArray[np.float64], bool]]:
@@ -95,7 +112,7 @@ def write_xyz(shape: Elements, path: PathLike) -> bytes:
 
 def read_pcd(path: PathLike) -> Elements:
     """Points whose DATA are ascii, binary or binary_compressed; those without a position (NaN) are left out."""
-    content = contents(path)
+    content = contents(path).removeprefix(codecs.BOM_UTF8)
     header: dict[str, list[str]] = {}
     at = 0
     while "DATA" not in header:
@@ -145,7 +162,7 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, NDArray[np.fl
     if kind != "ascii":
         raise FileFormatError(f"data are {kind}", remedy="write them as ascii, binary or binary_compressed")
     try:
-        numbers = np.array([line.split() for line in body.decode("ascii").splitlines() if line.strip()], dtype=float)
+        numbers = np.array([line.decode("ascii").split() for line in body.splitlines() if line.strip()], dtype=float)
         numbers = numbers.reshape(n, sum(counts))
     except (ValueError, UnicodeDecodeError):
         raise FileFormatError(f"there are no {n} lines of {sum(counts)} numbers") from None
@@ -154,37 +171,29 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, NDArray[np.fl
 
 
 def read_las(path: PathLike) -> PointCloud:
-    """Points of a LAS or LAZ file, with its scale and offset; it has no normals."""
-    size, opened = size_of(path), laspy.open
-    if Path(path).suffix.lower() == ".laz" and not laspy.LazBackend.detect_available():
-        require("lazrs", ".laz files")
-    with reading(path):
+    """Points of a LAS or LAZ file, with its scale and offset; it has no normals.
 
-        def parse() -> NDArray[np.float64]:
-            with opened(str(path)) as file:
-                ensure_fits(file.header.point_count * BYTES, path)
-                return np.array(file.read().xyz, dtype=np.float64)
-
-        return _cloud(parsed_by_others(parse, size), path)
+    Raises
+    ------
+    MissingPackageError
+        If laspy is not installed, or for LAZ no package that it decompresses with.
+    """
+    found = parsed("las", path, "laspy", f"{extension(path)} files", bytes_per_byte=PACKED)
+    return _cloud(found["points"], path)
 
 
 def read_e57(path: PathLike) -> PointCloud:
-    """Points of all scans of an E57 file, in its own place for each; those that are marked invalid are left out."""
-    size, opened = size_of(path), pye57.E57
+    """Points of all scans of an E57 file, in its own place for each; those that are marked invalid are left out.
+
+    Raises
+    ------
+    FileFormatError
+        If its description defines entities or names schemas: pye57 would open what these refer to, here or elsewhere.
+    """
+    ensure_installed("pye57", ".e57 files")
     with reading(path):
         _refuse_references(_e57_description(contents(path)))
-
-        def parse() -> NDArray[np.float64]:
-            file = opened(str(path))
-            try:
-                ensure_fits(sum(file.get_header(k).point_count for k in range(file.scan_count)) * BYTES, path)
-                scans = [file.read_scan(k, ignore_missing_fields=True) for k in range(file.scan_count)]
-            finally:
-                file.close()
-            axes = ("cartesianX", "cartesianY", "cartesianZ")
-            return np.concatenate([np.zeros((0, 3)), *(np.stack([s[a] for a in axes], axis=1) for s in scans)])
-
-        return _cloud(parsed_by_others(parse, size), path)
+        return _cloud(parsed("e57", path, "pye57", ".e57 files")["points"], path)
 
 
 def _e57_description(data: bytes) -> bytes:

@@ -1,43 +1,26 @@
-"""Scenes of several bodies: glTF by trimesh, 3MF (Core Specification 1.3), STEP by Open CASCADE; and their units."""
+"""Scenes of several bodies: glTF, 3MF (Core Specification 1.3), COLLADA, STEP by Open CASCADE; and their units."""
 
 from __future__ import annotations
 
 import io
-import json
 import posixpath
 import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
-from urllib.parse import unquote
 from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.joining import Body, concatenated
+from ..domains.joining import Body, concatenated, placed
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
 from ..geometry.welding import welded
-from ..packages import lazy_module
-from .files import PathLike, companion_contents, contents, damaged, ensure_fits, extension, parsed_by_others, reading
+from ..packages import ensure_installed
+from . import gltf
+from .files import PathLike, contents, damaged, ensure_fits, extension, reading
+from .sandbox import parsed
 
-trimesh = lazy_module("trimesh", ".glb and .gltf files")
-messages = lazy_module("OCP.Message", ".step files")
-control = lazy_module("OCP.STEPControl", ".step files")
-selected = lazy_module("OCP.IFSelect", ".step files")
-mesher = lazy_module("OCP.BRepMesh", ".step files")
-topology = lazy_module("OCP.TopAbs", ".step files")
-explorer = lazy_module("OCP.TopExp", ".step files")
-casts = lazy_module("OCP.TopoDS", ".step files")
-tools = lazy_module("OCP.BRep", ".step files")
-places = lazy_module("OCP.TopLoc", ".step files")
-boxes = lazy_module("OCP.Bnd", ".step files")
-bounding = lazy_module("OCP.BRepBndLib", ".step files")
-
-GLTF_BYTES = 80
-"""Measured: what each position, index or the like takes while a glTF scene is read."""
 TRIANGLE_BYTES = 100
 """Memory that a triangle of a 3MF package takes, with its vertices."""
 METRES = {
@@ -59,6 +42,10 @@ DEPTH = 32
 
 Key = tuple[str, str]
 """Part of the package, and id of an object in it."""
+STEP_BYTES = 10_000
+"""Memory that a STEP file may take for each of its bytes: a sphere is a line, and any number of triangles."""
+STEP_SECONDS = 300
+"""Processor time that any STEP file may take: what a line says may be hard to make triangles of."""
 FINENESS = 1e-3
 """Distance of triangles from the surface, over the diagonal of the box around it, if nothing else is said."""
 ANGLE = 0.3
@@ -75,52 +62,15 @@ def _joined(bodies: Sequence[Body]) -> TriangleMesh:
 
 
 def read_glb(path: PathLike) -> TriangleMesh:
-    """All triangles of a scene, transformed by their nodes, one body after another.
-
-    Buffers that the file names must lie in the same folder or below it; pictures are not read.
-    """
-    data = contents(path)
-    load_scene = trimesh.load_scene
-    plain, files = _without_looks(data, path)
-
-    def parse() -> list[Body]:
-        scene = load_scene(io.BytesIO(plain), file_type=extension(path)[1:], process=False, resolver=files)
-        bodies = [body for body in scene.dump() if isinstance(body, trimesh.Trimesh)]
-        return [(np.asarray(body.vertices), np.asarray(body.faces)) for body in bodies]
-
-    return _joined(parsed_by_others(parse, len(data)))
+    """All triangles of a glTF scene, transformed by their nodes, one body after another."""
+    return _joined(gltf.read_bodies(path))
 
 
-def _without_looks(data: bytes, path: PathLike) -> tuple[bytes, dict[str, bytes]]:
-    """The file without its materials and pictures, and the buffers that it names, by name.
-
-    Numbers that would be made of nothing (an accessor without a view is zeros, as many as it says) are refused where
-    they are more than the bytes of the file.
-    """
-    is_binary = data[:4] == b"glTF"
-    length = int.from_bytes(data[12:16], "little") if is_binary else len(data)
-    tree = json.loads(data[20 : 20 + length] if is_binary else data)
-    files = {
-        buffer["uri"]: companion_contents(path, unquote(buffer["uri"]))
-        for buffer in tree.get("buffers", [])
-        if "uri" in buffer and "base64," not in buffer["uri"]
-    }
-    most = len(data) + sum(map(len, files.values()))
-    if any(not 0 <= accessor.get("count", 0) <= most for accessor in tree.get("accessors", [])):
-        raise damaged("it announces more numbers than it has bytes: it is damaged")
-    ensure_fits(GLTF_BYTES * sum(accessor.get("count", 0) for accessor in tree.get("accessors", [])), path)
-    for looks in ("materials", "textures", "images", "samplers"):
-        tree.pop(looks, None)
-    for mesh in tree.get("meshes", []):
-        for primitive in mesh.get("primitives", []):
-            primitive.pop("material", None)
-    text = json.dumps(tree).encode()
-    if not is_binary:
-        return text, files
-    text += b" " * (-len(text) % 4)
-    rest = data[20 + length :]
-    head = b"glTF" + data[4:8] + (20 + len(text) + len(rest)).to_bytes(4, "little")
-    return head + len(text).to_bytes(4, "little") + data[16:20] + text + rest, files
+def read_dae(path: PathLike) -> TriangleMesh:
+    """All triangles of a COLLADA scene, transformed by their nodes, in the units of the file, with its axes."""
+    ensure_installed("collada", ".dae files")
+    found = parsed("dae", path, "trimesh", ".dae files")
+    return _joined([(found["points"], found["triangles"])] if len(found["triangles"]) else [])
 
 
 @dataclass
@@ -141,7 +91,7 @@ def read_3mf(path: PathLike) -> TriangleMesh:
         if not items:  # nothing is said about what to build: everything that is a mesh
             own = [_key(each, package.root, "id") for each in _all(root, "object")]
             items = [(key, np.eye(4, 3)) for key in own if len(package.object(key).faces)]
-        ensure_fits(TRIANGLE_BYTES * sum(package.count(key, 0) for key, _ in items), path)
+        ensure_fits(TRIANGLE_BYTES * sum(package.count(key)[0] for key, _ in items), path)
         return _joined([body for key, matrix in items for body in package.placed(key, matrix)])
 
 
@@ -167,7 +117,7 @@ class _Package:
         self._zip = zipfile.ZipFile(io.BytesIO(contents(path)))
         self._models: dict[str, ElementTree.Element] = {}
         self._objects: dict[Key, _Object] = {}
-        self._counts: dict[Key, int] = {}
+        self._counts: dict[Key, tuple[int, int]] = {}
 
     @property
     def root(self) -> str:
@@ -194,23 +144,27 @@ class _Package:
                 raise damaged(f"object {wanted} does not exist", element=f"object {wanted}")
         return self._objects[key]
 
-    def count(self, key: Key, depth: int) -> int:
-        """Number of triangles of an object with all its components, found without placing them."""
-        if depth > DEPTH:
-            raise damaged("its components contain themselves, or too many others")
+    def count(self, key: Key, depth: int = 0) -> tuple[int, int]:
+        """Number of triangles of an object with all its components, and how deep these lie, without placing them."""
         if key not in self._counts:
-            found = self.object(key)
-            inner = sum(self.count(part, depth + 1) for part, _ in found.parts)
-            self._counts[key] = len(found.faces) + inner
+            if depth > DEPTH:
+                raise damaged("its components contain themselves, or too many others")
+            item = self.object(key)
+            inner = [self.count(part, depth + 1) for part, _ in item.parts]
+            height = 1 + max((height for _, height in inner), default=0)
+            if height > DEPTH:
+                raise damaged(f"its components lie more than {DEPTH} levels deep")
+            self._counts[key] = len(item.faces) + sum(count for count, _ in inner), height
         return self._counts[key]
 
     def placed(self, key: Key, matrix: NDArray[np.float64]) -> Iterator[Body]:
-        """Vertices and faces of an object and its components; what is mirrored keeps its outside."""
-        found = self.object(key)
-        if len(found.faces):
-            faces = found.faces if np.linalg.det(matrix[:3]) >= 0 else found.faces[:, ::-1]
-            yield found.vertices @ matrix[:3] + matrix[3], faces
-        for part, own in found.parts:
+        """Vertices and faces of an object and its components; those without triangles are not visited."""
+        if not self.count(key)[0]:
+            return
+        item = self.object(key)
+        if len(item.faces):
+            yield placed((item.vertices, item.faces), matrix)
+        for part, own in item.parts:
             yield from self.placed(part, np.vstack([own[:3] @ matrix[:3], own[3] @ matrix[:3] + matrix[3]]))
 
     def _bytes(self, part: str) -> bytes:
@@ -290,54 +244,19 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
     >>> mesh, cad_faces = read_step("part.step", deflection=0.01)  # doctest: +SKIP
     >>> cad_faces[signedheat.complete(mesh).closest(points).faces]  # doctest: +SKIP
     """
-    shape = _shape(path)
-    box = boxes.Bnd_Box()
-    bounding.BRepBndLib.Add_s(shape, box)
-    if box.IsVoid():
+    fineness = {"deflection": deflection, "fineness": FINENESS, "angle": ANGLE}
+    found = parsed(
+        "step", path, "OCP", ".step files", bytes_per_byte=STEP_BYTES, least_seconds=STEP_SECONDS, **fineness
+    )
+    counts = found["triangle_counts"]
+    if not counts.sum():
         raise FileFormatError("it has no surface", path=path)
-    diagonal = float(np.sqrt(box.SquareExtent()))
-    mesher.BRepMesh_IncrementalMesh(shape, deflection or FINENESS * diagonal, False, ANGLE, False)
-    as_face = getattr(casts.TopoDS, "Face_s", None) or casts.TopoDS.Face  # its name until version 8
-    walk = explorer.TopExp_Explorer(shape, topology.TopAbs_ShapeEnum.TopAbs_FACE)
-    bodies = []
-    while walk.More():
-        bodies.append(_triangles(as_face(walk.Current())))
-        walk.Next()
-    counts = [len(triangles) for _, triangles in bodies]
-    if not sum(counts):
-        raise FileFormatError("it has no surface", path=path)
-    mesh = _joined(bodies)
-    kept, numbers = np.unique(welded(mesh.vertices, SEAM * diagonal), return_inverse=True)
-    return TriangleMesh(mesh.vertices[kept], numbers.ravel()[mesh.faces]), np.repeat(np.arange(len(bodies)), counts)
+    starts = np.cumsum([0, *found["point_counts"][:-1]])
+    faces = found["triangles"] + np.repeat(starts, counts)[:, None]
+    kept, numbers = np.unique(welded(found["points"], SEAM * found["diagonal"]), return_inverse=True)
+    return TriangleMesh(found["points"][kept], numbers.ravel()[faces]), np.repeat(np.arange(len(counts)), counts)
 
 
 def step_mesh(path: PathLike) -> TriangleMesh:
     """The triangles alone."""
     return read_step(path)[0]
-
-
-def _shape(path: PathLike) -> Any:
-    contents(path)  # which says why a file cannot be read
-    printer = messages.Message_PrinterOStream.get_type_descriptor_s()
-    messages.Message.DefaultMessenger_s().RemovePrinters(printer)  # which writes to standard output
-    reader = control.STEPControl_Reader()
-    status = reader.ReadFile(str(Path(path)))
-    if status != selected.IFSelect_ReturnStatus.IFSelect_RetDone or not reader.TransferRoots():
-        raise FileFormatError("Open CASCADE cannot read it, or it has no solid", remedy="export it again", path=path)
-    return reader.OneShape()
-
-
-def _triangles(face: Any) -> Body:
-    """Corners and triangles of a face, counterclockwise from outside."""
-    place = places.TopLoc_Location()
-    found = tools.BRep_Tool.Triangulation_s(face, place)
-    if found is None:
-        return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
-    moved = place.Transformation()
-    nodes = (found.Node(k).Transformed(moved) for k in range(1, found.NbNodes() + 1))
-    points = np.array([(node.X(), node.Y(), node.Z()) for node in nodes])
-    rows = (found.Triangle(k) for k in range(1, found.NbTriangles() + 1))
-    triangles = np.array([[row.Value(1), row.Value(2), row.Value(3)] for row in rows], dtype=np.int64) - 1
-    if face.Orientation() == topology.TopAbs_Orientation.TopAbs_REVERSED:
-        triangles = triangles[:, ::-1]
-    return points, triangles

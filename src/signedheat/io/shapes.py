@@ -15,13 +15,14 @@ from .files import PathLike, format_for, reading, replacing
 from .meshes import read_obj, read_off, read_stl, write_obj, write_off, write_pc, write_stl
 from .ply import read_ply, write_ply
 from .points import read_e57, read_las, read_pcd, read_xyz, write_xyz
-from .scenes import read_3mf, read_glb, step_mesh
+from .scenes import read_3mf, read_dae, read_glb, step_mesh
 from .tets import TET_FORMATS, read_tets, store_cells
 from .voxels import read_volume
 from .vtk_xml import read_vtp, write_vtp
 
 READERS: dict[str, Callable[[PathLike], Elements | Shape]] = {
     ".3mf": read_3mf,
+    ".dae": read_dae,
     ".e57": read_e57,
     ".glb": read_glb,
     ".gltf": read_glb,
@@ -62,11 +63,11 @@ MANY, BYTES_PER_FACE = 100_000, 250
 def read(path: PathLike) -> Shape:
     """Read a shape, in the format given by the extension.
 
-    STL, OBJ, PLY, OFF, VTP, GLB and STEP files have surfaces; XYZ, PCD, LAS, LAZ, E57 and PC files have points, and so
-    have PLY, OBJ, OFF and VTP files without faces. Vertices and faces keep their number and order, whatever their
-    defects: nothing is merged, dropped, split or turned. STL has no vertices; corners with exactly the same coordinates
-    become one. NPY, NRRD and VTI files have volumes of voxels, booleans or zeros and ones. MESH, MSH, VTU, VTK and
-    TetGen's NODE with ELE have tets.
+    STL, OBJ, PLY, OFF, VTP, GLB, DAE, 3MF and STEP files have surfaces; XYZ, PCD, LAS, LAZ, E57 and PC files have
+    points, and so have PLY, OBJ, OFF and VTP files without faces. Vertices and faces keep their number and order,
+    whatever their defects: nothing is merged, dropped, split or turned. STL has no vertices; corners with exactly the
+    same coordinates become one. NPY, NRRD and VTI files have volumes of voxels, booleans or zeros and ones. MESH, MSH,
+    VTU, VTK and TetGen's NODE with ELE have tets.
 
     Parameters
     ----------

@@ -1,7 +1,6 @@
 """Tet meshes, and fields on them, by meshio; VTK's XML is read by ourselves.
 
-What meshio reads is parsed within a limit of time: on some damaged files it does not end by itself. What Gmsh's files
-announce is checked before, since meshio allocates memory for it and counts to it.
+meshio reads in a process of its own: on some damaged files it does not end, and it allocates what they announce.
 """
 
 from __future__ import annotations
@@ -27,14 +26,14 @@ from .files import (
     PathLike,
     contents,
     damaged,
-    ensure_fits,
     extension,
     format_for,
-    parsed_by_others,
+    parsed_numbers,
     replacing,
     writing,
 )
-from .vtk_xml import read_vtu
+from .sandbox import parsed
+from .vtk_xml import Block, Cells, read_vtu
 
 MODULES = {
     ".mesh": "medit",
@@ -52,6 +51,7 @@ TET_FORMATS = frozenset(MODULES)
 
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
 
+
 COUNTED = {
     "PhysicalNames": 1,
     "Entities": 4,
@@ -64,8 +64,6 @@ COUNTED = {
 """Sections, and how many numbers at the beginning of each count what is in it (in version 2 there is but one)."""
 IN_TEXT = ("PhysicalNames", "NodeData", "ElementData")
 """Sections that begin with text in binary files, too."""
-LARGE = rb"^(\d{9,})(?=[ \t]*\r?$|(?:[ \t]+\S+){3})"
-"""Numbers of nodes with many digits, at the beginning of lines that are no coordinates."""
 
 
 def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
@@ -84,13 +82,15 @@ def load_cells(path: PathLike) -> Any:
     """Points, cells and values at the points, as a `meshio.Mesh` has them."""
     if extension(path) == ".vtu":
         return read_vtu(path, (NAME,))
-    module, files = _module(path), _files(path)
-    for file in files:
+    for file in _files(path):
         if all(line.startswith(b"#") for line in contents(file).split(b"\n") if line.strip()):  # meshio would look on
             raise FileFormatError("there is nothing in it", remedy="write it again", path=file)
     if extension(path) == ".msh":
-        refuse_announcements(path)
-    return parsed_by_others(lambda: module.read(str(path)), sum(len(contents(file)) for file in files))
+        _refuse_announcements(path)
+    found = parsed("cells", path, "meshio", "tet meshes", module=MODULES[extension(path)])
+    blocks = [Block(kind, found[f"cells {k}"]) for k, kind in enumerate(found["kinds"])]
+    values = {name: found[f"values {k}"] for k, name in enumerate(found["names"])}
+    return Cells(found["points"], blocks, values)
 
 
 def store_cells(mesh: Any, path: PathLike) -> None:
@@ -115,40 +115,19 @@ def _module(path: PathLike) -> Any:
     return require(f"meshio.{format_for(path, MODULES, 'a tet mesh')}", "tet meshes")
 
 
-def refuse_announcements(path: PathLike) -> None:
-    """Check that a Gmsh file can hold what it announces, and that a table up to its largest node number fits."""
+def _refuse_announcements(path: PathLike) -> None:
+    """Raise `FileFormatError` if a Gmsh file announces more things than it has bytes: meshio would count to them."""
     data = contents(path)
     form = re.search(rb"\$MeshFormat\s+(\S+)\s+([01])\s+([48])\s", data)
     if form is None:
         return  # meshio says so
-    is_raw = form[2] == b"1" and form[1].startswith(b"4")
-    kind = np.dtype(f"<u{form[3].decode()}")
+    is_raw, kind = form[2] == b"1" and form[1].startswith(b"4"), np.dtype(f"<u{form[3].decode()}")
     for section in re.finditer(rb"^\$(\w+)[ \t]*\r?\n", data, re.MULTILINE):
         name, begin = section[1].decode(), section.end()
-        if name not in COUNTED:
-            continue
-        if is_raw and name not in IN_TEXT:
+        if is_raw and name in COUNTED and name not in IN_TEXT:
             counts = np.frombuffer(data, kind, COUNTED[name], begin).tolist()
         else:
-            counts = [int(word) for word in data[begin : begin + 100].split(b"\n")[0].split()[: COUNTED[name]]]
+            words = data[begin : begin + 100].split(b"\n")[0].split()[: COUNTED.get(name, 0)]
+            counts = parsed_numbers(words, f"counts of {name}", int).tolist()
         if max(counts, default=0) > len(data):
             raise damaged(f"it has {len(data)} bytes, and announces {max(counts)} {name}", element=name)
-        if name == "Nodes":
-            if is_raw and form[1] != b"4.0":
-                largest = _largest_in_blocks(data, begin, counts[0], kind)
-            else:
-                rows = data[begin : data.find(b"$EndNodes", begin)]
-                largest = max(map(int, re.findall(LARGE, rows, re.MULTILINE)), default=0)
-            ensure_fits(8 * largest, path)
-
-
-def _largest_in_blocks(data: bytes, at: int, n_blocks: int, kind: np.dtype[np.unsignedinteger]) -> int:
-    """The largest number of a node in the blocks of a binary file of version 4.1."""
-    largest, at = 0, at + 4 * kind.itemsize
-    for _ in range(n_blocks):
-        at += 12  # dimension and number of the entity, whether it is parametric
-        count = int(np.frombuffer(data, kind, 1, at)[0])
-        numbers = np.frombuffer(data, kind, count, at + kind.itemsize)
-        largest = max(largest, int(numbers.max(initial=0)))
-        at += kind.itemsize * (1 + count) + 24 * count
-    return largest

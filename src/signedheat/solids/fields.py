@@ -28,7 +28,7 @@ from ..operators.grid.blocks import NODES, SIDE, Blocks
 from ..parallel import n_threads
 from ..progress import Progress
 from .nodes import distances_in, solved
-from .stores import Scheduler, in_store
+from .stores import Scheduler, blocks_held, in_store
 from .winding import Windings
 
 EDGE = 8
@@ -196,11 +196,11 @@ def blocks_where(
 
 
 def blocks_that_fit(store: str | PathLike[str] | None) -> int:
-    """How many blocks fit in memory, or on the disk of a store, with what is at work."""
+    """How many blocks fit in memory, or on the disk of a store with those that it holds already."""
     if store is not None:
         folder = Path(store).absolute()
         there = next(place for place in (folder, *folder.parents) if place.exists())
-        return int(shutil.disk_usage(there).free / (NODES * BYTES_IN_BAND))
+        return max(blocks_held(folder), int(shutil.disk_usage(there).free / (NODES * BYTES_IN_BAND)))
     available = available_memory()
     left = math.inf if available is None else available - libraries() - BYTES_AT_WORK
     return int(min(max(left, 0) / (NODES * BYTES_IN_BAND), 2**40))

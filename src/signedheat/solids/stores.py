@@ -6,9 +6,12 @@ tile whether it is done. Workers write rows of their own: a tile needs nothing o
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -113,13 +116,40 @@ def _begin(folder: Path, key: str, plan: dict[str, NDArray[Any]], n_blocks: int,
                 path=folder,
             )
         return
-    folder.mkdir(parents=True, exist_ok=True)
-    np.savez(folder / "plan.npz", allow_pickle=False, **plan)
     shape = (n_blocks, SIDE, SIDE, SIDE)
-    open_memmap(folder / "values.npy", mode="w+", dtype=np.float32, shape=shape).flush()
-    open_memmap(folder / "confidence.npy", mode="w+", dtype=np.float16, shape=shape).flush()
-    open_memmap(folder / "done.npy", mode="w+", dtype=np.uint8, shape=(n_tiles,)).flush()
-    name.write_text(key)  # last: a folder without it is begun anew
+    files = {"values": (np.float32, shape), "confidence": (np.float16, shape), "done": (np.uint8, (n_tiles,))}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        np.savez(folder / "plan.npz", allow_pickle=False, **plan)
+        for file, (dtype, size) in files.items():
+            _reserve(folder / f"{file}.npy", dtype, size)
+        name.write_text(key)  # last: a folder without it is begun anew
+    except OSError as error:
+        for file in (*(f"{file}.npy" for file in files), "plan.npz", "key.txt"):
+            with suppress(OSError):
+                (folder / file).unlink()
+        cause = f"the band cannot be kept there ({error.strerror or error})"
+        raise FileFormatError(cause, remedy="choose a folder that is yours and has room", path=folder) from error
+
+
+def _reserve(path: Path, dtype: type, shape: tuple[int, ...]) -> None:
+    """Make a file of zeros that has its room on disk: a mapped page without any would end the process."""
+    open_memmap(path, mode="w+", dtype=dtype, shape=shape).flush()
+    size = path.stat().st_size
+    with open(path, "r+b") as file:
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file.fileno(), 0, size)
+            return
+        file.seek(size - math.prod(shape) * np.dtype(dtype).itemsize)
+        while file.tell() < size:
+            file.write(bytes(min(1 << 24, size - file.tell())))
+
+
+def blocks_held(folder: Path) -> int:
+    """Number of blocks that a folder has room for already; none if it was not begun."""
+    if not (folder / "key.txt").exists():
+        return 0
+    return int(np.load(folder / "values.npy", mmap_mode="r").shape[0])
 
 
 @lru_cache(maxsize=1)

@@ -1,0 +1,196 @@
+"""glTF 2.0 scenes, as text with buffers of their own (``.gltf``) and binary (``.glb``)."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.joining import Body, placed
+from ..errors import FileFormatError
+from .files import PathLike, companion_contents, contents, damaged, ensure_fits
+
+NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+"""Types of the components of accessors."""
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+SUPPORTED = ("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp", "EXT_texture_")
+"""What the names of extensions begin with that are read, or do not matter to shapes."""
+INSTANCES = "EXT_mesh_gpu_instancing"
+TRIANGLES, STRIP, FAN = 4, 5, 6
+"""Modes of primitives that have faces; smaller numbers are points and lines."""
+BYTES = 200
+"""Measured: memory that a triangle of a scene takes while it is read, with its vertices."""
+
+
+def read_bodies(path: PathLike) -> list[Body]:
+    """Vertices and triangles of all primitives of the default scene, placed by their nodes.
+
+    Buffers that the file names must lie in the same folder or below it. Materials, skins and morph targets are ignored.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged, or needs an extension that is not supported.
+    MemoryLimitError
+        If the scene does not fit into memory: a mesh may stand in many places.
+    """
+    scene = _opened(path)
+    missing = [name for name in scene.tree.get("extensionsRequired", []) if not name.startswith(SUPPORTED)]
+    if any(INSTANCES in node.get("extensions", {}) for node in scene.tree.get("nodes", [])):
+        missing.append(INSTANCES)
+    if missing:
+        raise FileFormatError(
+            f"it needs the extension {missing[0]}, which is not supported",
+            remedy="export it without compression and extensions",
+            element=missing[0],
+        )
+    places = list(_places(scene.tree))
+    meshes = scene.tree.get("meshes", [])
+    counts = {mesh: _corner_count(scene.tree, meshes[mesh]) for mesh in {mesh for mesh, _ in places}}
+    ensure_fits(BYTES * sum(counts[mesh] for mesh, _ in places), path)
+    bodies = {mesh: [scene.body(primitive) for primitive in meshes[mesh]["primitives"]] for mesh in counts}
+    return [placed(body, matrix) for mesh, matrix in places for body in bodies[mesh] if len(body[1])]
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """The description of a scene, and its buffers."""
+
+    tree: dict[str, Any]
+    buffers: list[bytes]
+
+    def body(self, primitive: dict[str, Any]) -> Body:
+        """Vertices and triangles of a primitive; vertices that no triangle has are left out."""
+        mode = primitive.get("mode", TRIANGLES)
+        if mode not in range(FAN + 1):
+            raise damaged(f"primitives have the mode {mode}, which glTF does not know")
+        if mode < TRIANGLES or "POSITION" not in primitive["attributes"]:
+            return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
+        points = self.numbers(primitive["attributes"]["POSITION"]).astype(np.float64)
+        if points.shape[1] != 3:
+            raise damaged(f"positions have {points.shape[1]} coordinates")
+        named = primitive.get("indices")
+        corners = np.arange(len(points)) if named is None else self.numbers(named).ravel().astype(np.int64)
+        faces = _triangles(corners, mode)
+        if len(faces) and faces.max() >= len(points):
+            raise damaged(f"a face names vertex {faces.max()}, and there are {len(points)}")
+        used = np.unique(faces)
+        return points[used], np.searchsorted(used, faces)
+
+    def numbers(self, index: int) -> NDArray[Any]:
+        """(count, width) what an accessor holds; integers that stand for fractions become these."""
+        accessor = self.tree["accessors"][index]
+        count, width = int(accessor["count"]), WIDTHS[accessor["type"]]
+        dtype = np.dtype(NUMBERS[accessor["componentType"]])
+        if not 0 < count <= sum(map(len, self.buffers)):
+            raise damaged(f"accessor {index} announces {count} numbers, which the file does not have")
+        if "bufferView" in accessor:
+            values = self._viewed(accessor, dtype, count, width)
+        else:
+            values = np.zeros((count, width), dtype=dtype)
+        if "sparse" in accessor:
+            sparse, values = accessor["sparse"], values.copy()
+            code = np.dtype(NUMBERS[sparse["indices"]["componentType"]])
+            places = self._viewed(sparse["indices"], code, sparse["count"], 1).ravel()
+            values[places] = self._viewed(sparse["values"], dtype, sparse["count"], width)
+        if accessor.get("normalized") and dtype.kind in "iu":
+            return np.maximum(values.astype(np.float64) / np.iinfo(dtype).max, -1.0)
+        return values
+
+    def _viewed(self, part: dict[str, Any], dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
+        """(count, width) numbers in a view of a buffer."""
+        view = self.tree["bufferViews"][part["bufferView"]]
+        buffer, begin, length = self.buffers[view["buffer"]], view.get("byteOffset", 0), view["byteLength"]
+        start, row = begin + part.get("byteOffset", 0), width * dtype.itemsize
+        stride = view.get("byteStride", row)
+        end = start + (count - 1) * stride + row
+        if min(begin, length, part.get("byteOffset", 0), count - 1) < 0 or stride < row or end > begin + length:
+            raise damaged(f"{count} numbers go beyond their part of the buffer")
+        if end > len(buffer):
+            raise damaged(f"{end} bytes of a buffer are needed, and there are {len(buffer)}: it may be truncated")
+        return np.ndarray((count, width), dtype, buffer, start, (stride, dtype.itemsize))
+
+
+def _opened(path: PathLike) -> _Scene:
+    data, inner = contents(path), b""
+    text = data
+    if data[:4] == b"glTF":
+        if int.from_bytes(data[8:12], "little") > len(data):
+            raise damaged("it is shorter than it says: it is truncated")
+        length = int.from_bytes(data[12:16], "little")
+        text = data[20 : 20 + length]
+        inner = data[28 + length : 28 + length + int.from_bytes(data[20 + length : 24 + length], "little")]
+    tree = json.loads(text.decode("utf-8-sig"))
+    buffers = []
+    for buffer in tree.get("buffers", []):
+        uri = buffer.get("uri")
+        if uri is None:
+            buffers.append(inner)
+        elif uri.startswith("data:"):
+            buffers.append(base64.b64decode(uri.partition(",")[2]))
+        else:
+            buffers.append(companion_contents(path, unquote(uri)))
+    return _Scene(tree, buffers)
+
+
+def _triangles(corners: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
+    """(m, 3) triangles of a list, strip or fan of corners."""
+    if mode == TRIANGLES:
+        if len(corners) % 3:
+            raise damaged(f"{len(corners)} corners make no triangles")
+        return corners.reshape(-1, 3)
+    second, third = corners[1:-1], corners[2:]
+    if mode == FAN:
+        return np.stack([np.full(len(third), corners[0]), second, third], axis=1)
+    faces = np.stack([corners[:-2], second, third], axis=1)
+    faces[1::2] = faces[1::2, [1, 0, 2]]
+    distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return faces[distinct]  # others join strips
+
+
+def _corner_count(tree: dict[str, Any], mesh: dict[str, Any]) -> int:
+    named = [part.get("indices", part["attributes"].get("POSITION")) for part in mesh["primitives"]]
+    return sum(tree["accessors"][index]["count"] for index in named if index is not None)
+
+
+def _places(tree: dict[str, Any]) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    """Meshes and the (4, 3) transforms of rows by which nodes place them: each node once, as glTF demands."""
+    nodes, scenes = tree.get("nodes", []), tree.get("scenes", [])
+    if not nodes:
+        yield from ((mesh, np.eye(4, 3)) for mesh in range(len(tree.get("meshes", []))))
+        return
+    children = {child for node in nodes for child in node.get("children", [])}
+    roots = scenes[tree.get("scene", 0)].get("nodes", []) if scenes else set(range(len(nodes))) - children
+    stack = [(index, np.eye(4)) for index in sorted(roots)]
+    visited = set()
+    while stack:
+        index, outer = stack.pop()
+        if index in visited or not 0 <= index < len(nodes):
+            raise damaged(f"node {index} is part of two others or does not exist", element=f"node {index}")
+        visited.add(index)
+        matrix = outer @ _matrix(nodes[index])
+        if "mesh" in nodes[index]:
+            yield nodes[index]["mesh"], matrix.T[:, :3]
+        stack += [(child, matrix) for child in reversed(nodes[index].get("children", []))]
+
+
+def _matrix(node: dict[str, Any]) -> NDArray[np.float64]:
+    """(4, 4) from positions in a node to those around it."""
+    if "matrix" in node:
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    matrix = np.eye(4)
+    x, y, z, w = (float(number) for number in node.get("rotation", (0, 0, 0, 1)))
+    turn = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:3, :3] = np.array(turn) * np.array(node.get("scale", (1, 1, 1)), dtype=np.float64)
+    matrix[:3, 3] = np.array(node.get("translation", (0, 0, 0)), dtype=np.float64)
+    return matrix

@@ -1,0 +1,184 @@
+"""Parsers of other packages, run as a program of its own by `sandbox`: they read files of strangers, and may crash.
+
+This file is run by itself, and imports nothing of this package: a process starts sooner without it. Each function
+takes the path of a file, and returns arrays of numbers and other values that JSON can hold.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import json
+import os
+import sys
+import warnings
+from typing import Any
+
+import numpy as np
+
+NEW_NETWORK, NEW_USER = 0x40000000, 0x10000000
+"""Flags of Linux for a network without any interface, and for the right to have one."""
+FORBIDDEN = ("socket.", "subprocess.", "os.exec", "os.fork", "os.posix_spawn", "os.spawn", "os.system", "urllib.")
+"""Events of Python that end a parser."""
+MOST_WRITTEN = 1 << 20
+"""Bytes that it may write to a file; what it prints goes to one."""
+
+
+class Refused(Exception):
+    """A file that a parser reads, and that holds nothing of use: the cause, and a remedy."""
+
+
+def las(path: str) -> dict[str, Any]:
+    """Points of a LAS or LAZ file."""
+    sys.modules["requests"] = None  # type: ignore[assignment]  # which laspy would import, to fetch files
+    import laspy
+
+    if path.lower().endswith(".laz") and not laspy.LazBackend.detect_available():
+        raise ModuleNotFoundError("lazrs", name="lazrs")
+    with laspy.open(path) as file:
+        return {"points": np.array(file.read().xyz, dtype=np.float64)}
+
+
+def e57(path: str) -> dict[str, Any]:
+    """Points of all scans of an E57 file, each in its own place."""
+    import pye57
+
+    file = pye57.E57(path)
+    scans = [file.read_scan(k, ignore_missing_fields=True) for k in range(file.scan_count)]
+    points = [np.stack([scan[f"cartesian{axis}"] for axis in "XYZ"], axis=1) for scan in scans]
+    return {"points": np.concatenate([np.zeros((0, 3)), *points])}
+
+
+def step(path: str, deflection: float | None, fineness: float, angle: float) -> dict[str, Any]:
+    """Triangles of a STEP file, and how many of them and of their corners each CAD face has."""
+    from OCP import Bnd, BRep, BRepBndLib, BRepMesh, IFSelect, Message, STEPControl, TopAbs, TopExp, TopLoc, TopoDS
+
+    printer = Message.Message_PrinterOStream.get_type_descriptor_s()
+    Message.Message.DefaultMessenger_s().RemovePrinters(printer)
+    reader = STEPControl.STEPControl_Reader()
+    if reader.ReadFile(path) != IFSelect.IFSelect_ReturnStatus.IFSelect_RetDone or not reader.TransferRoots():
+        raise Refused("Open CASCADE cannot read it, or it has no solid", "export it again")
+    shape, box = reader.OneShape(), Bnd.Bnd_Box()
+    BRepBndLib.BRepBndLib.Add_s(shape, box)
+    if box.IsVoid():
+        raise Refused("it has no surface", "export it again")
+    diagonal = float(np.sqrt(box.SquareExtent()))
+    BRepMesh.BRepMesh_IncrementalMesh(shape, deflection or fineness * diagonal, False, angle, False)
+    as_face = getattr(TopoDS.TopoDS, "Face_s", None) or TopoDS.TopoDS.Face  # its name until version 8
+    walk = TopExp.TopExp_Explorer(shape, TopAbs.TopAbs_ShapeEnum.TopAbs_FACE)
+    points, triangles = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)]
+    while walk.More():
+        face, place = as_face(walk.Current()), TopLoc.TopLoc_Location()
+        mesh = BRep.BRep_Tool.Triangulation_s(face, place)
+        n_points, n_triangles = (0, 0) if mesh is None else (mesh.NbNodes(), mesh.NbTriangles())
+        move = place.Transformation()
+        nodes = (mesh.Node(k).Transformed(move) for k in range(1, n_points + 1))
+        points.append(np.array([(node.X(), node.Y(), node.Z()) for node in nodes]).reshape(-1, 3))
+        rows = (mesh.Triangle(k) for k in range(1, n_triangles + 1))
+        corners = np.array([[row.Value(1), row.Value(2), row.Value(3)] for row in rows], dtype=np.int64).reshape(-1, 3)
+        turned = face.Orientation() == TopAbs.TopAbs_Orientation.TopAbs_REVERSED
+        triangles.append((corners[:, ::-1] if turned else corners) - 1)
+        walk.Next()
+    return {
+        "points": np.concatenate(points),
+        "triangles": np.concatenate(triangles),
+        "point_counts": np.array([len(part) for part in points[1:]], dtype=np.int64),
+        "triangle_counts": np.array([len(part) for part in triangles[1:]], dtype=np.int64),
+        "diagonal": diagonal,
+    }
+
+
+def dae(path: str) -> dict[str, Any]:
+    """Triangles of a COLLADA scene, placed by its nodes."""
+    import trimesh
+
+    with open(path, "rb") as file:
+        scene = trimesh.load_scene(file, file_type="dae", process=False)
+    bodies = [body for body in scene.dump() if isinstance(body, trimesh.Trimesh)]
+    starts = np.cumsum([0, *(len(body.vertices) for body in bodies)])[: len(bodies)]
+    faces = [np.asarray(body.faces, dtype=np.int64) + start for body, start in zip(bodies, starts, strict=True)]
+    return {
+        "points": np.concatenate([np.zeros((0, 3)), *(np.asarray(body.vertices) for body in bodies)]),
+        "triangles": np.concatenate([np.zeros((0, 3), dtype=np.int64), *faces]),
+    }
+
+
+def cells(path: str, module: str) -> dict[str, Any]:
+    """Points, cells and values at the points, by one of meshio's modules."""
+    from importlib import import_module
+
+    mesh = import_module(f"meshio.{module}").read(path)
+    values = {name: np.asarray(column) for name, column in mesh.point_data.items()}
+    values = {name: column for name, column in values.items() if column.dtype.kind in "biuf"}
+    found = {"points": np.asarray(mesh.points, dtype=np.float64), "kinds": [block.type for block in mesh.cells]}
+    found |= {f"cells {k}": np.asarray(block.data, dtype=np.int64) for k, block in enumerate(mesh.cells)}
+    return found | {"names": list(values)} | {f"values {k}": column for k, column in enumerate(values.values())}
+
+
+def nifti(path: str) -> dict[str, Any]:
+    """Values and affine map of a NIfTI image."""
+    import nibabel
+
+    nibabel.imageglobals.logger.disabled = True
+    image = nibabel.load(path)
+    return {"values": np.asarray(image.dataobj), "affine": np.asarray(image.affine, dtype=np.float64)}
+
+
+def confine(memory: int, seconds: int) -> None:
+    """Take memory beyond a limit, processor time beyond a limit, network and further programs from this process.
+
+    Where a system has no such limit, it is not set: there are none on Windows, and a network can be taken away on
+    Linux alone, unless it forbids that. Python's own sockets are refused everywhere.
+    """
+    with contextlib.suppress(ImportError):
+        import resource
+
+        kinds = {resource.RLIMIT_CPU: seconds, resource.RLIMIT_FSIZE: MOST_WRITTEN, resource.RLIMIT_CORE: 0}
+        for kind, most in (kinds | {resource.RLIMIT_DATA: memory}).items():
+            _, bound = resource.getrlimit(kind)
+            least = most if bound == resource.RLIM_INFINITY else min(most, bound)
+            with contextlib.suppress(ValueError, OSError):
+                resource.setrlimit(kind, (least, least if kind != resource.RLIMIT_CPU else bound))
+    if sys.platform == "linux":
+        unshare = ctypes.CDLL(None).unshare
+        if unshare(NEW_NETWORK):  # which only root may have at once
+            unshare(NEW_USER | NEW_NETWORK)
+    sys.addaudithook(refuse)
+
+
+def refuse(event: str, _: object) -> None:
+    """End whatever is forbidden."""
+    if event.startswith(FORBIDDEN):
+        raise PermissionError(f"{event} is not for parsers")
+
+
+def answer(found: dict[str, Any], file: Any) -> None:
+    """Write values, a line of JSON with what is no array, and behind it the bytes of those in turn."""
+    arrays = {name: np.ascontiguousarray(each) for name, each in found.items() if isinstance(each, np.ndarray)}
+    values = {name: each for name, each in found.items() if name not in arrays}
+    about = [[name, array.dtype.newbyteorder("=").str, array.shape] for name, array in arrays.items()]
+    file.write(json.dumps({"values": values, "arrays": about}).encode() + b"\n")
+    for array in arrays.values():
+        file.write(memoryview(array.astype(array.dtype.newbyteorder("="), copy=False).ravel()).cast("B"))
+    file.flush()
+
+
+def main(function: str, path: str, options: str, memory: str, seconds: str) -> None:
+    """Parse a file, and answer on standard output."""
+    file = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what anybody prints must not come between
+    warnings.simplefilter("ignore")
+    confine(int(memory), int(seconds))
+    try:
+        with np.errstate(all="ignore"):
+            found = globals()[function](path, **json.loads(options))
+    except Refused as error:
+        found = {"refused": error.args}
+    except BaseException as error:
+        found = {"error": type(error).__name__, "message": f"{error}"[:400], "package": getattr(error, "name", None)}
+    answer(found, file)
+    os._exit(0)  # without what packages may do at the end
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

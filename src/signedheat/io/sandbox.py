@@ -1,0 +1,171 @@
+"""Parsers of other packages, each in a process of its own.
+
+What reads the files of strangers may be led to crash, to run for ever, to take all memory, or to fetch something. So
+it has limits of memory and of processor time, no network where the system can take that away, and it answers with
+numbers, which are not run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from contextlib import suppress
+from math import prod
+from signal import Signals
+from typing import Any, BinaryIO, cast
+
+import numpy as np
+
+from ..errors import FileFormatError, MemoryLimitError, SignedHeatError
+from ..memory import available_memory
+from ..packages import ensure_installed, missing_package
+from . import parsers
+from .files import PathLike, ensure_fits, size_of
+
+RUN = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); file = sys.argv.pop(1); "
+    "exec(compile(open(file, encoding='utf-8').read(), file, 'exec'))"
+)
+"""What the process runs: isolated, so that nothing comes from the current folder; then with the path of this one."""
+LEAST_MEMORY, MEMORY_PER_BYTE = 1 << 29, 100
+"""Bytes that a parser may take with its package, and further ones for each byte of a file."""
+LEAST_SECONDS, BYTES_PER_SECOND = 10, 20_000
+"""Processor time that a parser may take, and bytes of a file for which it has another second."""
+NUMBERS = re.compile(r"[<>|][biuf][1248]")
+MOST_SAID = 1 << 24
+"""Bytes of an answer apart from its arrays."""
+ALONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
+"""Variables for one thread: each takes memory before it does anything."""
+
+
+def parsed(
+    function: str,
+    path: PathLike,
+    package: str,
+    purpose: str,
+    *,
+    bytes_per_byte: int = MEMORY_PER_BYTE,
+    least_seconds: int | None = None,
+    **options: object,
+) -> dict[str, Any]:
+    """What a function of `parsers` finds in a file.
+
+    Parameters
+    ----------
+    function : str
+        Its name.
+    path : str or path
+        The file.
+    package : str
+        The package that it calls, which must be installed, as it is imported.
+    purpose : str
+        What needs the package, in the plural.
+    bytes_per_byte : int
+        Memory that it may take for each byte of the file, in addition to `LEAST_MEMORY`.
+    least_seconds : int, optional
+        Processor time that it may take for any file; `LEAST_SECONDS` by default.
+    options : any
+        Further arguments, which JSON can hold.
+
+    Returns
+    -------
+    dict
+        Arrays and other values by name.
+
+    Raises
+    ------
+    FileFormatError
+        If the package cannot read the file, crashes, or takes too long.
+    MemoryLimitError
+        If it needs more memory than a file of this size may.
+    MissingPackageError
+        If it is not installed.
+    """
+    size = size_of(path)
+    ensure_installed(package, purpose)
+    free = available_memory()
+    memory = LEAST_MEMORY + bytes_per_byte * size
+    memory = memory if free is None else min(memory, free)
+    seconds = (least_seconds or LEAST_SECONDS) + size // BYTES_PER_SECOND
+    folders = json.dumps([os.path.abspath(folder) for folder in sys.path if folder])
+    order = [function, os.path.abspath(path), json.dumps(options), str(memory), str(seconds)]
+    with tempfile.TemporaryFile() as messages:
+        process = subprocess.Popen(
+            [sys.executable, "-I", "-c", RUN, folders, str(parsers.__file__), *order],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=messages,
+            env={**os.environ, **ALONE, "RUST_BACKTRACE": "0"},
+        )
+        with process:
+            try:
+                found = _answer(cast("BinaryIO", process.stdout), path)
+                with suppress(subprocess.TimeoutExpired):
+                    process.wait(1.0)
+            finally:
+                process.kill()
+        if found is None:
+            messages.seek(0)
+            lines = messages.read().decode("utf-8", errors="replace").splitlines()
+            said = [line for line in lines if line.strip() and not line.startswith("note:")]
+            raise _died(package, process.returncode, said[-1] if said else "", seconds)
+    if "refused" in found:
+        cause, remedy = found["refused"]
+        raise FileFormatError(cause, remedy=remedy)
+    if "error" in found:
+        raise _failed(package, purpose, found, memory)
+    return found
+
+
+def _answer(stream: BinaryIO, path: PathLike) -> dict[str, Any] | None:
+    """What a parser has written, if that is whole: numbers alone, and no more of them than there is memory for."""
+    try:
+        about = json.loads(stream.readline(MOST_SAID))
+        if "values" not in about:
+            return dict(about)
+        found = dict(about["values"])
+        shapes = [(str(name), str(code), [int(n) for n in shape]) for name, code, shape in about["arrays"]]
+    except (ValueError, KeyError, TypeError):
+        return None
+    for name, code, shape in shapes:
+        if not NUMBERS.fullmatch(code) or min(shape, default=0) < 0:
+            return None
+        ensure_fits(prod(shape) * np.dtype(code).itemsize, path)
+        found[name] = np.empty(shape, dtype=code)
+        rest = memoryview(found[name].reshape(-1).view(np.uint8))
+        while rest:
+            count = stream.readinto(rest)  # type: ignore[attr-defined]
+            if not count:
+                return None
+            rest = rest[count:]
+    return found
+
+
+def _died(package: str, status: int, said: str, seconds: int) -> SignedHeatError:
+    """The error for a parser that ended without an answer."""
+    number = -status if status < 0 else 0
+    name = Signals(number).name if number else f"status {status}"
+    if name == "SIGKILL":
+        cause = f"{package} was killed while it read it, as where memory ends"
+        return MemoryLimitError(cause, remedy="check that it is not damaged, or free some memory")
+    if name == "SIGXCPU":
+        cause = f"{package} takes more than {seconds} s of processor time for it"
+    else:
+        cause = f"{package} crashed on it ({name}{': ' if said else ''}{said:.200})"
+    return FileFormatError(cause, remedy="write it again, or in another format")
+
+
+def _failed(package: str, purpose: str, found: dict[str, Any], memory: int) -> SignedHeatError:
+    """The error for a parser that gave up."""
+    kind, message = found["error"], " ".join(str(found["message"]).split())
+    if kind == "MemoryError":
+        cause = f"{package} takes more than {memory / 1e9:.2g} GB for it"
+        return MemoryLimitError(cause, remedy="check that it is not damaged, or free some memory")
+    if kind == "ModuleNotFoundError":
+        return missing_package(found["package"] or package, purpose)
+    cause = f"{package} cannot read it ({message or kind:.200})"
+    return FileFormatError(cause, remedy="write it again, or in another format")
