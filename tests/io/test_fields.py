@@ -126,3 +126,25 @@ def test_fields_of_four_dimensions_fit_npz_only(tmp_path):
     np.testing.assert_array_equal(load_field(tmp_path / "phi.npz").values, phi.values)
     with refused(sh.errors.FileFormatError):
         phi.save(tmp_path / "phi.vti")
+
+
+@pytest.mark.parametrize("places", [[[-1, 0, 0]], [[0, 0, 99]], [[0.0, 0.0, 0.0]], [[0, 0]], [0, 0, 0]])
+def test_bands_whose_blocks_lie_nowhere(tmp_path, places):
+    band = sh.complete(sh.samples.sphere(1)).field(spacing=0.2, band=0.2)
+    band.save(tmp_path / "band.npz")
+    with np.load(tmp_path / "band.npz") as file:
+        arrays = dict(file)
+    arrays["places"] = np.array(places, dtype=np.array(places).dtype)
+    np.savez(tmp_path / "band.npz", **arrays)
+    with refused(sh.errors.FileFormatError):
+        load_field(tmp_path / "band.npz")
+
+
+@pytest.mark.parametrize("version", [np.nan, np.inf, -1, "one", [1, 2]])
+def test_solids_of_odd_versions(tmp_path, version):
+    sh.complete(sh.samples.sphere(1)).save(tmp_path / "solid.npz")
+    with np.load(tmp_path / "solid.npz") as file:
+        arrays = dict(file)
+    np.savez(tmp_path / "solid.npz", **arrays | {"solid_version": version})
+    with refused(sh.errors.FileFormatError):
+        sh.io.load(tmp_path / "solid.npz")

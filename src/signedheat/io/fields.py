@@ -198,8 +198,13 @@ def _load_band(path: PathLike) -> GridField:
         grid = _made(Grid, found["origin"], found["spacing"], found["shape"])
         far = found["coarse_values"]
         coarse = _made(GridField, _made(Grid, found["origin"], found["coarse_spacing"], far.shape), far)
-        blocks = Blocks.of(found["places"], grid.shape)
-        if not np.array_equal(blocks.places, found["places"]):
+        places = found["places"]
+        if places.ndim != 2 or places.dtype.kind not in "iu" or places.shape[1] != len(grid.shape):
+            raise damaged("its blocks have no places", element="places")
+        if len(places) and not ((places >= 0) & (places * SIDE < grid.shape)).all():
+            raise damaged("its blocks lie outside of the grid", element="places")
+        blocks = Blocks.of(places, grid.shape)
+        if not np.array_equal(blocks.places, places):
             raise damaged("its blocks are not in order", element="places")
         options = {"blocks": blocks, "coarse": coarse, "width": float(found["width"]), "solid": _held_solid(path)}
         return _made(GridField, grid, found["values"], confidence=found.get(CONFIDENCE), **options)

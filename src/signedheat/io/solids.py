@@ -56,7 +56,7 @@ def load(path: PathLike) -> Solid:
     True
     """
     version = read_npz(path, ("solid_version",)).get("solid_version", np.zeros(1))
-    if version.shape or int(version) <= 0:
+    if version.shape or version.dtype.kind not in "iuf" or not 0 < version < np.inf:
         raise FileFormatError("it has no solid", remedy="read fields by `load_field`, shapes by `read`", path=path)
     if int(version) != VERSION:
         remedy = "install a later version of signedheat" if int(version) > VERSION else "complete the shape again"
