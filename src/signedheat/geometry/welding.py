@@ -96,6 +96,20 @@ def same_positions(points: NDArray[np.float64]) -> NDArray[np.int64]:
     return same_rows((np.ascontiguousarray(points) + 0.0).view(np.uint64))  # −0 becomes 0
 
 
+def indexed(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """(n, 3) points of (m, 3, 3) triangles in order of first use, and (m, 3) triangles between them.
+
+    Examples
+    --------
+    >>> corners = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [0, 1, 0]]])
+    >>> indexed(corners)[1].tolist()
+    [[0, 1, 2], [1, 3, 2]]
+    """
+    corners = triangles.reshape(-1, 3)
+    used, faces = np.unique(same_positions(corners), return_inverse=True)
+    return corners[used], faces.reshape(-1, 3)
+
+
 def same_rows(rows: NDArray[np.integer]) -> NDArray[np.int64]:
     """(n,) first row that equals each of (n, k) rows, in O(n) time.
 

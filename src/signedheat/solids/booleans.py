@@ -14,9 +14,10 @@ from ..diagnostics import Diagnostics
 from ..domains.joining import concatenated
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
-from ..geometry.cut_faces import cut_faces
-from ..geometry.welding import same_positions
-from .keeping import TOGETHER, covered, outward
+from ..geometry.arrangement import arranged
+from ..geometry.welding import indexed
+from .keeping import outward
+from .regions import Regions
 from .solid import Solid
 from .winding import Windings
 
@@ -58,17 +59,13 @@ def _combination(a: Solid, b: Solid, turned: bool, around: NDArray[np.float64] |
     if not len(triangles):
         raise SourceError("neither encloses anything", remedy="combine solids, not sheets", element="solid")
     chain = triangles if around is None else np.concatenate([triangles, around])
-    ids = same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)
-    pieces, parents, _ = cut_faces(triangles, ids, triangles, ids)
+    cut = arranged(*indexed(triangles))
     windings = Windings(chain)
-    behind, ahead = windings.sides(pieces)
-    kept = behind & ~ahead
+    regions = Regions.of(cut, windings)
+    kept = regions.behind & ~regions.ahead & ~regions.doubled
     if not kept.any():
         raise SourceError("nothing is inside the result", remedy="check that the solids overlap", element="solid")
-    pieces, parents = pieces[kept], parents[kept]
-    size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
-    once = ~covered(pieces, (parents >= len(first)).astype(np.int64), TOGETHER * size)
-    pieces, parents = pieces[once], parents[once]
+    pieces, parents = cut.points[cut.faces[kept]], cut.origins[kept]
     count = a.source.n_faces if a.source is not None else int(a.origins.max()) + 1
     origins = np.concatenate(
         [a.origins[of_first], np.where(b.origins[of_second] < 0, -1, b.origins[of_second] + count)]

@@ -15,21 +15,18 @@ from numpy.typing import NDArray
 
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
-from ..geometry.box_tree import BoxTree
+from ..geometry.arrangement import arranged, meeting_faces
 from ..geometry.components import element_components, sums_of
-from ..geometry.conforming import conforming
-from ..geometry.cut_faces import cut_faces
-from ..geometry.directions import unit
+from ..geometry.edges import edge_table
 from ..geometry.face_tree import FaceTree
-from ..geometry.meshes import area_vectors, part_volumes
+from ..geometry.manifold import split_at_pinches
+from ..geometry.meshes import part_volumes
 from ..geometry.self_intersections import self_intersections
+from ..geometry.welding import coincident_faces, indexed
 from .fields import Evaluated
-from .parts import parts_of
+from .regions import Regions, widest
 from .winding import Windings
 
-TOGETHER = 1e-7
-"""Distance, over the size of the solid, up to which corners are one: triangles that cut each other are cut one by one,
-and come to the same place only up to rounding in their planes."""
 OFF = 0.5
 """Cells between contour and faces from which on faces are missing; edges of contours are cut off by less."""
 SHIFT = np.array([0.37, 0.41, 0.43])
@@ -41,13 +38,47 @@ SQUARES = np.array([[[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0]], [[1, 0, 0], [1
 """Corners of the sides of a cell across the first axis, counter-clockwise as seen from outside."""
 
 
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """Triangles that meet in whole edges, and where they do not close or pass through each other.
+
+    Attributes
+    ----------
+    points, faces : (n, 3) float, (m, 3) int
+        The triangles.
+    bad : (k, 2) int
+        Ends of edges that faces do not run along as often one way as the other, and of those of faces that meet.
+    open : bool
+        Whether there are any of the former.
+    """
+
+    points: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    bad: NDArray[np.int64]
+    open: bool
+
+    @classmethod
+    def of(cls, points: NDArray[np.float64], faces: NDArray[np.int64]) -> Joined:
+        """Look at triangles."""
+        table = edge_table(faces)
+        gaps = table.vertices[table.balance != 0]
+        meeting = faces[np.unique(self_intersections(points, faces))]
+        return cls(points, faces, np.concatenate([gaps, meeting[:, :2], meeting[:, 1:]]), bool(len(gaps)))
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """They alone; where bodies touch along an edge or at a vertex, each has its own."""
+        used, faces = np.unique(self.faces, return_inverse=True)
+        return TriangleMesh(*split_at_pinches(self.points[used], faces.reshape(-1, 3)))
+
+
 def given_surface(
     solid: Evaluated, contour: Callable[[], TriangleMesh], cell: float
 ) -> tuple[TriangleMesh, NDArray[np.float64]]:
     """Triangles of a solid with the inside on one side, turned to have it behind them, joined into a closed mesh.
 
-    Of faces that lie in each other, where bodies overlap, one is taken. Where triangles do not join, the surface of
-    `contour`, with cells of this size, takes their place; the middles of such places, (k, 3), are returned, too.
+    Those that join already stay as they are, in their order. Where triangles do not join, the surface of `contour`,
+    with cells of this size, takes their place; the middles of such places, (k, 3), are returned, too.
 
     Raises
     ------
@@ -55,52 +86,61 @@ def given_surface(
         If there are no such triangles, or they do not join with the contour either.
     """
     windings = solid.windings
-    size = float(np.ptp(solid.triangles.reshape(-1, 3), axis=0).max())
     turned, _ = outward(solid)
     if not len(turned):
         raise GeometryError(
             "nothing of the shape bounds a solid", remedy="thicken it, or take the surface at a distance above zero"
         )
-    found: tuple[int, TriangleMesh, Boxes | None] | None = None
-    boxes: Boxes | None = None
-    bad: list[NDArray[np.float64]] = []
-    pieces = turned
+    whole = Joined.of(*indexed(turned))
+    if len(whole.bad):
+        whole = _conforming(whole, windings)
+    if not len(whole.bad):
+        return whole.mesh, np.zeros((0, 3))
+    best = None if whole.open else (whole, None)
+    surface = contour()
+    bad = [_far(surface, whole.points[whole.faces], OFF * cell)]
+    found: Joined = whole
     for attempt in range(ATTEMPTS):
-        vertices, faces, gaps = conforming(pieces, TOGETHER * size)
-        meeting = faces[np.unique(self_intersections(vertices, faces))]
-        if not len(gaps) and (found is None or len(meeting) < found[0]):
-            found = len(meeting), _compact(vertices, faces), boxes
-            if not len(meeting):
-                break
-        if not bad:
-            surface = contour()
-            bad.append(_far(surface, vertices[faces], OFF * cell))
-        bad.append(_along(vertices[np.concatenate([gaps, meeting[:, :2], meeting[:, 1:]])], 0.5 * cell))
+        bad.append(_along(found.points[found.bad], 0.5 * cell))
         boxes = Boxes.around(np.concatenate(bad), cell, (attempt + 1) * SHIFT % 1)
-        pieces = _exchanged(turned, windings, surface, boxes)
-    if found is None:
-        place = vertices[gaps[0]].mean(axis=0)
+        found = _exchanged(whole, windings, surface, boxes)
+        if not found.open and (best is None or len(found.bad) < len(best[0].bad)):
+            best = found, boxes
+        if not len(found.bad):
+            break
+    if best is None:
+        place = found.points[found.bad[0]].mean(axis=0)
         raise GeometryError(
-            f"faces and completion do not join along {len(gaps)} edges, the first at "
-            f"({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g})",
+            f"faces and completion do not join, first at ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g})",
             remedy="leave out keep_faces: the sharp surface is closed",
             element="surface",
         )
-    _, whole, boxes = found
-    return (whole, np.zeros((0, 3))) if boxes is None else (_without_crumbs(whole, boxes), boxes.middles)
+    found, boxes = best
+    return (found.mesh, np.zeros((0, 3))) if boxes is None else (_without_crumbs(found.mesh, boxes), boxes.middles)
+
+
+def _conforming(whole: Joined, windings: Windings) -> Joined:
+    """Triangles divided where they end on each other or cross, without those that are inside then or there twice."""
+    points, faces = whole.points, whole.faces
+    pieces = arranged(points, faces)
+    regions = Regions.of(pieces, windings)
+    faces = pieces.faces[regions.behind & ~regions.ahead & ~regions.doubled]
+    return Joined.of(pieces.points, _without_doubles(faces))
+
+
+def _without_doubles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Faces without pairs on the same vertices that face opposite ways."""
+    first, reverse = coincident_faces(faces.ravel(), np.arange(0, faces.size + 1, 3))
+    forth, back = (np.bincount(first[reverse == way], minlength=len(faces)) for way in (False, True))
+    return faces[~((forth == 1) & (back == 1))[first]]
 
 
 def outward(solid: Evaluated) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """(k, 3, 3) triangles with the inside on one side, turned to have it behind them, and which ones these are.
-
-    Of those that lie in each other, where bodies overlap, one is taken.
-    """
+    """(k, 3, 3) triangles with the inside on one side, turned to have it behind them, and which ones these are."""
     behind, ahead = solid.windings.sides(solid.triangles)
     chosen = np.flatnonzero(behind != ahead)
     turned = np.where(ahead[chosen, None, None], solid.triangles[chosen, ::-1], solid.triangles[chosen])
-    size = float(np.ptp(solid.triangles.reshape(-1, 3), axis=0).max())
-    once = ~covered(turned, _parts(solid)[chosen], TOGETHER * size)
-    return turned[once], chosen[once]
+    return turned, chosen
 
 
 def unjoined(places: NDArray[np.float64]) -> str:
@@ -108,42 +148,6 @@ def unjoined(places: NDArray[np.float64]) -> str:
     x, y, z = places[0]
     around = "one place" if len(places) == 1 else f"{len(places)} places, the first"
     return f"around {around} at ({x:.4g}, {y:.4g}, {z:.4g}), where they do not join: contoured there"
-
-
-def _compact(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> TriangleMesh:
-    used, renumbered = np.unique(faces, return_inverse=True)
-    return TriangleMesh(vertices[used], renumbered.reshape(-1, 3))
-
-
-def _parts(solid: Evaluated) -> NDArray[np.int64]:
-    """(m,) the part of the shape that each triangle is of; completion comes last."""
-    if solid.source is None:
-        return np.zeros(len(solid.triangles), dtype=np.int64)
-    given = parts_of(solid.source.faces)
-    return np.where(solid.origins >= 0, given[solid.origins], given.max() + 1)
-
-
-def covered(triangles: NDArray[np.float64], parts: NDArray[np.int64], tolerance: float) -> NDArray[np.bool_]:
-    """(m,) which triangles lie in triangles of a part that comes before theirs, and face the same way."""
-    if not len(triangles):
-        return np.zeros(0, dtype=bool)
-    a, b, c = triangles.transpose(1, 0, 2)
-    normals = unit(area_vectors(triangles))
-    centres = triangles.mean(axis=1)
-    tree = BoxTree.of(triangles.min(axis=1), triangles.max(axis=1))
-    starts, near = tree.meeting(np.repeat(centres[:, None], 3, axis=1), tolerance)
-    own = np.repeat(np.arange(len(triangles)), np.diff(starts))
-    before = parts[near] < parts[own]
-    own, near = own[before], near[before]
-    inside = ((normals[own] * normals[near]).sum(axis=1) > 0.5) & (
-        np.abs(((centres[own] - a[near]) * normals[near]).sum(axis=1)) <= tolerance
-    )
-    for tail, head in ((a, b), (b, c), (c, a)):
-        across = unit(np.cross(normals[near], head[near] - tail[near]))
-        inside &= ((centres[own] - tail[near]) * across).sum(axis=1) >= -tolerance
-    result = np.zeros(len(triangles), dtype=bool)
-    result[own[inside]] = True
-    return result
 
 
 def _along(edges: NDArray[np.float64], step: float) -> NDArray[np.float64]:
@@ -162,22 +166,22 @@ def _far(surface: TriangleMesh, triangles: NDArray[np.float64], distance: float)
     return points[tree.distances(points) > distance]
 
 
-def _exchanged(
-    triangles: NDArray[np.float64], windings: Windings, surface: TriangleMesh, boxes: Boxes
-) -> NDArray[np.float64]:
+def _exchanged(whole: Joined, windings: Windings, surface: TriangleMesh, boxes: Boxes) -> Joined:
     """Triangles outside of boxes, those of a surface within, and walls of the boxes where one of them is inside."""
-
-    def cut(pieces: NDArray[np.float64], knives: NDArray[np.float64]) -> NDArray[np.float64]:
-        ids = np.arange(3 * len(pieces)).reshape(-1, 3)
-        return cut_faces(pieces, ids, knives, ids.size + np.arange(3 * len(knives)).reshape(-1, 3))[0]
-
     contour = surface.vertices[surface.faces]
-    outer, inner = cut(triangles, boxes.walls), cut(contour, boxes.walls)
-    outer, inner = outer[~boxes.have(outer.mean(axis=1))], inner[boxes.have(inner.mean(axis=1))]
-    walls = cut(cut(boxes.walls, triangles), contour)
-    centres = walls.mean(axis=1)
-    here, there = Windings(contour).inside(centres), windings.inside(centres)
-    return np.concatenate([outer, inner, walls[here & ~there], walls[there & ~here][:, ::-1]])
+    points, faces = indexed(np.concatenate([whole.points[whole.faces], contour, boxes.walls]))
+    sets = np.repeat(np.arange(3), [len(whole.faces), len(contour), len(boxes.walls)])
+    pairs = meeting_faces(points, faces)
+    pieces = arranged(points, faces, pairs[sets[pairs[:, 0]] != sets[pairs[:, 1]]])
+    centres = widest(pieces)
+    within, kind = boxes.have(centres), sets[pieces.origins]
+    walls = np.flatnonzero(kind == 2)
+    here, there = Windings(contour).inside(centres[walls]), windings.inside(centres[walls])
+    chosen = [(kind == 0) & ~within, (kind == 1) & within, walls[here & ~there]]
+    backwards = pieces.faces[walls[there & ~here]][:, ::-1]
+    return Joined.of(
+        pieces.points, _without_doubles(np.concatenate([*(pieces.faces[each] for each in chosen), backwards]))
+    )
 
 
 def _without_crumbs(mesh: TriangleMesh, boxes: Boxes) -> TriangleMesh:
@@ -186,7 +190,8 @@ def _without_crumbs(mesh: TriangleMesh, boxes: Boxes) -> TriangleMesh:
     small = np.abs(volumes) < boxes.cell**3
     beyond = ~boxes.grown.have(mesh.vertices)[mesh.faces].all(axis=1)
     crumbs = small & (np.bincount(parts, beyond) == 0)
-    return _compact(mesh.vertices, mesh.faces[~crumbs[parts]])
+    used, faces = np.unique(mesh.faces[~crumbs[parts]], return_inverse=True)
+    return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,10 @@ import scipy
 from numpy.typing import NDArray
 
 from ..diagnostics import BoundsNothing, CompletedArea, Diagnostics, LeftOut, Note
-from ..geometry.cut_faces import cut_faces
+from ..geometry.arrangement import Arrangement, arranged, meeting_faces
 from ..geometry.meshes import face_areas
 from ..geometry.welding import same_positions
-from . import parts
+from .regions import Regions
 from .solid import Solid
 from .winding import Windings
 
@@ -64,12 +64,14 @@ def united(
     whole = _joined(surfaces)
     closing = np.concatenate([np.full(len(each.triangles), each.closing) for each in surfaces])
     windings = Windings(whole.triangles[closing])
-    triangles, parents, behind, ahead = _cut(whole, closing, windings)
-    origins = whole.origins[parents]
+    pieces = _cut(whole, closing)
+    regions = Regions.of(pieces, windings)
+    triangles, behind, ahead = pieces.points[pieces.faces], regions.behind, regions.ahead
+    origins = whole.origins[pieces.origins]
     given = origins >= 0
     buried = behind & ahead
-    bounds = behind != ahead
-    kept = np.where(given, ~buried | keep_overlaps, bounds | ~closing[parents])
+    bounds = (behind != ahead) & ~regions.doubled
+    kept = np.where(given, (~buried & ~regions.doubled) | keep_overlaps, bounds | ~closing[pieces.origins])
     if not kept.any():
         kept[:] = True
     confidence = _confidence(triangles[kept], given[kept], whole, points)
@@ -78,24 +80,47 @@ def united(
     return Solid(triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics)
 
 
-def _cut(
-    whole: Surface, closing: NDArray[np.bool_], windings: Windings
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Triangles cut along those that close, the triangle each is a piece of, and whether it is inside behind and ahead.
+def _cut(whole: Surface, closing: NDArray[np.bool_]) -> Arrangement:
+    """Faces divided where they meet: those that close by each other, all others by these."""
+    ids = whole.ids
+    first = np.full(int(ids.max()) + 1, -1)
+    first[ids.ravel()[::-1]] = np.arange(ids.size)[::-1]
+    points = whole.triangles.reshape(-1, 3)[first]
+    faces = same_positions(points)[ids]
+    pairs = meeting_faces(points, faces)
+    both = closing[pairs].all(axis=1)
+    closed = np.flatnonzero(closing)
+    number = np.cumsum(closing) - 1
+    pieces = _arranged(points, faces, closed, number[pairs[both]])
+    if closing.all():
+        return pieces
+    across = pairs[closing[pairs].any(axis=1) & ~both]
+    used = ~closing
+    used[across] = True
+    used = np.flatnonzero(used)
+    number = np.full(len(faces), -1)
+    number[used] = np.arange(len(used))
+    others = _arranged(points, faces, used, number[across])
+    sheets = ~closing[others.origins]
+    return Arrangement(
+        np.concatenate([pieces.points, others.points]),
+        np.concatenate([pieces.faces, others.faces[sheets] + len(pieces.points)]),
+        np.concatenate([pieces.origins, others.origins[sheets]]),
+        np.concatenate([pieces.cells, others.cells[sheets] + 1 + int(pieces.cells.max(initial=-1))]),
+    )
 
-    Between cuts both sides are the same all over a part, which is looked at once.
-    """
-    pieces, parents, met = cut_faces(whole.triangles, whole.ids, whole.triangles[closing], whole.ids[closing])
-    regions = np.arange(len(pieces))
-    uncut = np.flatnonzero(~met[parents])
-    if len(uncut):
-        labels = parts.parts_of(whole.ids[parents[uncut]])
-        largest = np.lexsort((-face_areas(pieces[uncut]), labels))
-        _, first = np.unique(labels[largest], return_index=True)
-        regions[uncut] = uncut[largest[first]][labels]
-    some, where = np.unique(regions, return_inverse=True)
-    behind, ahead = windings.sides(pieces[some])
-    return pieces, parents, behind[where], ahead[where]
+
+def _arranged(
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    chosen: NDArray[np.int64],
+    pairs: NDArray[np.int64],
+) -> Arrangement:
+    """Some faces, divided where pairs of them meet."""
+    if not len(pairs):
+        return Arrangement(points, faces[chosen], chosen, np.arange(len(chosen)))
+    pieces = arranged(points, faces[chosen], pairs)
+    return pieces._replace(origins=chosen[pieces.origins])
 
 
 def _notes(

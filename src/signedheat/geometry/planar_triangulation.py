@@ -1,0 +1,482 @@
+"""Kernel: constrained Delaunay triangulations of triangles with points on their sides and within, and segments."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+
+FLAT = 1e-13
+"""Height of a triangle, over the size of the face, below which it is flat."""
+DELAUNAY = 1e-10
+"""Sine by which two opposite angles may add up to more than a straight one."""
+
+ROUNDS = 64
+"""Times that all edges are looked at; most faces need three."""
+
+
+@compiled
+def triangulate_faces(
+    points: NDArray[np.float64],
+    starts: NDArray[np.int64],
+    members: NDArray[np.int64],
+    corners: NDArray[np.int64],
+    segment_starts: NDArray[np.int64],
+    segments: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Triangulate faces, each with points on its rim and within, so that segments between these are edges.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Positions.
+    starts, members : (m + 1,), (s,) int
+        Points of each face: those on its rim first, in order from the first corner on, then those within.
+    corners : (m, 3) int
+        Places of the second and third corner among the points of the face, and how many are on its rim.
+    segment_starts, segments : (m + 1,), (t, 2) int
+        Segments of each face, as places among its points.
+
+    Returns
+    -------
+    triangles : (k, 3) int
+        Points of each.
+    owners : (k,) int
+        Face of each, ascending.
+    cells : (k,) int
+        Which hang together without a segment between them, numbered from zero.
+    """
+    m = len(corners)
+    total = np.int64(0)
+    for f in range(m):
+        total += max(2 * (starts[f + 1] - starts[f]) - corners[f, 2] - 2, 0)
+    triangles, owners, cells = np.empty((total, 3), np.int64), np.empty(total, np.int64), np.full(total, -1, np.int64)
+    filled, n_cells = 0, 0
+    for f in range(m):
+        begin, n, rim = starts[f], starts[f + 1] - starts[f], corners[f, 2]
+        x = _flattened(points, members[begin : begin + n], corners[f])
+        size = max(np.ptp(x[:, 0]), np.ptp(x[:, 1]))
+        flat = FLAT * size
+        count = 2 * n - rim - 2
+        tri = np.empty((count, 3), np.int64)
+        adj = np.full((count, 3), -1, np.int64)
+        fixed = np.zeros((count, 3), np.bool_)
+        at = np.zeros(n, np.int64)
+        last = _rim(tri, adj, at, corners[f])
+        for i in range(rim, n):
+            last = _insert(x, tri, adj, fixed, at, last, i, flat)
+        for s in range(segment_starts[f], segment_starts[f + 1]):
+            _connect(x, tri, adj, fixed, at, segments[s, 0], segments[s, 1], flat)
+        _improve(x, tri, adj, fixed, at, flat)
+        n_cells = _number_cells(adj, fixed, cells[filled : filled + last], n_cells)
+        for t in range(last):
+            for k in range(3):
+                triangles[filled, k] = members[begin + tri[t, k]]
+            owners[filled] = f
+            filled += 1
+    return triangles[:filled], owners[:filled], cells[:filled]
+
+
+@compiled
+def _number_cells(adj: NDArray[np.int64], fixed: NDArray[np.bool_], cells: NDArray[np.int64], n_cells: int) -> int:
+    """Number triangles, none of which has a number, by what hangs together; returns the next number."""
+    stack = np.empty(len(cells), np.int64)
+    for seed in range(len(cells)):
+        if cells[seed] >= 0:
+            continue
+        cells[seed] = n_cells
+        stack[0], depth = seed, 1
+        while depth > 0:
+            depth -= 1
+            t = stack[depth]
+            for k in range(3):
+                s = adj[t, k]
+                if s >= 0 and not fixed[t, k] and cells[s] < 0:
+                    cells[s] = n_cells
+                    stack[depth] = s
+                    depth += 1
+        n_cells += 1
+    return n_cells
+
+
+@compiled
+def _flattened(
+    points: NDArray[np.float64], members: NDArray[np.int64], corners: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """(n, 2) the two coordinates along which a face is largest, counter-clockwise, from its first corner."""
+    a, b, c = members[0], members[corners[0]], members[corners[1]]
+    normal = np.empty(3)
+    for d in range(3):
+        p, q = (d + 1) % 3, (d + 2) % 3
+        normal[d] = (points[b, p] - points[a, p]) * (points[c, q] - points[a, q])
+        normal[d] -= (points[b, q] - points[a, q]) * (points[c, p] - points[a, p])
+    axis = int(np.argmax(np.abs(normal)))
+    p, q = (axis + 1) % 3, (axis + 2) % 3
+    if normal[axis] < 0.0:
+        p, q = q, p
+    x = np.empty((len(members), 2))
+    for i in range(len(members)):
+        x[i, 0] = points[members[i], p] - points[a, p]
+        x[i, 1] = points[members[i], q] - points[a, q]
+    return x
+
+
+@compiled
+def _turn(x: NDArray[np.float64], a: int, b: int, c: int) -> float:
+    """Twice the signed area of a triangle."""
+    return (x[b, 0] - x[a, 0]) * (x[c, 1] - x[a, 1]) - (x[b, 1] - x[a, 1]) * (x[c, 0] - x[a, 0])
+
+
+@compiled
+def _length(x: NDArray[np.float64], a: int, b: int) -> float:
+    return np.sqrt((x[b, 0] - x[a, 0]) ** 2 + (x[b, 1] - x[a, 1]) ** 2)
+
+
+@compiled
+def _rim(tri: NDArray[np.int64], adj: NDArray[np.int64], at: NDArray[np.int64], corners: NDArray[np.int64]) -> int:
+    """Divide the face at the points on its rim; returns how many triangles there are."""
+    tri[0, 0], tri[0, 1], tri[0, 2] = 0, corners[0], corners[1]
+    at[0] = at[corners[0]] = at[corners[1]] = 0
+    count = 1
+    for side in range(3):
+        begin = 0 if side == 0 else corners[side - 1]
+        end = corners[side] if side < 2 else corners[2]
+        for i in range(begin + 1, end):
+            edge = _edge(tri, adj, at, i - 1, end % corners[2])
+            _split(tri, adj, at, edge // 3, edge % 3, i, count)
+            count += 1
+    return count
+
+
+@compiled
+def _point_to(tri: NDArray[np.int64], adj: NDArray[np.int64], t: int, tail: int, neighbour: int) -> None:
+    """Make a triangle know its neighbour across the edge that begins at a vertex."""
+    if t >= 0:
+        for k in range(3):
+            if tri[t, k] == tail:
+                adj[t, k] = neighbour
+
+
+@compiled
+def _split(
+    tri: NDArray[np.int64], adj: NDArray[np.int64], at: NDArray[np.int64], t: int, k: int, i: int, new: int
+) -> None:
+    """Put a vertex on edge k of a triangle: the half from the vertex to the edge's head is new."""
+    a, b = (k + 1) % 3, (k + 2) % 3
+    u, v, w = tri[t, k], tri[t, a], tri[t, b]
+    beyond = adj[t, a]
+    tri[new, 0], tri[new, 1], tri[new, 2] = i, v, w
+    adj[new, 0], adj[new, 1], adj[new, 2] = -1, beyond, t
+    _point_to(tri, adj, beyond, w, new)
+    tri[t, a] = i
+    adj[t, k], adj[t, a] = -1, new
+    at[i], at[v], at[w], at[u] = t, new, t, t
+
+
+@compiled
+def _flip(
+    tri: NDArray[np.int64], adj: NDArray[np.int64], fixed: NDArray[np.bool_], at: NDArray[np.int64], t: int, k: int
+) -> int:
+    """Replace edge k of a triangle by the one between the apexes: (c, a, d) and (d, b, c). Returns the second."""
+    s = adj[t, k]
+    a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
+    j = _place(tri, s, b)
+    d = tri[s, (j + 2) % 3]
+    bc, ca, ad, db = adj[t, (k + 1) % 3], adj[t, (k + 2) % 3], adj[s, (j + 1) % 3], adj[s, (j + 2) % 3]
+    fbc, fca, fad, fdb = fixed[t, (k + 1) % 3], fixed[t, (k + 2) % 3], fixed[s, (j + 1) % 3], fixed[s, (j + 2) % 3]
+    tri[t, 0], tri[t, 1], tri[t, 2] = c, a, d
+    adj[t, 0], adj[t, 1], adj[t, 2] = ca, ad, s
+    fixed[t, 0], fixed[t, 1], fixed[t, 2] = fca, fad, False
+    tri[s, 0], tri[s, 1], tri[s, 2] = d, b, c
+    adj[s, 0], adj[s, 1], adj[s, 2] = db, bc, t
+    fixed[s, 0], fixed[s, 1], fixed[s, 2] = fdb, fbc, False
+    _point_to(tri, adj, ad, d, t)
+    _point_to(tri, adj, bc, c, s)
+    at[a], at[b], at[c], at[d] = t, s, t, t
+    return s
+
+
+@compiled
+def _insert(
+    x: NDArray[np.float64],
+    tri: NDArray[np.int64],
+    adj: NDArray[np.int64],
+    fixed: NDArray[np.bool_],
+    at: NDArray[np.int64],
+    count: int,
+    i: int,
+    flat: float,
+) -> int:
+    """Put a point into the triangle that has it, and flip edges until they are Delaunay; the number of triangles."""
+    t, k, depth = _locate(x, tri, adj, count, i)
+    a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
+    s = adj[t, k]
+    if s >= 0 and depth <= flat * _length(x, a, b):  # on an edge: four
+        j = _place(tri, s, b)
+        _split(tri, adj, at, t, k, i, count)
+        _split(tri, adj, at, s, j, i, count + 1)
+        first, second = count, count + 1  # (i, b, c) and (i, a, d); t is (a, i, c), s is (b, i, d)
+        _point_to(tri, adj, t, a, second)
+        _point_to(tri, adj, second, i, t)
+        _point_to(tri, adj, s, b, first)
+        _point_to(tri, adj, first, i, s)
+        count += 2
+    else:
+        bc, ca = adj[t, (k + 1) % 3], adj[t, (k + 2) % 3]
+        first, second = count, count + 1
+        tri[t, 0], tri[t, 1], tri[t, 2] = a, b, i
+        adj[t, 0], adj[t, 1], adj[t, 2] = s, first, second
+        tri[first, 0], tri[first, 1], tri[first, 2] = b, c, i
+        adj[first, 0], adj[first, 1], adj[first, 2] = bc, second, t
+        tri[second, 0], tri[second, 1], tri[second, 2] = c, a, i
+        adj[second, 0], adj[second, 1], adj[second, 2] = ca, t, first
+        _point_to(tri, adj, bc, c, first)
+        _point_to(tri, adj, ca, a, second)
+        at[i], at[a], at[b], at[c] = t, t, t, first
+        count += 2
+    _legalize(x, tri, adj, fixed, at, i, flat)
+    return count
+
+
+@compiled
+def _legalize(
+    x: NDArray[np.float64],
+    tri: NDArray[np.int64],
+    adj: NDArray[np.int64],
+    fixed: NDArray[np.bool_],
+    at: NDArray[np.int64],
+    i: int,
+    flat: float,
+) -> None:
+    """Flip edges opposite a new point until they are Delaunay."""
+    first = at[i]
+    t = first
+    while True:
+        k = _place(tri, t, i)
+        edge = (k + 1) % 3
+        if adj[t, edge] >= 0 and not fixed[t, edge] and _bad(x, tri, adj, t, edge, flat):
+            _flip(tri, adj, fixed, at, t, edge)  # t is (i, a, d): looked at again
+            first = t
+            continue
+        t = adj[t, (k + 2) % 3]  # across the edge back to i, counter-clockwise
+        if t == first or t < 0:
+            return
+
+
+@compiled
+def _improve(
+    x: NDArray[np.float64],
+    tri: NDArray[np.int64],
+    adj: NDArray[np.int64],
+    fixed: NDArray[np.bool_],
+    at: NDArray[np.int64],
+    flat: float,
+) -> None:
+    """Flip edges that are not Delaunay."""
+    for _ in range(ROUNDS):
+        flips = 0
+        for t in range(len(tri)):
+            for k in range(3):
+                if adj[t, k] > t and not fixed[t, k] and _bad(x, tri, adj, t, k, flat):
+                    _flip(tri, adj, fixed, at, t, k)
+                    flips += 1
+        if flips == 0:
+            return
+
+
+@compiled
+def _bad(x: NDArray[np.float64], tri: NDArray[np.int64], adj: NDArray[np.int64], t: int, k: int, flat: float) -> bool:
+    """Whether an edge is not Delaunay, and can be flipped."""
+    s = adj[t, k]
+    a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
+    j = _place(tri, s, b)
+    d = tri[s, (j + 2) % 3]
+    if not _convex(x, a, b, c, d, flat):
+        return False
+    acx, acy, bcx, bcy = x[a, 0] - x[c, 0], x[a, 1] - x[c, 1], x[b, 0] - x[c, 0], x[b, 1] - x[c, 1]
+    adx, ady, bdx, bdy = x[a, 0] - x[d, 0], x[a, 1] - x[d, 1], x[b, 0] - x[d, 0], x[b, 1] - x[d, 1]
+    cos_c, sin_c = acx * bcx + acy * bcy, acx * bcy - acy * bcx
+    cos_d, sin_d = adx * bdx + ady * bdy, bdx * ady - bdy * adx
+    scale = np.sqrt((acx**2 + acy**2) * (bcx**2 + bcy**2) * (adx**2 + ady**2) * (bdx**2 + bdy**2))
+    return sin_c * cos_d + cos_c * sin_d < -DELAUNAY * scale
+
+
+@compiled
+def _convex(x: NDArray[np.float64], a: int, b: int, c: int, d: int, flat: float) -> bool:
+    """Whether the edge from a to b between the apexes c, on its left, and d can be flipped."""
+    least = flat * _length(x, c, d)
+    return _turn(x, c, a, d) > least and _turn(x, d, b, c) > least
+
+
+@compiled
+def _locate(
+    x: NDArray[np.float64], tri: NDArray[np.int64], adj: NDArray[np.int64], count: int, i: int
+) -> tuple[int, int, float]:
+    """The triangle that has a point, the edge that it is nearest to, and twice the area between."""
+    t = count - 1
+    for _ in range(count):
+        k, depth = _side(x, tri, t, i)
+        if depth >= 0.0 or adj[t, k] < 0:
+            break
+        t = adj[t, k]
+    if depth >= 0.0:
+        return t, k, depth
+    best, most = 0, -np.inf
+    for t in range(count):
+        k, depth = _side(x, tri, t, i)
+        if depth > most:
+            best, most = t, depth
+    k, depth = _side(x, tri, best, i)
+    return best, k, depth
+
+
+@compiled
+def _side(x: NDArray[np.float64], tri: NDArray[np.int64], t: int, i: int) -> tuple[int, float]:
+    """The edge of a triangle that a point is farthest beyond, and twice the area between."""
+    side, depth = 0, np.inf
+    for k in range(3):
+        turn = _turn(x, tri[t, k], tri[t, (k + 1) % 3], i)
+        if turn < depth:
+            side, depth = k, turn
+    return side, depth
+
+
+@compiled
+def _edge(tri: NDArray[np.int64], adj: NDArray[np.int64], at: NDArray[np.int64], u: int, v: int) -> int:
+    """The edge from one vertex to another as three times its triangle plus its place there; −1 if there is none."""
+    first = at[u]
+    t, back = first, False
+    while t >= 0:
+        k = _place(tri, t, u)
+        if tri[t, (k + 1) % 3] == v:
+            return 3 * t + k
+        t = adj[t, k if back else (k + 2) % 3]
+        if t < 0 and not back:
+            back, t = True, adj[first, _place(tri, first, u)]
+        if t == first:
+            break
+    return -1
+
+
+@compiled
+def _connect(
+    x: NDArray[np.float64],
+    tri: NDArray[np.int64],
+    adj: NDArray[np.int64],
+    fixed: NDArray[np.bool_],
+    at: NDArray[np.int64],
+    a: int,
+    b: int,
+    flat: float,
+) -> bool:
+    """Make a segment an edge, or edges through the points that it meets, by flips (Sloan 1993)."""
+    while a != b:
+        t, k, goal = _aim(x, tri, adj, at, a, b, flat)
+        if goal < 0:
+            if t < 0:
+                return False
+            goal = _clear(x, tri, adj, fixed, at, t, k, a, b, flat)
+            if goal < 0:
+                return False
+        for tail, head in ((a, goal), (goal, a)):
+            edge = _edge(tri, adj, at, tail, head)
+            if edge >= 0:
+                fixed[edge // 3, edge % 3] = True
+        a = goal
+    return True
+
+
+@compiled
+def _aim(
+    x: NDArray[np.float64],
+    tri: NDArray[np.int64],
+    adj: NDArray[np.int64],
+    at: NDArray[np.int64],
+    a: int,
+    b: int,
+    flat: float,
+) -> tuple[int, int, int]:
+    """The triangle around a, and its edge, that a segment to b leaves through; or the neighbour of a that it meets."""
+    first = at[a]
+    t, back, length = first, False, _length(x, a, b)
+    found, edge = -1, -1
+    while t >= 0:
+        k = _place(tri, t, a)
+        u, w = tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
+        if u == b or w == b:
+            return t, k, b
+        for i in (u, w):
+            ahead = (x[i, 0] - x[a, 0]) * (x[b, 0] - x[a, 0]) + (x[i, 1] - x[a, 1]) * (x[b, 1] - x[a, 1])
+            if ahead > 0.0 and ahead < length * length and abs(_turn(x, a, b, i)) <= flat * length:
+                return t, k, i
+        if _turn(x, a, b, u) < 0.0 and _turn(x, a, b, w) > 0.0:
+            found, edge = t, (k + 1) % 3
+        t = adj[t, k if back else (k + 2) % 3]
+        if t < 0 and not back:
+            back, t = True, adj[first, _place(tri, first, a)]
+        if t == first:
+            break
+    return found, edge, -1
+
+
+@compiled
+def _place(tri: NDArray[np.int64], t: int, a: int) -> int:
+    k = 0
+    while tri[t, k] != a:
+        k += 1
+    return k
+
+
+@compiled
+def _clear(
+    x: NDArray[np.float64],
+    tri: NDArray[np.int64],
+    adj: NDArray[np.int64],
+    fixed: NDArray[np.bool_],
+    at: NDArray[np.int64],
+    t: int,
+    k: int,
+    a: int,
+    b: int,
+    flat: float,
+) -> int:
+    """Flip the edges that a segment crosses, beginning with edge k of a triangle, up to the point it meets; or −1."""
+    tails, heads = [tri[t, k]], [tri[t, (k + 1) % 3]]
+    length = _length(x, a, b)
+    while True:  # edges across the segment: tails on its right, heads on its left
+        if adj[t, k] < 0 or fixed[t, k]:
+            return -1
+        u = tri[t, k]
+        s = adj[t, k]
+        j = (_place(tri, s, u) + 2) % 3
+        z = tri[s, (j + 2) % 3]
+        turn = _turn(x, a, b, z)
+        if z == b or abs(turn) <= flat * length:
+            break
+        t, k = s, ((j + 1) % 3 if turn > 0.0 else (j + 2) % 3)  # (u, z) or (z, head)
+        tails.append(tri[t, k])
+        heads.append(tri[t, (k + 1) % 3])
+    begin, left = 0, 16 * (len(tails) + 4) ** 2
+    while begin < len(tails):
+        left -= 1
+        if left < 0:
+            return -1
+        u, w = tails[begin], heads[begin]
+        begin += 1
+        edge = _edge(tri, adj, at, u, w)
+        t, k = edge // 3, edge % 3
+        c = tri[t, (k + 2) % 3]
+        s = adj[t, k]
+        j = _place(tri, s, w)
+        d = tri[s, (j + 2) % 3]
+        if not _convex(x, u, w, c, d, flat):
+            tails.append(u)
+            heads.append(w)
+            continue
+        _flip(tri, adj, fixed, at, t, k)
+        if c not in (a, z) and d not in (a, z) and _turn(x, a, z, c) * _turn(x, a, z, d) < 0.0:
+            right = _turn(x, a, z, c) < 0.0
+            tails.append(c if right else d)
+            heads.append(d if right else c)
+    return z
