@@ -16,8 +16,7 @@ from ..geometry.components import element_components
 from ..geometry.directions import unit
 from ..geometry.edges import edge_keys, edge_table
 from ..geometry.meshes import area_vectors, face_areas
-from . import bending, creases, lids, walls
-from .lost_faces import MOST_SIDES, least_bent
+from . import bending, creases, lids, lost_faces, walls
 from .rims import boundary, corners_of, loops
 from .spanning import Frame, frame_of
 
@@ -143,7 +142,7 @@ def small_lids(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArr
         places = corners_of(surface.vertices[loop])
         if len(places) < 3:
             triangles.append(_fan(loop))
-        elif len(places) <= MOST_SIDES:
+        elif len(places) <= lost_faces.MOST_SIDES:
             chosen.append(loop)
             corners.append(places)
     if not chosen:
@@ -156,7 +155,10 @@ def small_lids(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArr
     edges = edges[touching[edges].all(axis=1)]
     taken = np.sort(edge_keys(edges[:, 0], edges[:, 1]))
     for loop, places, lid in zip(
-        chosen, corners, least_bent(surface.vertices, rims, np.concatenate(normals), taken), strict=True
+        chosen,
+        corners,
+        lost_faces.least_bent(surface.vertices, rims, np.concatenate(normals), taken, lost_faces.BENT),
+        strict=True,
     ):
         if len(lid):
             triangles.append(_with_sides(loop, places, lid))
@@ -236,7 +238,9 @@ def _spanned(
         if lid is not None:
             return lid
         places = corners_of(corners)
-        if len(places) <= MOST_SIDES:
-            triangles = least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[0]
+        if len(places) <= lost_faces.MOST_SIDES:
+            triangles = lost_faces.least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[
+                0
+            ]
             return np.empty((0, 3)), _with_sides(np.arange(len(loop)), places, triangles)
     return lids.draped(corners, rim.starts, frame, plate or flat)

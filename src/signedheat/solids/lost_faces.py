@@ -25,7 +25,7 @@ def least_bent(
     loops: list[NDArray[np.int64]],
     normals: NDArray[np.float64],
     taken: NDArray[np.int64],
-    most: float = BENT,
+    most: float,
 ) -> list[NDArray[np.int64]]:
     """(n − 2, 3) triangles on the vertices of each loop of n; none where they do not continue the surface around it.
 
