@@ -1,6 +1,6 @@
 """Surfaces from narrow bands, beside other programs at the same spacing.
 
-``python benchmarks/bands.py [RESOLUTION]`` prints the table of docs/large.md.
+``python benchmarks/bands.py [RESOLUTION]`` prints what docs/performance.md sums up.
 Each row is a process of its own. The error is that of the vertices of the closed surface, against the unit sphere;
 its volume is told over that of the sphere, since specks beside faces have small errors, too.
 Packages: MeshLib's voxels, libigl's fast winding numbers (pip install meshlib libigl).

@@ -3,7 +3,7 @@
 Every cell of the table is a run: a task, done with the calls that a package's documentation names for it, and judged
 against the same truth. The truth in space is libigl's exact distance to the whole part; on the sphere it is arc length.
 Packages: potpourri3d, libigl, MeshLib, trimesh, PyVista, gpytoolbox (pip install potpourri3d libigl meshlib trimesh
-rtree manifold3d pyvista gpytoolbox). What is not installed has an empty column.
+rtree manifold3d pyvista gpytoolbox). What is not installed has no column.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -157,17 +158,17 @@ ROWS = [
 
 def main() -> int:
     warnings.simplefilter("ignore")
-    lines = []
+    installed, lines = versions(), []
     for title, name, arguments, judge in ROWS:
-        cells = [cell(package, name, arguments, judge) for package in PACKAGES]
+        cells = [cell(package, name, arguments, judge) for package in installed]
         lines.append(f"| {title} | " + " | ".join(cells) + " |")
         print(lines[-1], flush=True)
-    PAGE.write_text(page(lines), encoding="utf-8")
+    PAGE.write_text(page(installed, lines), encoding="utf-8")
     return 0
 
 
 def cell(package: str, name: str, arguments: Callable[[], tuple], judge: Callable[[Any], str]) -> str:
-    """What a package made of a task: the judgement, "fails", "–" where it has no call for it, or nothing."""
+    """What a package made of a task: the judgement, "fails", "not run", or "–" where it has no call for it."""
     call = calls.CALLS[package].get(name)
     if call is None:
         return "–"
@@ -179,22 +180,25 @@ def cell(package: str, name: str, arguments: Callable[[], tuple], judge: Callabl
         print(f"  {package}, {name}: {seconds:.2f} s", file=sys.stderr)
         return judge(result)
     except ModuleNotFoundError:
-        return " "
+        return "not run"  # it needs another package
     except Exception as error:  # whatever another package throws
         print(f"  {package}, {name}: {type(error).__name__}: {str(error)[:200]}", file=sys.stderr)
         return "fails"
 
 
-def page(lines: list[str]) -> str:
-    """The page with this table in place of the old one."""
-    found = [f"signedheat {sh.__version__}"]
+def versions() -> dict[str, str]:
+    """The packages that are installed, by name, with their versions."""
+    found = {"signedheat": sh.__version__}
     for name in PACKAGES[1:]:
-        try:
-            found.append(f"{name} {version(name)}")
-        except PackageNotFoundError:
-            found.append(f"{name} (not installed)")
-    head = "| | " + " | ".join(found) + " |"
-    table = f"{head}\n|---|{'---|' * len(PACKAGES)}\n" + "\n".join(lines)
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
+
+
+def page(installed: dict[str, str], lines: list[str]) -> str:
+    """The page with this table in place of the old one."""
+    head = "| | " + " | ".join(f"{name} {number}" for name, number in installed.items()) + " |"
+    table = f"{head}\n|---|{'---|' * len(installed)}\n" + "\n".join(lines)
     before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
     return f"{before}{BEGIN}\n{table}\n{END}{rest.partition(END)[2]}"
 

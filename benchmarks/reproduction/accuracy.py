@@ -34,9 +34,8 @@ def seconds(run: Callable[[], object]) -> tuple[object, float]:
 
 @figure("7", "Whole and broken geometry")
 def whole_and_broken(page: Page) -> None:
-    """The same curve whole and with half of it gone, on finer and finer meshes of one bumpy sphere (Loop's
-    subdivision): the error of the whole curve falls, more slowly in the end (Fig. 25 says why). Gaps are twelve nodes
-    or more long and shrink with the mesh, so that the error of the broken curve comes down towards that of the whole.
+    """The same curve whole and with half of it gone, on Loop subdivisions of one bumpy sphere; gaps of twelve nodes or
+    more shrink with the mesh.
     """
     base = shapes.organic(1, 320)
     for level in range(4):
@@ -70,9 +69,8 @@ def row_of_surfaces(
 
 @figure("15", "Sharpening")
 def sharpening(page: Page) -> None:
-    """A large diffusion time, t = 100 h², to see the effect: afterwards distance is sharpened with the same zero set.
-    The paper maximises a convex objective (Eq. 18), in 0.66 s after 0.51 s; by default we measure straight lines from
-    the zero set instead, which is exact on triangles, and keep the convex method as `sh.Convex()`.
+    """Sharpened after t = 100 h². The paper maximises a convex objective (Eq. 18; here `sh.Convex()`); our default
+    measures straight lines from the zero set.
     """
     mesh = shapes.flat_disk(6000)
     exact = np.linalg.norm(mesh.vertices[:, :2] - [0.5, 0], axis=1) - 0.7
@@ -93,17 +91,11 @@ def sharpening(page: Page) -> None:
 
 @figure("24", "Accuracy in the plane")
 def accuracy_in_the_plane(page: Page) -> None:
-    """Closed curves in two domains, where exact distance is that to the nearest segment: a disk of irregular triangles,
-    and a square on random points, whose triangles have all sizes and angles. The paper's figure gives, for one curve
-    and mesh: SHM 0.14 % in 0.37 s, the unsigned heat method (UHM) 0.15 % in 0.17 s, the convex method of Belyaev and
-    Fayolle 0.13 % in 1.89 s (on an Apple M1, nothing factorised before). Like there, SHM cuts the curve into an
-    intrinsic triangulation first. Ours are CPU seconds of all threads, which do not depend on what else the machine
-    does, and include that triangulation and all factorisations; UHM runs on the mesh as it is. The convex column is our
-    own method for the same objective, on the mesh as it is; it and fast marching, a loop in plain Python, are run on
-    the smallest meshes only. The unsigned methods get the true sign for nothing; fast marching starts from exact
-    distances beside the curve. `sh.signed_distance` is what a user would call. UHM is the more accurate one for the
-    star on the finest mesh, where heat rounds its corners off in the signed method too; and it is the fastest
-    everywhere.
+    """Closed curves in a disk of irregular triangles and in a square on random points, ε and CPU seconds of a first
+    distance. The paper names, for one curve and mesh on an Apple M1: SHM 0.14 % in 0.37 s, unsigned heat method
+    (UHM) 0.15 % in 0.17 s, convex 0.13 % in 1.89 s. SHM cuts the curve into an intrinsic triangulation, as there;
+    unsigned methods get the true sign for nothing. UHM is the fastest everywhere, and better for the star on the
+    finest mesh.
     """
     domains = {"disk": shapes.flat_disk, "square": shapes.flat_square}
     curves = {"circle": [circle(0.8, n=400)], "blob": [shapes.blob(480)], "star": [shapes.star()]}
@@ -159,31 +151,11 @@ def planar_errors(mesh: sh.TriangleMesh, lines: list[sh.Polyline], slow_ones: bo
 
 @figure("25", "Convergence on surfaces")
 def convergence(page: Page) -> None:
-    """Twenty generated bumpy surfaces, five of them tori, of irregular triangles, Loop-subdivided four times; at each
-    level the level set of one smooth function is the source. Truth is exact polyhedral distance to the zero line of
-    that function, which is what `sh.signed_distance` computes (it differs from that by 10⁻⁵ % at most). Order: slope of
-    log ε against the log of the mean edge length. The paper finds about 1 for all methods. At t = h² heat falls by a
-    factor e along an edge, which triangles do not resolve: directions far from the source keep an error of the size
-    h²/t, which depends on the triangles' shapes and not on their size, so that one time alone converges more slowly. A
-    longer t smooths the source, an error of the size √t. The default, `Extrapolated`, goes by how directions change
-    with t, so that both cancel; on fine meshes t is somewhat longer. "default" is
-    `SignedHeatSolver(mesh).distance(curves)`, "one time" `SignedHeatSolver(mesh, 1.0)`, which is the paper's; "falls":
-    on how many ε falls at every level. The default's exception is one surface whose coarsest mesh of 160 vertices it
-    refines, as 2 % of the area has large angles, and the next not: 1.255 and 1.262, against 1.535 and 1.262 unrefined.
-    Its orders below 0.9 are five, 0.79 to 0.87: on three surfaces the coarsest mesh is refined or the second does not
-    resolve the shape (0.92 to 1.08 from the first subdivision on); on two, 0.77 and 0.80 from there on, what
-    extrapolation leaves of h²/t shows on the finest mesh. Longer times there would cost more elsewhere: where
-    directions turn back, at equal distance from two parts of the source, a longer time smooths more.
-
-    The paper's own way, meshes of 1,250 vertices decimated from scans and level sets of the three lowest
-    eigenfunctions, is `python -m benchmarks.convergence MESH ...`. On eleven scans ε of the default falls at every
-    level for all 33 sources, from 0.72 to 0.059 % in the median, with orders from 0.60 to 1.06, median 0.88, 15 of
-    them at least 0.9; that of one time falls for 26, to 0.15 %, with orders from 0.18 to 0.78, median 0.55.
-    `sh.signed_distance` is exact (10⁻⁴ %) at every level. What is left lies within some ten edges of where directions
-    turn back: that place comes from comparing heat that has fallen along two paths, which is the less exact the longer
-    they are. Even the best times at each level, chosen by the error, would leave one source on a femur at an order of
-    0.6; each other way that was tried (shorter times there, directions carried on from where they are sure, φ's own
-    slopes, shorter vectors) helps some shapes and harms others.
+    """Twenty bumpy surfaces of irregular triangles, Loop-subdivided four times; the source is a level set, the truth
+    exact polyhedral distance. The paper finds order 1 for all methods. At one time t = h² directions keep an error
+    h²/t, which does not fall with h; `Extrapolated`, the default, cancels it. Falls: on how many ε falls at every
+    level. On eleven decimated scans (`python -m benchmarks.convergence MESH ...`) the default has orders from 0.60
+    to 1.06, one time from 0.18 to 0.78.
     """
     ways: dict[str, Callable[[sh.TriangleMesh, list[sh.Curve]], sh.VertexField[sh.TriangleMesh]]] = {
         "default": lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),
@@ -239,14 +211,9 @@ def convergence(page: Page) -> None:
 
 @figure("section-9.5", "Broken curves")
 def broken_curves_on_surfaces(page: Page) -> None:
-    """The paper compares with repairing a curve first: surface winding numbers (SWN, Feng et al. 2023) give the sign,
-    exact polyhedral distance to what is left the rest. Here five surfaces, ten seeds each, a closed curve in
-    about twelve pieces, damaged in seven ways (`benchmarks/broken_curves.py`; all but the first three with 25 % gone).
-    ε as median / worst over the fifty cases; in brackets, how often a program failed. `sh.signed_distance` also turns
-    pieces and leaves out what belongs to no other; heat is the method alone, zero set the same sharpened. This takes
-    seven minutes. Against the method alone SWN × exact wins where little is gone, since most of the surface is nearer
-    to what is left than to a gap, where pieces were moved, and where few are turned; against `sh.signed_distance`,
-    which measures to what is left too, nowhere.
+    """Five surfaces, ten seeds each, a closed curve in twelve pieces, damaged in seven ways
+    (`benchmarks/broken_curves.py`; all but the first three with 25 % gone). ε as median / worst; in brackets, how
+    often a program failed. Surface winding numbers (SWN, Feng et al. 2023) give the sign in the last column.
     """
     names = {"one call": "signed_distance", "nearest": "nearest side × exact", "winding": "SWN × exact"}
     errors = broken_curves.study(10)
@@ -271,10 +238,7 @@ def draw_broken_curves(page: Page) -> None:
 
 @figure("section-9", "Timings")
 def timings(page: Page) -> None:
-    """CPU seconds of all threads on a bumpy sphere, for a first distance (with factorisations), one more, and one of a
-    batch of 16. The paper plots its times and names two (Fig. 24). `benchmarks/surface.py` compares with potpourri3d,
-    the authors' own code, and with the bare solves.
-    """
+    """CPU seconds on a bumpy sphere: a first distance with factorisations, one more, and one of a batch of 16."""
     for level in (2, 3):
         mesh = shapes.subdivided(shapes.organic(1, 700), level)
         heights = shapes.height(mesh.vertices, 1)

@@ -15,8 +15,8 @@ from .pages import Page, figure
 
 @figure("16", "Polygon meshes, point clouds, digital surfaces")
 def other_surfaces(page: Page) -> None:
-    """A circle of latitude on a sphere, given as polygons, as points and as voxels. ε against arc length on the sphere;
-    sharpened where sharpening is for that domain.
+    """A circle of latitude on a sphere of polygons, points and voxels, against arc length; sharpened where sharpening
+    exists.
     """
     from shapes import domain_cases as cases
 
@@ -48,9 +48,8 @@ def other_surfaces(page: Page) -> None:
 
 @figure("23", "Robust domains")
 def robust_domains(page: Page) -> None:
-    """Domains that are broken themselves: three sheets that meet along a line, a Möbius strip (whose curve bounds
-    nothing, so that φ jumps once), and a sphere of which a quarter of the faces is missing. ε against distance in the
-    unbroken domain, in closed form.
+    """Three sheets that meet along a line, a Möbius strip (φ jumps once), and a sphere without a quarter of its faces;
+    ε against closed forms in the unbroken domain.
     """
     picture = new_figure(15, 4.6)
     for k, (name, mesh, curve, exact, view) in enumerate((_book(), _moebius(), _sieve())):

@@ -44,6 +44,8 @@ class Section:
     make: Callable[[Page], None]
 
 
+DIFFERENCES = Path(__file__).parent / "differences.md"
+"""The last section: what the library does differently, and why."""
 FIGURES: dict[str, Section] = {}
 """By the number that the paper gives them."""
 
@@ -96,14 +98,14 @@ def write_chapter(folder: Path, numbers: Mapping[str, list[Row]], versions: str)
     lines = [
         "# The paper, reproduced",
         "",
-        "Nicole Feng and Keenan Crane, *A Heat Method for Generalized Signed Distance*, ACM Transactions on Graphics",
-        "43(4), 2024. Every section remakes one of its figures with this library, on generated shapes: the meshes of",
-        "the paper are not all public, nor is its machine. Where the paper gives numbers, they stand beside ours. The",
-        "ways that it compares with are in `benchmarks/reproduction/baselines.py`; where one wins, the text says so.",
+        "Every section remakes a figure of Nicole Feng and Keenan Crane, *A Heat Method for Generalized Signed",
+        "Distance*, ACM Transactions on Graphics 43(4), 2024, [doi:10.1145/3658220](https://doi.org/10.1145/3658220),",
+        "on generated shapes. Baselines are in `benchmarks/reproduction/baselines.py`. The last section lists what is",
+        "done differently.",
         "",
         f"`python benchmarks/paper.py` makes this page. Last run with {versions}.",
-        "Errors ε are root mean squares over the domain in per cent of the range of the true distance, as in Sec. 9.1.",
-        "The diffusion time is one, t = h², as in the paper, where the text does not say otherwise.",
+        "Errors ε are root mean squares in per cent of the range of the true distance (Sec. 9.1); t = h² if nothing",
+        "is said.",
     ]
     for number, section in sorted(FIGURES.items(), key=lambda item: order(item[0])):
         lines += ["", f"## {heading(number)}: {section.title}", "", inspect.getdoc(section.make) or ""]
@@ -111,6 +113,7 @@ def write_chapter(folder: Path, numbers: Mapping[str, list[Row]], versions: str)
             lines += ["", f"![{section.title}](paper/{picture_name(number)})"]
         if numbers.get(number):
             lines += ["", *table(numbers[number])]
+    lines += ["", DIFFERENCES.read_text(encoding="utf-8").rstrip()]
     (folder.parent / "paper.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -48,12 +48,9 @@ def n_parts(mesh: sh.TriangleMesh) -> int:
 
 @figure("3", "Completed surfaces")
 def completed_surfaces(page: Page) -> None:
-    """Generalized winding numbers (GWN) and generalized signed distance (GSD) both complete a noisy surface with holes.
-
-    GWN jumps at every face and so must follow the noise; GSD may interpolate its input (constraint `ZeroSet`) or
-    approximate it (`Free`). Deviation: root mean square distance of the completed surface's vertices from the whole
-    duck, in per cent of its length. Where the surface is there and clean, GWN with exact distance is the more exact
-    way, and it is what `sh.signed_distance` does there.
+    """Generalized winding numbers (GWN) and generalized signed distance (GSD) complete a noisy surface with holes. GWN
+    jumps at every face and follows the noise; GSD may interpolate (`ZeroSet`) or approximate (`Free`). Deviation of
+    the completed vertices from the whole duck, in per cent of its length.
     """
     broken = scanned_duck()
     grid = sh.Grid.around(broken.bounds, resolution=72, padding=0.3)
@@ -77,11 +74,9 @@ def completed_surfaces(page: Page) -> None:
 
 @figure("4-19", "Offsets of badly broken surfaces")
 def offsets_of_broken_surfaces(page: Page) -> None:
-    """Level sets of GSD are closed, manifold surfaces at even distances, whatever the input.
-
-    The duck has holes, noise, flipped and duplicate faces. Error of an offset: root mean square of the difference
-    between the exact distance of its vertices from the whole duck and the level, in per cent of the duck's length.
-    The baseline signs exact distance to the broken faces by winding numbers, as one would without heat.
+    """The duck has holes, noise, flipped and duplicate faces. Error of an offset: root mean square difference between
+    exact distance from the whole duck and the level, in per cent of its length. The last rows sign exact distance
+    by winding numbers.
     """
     broken = samples.broken_duck()
     grid = sh.Grid.around(broken.bounds, resolution=80, padding=0.45)
@@ -110,11 +105,9 @@ def offsets_of_broken_surfaces(page: Page) -> None:
 
 @figure("5", "From linear to harmonic completion")
 def diffusion_times(page: Page) -> None:
-    """For a short time, φ completes a curve by straight extension, as pseudonormals do; the longer the time, the
-    rounder the completion, as from a harmonic function. Without a constraint, a long time also lets the zero set
-    leave the curve. Differences are areas between the completed shape and others, in per cent of the whole shape's
-    area. The paper names winding numbers as the limit for long times; the shapes that they enclose are not what we
-    see here: they lose much where gaps are wide.
+    """For a short time φ continues a curve straight, as pseudonormals do; the longer the time, the rounder. Areas by
+    which the completed shape differs from others, in per cent of the whole shape's area. We do not find winding
+    numbers as the limit for long times.
     """
     lines, grid = shapes.broken_blob(gaps=3, share=0.45), plane()
     points = grid.points.reshape(-1, 2)
@@ -136,9 +129,8 @@ def diffusion_times(page: Page) -> None:
 
 @figure("6", "Signing unsigned distance is not enough")
 def signing_unsigned_distance(page: Page) -> None:
-    """Distance to a broken curve with a sign is not distance to the curve that it stands for: its level sets wrap
-    around every gap, and its sign tears. ε is measured against the whole curve. With few small gaps the baselines are
-    as good in the mean, since most of the plane lies nearer to what is there; with wide gaps they are not.
+    """Level sets of signed unsigned distance wrap around every gap, and its sign tears. ε against the whole curve:
+    with few small gaps the baselines are as good in the mean, with wide gaps they are not.
     """
     grid = plane()
     points = grid.points.reshape(-1, 2)
@@ -166,8 +158,8 @@ def signing_unsigned_distance(page: Page) -> None:
 
 @figure("18", "Joins of strokes")
 def joins_of_strokes(page: Page) -> None:
-    """The sides of a letter, cut short at its corners. The diffusion time chooses the join, as in 2D drawing programs:
-    sharp for a short time, round for a long one. Cut: how far the completed outline passes from the letter's corner.
+    """The sides of a letter, cut short at its corners: sharp joins for a short time, round ones for a long time. Cut:
+    how far the outline passes from the letter's corner.
     """
     corners = np.array(
         [[0, 0], [0, 5], [3, 5], [3, 4], [1, 4], [1, 3], [2.5, 3], [2.5, 2], [1, 2], [1, 0]], dtype=float
@@ -192,8 +184,8 @@ def joins_of_strokes(page: Page) -> None:
 
 @figure("20", "Simplified by offsets")
 def simplified_by_offsets(page: Page) -> None:
-    """Closing (outwards, then back) fills narrow gaps, opening (inwards, then back) removes thin parts: of broken
-    shapes as if they were whole. Area of the result's surface, and how far it is from the whole duck's.
+    """Closing fills narrow gaps and opening removes thin parts of broken shapes as if they were whole. Area of the
+    result, and its distance from the whole duck's surface.
     """
     broken = samples.broken_duck()
     grid = sh.Grid.around(broken.bounds, resolution=72, padding=0.6)
@@ -217,12 +209,8 @@ def simplified_by_offsets(page: Page) -> None:
 
 @figure("26", "Broken geometry on tets")
 def broken_geometry_on_tets(page: Page) -> None:
-    """GWN and GSD at the vertices of one tet mesh. Both give a completed surface; only GSD gives distance as well, and
-    its level sets stay closed away from zero. ε: at the vertices, against exact distance to the whole duck.
-    Winding sign × exact distance to what is there is a strong baseline where the faces that are left are exact and lie
-    everywhere: it wins in the last two rows. With holes and noise sharpened GSD is the better one. `sh.signed_distance`
-    measures to the faces as well; it differs at 51 vertices alone, where beak and head overlap: the truth here counts
-    the faces inside, and the union has none.
+    """GWN and GSD at the vertices of one tet mesh, against exact distance to the whole duck. Winding sign × exact
+    distance to what is there wins where the faces that are left are exact and lie everywhere.
     """
     duck = samples.duck()
     for name, broken in (
@@ -258,10 +246,8 @@ def broken_geometry_on_tets(page: Page) -> None:
 
 @figure("27", "Completion that continues positions and normals")
 def natural_completion(page: Page) -> None:
-    """A sphere without a cap. The zero set of GSD leaves the rim in the direction of the surface there, and bulges
-    over the hole; GWN closes it with a flat membrane. Height of the completion over the plane of the rim: the cap's own
-    is 0.25, straight extension gives a cone of height 0.58, GWN gives 0. Which is nearer to what is missing depends on
-    the shape; only GSD continues positions and normals.
+    """A sphere without a cap. Height of the completion over the plane of the rim: the cap's own is 0.25, straight
+    extension gives 0.58. GSD continues positions and normals, GWN closes flat.
     """
     ball, rim = samples.sphere(5), 0.75
     centers = ball.vertices[ball.faces].mean(axis=1)

@@ -25,9 +25,8 @@ def circle(radius: float, center: tuple[float, float] = (0.0, 0.0), n: int = 120
 
 @figure("8", "No bias at the boundary")
 def no_bias_at_the_boundary(page: Page) -> None:
-    """A circle of radius 0.7 around the point (0.8, 0) in a disk of radius 2, with a long diffusion time, t = 100 h².
-    The unsigned heat method (Crane et al. 2013), even with the mean of its two boundary conditions, bends the isolines
-    near the rim; vectors diffused with natural conditions do not. ε of the distance from the circle.
+    """A circle of radius 0.7 around (0.8, 0) in a disk of radius 2, t = 100 h². The unsigned heat method (Crane et al.
+    2013) bends isolines near the rim; vectors diffused with natural conditions do not.
     """
     mesh, line = shapes.flat_disk(4000), circle(0.7, (0.8, 0.0))
     curve = shapes.placed(mesh, line)
@@ -51,8 +50,8 @@ def no_bias_at_the_boundary(page: Page) -> None:
 
 @figure("9", "Signed and unsigned sources together")
 def mixed_sources(page: Page) -> None:
-    """Oriented arcs stand for a broken region boundary; an open curve and a point are what they are. φ is negative
-    inside the region and positive around the others. Value on each source: 0 on the curves, and at the point 0 as well.
+    """Oriented arcs of a broken boundary, an open curve and a point: φ is negative inside the region, positive around
+    the others, and about 0 on each.
     """
     ball = samples.sphere(5)
     angle = np.linspace(0, 2 * np.pi, 61)
@@ -75,10 +74,8 @@ def mixed_sources(page: Page) -> None:
 
 @figure("10", "Level set constraints")
 def level_set_constraints(page: Page) -> None:
-    """Three circles around one centre, given as partial level sets of one distance. Without a constraint isolines
-    deviate a little; zero along all of them contradicts the distance; constant along each is right. Spread: largest
-    difference between values of φ along one circle. Slope error: mean of |1 − |∇φ||. Circles that cross triangles are
-    held by springs, so that φ need not be flat beside them; exactly, by `ZeroSet(hard=True)`, the spread is zero.
+    """Three concentric circles, given as partial level sets of one distance: constant along each is right, zero along
+    all contradicts the distance. Spread: largest difference of φ along one circle; slope error: mean of |1 − |∇φ||.
     """
     mesh = shapes.flat_disk(3000)
     curves = [shapes.placed(mesh, circle(radius)) for radius in (0.6, 1.0, 1.5)]
@@ -98,9 +95,8 @@ def level_set_constraints(page: Page) -> None:
 
 @figure("11", "Soft constraints at crossings")
 def soft_constraints(page: Page) -> None:
-    """A curve that crosses itself cannot be a zero set with normals along it. A hard constraint bends distance around
-    the crossing; a soft one keeps the zero set near the curve with less distortion. Exact is `ZeroSet(hard=True)`;
-    default is `ZeroSet()`, which holds a curve that crosses triangles by stiff springs; soft is `Soft(1 / h)`.
+    """A curve that crosses itself cannot be a zero set with normals along it: a soft constraint keeps φ near zero with
+    less distortion than a hard one. Default is `ZeroSet()`, soft `Soft(1 / h)`.
     """
     mesh = shapes.flat_disk(3000)
     t = np.linspace(0, 2 * np.pi, 160, endpoint=False)
@@ -123,9 +119,8 @@ def soft_constraints(page: Page) -> None:
 
 @figure("12-14", "Curves that bound nothing")
 def curves_that_bound_nothing(page: Page) -> None:
-    """A loop around the tube of a torus, a loop around its hole, and an equator whose halves face against each other.
-    No continuous function has the slope that they ask for; φ jumps across a cut that is as short as possible (found by
-    the least absolute jump, Eq. 16). The loop around the tube needs a cut of one meridian, length 2π · 0.4 = 2.51.
+    """A loop around the tube of a torus, one around its hole, and an equator whose halves face against each other: φ
+    jumps across the shortest cut (Eq. 16). That of the first is a meridian, 2π · 0.4 = 2.51.
     """
     ring, ball = samples.torus(n_around=96, n_across=40), samples.sphere(4)
     half = np.linspace(0, np.pi, 60)
@@ -157,12 +152,8 @@ def curves_that_bound_nothing(page: Page) -> None:
 
 @figure("17", "Failing gracefully")
 def failing_gracefully(page: Page) -> None:
-    """One closed curve on a bumpy sphere, damaged in the three ways of the figure, more and more. ε against exact
-    distance from the whole curve (the paper gives its own as colours only). Beside it `sh.signed_distance`, which also
-    turns pieces and leaves out what belongs to no other; and a baseline that nobody can have: exact distance to what is
-    left, with the true sign of the whole curve. It beats heat alone where little is gone, since most of the surface is
-    nearer to what is left than to a gap, and where curves were shifted; `sh.signed_distance` is as good there, and
-    better elsewhere.
+    """One closed curve on a bumpy sphere, damaged more and more. The last column is a baseline that nobody can have:
+    exact distance to what is left, with the true sign.
     """
     mesh = shapes.subdivided(shapes.organic(4, 700), 1)
     heights = shapes.height(mesh.vertices, 4)
@@ -226,8 +217,8 @@ def drawn_on_higher_genus(page: Page) -> None:
 
 @figure("22", "Intrinsic triangulations")
 def intrinsic_triangulations(page: Page) -> None:
-    """A disk whose triangles were made in a plane stretched more and more, then squeezed back: slivers. ε of the
-    distance from a circle, on the mesh as it is and on an intrinsic Delaunay refinement of it.
+    """A disk of slivers, made in a plane stretched more and more: ε of the distance from a circle, on the mesh as it
+    is and on an intrinsic Delaunay refinement of it.
     """
     picture = new_figure(12, 5)
     for stretch in (1.0, 4.0, 10.0, 25.0):
