@@ -97,7 +97,7 @@ class Arithmetic:
         return self._mapped(lambda phi: phi + summand) if summand else self._scaled(1.0)
 
     def __sub__(self: AnyField, level: Number) -> AnyField:
-        return self + -float(level) if isinstance(level, NUMBERS) else NotImplemented
+        return Arithmetic.__add__(self, -float(level)) if isinstance(level, NUMBERS) else NotImplemented
 
     def __rsub__(self: AnyField, level: Number) -> AnyField:
         return self._mapped(lambda phi: level - phi) if isinstance(level, NUMBERS) else NotImplemented

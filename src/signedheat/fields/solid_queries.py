@@ -107,5 +107,5 @@ class Scaled:
 def scaled(solid: SolidQueries, factor: float) -> SolidQueries:
     """The distance to a solid times a number; the solid itself, where that is 1."""
     if isinstance(solid, Scaled):
-        solid, factor = solid.solid, solid.factor * factor
+        return scaled(solid.solid, solid.factor * factor)
     return solid if factor == 1 else Scaled(solid, factor)
