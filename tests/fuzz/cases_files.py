@@ -5,17 +5,20 @@ from __future__ import annotations
 import bz2
 import gzip
 import tempfile
+import zipfile
 import zlib
 from base64 import b64encode
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import scan_files
 import signedheat as sh
 from fuzz.frame import Wrong, family
 from fuzz.mutations import damaged
@@ -191,6 +194,59 @@ def fields() -> list[Files]:
 
 
 @cache
+def scans() -> list[Files]:
+    """LAS, LAZ and E57, of those that can be written."""
+    found = []
+    with suppress(ImportError):
+        import laspy
+
+        for ending in ("las", "laz") if laspy.LazBackend.detect_available() else ("las",):
+            header = laspy.LasHeader(point_format=3, version="1.2")
+            cloud = laspy.LasData(header)
+            cloud.x, cloud.y, cloud.z = CLOUD.points.T
+            found.append(written(cloud.write, f"scan.{ending}"))
+    with suppress(ImportError):
+        found.append(written(lambda path: scan_files.write_e57(path, np.array(CLOUD.points)), "scan.e57"))
+    return found
+
+
+@cache
+def scenes() -> list[Files]:
+    """COLLADA, and 3MF packages."""
+    mesh = samples.sphere(1).to_trimesh()
+    corners = "".join('<vertex x="{}" y="{}" z="{}"/>'.format(*p) for p in BALL.vertices.tolist())
+    faces = "".join('<triangle v1="{}" v2="{}" v3="{}"/>'.format(*f) for f in BALL.faces.tolist())
+    model = (
+        '<model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
+        f'<object id="1"><mesh><vertices>{corners}</vertices><triangles>{faces}</triangles></mesh></object>'
+        '<object id="2"><components><component objectid="1" transform="1 0 0 0 1 0 0 0 1 5 0 0"/></components></object>'
+        '</resources><build><item objectid="1"/><item objectid="2"/></build></model>'
+    )
+
+    def package(path: Path) -> None:
+        with zipfile.ZipFile(path, "w") as file:
+            file.writestr("3D/3dmodel.model", model)
+
+    found = [written(package, "scene.3mf")]
+    with suppress(ImportError):
+        import collada  # noqa: F401
+
+        found.append({"scene.dae": mesh.export(file_type="dae")})
+    return found
+
+
+@cache
+def step() -> list[Files]:
+    """A cone by Open CASCADE, which is where it is installed."""
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeCone
+    from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
+
+    writer = STEPControl_Writer()
+    writer.Transfer(BRepPrimAPI_MakeCone(10.0, 5.0, 8.0).Shape(), STEPControl_StepModelType.STEPControl_AsIs)
+    return [written(lambda path: writer.Write(str(path)), "part.step")]
+
+
+@cache
 def volumes() -> list[Files]:
     """Voxels."""
     voxels = np.zeros((3, 3, 3), dtype=np.uint8)
@@ -260,6 +316,7 @@ KINDS: dict[str, tuple[Callable[[Path], Any], Callable[[], list[Files]]]] = {
     "texts": (sh.read, texts),
     "VTP": (sh.read, vtp),
     "glTF": (sh.read, gltf),
+    "scenes": (sh.read, scenes),
     "tets": (sh.read, tets),
     "tet fields": (sh.load_field, lambda: [f for f in tets() if b"signed_distance" in next(iter(f.values()))]),
     "fields": (sh.load_field, fields),
@@ -269,6 +326,11 @@ KINDS: dict[str, tuple[Callable[[Path], Any], Callable[[], list[Files]]]] = {
     "curves": (lambda path: sh.io.read_curves(path, BALL), curves),
     "line elements": (read_obj_elements, lambda: [f for f in curves() if "curves.obj" in f]),
 }
+
+if find_spec("laspy") is not None or find_spec("pye57") is not None:
+    KINDS["scans"] = sh.read, scans
+if find_spec("OCP") is not None:
+    KINDS["STEP"] = sh.read, step
 
 for _kind in KINDS:
     family(
