@@ -81,7 +81,7 @@ COMPARISONS = {
         "Broken curves on surfaces",
         ("broken_curves.py", "--seeds", "3"),
         """Distance to what is left of a curve against distance to the whole: five meshes, three seeds ([ten seeds
-        each](../docs/extensions.md)). In brackets, how often a program failed.""",
+        each](../docs/evidence.md#how-good-are-broken-curves)). In brackets, how often a program failed.""",
     ),
     "polygons": Comparison(
         "Polygons, points, voxels",

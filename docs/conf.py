@@ -7,8 +7,11 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+from docutils.nodes import Node, SkipNode, math_block
+from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
+from sphinx.writers.html5 import HTML5Translator
 from sphinx_gallery.scrapers import figure_rst
 
 import signedheat
@@ -25,7 +28,6 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
     "sphinx.ext.viewcode",
     "numpydoc",
     "sphinx_gallery.gen_gallery",
@@ -48,6 +50,7 @@ html_show_sphinx = False
 html_static_path = ["_static"]
 html_css_files = ["pages.css"]
 
+html_math_renderer = "mathml"
 myst_enable_extensions = ["amsmath", "dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3
 autodoc_typehints = "none"  # numpydoc's sections name types in words
@@ -74,6 +77,13 @@ def escape(app: object, what: str, name: str, thing: object, options: object, li
     lines[:] = [line.replace("(*", "(\\*") for line in lines]
 
 
+def write_mathml(translator: HTML5Translator, node: Node) -> None:
+    """Write a formula as MathML, which browsers draw without fetching anything."""
+    display = "block" if isinstance(node, math_block) else "inline"
+    translator.body.append(convert(node.astext(), display=display))
+    raise SkipNode
+
+
 def check_anchors(app: Sphinx, error: Exception | None) -> None:
     """Fail if a public method has no anchor, by which others can link to it."""
     anchors = app.env.get_domain("py").objects
@@ -86,6 +96,7 @@ def setup(app: Sphinx) -> None:
     """Connect what is done before numpydoc reads docstrings, and after all pages are written."""
     app.connect("autodoc-process-docstring", escape, priority=400)
     app.connect("build-finished", check_anchors)
+    app.add_html_math_renderer("mathml", (write_mathml, None), (write_mathml, None))
 
 
 sphinx_gallery_conf = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from functools import partial
 
 import broken_curves
 import numpy as np
@@ -234,19 +233,3 @@ def draw_broken_curves(page: Page) -> None:
         pieces = broken_curves.damaged(mesh, heights, curve, np.random.default_rng(0), **options)
         shown[name] = sh.signed_distance(pieces, mesh), pieces
     page.draw(row_of_surfaces(shown), width=1500)
-
-
-@figure("section-9", "Timings")
-def timings(page: Page) -> None:
-    """CPU seconds on a bumpy sphere: a first distance with factorisations, one more, and one of a batch of 16."""
-    for level in (2, 3):
-        mesh = shapes.subdivided(shapes.organic(1, 700), level)
-        heights = shapes.height(mesh.vertices, 1)
-        curves = mesh.level_set(heights, 0.0)
-        solver = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False)
-        begin = time.process_time()
-        solver.distance(curves)
-        first = time.process_time() - begin
-        _, one = seconds(partial(solver.distance, curves))
-        _, batch = seconds(partial(solver.distance_many, [curves] * 16))
-        page.add(vertices=mesh.n_vertices, first=first, **{"one more": one, "one of 16": batch / 16})
