@@ -30,7 +30,6 @@ FLOORS = [
     {"solver"},
     {"sharpening", "tets"},
     {"curves"},
-    {"orientations"},
     {"solids"},
     {"distances", "morphology"},
     {"io", "torch"},

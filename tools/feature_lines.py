@@ -26,7 +26,7 @@ FEATURES: dict[str, tuple[str, ...]] = {
     ),
     "tets": ("domains.tet_mesh.TetMesh", "fields.tet_field", "lowering.tets.*", "tets.*", "io.tets", "sharpening.tets"),
     "distance that jumps (piecewise)": ("curves.piecewise", "curves.jumps", "fields.piecewise_field"),
-    "point clouds": ("domains.point_cloud.PointCloud", "io.points", "orientations.points"),
+    "point clouds": ("domains.point_cloud.PointCloud", "io.points", "solids.orient_points"),
     "voxels and labels": ("domains.digital_surface.DigitalSurface", "io.voxels", "operators.surface_nets"),
     "drawings in the plane": ("domains.polyline.Polyline", "curves.plane", "io.polylines"),
     "polygon meshes": ("domains.polygon_mesh.PolygonMesh", "geometry.virtual_refinement"),

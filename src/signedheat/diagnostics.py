@@ -158,7 +158,6 @@ class ShapeOriented(Note):
     merged_faces: int
     nonorientable_parts: int
     undecided_area: float
-    doubled_walls: int
     nested_bodies: int
     cavities: int
 
@@ -171,7 +170,6 @@ class ShapeOriented(Note):
             (self.turned_faces, f"faces turned: {self.turned_faces}, {self.turned_area:.1%} of the area"),
             (self.merged_faces, f"duplicate faces merged: {self.merged_faces}"),
             (self.nonorientable_parts, f"parts that cannot be oriented: {self.nonorientable_parts}"),
-            (self.doubled_walls, f"doubled walls: {self.doubled_walls}"),
             (self.nested_bodies, f"bodies hidden in others: {self.nested_bodies}"),
             (self.cavities, f"cavities: {self.cavities}"),
             (self.undecided_area, f"sheets without an inside: {self.undecided_area:.1%} of the area"),

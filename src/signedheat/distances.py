@@ -27,9 +27,9 @@ from .fields.to_field import Field
 from .fields.vertex_field import VertexField
 from .geometry.outlines import FillRule
 from .lowering.area_elements import bounds_around
-from .orientations.orient import orient
 from .progress import Progress
 from .solids.distance import distance_to_shapes
+from .solids.orient import orient
 from .solids.solid import Solid
 from .solver import SignedHeatSolver, as_list
 

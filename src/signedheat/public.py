@@ -41,12 +41,12 @@ from .fields.tet_field import TetField
 from .fields.vertex_field import VertexField
 from .io import load_field, read, save
 from .morphology import offset
-from .orientations.meshes import orientation
-from .orientations.orient import orient
 from .sharpening.methods import Convex, Geodesic
 from .sharpening.sharpen import sharpen
 from .solids.complete import complete
 from .solids.deviation import deviation
+from .solids.orient import orient
+from .solids.orientation import orientation
 from .solids.sampling import sample
 from .solids.solid import Solid
 from .solver import SignedHeatSolver

@@ -3,8 +3,8 @@
 from .curves.orientation import CurveOrientation
 from .diagnostics import Diagnostics
 from .fields.solid_queries import Closest
-from .orientations.meshes import Orientation
 from .solids.deviation import Deviation
+from .solids.orientation import Orientation
 from .solids.sample_set import Samples
 
 __all__ = ["Closest", "CurveOrientation", "Deviation", "Diagnostics", "Orientation", "Samples"]

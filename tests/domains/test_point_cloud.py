@@ -13,8 +13,8 @@ from signedheat.diagnostics import PointsLeftOut
 from signedheat.geometry.hole_filling import hole_fillings
 from signedheat.geometry.local_triangulations import local_triangulations
 from signedheat.geometry.outward_signs import spread_out
-from signedheat.orientations.points import orient_points
 from signedheat.samples import sphere
+from signedheat.solids.orient_points import orient_points
 
 
 def sphere_with_circle(n, height=0.3, seed=0):

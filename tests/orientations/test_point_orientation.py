@@ -6,8 +6,8 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples
-from signedheat.orientations.points import orient_points
-from signedheat.orientations.soups import orient_triangles
+from signedheat.solids.gauss import Pieces, system_of
+from signedheat.solids.orient_points import orient_points
 
 
 def box(size, center=(0.0, 0.0, 0.0)):
@@ -161,6 +161,11 @@ def test_too_few_points_and_points_in_the_plane_are_refused():
         orient_points(sh.PointCloud([[0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0]]))
     with refused(sh.errors.GeometryError, "points"):
         orient_points(sh.PointCloud(np.random.default_rng(0).random((9, 2))))
+
+
+def orient_triangles(corners):
+    """Signs of loose triangles by Gauss's formula."""
+    return np.where(system_of(Pieces(corners, np.arange(len(corners)))).weights() >= 0, 1.0, -1.0)
 
 
 @pytest.mark.parametrize(

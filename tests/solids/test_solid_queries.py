@@ -10,6 +10,7 @@ from signedheat import samples
 from signedheat.geometry.face_features import FaceFeatures
 from signedheat.io.solid_arrays import _key
 from signedheat.solids.complete import complete
+from signedheat.solids.winding import Windings, open_edges_of
 
 
 def two_cones():
@@ -62,16 +63,18 @@ def test_signs_are_those_of_winding_numbers(name, keep_overlaps):
     np.testing.assert_array_equal(solid.closest(points).distances, solid.distance(points))
 
 
-def test_where_sides_change_but_across_triangles_is_known():
-    closed, lids = complete(samples.sphere(3)), complete(SHAPES["lids"]())
-    assert closed.windings.sided_beyond == 0.0
-    assert lids.windings.sided_beyond == 0.0  # lids balance each edge
-    gaps = complete(SHAPES["lids"](), completion="heat")
-    assert 1e-3 < gaps.windings.sided_beyond < 0.2  # seams between faces and the zero set of φ
-    points = points_around(gaps)
-    np.testing.assert_array_equal(gaps.distance(points) < 0, gaps.inside(points))
-    assert len(gaps.completion.faces)  # that of the paper, which is one word away
-    assert np.abs(lids.distance(points) - gaps.distance(points)).max() < 0.1
+@pytest.mark.parametrize("completion", ["lids", "heat"])
+def test_what_closes_is_a_cycle_and_signs_are_those_of_its_winding_number(completion):
+    solid = complete(SHAPES["lids"](), completion=completion)
+    assert not len(open_edges_of(solid.windings.triangles))
+    points = points_around(solid)
+    np.testing.assert_array_equal(solid.distance(points) < 0, solid.inside(points))
+
+
+def test_no_solid_is_made_of_what_is_open():
+    ball = samples.sphere(2)
+    with refused(sh.errors.GeometryError, "triangles"):
+        Windings(ball.vertices[ball.faces[1:]])
 
 
 def test_vertices_at_which_cones_touch_are_not_regular():

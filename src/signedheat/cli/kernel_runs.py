@@ -20,10 +20,10 @@ from ..domains.point_cloud import PointCloud
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
 from ..fields.redistancing import redistance
-from ..orientations.meshes import orientation
 from ..sharpening.methods import Convex, Geodesic
 from ..sharpening.sharpen import sharpen
 from ..solids.complete import complete
+from ..solids.orientation import orientation
 from ..solids.sampling import sample
 from ..solids.thickness import thickness
 from ..solver import SignedHeatSolver

@@ -28,8 +28,8 @@ from ..io.voxels import LabelImage
 from ..lowering.area_elements import bounds_around
 from ..lowering.grid.discretization import fitting_spacing, memory_estimate
 from ..memory import available_memory
-from ..orientations.meshes import Orientation, orientation
 from ..solids.fields import BYTES_AT_WORK, BYTES_PER_NODE
+from ..solids.orientation import Orientation, orientation
 from ..solids.thickness import Thickness, thickness
 from .options import Summary, is_planar
 from .shapes import describe, field_or_image, labels_of
@@ -175,7 +175,6 @@ def orientation_text(found: Orientation) -> str:
         said.append("facing outwards")
     kinds = (
         (found.nonorientable_parts, "nonorientable part", "nonorientable parts"),
-        (found.doubled_walls, "doubled wall", "doubled walls"),
         (found.nested_bodies, "body hidden in another", "bodies hidden in others"),
         (found.cavities, "cavity", "cavities"),
     )

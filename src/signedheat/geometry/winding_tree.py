@@ -21,6 +21,8 @@ from .box_tree import LEAF, BoxTree
 
 DEPTH = 1e-5
 """Size of a face by which what is behind it lies behind it."""
+IN_PLANE = 1e-9
+"""Volume of the cone to a triangle, over the product of its sides there, up to which a point lies in its plane."""
 OPENING = 1.25
 """Distance over radius from which on moments replace what is below a node."""
 
@@ -148,6 +150,17 @@ def solid_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z: 
     rest = a * b * c + (ax * bx + ay * by + az * bz) * c
     rest += (bx * cx + by * cy + bz * cz) * a + (cx * ax + cy * ay + cz * az) * b
     return rest, volume
+
+
+@compiled
+def mean_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z: float) -> float:
+    """Signed solid angle of a triangle from a point; from a point in its plane the mean of both sides, 0."""
+    rest, volume = solid_angle(corners, face, x, y, z)
+    scale = 1.0
+    for c in range(0, 9, 3):
+        dx, dy, dz = corners[face, c] - x, corners[face, c + 1] - y, corners[face, c + 2] - z
+        scale *= np.sqrt(dx * dx + dy * dy + dz * dz)
+    return 0.0 if abs(volume) <= IN_PLANE * scale else 2.0 * np.arctan2(volume, rest)
 
 
 SQUARES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))

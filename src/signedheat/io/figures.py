@@ -15,7 +15,7 @@ from ..domains.kinds import Shape
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..fields.grid_field import GridField
-from ..orientations.meshes import orientation
+from ..solids.orientation import orientation
 from ..solids.thickness import thickness
 
 

@@ -12,14 +12,12 @@ from ..cache import fingerprint
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import refuse_extreme
 from ..errors import FileFormatError, GeometryError
-from ..geometry.meshes import area_vectors, face_areas
+from ..geometry.meshes import face_areas
 from ..solids.solid import Solid
 from ..solids.winding import Windings
 
 NEEDED = ("triangles", "origins", "confidence", "bounding", "closing", "key")
 SOURCE = ("source_vertices", "source_faces")
-NET = 0.01
-"""Net area of what closes a solid, over all of it, beyond which it is not closed; the zero set of φ leaves .00004."""
 
 
 def arrays_of(solid: Solid) -> dict[str, NDArray[Any]]:
@@ -58,6 +56,7 @@ def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
             refuse_extreme(corners.min(axis=0, initial=0.0), corners.max(axis=0, initial=0.0), "triangles")
         if all(name in arrays for name in SOURCE):
             source = TriangleMesh(*(arrays[name] for name in SOURCE))
+        windings = Windings(np.ascontiguousarray(closing, dtype=np.float64))
     except GeometryError as error:
         raise FileFormatError(error.cause, remedy=error.remedy, element=error.element) from error
     last = int(origins.max()) if source is None else source.n_faces - 1
@@ -65,9 +64,6 @@ def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
         raise _damaged("it names faces that are not there, or its confidence is not from 0 to 1")
     if not face_areas(triangles).any():
         raise _damaged("none of its triangles has an area")
-    net = float(np.linalg.norm(area_vectors(closing).sum(axis=0)))
-    if net > NET * float(face_areas(closing).sum()) or (bounding.any() and not face_areas(closing).any()):
-        raise _damaged("what closes it is not closed")
     if not np.array_equal(arrays["key"], _key({name: arrays[name] for name in arrays if name != "key"})):
         raise _damaged("its arrays were changed after it was written")
     return Solid(
@@ -75,7 +71,7 @@ def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
         origins.astype(np.int64),
         confidence.astype(np.float32),
         bounding.astype(np.bool_),
-        Windings(np.ascontiguousarray(closing, dtype=np.float64)),
+        windings,
         source,
     )
 

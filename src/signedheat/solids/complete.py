@@ -8,6 +8,7 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..constraints import Constraint
@@ -16,24 +17,23 @@ from ..domains.foreign import SurfaceShape
 from ..domains.joining import joined_shape
 from ..domains.kinds import ShapeLike
 from ..domains.point_cloud import PointCloud
-from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import flag
 from ..errors import SignedHeatError, SourceError
 from ..geometry.directions import axes_across
 from ..geometry.face_tree import FaceTree
 from ..geometry.meshes import face_areas
-from ..geometry.welding import welded_vertices
 from ..memory import refuse_beyond_memory
 from ..operators.grid.fitted_points import mean_gap
-from ..orientations.meshes import orientation
-from ..orientations.points import orient_points
 from ..progress import Progress, Stopwatch
-from . import parts
-from .closing import closed_by, small_lids, strips
+from .bounding import Bounding, Nesting, bounding
+from .chain import Chain
+from .closing import closed_by, small_lids
 from .heat import Heat, heat_surface
-from .loose import are_copies, bound_together, fragments, scatter_of
+from .orient_points import orient_points
+from .orientation import oriented_as, owners_of
 from .rims import open_edges
+from .seams import seams, small_gaps
 from .solid import Solid
 from .unite import Surface, united
 
@@ -45,6 +45,8 @@ BYTES_IF_LOOSE, BYTES_OF_HEAT = 3400, 150_000_000
 """The same for loose triangles; and of the grid that they and points are completed on."""
 CELLS = 2.0
 """Cells between neighbouring points of a cloud."""
+MATCH = (1e-6, 0.75)
+"""Distance of corners over the size of pieces between which they were one corner, before noise moved them."""
 SEAM = 0.75
 """Cells from faces within which the zero set of φ is taken for those faces."""
 
@@ -53,8 +55,10 @@ def complete(
     shape: ShapeLike | Sequence[ShapeLike],
     *,
     completion: Literal["lids", "heat"] = "lids",
+    lids: Literal["bent", "flat"] = "bent",
     as_oriented: bool = False,
     keep_overlaps: bool = False,
+    nested: Nesting = "given",
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
     progress: Progress | None = None,
@@ -74,10 +78,15 @@ def complete(
         (vertices, faces) are taken wherever a shape is. A `Solid` is returned as it is.
     completion : {"lids", "heat"}
         What closes meshes: lids, or the zero set of φ where no face is, as in the paper (Feng & Crane 2024).
+    lids : {"bent", "flat"}
+        Whether lids go on as the surface bends towards them, or are flat: for half models, ducts and hulls.
     as_oriented : bool
         Take faces and normals as they are, whichever way they face.
     keep_overlaps : bool
         Count what lies inside other bodies as surface.
+    nested : {"given", "cavities", "bodies"}
+        What closed pieces within others are: as they were given, to what they lie in; cavities, and bodies in these, as
+        slicers take them; or bodies all.
     constraint, diffusion : Constraint, float
         Of the signed heat method, where that completes.
     progress : callable, optional
@@ -107,6 +116,10 @@ def complete(
         return shape
     if completion not in ("lids", "heat"):
         raise SignedHeatError(f'completion must be "lids" or "heat", not {completion!r}', element="completion")
+    if lids not in ("bent", "flat"):
+        raise SignedHeatError(f'lids must be "bent" or "flat", not {lids!r}', element="lids")
+    if nested not in ("given", "cavities", "bodies"):
+        raise SignedHeatError(f'nested must be "given", "cavities" or "bodies", not {nested!r}', element="nested")
     as_oriented, keep_overlaps = flag(as_oriented, "as_oriented"), flag(keep_overlaps, "keep_overlaps")
     joined = joined_shape(shape)
     count = joined.n_points if isinstance(joined, PointCloud) else joined.triangulation.n_faces
@@ -118,25 +131,25 @@ def complete(
     )
     method = Heat(constraint, diffusion)
     stopwatch = Stopwatch(progress, STEPS)
-    with stopwatch("orient") as run:
-        found = run(lambda: orientation(joined)) if not (as_oriented or isinstance(joined, PointCloud)) else None
-        turned = found.shape if found else joined
-        notes: tuple[Note, ...] = (found.note,) if found else ()
-        if isinstance(joined, PointCloud) and not as_oriented:
-            turned, notes = run(partial(oriented, joined))
-    with stopwatch("complete") as run:
-        if isinstance(turned, PointCloud):
-            solid = run(partial(_from_points, turned, method))
-        else:
-            inner = found.inner[_owners(turned)] if found else None
-            solid = run(partial(completed, turned.triangulation, completion, keep_overlaps, method, inner))
-    origins = solid.origins
-    if isinstance(turned, TriangleMesh | PolygonMesh):  # as the shape that was given numbers its faces
-        names = _owners(turned) if found is None else found.faces[_owners(turned)]
-        origins = np.where(origins >= 0, names[origins], -1)
+    if isinstance(joined, PointCloud):
+        with stopwatch("orient") as run:
+            cloud, notes = (joined, ()) if as_oriented else run(partial(oriented_points, joined))
+        with stopwatch("complete") as run:
+            solid = run(partial(_from_points, cloud, method))
+    else:
+        with stopwatch("orient") as run:
+            chain = run(lambda: Chain.of(joined.triangulation))
+            decided = bounding(chain, nested, as_oriented)
+            notes = () if as_oriented else (oriented_as(joined, chain, decided).note,)
+        with stopwatch("complete") as run:
+            solid = run(
+                partial(completed, joined.triangulation, chain, decided, completion, lids, keep_overlaps, method)
+            )
+            owners = owners_of(joined)
+            solid = replace(solid, origins=np.where(solid.origins >= 0, owners[solid.origins], -1))
     source = joined if isinstance(joined, TriangleMesh) else None
     diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
-    return replace(solid, origins=origins, source=source, diagnostics=diagnostics)
+    return replace(solid, source=source, diagnostics=diagnostics)
 
 
 def bytes_to_complete(shape: SurfaceShape, count: int) -> float:
@@ -149,103 +162,100 @@ def bytes_to_complete(shape: SurfaceShape, count: int) -> float:
     return BYTES_PER_FACE * count
 
 
-def oriented(shape: SurfaceShape) -> tuple[SurfaceShape, tuple[Note, ...]]:
-    """A shape whose faces or normals point outwards, and what was done for it."""
-    if isinstance(shape, PointCloud):
-        points = orient_points(shape)
-        return points.cloud, (OrientedPoints(points.n_fitted, points.n_turned),)
-    found = orientation(shape)
-    return found.shape, (found.note,)
-
-
-def _owners(shape: TriangleMesh | PolygonMesh) -> NDArray[np.int64]:
-    """(m,) face that each triangle of a mesh is part of."""
-    return shape.refinement.face_polygons if isinstance(shape, PolygonMesh) else np.arange(shape.n_faces)
+def oriented_points(cloud: PointCloud) -> tuple[PointCloud, tuple[Note, ...]]:
+    """Points whose normals point outwards, and what was done for it."""
+    points = orient_points(cloud)
+    return points.cloud, (OrientedPoints(points.n_fitted, points.n_turned),)
 
 
 def completed(
     mesh: TriangleMesh,
+    chain: Chain,
+    decided: Bounding,
     completion: Literal["lids", "heat"],
+    lids: Literal["bent", "flat"],
     keep_overlaps: bool,
     method: Heat,
-    inner: NDArray[np.bool_] | None = None,
 ) -> Solid:
-    """The solid that oriented triangles are, of which inner ones bound nothing; its origins are theirs."""
-    vertices = mesh.vertices
-    ids = welded_vertices(vertices, mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel())[mesh.faces]
-    a, b, c = ids.T
-    proper = np.flatnonzero((a != b) & (b != c) & (c != a))
-    every = Surface(vertices[mesh.faces[proper]], ids[proper], proper, True)
-    bounding = np.ones(len(proper), dtype=bool) if inner is None else ~inner[proper]
-    given, walls = every.select(bounding, True), [every.select(~bounding, False)]
-    if not face_areas(given.triangles).any():
+    """The solid of a mesh of which it is decided what bounds; its origins are the triangles of the mesh."""
+    if not chain.areas.any():
         raise SourceError("no face of the shape has an area", element="shape")
-    if completion == "heat":
-        return united(_by_heat(given, method) + walls, keep_overlaps)
-    lost = small_lids(vertices, given.ids)
-    added = np.concatenate([lost, strips(vertices, np.concatenate([given.ids, lost]))])
-    surfaces, copies = _by_lids(given, added, vertices, method)
-    restored = float(face_areas(vertices[lost]).sum() / face_areas(given.triangles).sum())
-    notes = [FacesRestored(len(lost), restored / (1 + restored))] if len(lost) else []
-    return united(surfaces + walls, keep_overlaps, notes, copies=copies)
+    vertices = mesh.vertices
+    counts = np.abs(decided.counts)
+    faces = np.where((decided.counts < 0)[:, None], chain.faces[:, ::-1], chain.faces)
+    torn = np.where(counts > 0, 0, -1) if completion == "heat" else decided.torn
+    surfaces, notes = [], []
+    for group in np.unique(torn[torn >= 0]):
+        chosen = np.flatnonzero((torn == group) & (counts > 0))
+        surfaces += _torn(vertices, faces[chosen], chain.firsts[chosen], decided.pieces[chosen], method, completion)
+    bounds = np.repeat(np.arange(len(faces)), np.where(torn < 0, counts, 0))
+    if len(bounds):
+        lost = small_lids(vertices, faces[bounds])
+        whole = np.concatenate([faces[bounds], lost])
+        places, added = closed_by(vertices, whole, bent=lids == "bent")
+        surfaces.append(_made_from(places, whole, added, chain.firsts[bounds]))
+        if len(lost):
+            restored = float(face_areas(vertices[lost]).sum() / face_areas(vertices[faces[bounds]]).sum())
+            notes.append(FacesRestored(len(lost), restored / (1 + restored)))
+    idle = np.flatnonzero(counts == 0)
+    surfaces.append(Surface(vertices[chain.faces[idle]], chain.faces[idle], chain.firsts[idle], False))
+    return united(surfaces, keep_overlaps, notes)
 
 
-def _by_lids(
-    given: Surface, added: NDArray[np.int64], vertices: NDArray[np.float64], method: Heat
-) -> tuple[list[Surface], int]:
-    """Bodies, with the faces added between their vertices, and their lids; sheets; what loose pieces are.
-
-    Also how many faces are left out as copies of others.
-    """
-    whole = Surface(
-        np.concatenate([given.triangles, vertices[added]]),
-        np.concatenate([given.ids, added]),
-        np.concatenate([given.origins, np.full(len(added), -1)]),
-        True,
-    )
-    labels, is_body = parts.bodies(whole.triangles, whole.ids)
-    copies = ~is_body[labels]
-    if copies.any():
-        copies[copies] = are_copies(whole.triangles[copies], labels[copies], whole.triangles[~copies])
-    whole, labels = whole.select(~copies, True), labels[~copies]
-    surfaces, lidded = [], is_body[labels]
-    opened = np.isin(np.arange(len(is_body)), open_edges(whole.ids, labels)[1])
-    for chosen in fragments(whole.triangles, labels, ~is_body, is_body & opened):
-        pieces, loose = whole.select(chosen, False), ~is_body[labels[chosen]]
-        if bound_together(pieces.triangles, labels[chosen], loose):
-            surfaces += _scattered(pieces, labels[chosen], method)
-            lidded[chosen] = False
-        else:
-            surfaces.append(pieces.select(loose, False))
-    bodies = whole.select(lidded, True)
-    positions, added = closed_by(vertices, bodies.ids)
-    lids = Surface(positions[added], added, np.full(len(added), -1), True)
-    return [bodies, lids, *surfaces], int(copies.sum())
+def _made_from(
+    places: NDArray[np.float64], faces: NDArray[np.int64], added: NDArray[np.int64], origins: NDArray[np.int64]
+) -> Surface:
+    """The cycle of faces, the first of which were given, and of what is added to them."""
+    whole = np.concatenate([faces, added])
+    return Surface(places[whole], whole, np.append(origins, np.full(len(whole) - len(origins), -1)), True)
 
 
-def _scattered(pieces: Surface, labels: NDArray[np.int64], method: Heat) -> list[Surface]:
-    """The surface that pieces scatter around; or they and what closes them."""
-    if scatter := scatter_of(pieces.triangles, labels):
-        made = _heat_of(pieces, method, scatter)
-        return [pieces] if made is None else [made]
-    return _by_heat(pieces, method)
-
-
-def _by_heat(given: Surface, method: Heat) -> list[Surface]:
-    """Triangles, and the zero set of φ where they are not."""
-    made = _heat_of(given, method)
+def _torn(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    origins: NDArray[np.int64],
+    pieces: NDArray[np.int64],
+    method: Heat,
+    completion: str,
+) -> list[Surface]:
+    """What is left of a body, and the zero set of φ where it is not; that alone where faces are noise around it."""
+    triangles = vertices[faces]
+    given = Surface(triangles, faces, origins, False)
+    scatter = scatter_of(triangles, pieces) if completion == "lids" else 0.0
+    names, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    made = heat_surface(TriangleMesh(names, corners.reshape(-1, 3)), method, scatter)
     if made is None:
-        return [replace(given, closing=False)]
-    tree = FaceTree.of_triangles(given.triangles)
-    cell = float(np.median(np.linalg.norm(made.triangles[:, 1] - made.triangles[:, 0], axis=1)))
-    away = tree.distances(made.triangles.mean(axis=1)) > SEAM * cell
-    return [replace(given, closing=True), made.select(away, True)]
+        return [given]
+    if scatter:
+        return [Surface.made(made[0][made[1]])]
+    tree = FaceTree.of_triangles(triangles)
+    patches = made[0][made[1]]
+    cell = float(np.median(np.linalg.norm(patches[:, 1] - patches[:, 0], axis=1)))
+    away = tree.distances(patches.mean(axis=1)) > SEAM * cell
+    if not len(open_edges(faces, np.zeros(len(faces), dtype=np.int64))[0]):
+        return [replace(given, closing=True)]
+    places = np.concatenate([vertices, made[0]])
+    others = made[1][away] + len(vertices)
+    points, joins = seams(places, faces, others, cell)
+    places, whole = np.concatenate([places, points]), np.concatenate([faces, others, joins])
+    whole = np.concatenate([whole, small_gaps(places, whole)])
+    places, added = closed_by(places, whole)
+    return [_made_from(places, whole, added, origins)]
 
 
-def _heat_of(pieces: Surface, method: Heat, cell: float = 0.0) -> Surface | None:
-    names, faces = np.unique(pieces.triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    made = heat_surface(TriangleMesh(names, faces.reshape(-1, 3)), method, cell)
-    return None if made is None else Surface.made(made[0][made[1]])
+def scatter_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> float:
+    """How far corners that were one have come apart, if pieces are noise around a surface; else 0.
+
+    They are if most of their corners lie near corners of others, but not on them.
+    """
+    points = triangles.reshape(-1, 3)
+    owners = np.repeat(labels, 3)
+    near, which = scipy.spatial.cKDTree(points).query(points, min(8, len(points)), workers=-1)
+    others = owners[which] != owners[:, None]
+    nearest = np.where(others, near, np.inf).min(axis=1)
+    sizes = np.repeat(np.sqrt(face_areas(triangles)), 3)
+    moved = (nearest > MATCH[0] * sizes) & (nearest < MATCH[1] * sizes)
+    return float(np.median(nearest[moved])) if moved.mean() > 0.5 else 0.0
 
 
 def _from_points(cloud: PointCloud, method: Heat) -> Solid:

@@ -219,7 +219,6 @@ def prepared(solid: Evaluated) -> tuple[FaceTree, Windings]:
     tree, windings = solid.tree, solid.windings
     _ = tree.discs
     windings.inside(np.zeros((1, 3)))
-    _ = windings.sided_beyond
     return tree, windings
 
 

@@ -75,12 +75,11 @@ def solved(
 def _inside(windings: Windings, grid: Grid, first: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Where nodes are inside, computed for one of all those between which there is no surface.
 
-    Of two neighbours that are both farther than half a step no surface is between, nor a gap if they are farther than
-    these are wide.
+    Of two neighbours that are both farther than half a step no surface is between.
     """
     origin, steps = grid.origin + first * grid.spacing, grid.spacing
     inside = np.zeros(values.shape, dtype=bool)
-    far = values > max(0.5 * (1.0 + SLACK) * float(steps.max()), windings.sided_beyond)
+    far = values > 0.5 * (1.0 + SLACK) * float(steps.max())
     groups, count = scipy.ndimage.label(far)
     if count:
         farthest = _farthest(values, groups, count)

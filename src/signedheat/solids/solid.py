@@ -607,14 +607,11 @@ class Solid(Displayed, Represented, Frozen):
     def _inside(self, points: NDArray[np.float64], found: NearestFaces) -> NDArray[np.bool_]:
         """(n,) whether points are inside, whose nearest faces are known.
 
-        No triangle is between a point and the nearest place. So where sides change across triangles only it is inside
-        where it is on that side of this place, by the normal there. Elsewhere winding numbers are counted.
+        No triangle is between a point and the nearest place, and sides change across triangles only: it is inside where
+        it is on that side of this place, by the normal there. Where that is not clear winding numbers are counted.
         """
-        beyond = self.windings.sided_beyond
-        if np.isinf(beyond):
-            return self.windings.inside(points)
         clear = found.regular & self.bounding[self.features.ids[found.faces]] & (np.abs(found.cosines) > SLANT)
-        clear &= found.distances > max(beyond, CLEAR * float(np.abs(self.tree.tree.bounds[1]).max()))
+        clear &= found.distances > CLEAR * float(np.abs(self.tree.tree.bounds[1]).max())
         inside = found.cosines < 0
         if not clear.all():
             inside[~clear] = self.windings.inside(points[~clear])

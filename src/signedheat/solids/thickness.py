@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..geometry.directions import unit
 from ..geometry.meshes import area_vectors
-from ..orientations.mesh_faces import Mesh, MeshFaces
-from ..orientations.stabbing_lines import LineCrossings, stabbing_lines
+from ..geometry.stabbing_lines import LineCrossings, stabbing_lines
+from .orientation import Mesh
 
 N_LINES = 30_000
 """Lines laid through a shape to measure it."""
@@ -68,11 +68,13 @@ def thickness(shape: Mesh) -> Thickness:
     >>> 0.75 < found.wall < 0.8, 1.0 < found.gap < 1.2
     (True, True)
     """
-    faces = MeshFaces.of(shape)
-    lines = stabbing_lines(faces.positions, faces.triangles, faces.bounds, N_LINES, N_DIRECTIONS)
-    walls, n_walls = _widths(faces, lines, True)
-    gaps, n_gaps = _widths(faces, lines, False)
-    unit = faces.unit
+    mesh, exponent = shape.triangulation, int(np.frexp(np.abs(shape.bounds).max())[1])
+    corners = np.ldexp(mesh.vertices, -exponent)  # so that no product leaves the range of numbers
+    bounds = np.ldexp(shape.bounds, -exponent)
+    lines = stabbing_lines(corners, mesh.faces, bounds, N_LINES, N_DIRECTIONS)
+    size = float(np.abs(bounds).max())
+    (walls, n_walls), (gaps, n_gaps) = (_widths(corners[mesh.faces], lines, wall, size) for wall in (True, False))
+    unit = float(np.ldexp(1.0, exponent))
     return Thickness(
         wall=_quantile(walls * unit, SHARE * n_walls),
         gap=_quantile(gaps * unit, SHARE * n_gaps),
@@ -81,16 +83,17 @@ def thickness(shape: Mesh) -> Thickness:
     )
 
 
-def _widths(faces: MeshFaces, lines: LineCrossings, wall: bool) -> tuple[NDArray[np.float64], int]:
+def _widths(
+    triangles: NDArray[np.float64], lines: LineCrossings, wall: bool, size: float
+) -> tuple[NDArray[np.float64], int]:
     """Widths along lines of walls, else of gaps, between opposite faces; and how many of either sort are crossed."""
     last = np.zeros(len(lines.crossed), dtype=bool)
     last[lines.starts[1:][np.diff(lines.starts) > 0] - 1] = True
     here = np.flatnonzero(~last[:-1] & (lines.entering[:-1] == wall) & (lines.entering[1:] != wall))
-    one, other = (unit(area_vectors(faces.positions[faces.triangles[lines.crossed[here + k]]])) for k in (0, 1))
+    one, other = (unit(area_vectors(triangles[lines.crossed[here + k]])) for k in (0, 1))
     opposite = np.einsum("ij,ij->i", one, other) < OPPOSITE
     opposite &= np.minimum(lines.cosines[here], lines.cosines[here + 1]) > STEEP
     widths = (lines.depths[here + 1] - lines.depths[here]) * 0.5 * (lines.cosines[here] + lines.cosines[here + 1])
-    size = float(np.abs(faces.bounds).max())
     return widths[opposite & (widths > 1e-9 * size)], len(here)
 
 

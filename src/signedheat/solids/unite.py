@@ -61,7 +61,7 @@ def united(
     copies: int = 0,
 ) -> Solid:
     """The solid that surfaces close: without what lies inside, where bodies overlap, and without idle completion."""
-    whole = _joined(surfaces)
+    whole = joined_surfaces(surfaces)
     closing = np.concatenate([np.full(len(each.triangles), each.closing) for each in surfaces])
     windings = Windings(whole.triangles[closing])
     pieces = _cut(whole, closing)
@@ -169,7 +169,7 @@ def _confidence(
     return confidence
 
 
-def _joined(surfaces: list[Surface]) -> Surface:
+def joined_surfaces(surfaces: list[Surface]) -> Surface:
     """Several surfaces as one; numbers of vertices that are new, which are negative, stay apart."""
     ids, lowest = [], 0
     for each in surfaces:

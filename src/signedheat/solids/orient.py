@@ -9,8 +9,7 @@ from ..curves.orientation import curve_orientation
 from ..domains.curves import CurveOrPoints
 from ..domains.foreign import ForeignShape
 from ..domains.kinds import SurfaceDomain
-from .mesh_faces import Mesh
-from .meshes import orientation
+from .orientation import Mesh, orientation
 
 
 @overload

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.components import connected_components
-from ..geometry.directions import axes_across, unit
-from ..geometry.edges import HalfedgePairs
+from .components import connected_components
+from .directions import axes_across, unit
+from .edges import HalfedgePairs
 
 SAME_ANGLE = 1e-6
 """Radians between faces around an edge up to which their order is unknown: they lie on each other, but for rounding."""

@@ -18,9 +18,6 @@ from ..compiled import compiled
 from ..frozen import read_only
 from ..geometry.components import grouped
 
-N_WAYS = 4
-"""Directions of lines through points."""
-
 
 @dataclass(frozen=True, eq=False)
 class LineCrossings:
@@ -88,40 +85,6 @@ def stabbing_lines(
     return _in_order(found, int(first_lines[-1]))
 
 
-def aimed_lines(
-    vertices: NDArray[np.float64],
-    triangles: NDArray[np.int64],
-    bounds: NDArray[np.float64],
-    points: NDArray[np.float64],
-) -> LineCrossings:
-    """Cross a shape by lines through some points, along `N_WAYS` directions: for parts that evenly spread lines miss.
-
-    All lines along the first direction come first.
-
-    Examples
-    --------
-    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
-    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
-    >>> lines = aimed_lines(corners, faces, np.array([[0, 0, 0], [1, 1, 1]]), np.full((1, 3), 0.1))
-    >>> np.diff(lines.starts).tolist()
-    [2, 2, 2, 2]
-    """
-    frames = line_frames(N_WAYS)
-    center = 0.5 * (bounds[0] + bounds[1])
-    size = max(float(np.linalg.norm(bounds[1] - bounds[0])), np.finfo(float).tiny)
-    n_cells = int(np.clip(np.sqrt(len(points)), 1, 512))
-    found = []
-    for k, frame in enumerate(frames):
-        at = (points - center) @ frame.T
-        cells = np.clip(((at[:, :2] / size + 0.5) * n_cells).astype(np.int64), 0, n_cells - 1)
-        cell = cells[:, 1] * n_cells + cells[:, 0]
-        starts, order = grouped(cell, n_cells**2)
-        found.append(
-            _aim(vertices, triangles, frame, center, at, order, starts, n_cells / size, n_cells, k * len(points))
-        )
-    return _in_order(found, N_WAYS * len(points))
-
-
 def _in_order(found: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]], n_lines: int) -> LineCrossings:
     ids, entering, places = (np.concatenate(columns) for columns in zip(*found, strict=True))
     by_depth = np.argsort(places[:, 0])
@@ -129,17 +92,6 @@ def _in_order(found: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]], n_li
     order = by_depth[members]
     places = places[order]
     return LineCrossings(starts, ids[order, 1], entering[order], places[:, 0], places[:, 1])
-
-
-def joined(one: LineCrossings, other: LineCrossings) -> LineCrossings:
-    """The crossings of one set of lines, then those of another."""
-    return LineCrossings(
-        np.concatenate([one.starts, one.starts[-1] + other.starts[1:]]),
-        np.concatenate([one.crossed, other.crossed]),
-        np.concatenate([one.entering, other.entering]),
-        np.concatenate([one.depths, other.depths]),
-        np.concatenate([one.cosines, other.cosines]),
-    )
 
 
 @lru_cache(maxsize=4)
@@ -222,61 +174,6 @@ def crossings_at_pixels(
                 entering[count] = double < 0.0
                 places[count, 0] = min(max(at[a, 2] + slope_x * (i - ax) + slope_y * (j - ay), least), most)
                 places[count, 1] = steep
-                count += 1
-    return ids[:count], entering[:count], places[:count]
-
-
-@compiled
-def _aim(
-    vertices: NDArray[np.float64],
-    triangles: NDArray[np.int64],
-    frame: NDArray[np.float64],
-    center: NDArray[np.float64],
-    points: NDArray[np.float64],
-    order: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    scale: float,
-    n_cells: int,
-    first_line: int,
-) -> tuple[NDArray[np.int32], NDArray[np.bool_], NDArray[np.float64]]:
-    """Crossings of lines through points, which are sorted into the cells of a picture."""
-    capacity, count = 8 * len(points) + 1024, 0
-    ids, entering, places = np.empty((capacity, 2), np.int32), np.empty(capacity, np.bool_), np.empty((capacity, 2))
-    at, low, high = np.empty((3, 3)), np.empty(2, np.int64), np.empty(2, np.int64)
-    for t in range(len(triangles)):
-        for k in range(3):
-            for d in range(3):
-                at[k, d] = 0.0
-                for e in range(3):
-                    at[k, d] += frame[d, e] * (vertices[triangles[t, k], e] - center[e])
-        for d in range(2):
-            least, most = min(at[0, d], at[1, d], at[2, d]), max(at[0, d], at[1, d], at[2, d])
-            low[d] = max(np.int64((least * scale) + 0.5 * n_cells), 0)
-            high[d] = min(np.int64((most * scale) + 0.5 * n_cells), n_cells - 1)
-        ux, uy, uz = at[1, 0] - at[0, 0], at[1, 1] - at[0, 1], at[1, 2] - at[0, 2]
-        wx, wy, wz = at[2, 0] - at[0, 0], at[2, 1] - at[0, 1], at[2, 2] - at[0, 2]
-        double = ux * wy - uy * wx
-        if double == 0.0:
-            continue
-        slope_x, slope_y = (uz * wy - wz * uy) / double, (wz * ux - uz * wx) / double
-        for j in range(low[1], high[1] + 1):
-            for s in range(starts[j * n_cells + low[0]], starts[j * n_cells + high[0] + 1]):
-                p = order[s]
-                x, y = points[p, 0], points[p, 1]
-                inside = False
-                for k in range(3):
-                    a, b = k, (k + 1) % 3
-                    if (at[a, 1] < y) != (at[b, 1] < y) and x < _crossed(at[a, 0], at[a, 1], at[b, 0], at[b, 1], y):
-                        inside = not inside
-                if not inside:
-                    continue
-                if count == capacity:
-                    ids, entering, places = _doubled(ids, entering, places)
-                    capacity *= 2
-                ids[count, 0], ids[count, 1] = first_line + p, t
-                entering[count] = double < 0.0
-                places[count, 0] = at[0, 2] + slope_x * (x - at[0, 0]) + slope_y * (y - at[0, 1])
-                places[count, 1] = 1.0 / np.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
                 count += 1
     return ids[:count], entering[:count], places[:count]
 

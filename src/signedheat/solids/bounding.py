@@ -1,0 +1,341 @@
+"""Which triangles of a shape bound a solid, and which way they face.
+
+What closes is kept whole: a complex whose directed edges cancel as given, or a piece whose edges cancel once its faces
+agree. It faces outwards as a whole; within another body it stays to that as it was given. All other pieces are open,
+and Gauss's formula (`gauss`) decides for them together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..frozen import Frozen
+from ..geometry.components import connected_components
+from ..geometry.directions import unit
+from ..geometry.meshes import area_vectors
+from ..geometry.part_levels import levels_within
+from ..geometry.winding_tree import WindingTree
+from .chain import Chain
+from .gauss import Pieces, means, sampled, system_of
+from .rims import meeting_edges, open_edges
+
+Nesting = Literal["given", "cavities", "bodies"]
+SHEET = 0.146
+"""Level up to which a piece bounds nothing: it explains less than half of what is to be explained, (½ − .146)² = ½ · ¼.
+Flat and wavy sheets have 0, a seventh of a ball .16, half of one .31, all of it ½."""
+COHERENT = 0.7
+"""Coherence of the levels of loose pieces from which on they are what is left of a body: .81 to 1 of bodies, however
+little is left of them, .3 to .6 of leaves, cards and strips, however many there are."""
+CHANCE = 0.42
+"""Level times √(n + 1) up to which n loose pieces bound nothing: the choice of their signs explains as much. Two sheets
+a quarter of their width apart have .38, three sides of a box .2, one that four others lack .47, a ball of which 85 % is
+gone .95."""
+ALONG = 0.25
+"""Share of loose pieces inside closed ones, less whole numbers, from which on they lie along their surface."""
+FEW = 8
+"""Loose pieces, if all were alike, up to which lids close what is between them; more are completed by heat."""
+CLOSING = 0.4
+"""Rise of the level of a body by loose pieces, over that if all were faces of one body, from which on they are: what is
+left at random of balls, boxes and parts has .43 to .95, sheets in an open box .37, litter in and around it .16."""
+ISLANDS = 0.003
+"""Area of loose pieces over that of a body up to which they may be islands in its holes, and do not count."""
+REACH = 1.5
+"""Distance of faces of two pieces, over the size of the smaller, up to which these belong together."""
+NEAREST = 9
+"""Faces next to each, itself included, that may be of the same cluster."""
+PLACES = 100_000
+"""Faces at most that are looked at for this, evenly spread."""
+HINT = 0.5
+"""Share of the area of a closed piece that faces one way, less the rest, from which on it was given that way."""
+PROBES = 16
+"""Triangles of a closed piece, spread evenly, at all of which it must lie within others to be nested."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bounding(Frozen):
+    """What was decided of a chain.
+
+    Attributes
+    ----------
+    pieces : (m,) int
+        Piece that each triangle is of.
+    turned : (m,) bool
+        Which must turn from the direction in which they were given first.
+    counts : (m,) int
+        How often each bounds, negative if reversed; 0 of sheets, walls between cells, and what cancels.
+    closed : (m,) bool
+        Which are of pieces that close.
+    torn : (m,) int
+        Group of pieces, each by itself a sheet, or torn from these, that bound together only; −1 of all others.
+    as_given : (m,) bool
+        Which are of complexes that close as they were given, copies and all.
+    inner : (m,) bool
+        Walls between closed cells.
+    orientable : (p,) bool
+        Which pieces can agree.
+    disagreeing : int
+        Edges across which two faces disagreed.
+    bodies, cavities : int
+        Closed pieces within others, those that face outwards and those that face inwards.
+    """
+
+    pieces: NDArray[np.int64]
+    turned: NDArray[np.bool_]
+    counts: NDArray[np.int64]
+    closed: NDArray[np.bool_]
+    torn: NDArray[np.int64]
+    as_given: NDArray[np.bool_]
+    inner: NDArray[np.bool_]
+    orientable: NDArray[np.bool_]
+    disagreeing: int
+    bodies: int
+    cavities: int
+
+    def to_turn(self, chain: Chain) -> NDArray[np.bool_]:
+        """(k,) which of the triangles that were given must turn; those on fewer than three places need not."""
+        as_given, turned = (np.append(values, False)[chain.numbers] for values in (self.as_given, self.turned))
+        return np.asarray((chain.numbers >= 0) & ((~as_given & chain.reversed) != turned))
+
+
+def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False) -> Bounding:
+    """Decide what bounds and which way it faces; as given, if that is asked for."""
+    counts, whole = whole_complexes(chain)
+    inner = chain.walls() & ~whole
+    agreed = chain.pieces_as_given() if as_oriented else chain.pieces(~inner)
+    # complexes that are whole are pieces, and so are all others' pieces
+    pieces = np.where(whole, len(agreed.orientable) + chain.complexes, agreed.parts)
+    pieces = np.unique(pieces, return_inverse=True)[1]
+    orientable = np.ones(int(pieces.max(initial=-1)) + 1, dtype=bool)
+    orientable[pieces[~whole]] = agreed.orientable[agreed.parts[~whole]]
+    turned = (chain.multiplicities < 0) if as_oriented else np.where(whole, False, agreed.turned)
+    counts = np.where(whole, counts, np.where(turned, -1, 1) * (orientable[pieces] & ~inner))
+    open_pieces = chain.unbalanced(counts, pieces)
+    open_pieces[pieces[inner]] = True
+    n = len(open_pieces)
+    closed = ~open_pieces & orientable
+    flips, torn, bounds = np.ones(n), np.full(n, -1), closed.copy()
+    rest = np.flatnonzero((open_pieces & orientable)[pieces] & ~inner)
+    if len(rest):
+        names, labels = np.unique(pieces[rest], return_inverse=True)
+        triangles = np.where((counts[rest] < 0)[:, None, None], chain.triangles[rest, ::-1], chain.triangles[rest])
+        groups = connected_pieces(chain, rest, labels)
+        signs, bounds[names], torn[names] = open_bounding(Pieces(triangles, labels), groups, as_oriented)
+        flips[names] = np.where(bounds[names], signs, 1.0)
+    bodies = cavities = 0
+    if closed.any() and not as_oriented:
+        flips, bodies, cavities = _nested(chain, pieces, counts * bounds[pieces], closed, flips, nested)
+    if (torn >= 0).any() and closed.any():
+        along = _along(chain, pieces, torn, counts * flips[pieces] * closed[pieces])
+        bounds &= ~along
+        torn[along] = -1
+    turned = np.where(whole, False, turned) != (flips[pieces] < 0)
+    as_given = whole & (np.abs(counts) == np.abs(chain.multiplicities))
+    counts = (counts * flips[pieces] * bounds[pieces]).astype(np.int64)
+    return Bounding(
+        pieces=pieces,
+        turned=turned & ~inner,
+        counts=counts,
+        closed=closed[pieces],
+        torn=torn[pieces],
+        as_given=as_given,
+        inner=inner,
+        orientable=orientable,
+        disagreeing=agreed.disagreeing,
+        bodies=bodies,
+        cavities=cavities,
+    )
+
+
+def whole_complexes(chain: Chain) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """(m,) how often triangles are there, and which are of complexes that close as they were given.
+
+    All pieces of such a complex have a positive level in it, or all a negative one. Where it closes once each triangle
+    is counted once, copies are left out.
+    """
+    counts, complexes = chain.multiplicities, chain.complexes
+    once = np.sign(counts)
+    off = chain.unbalanced(counts, complexes)
+    single = off & ~chain.unbalanced(once, complexes)
+    counts = np.where(single[complexes], once, counts)
+    filled = np.bincount(complexes, counts != 0) > 0
+    balanced = (~off | single) & filled
+    if not balanced.any():
+        return counts, np.zeros(len(counts), dtype=bool)
+    chosen = np.flatnonzero(balanced[complexes] & (counts != 0))
+    # of each piece the largest triangle
+    parts = chain.pieces(counts != 0).parts[chosen]
+    order = np.lexsort((-chain.areas[chosen], parts))
+    largest = order[np.unique(parts[order], return_index=True)[1]]
+    levels = levels_within(chain.triangles[chosen], complexes[chosen], counts[chosen], largest)
+    owners = complexes[chosen[largest]]
+    ahead, back = (np.bincount(owners, sign * levels < 0.25, len(balanced)) == 0 for sign in (1, -1))
+    return counts, (balanced & (ahead | back))[complexes]
+
+
+def _nested(
+    chain: Chain,
+    pieces: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    closed: NDArray[np.bool_],
+    flips: NDArray[np.float64],
+    nested: Nesting,
+) -> tuple[NDArray[np.float64], int, int]:
+    """(p,) signs by which pieces turn, those of open ones given; bodies and cavities among closed ones within others.
+
+    What is closed faces outwards. Within others it stays to the outermost as it was given, if that is clear, and else
+    bounds a cavity, or a body in one.
+    """
+    n = len(closed)
+    some = np.flatnonzero(counts != 0)
+    triangles, owners = chain.triangles[some], pieces[some]
+    a, b, c = triangles.transpose(1, 0, 2)
+    cones = counts[some] * np.einsum("ij,ij->i", a, np.cross(b, c))
+    outward = np.where(closed, np.where(np.bincount(owners, cones, n) >= 0, 1.0, -1.0), flips)
+    if len(np.unique(owners)) == 1:
+        return outward, 0, 0
+    names, labels = np.unique(owners, return_inverse=True)
+    faces, places = sampled(Pieces(triangles, labels), PROBES * len(names))
+    probes, own = owners[faces], np.abs(counts[some[faces]])
+    steps = unit(area_vectors(triangles[faces])) * (np.sqrt(chain.areas[some[faces]]) * 1e-5)[:, None]
+    tree = WindingTree.of(_directed(chain, counts * outward[pieces]))
+    around = 0.5 * (tree.numbers(places - steps) + tree.numbers(places + steps)) - 0.5 * own
+    depth = np.full(n, np.inf)
+    np.minimum.at(depth, probes, np.round(around))
+    depth = np.where(closed & np.isfinite(depth), depth, 0.0)
+    inner = closed & (depth > 0)
+    if not inner.any():
+        return outward, 0, 0
+    given = np.bincount(pieces, np.sign(counts) * np.sign(chain.multiplicities) * chain.areas, n)
+    clear = np.abs(given) >= HINT * np.bincount(pieces, chain.areas, n)
+    way = np.where(given >= 0, 1.0, -1.0)
+    at, outermost = np.flatnonzero(inner[probes]), np.zeros(n)
+    roots = WindingTree.of(_directed(chain, counts * (way * (depth <= 0))[pieces]))
+    np.add.at(outermost, probes[at], roots.numbers(places[at]))
+    by_depth = np.where(depth % 2 == 0, 1.0, -1.0)
+    facing = np.where(clear, outward * way * np.where(outermost >= 0, 1.0, -1.0), by_depth)
+    facing = {"given": facing, "cavities": by_depth, "bodies": np.ones(n)}[nested]
+    signs = np.where(inner, outward * facing, outward)
+    return signs, int((inner & (facing > 0)).sum()), int((inner & (facing < 0)).sum())
+
+
+def open_bounding(
+    pieces: Pieces, groups: NDArray[np.int64], as_oriented: bool = False
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.int64]]:
+    """(p,) signs of open pieces; which bound something, and the clusters of those that do so torn apart, or −1.
+
+    Pieces of one group, (p,), hang together, which chance does not make them do.
+
+    Of the pieces that bound nothing those go that leave most unexplained, and all is solved again.
+    """
+    n, areas = len(pieces.areas), pieces.areas
+    alone = np.abs(levels_of_pieces(pieces))
+    shared = np.bincount(groups, minlength=n)[groups] > 1
+    clusters, whole = clusters_of(pieces), system_of(pieces)
+    alive, signs = np.ones(n, dtype=bool), np.ones(n)
+    while alive.any():
+        names = np.flatnonzero(alive)
+        system = whole.chosen(alive)
+        if not as_oriented:
+            signs[names] = np.where(system.weights() >= 0, 1.0, -1.0)
+        values = system.levels(signs[names])
+        rows, levels = names[system.owners], np.zeros(n)
+        levels[names] = means(values, system.owners, system.areas, len(names))
+        # groups that are bodies by themselves; loose pieces are so cluster by cluster
+        together = means(system.levels_within(signs[names], groups[names]), groups[rows], system.areas, n)[groups]
+        by_itself = np.where(shared, together, alone)
+        own = by_itself >= SHEET
+        loose = alive & ~own
+        weights = np.where(loose[rows], system.areas, 0.0)
+        mean = means(values, clusters[rows], weights, n)
+        square = means(values**2, clusters[rows], weights, n)
+        amount = _counted(areas * loose, groups, clusters)
+        body = (mean * np.sqrt(amount + 1) >= CHANCE) & (mean**2 >= COHERENT * square)
+        least = np.where(body, np.minimum(SHEET, 2 * SHEET * mean), np.inf)[clusters]
+        wrong = alive & (levels < np.where(loose, least, SHEET * np.minimum(1.0, 2.0 * by_itself)))
+        unexplained = np.where(wrong, areas * (0.5 - levels) ** 2, 0.0)
+        if not wrong.any():
+            break
+        alive &= ~(wrong & (unexplained >= 0.5 * unexplained.max()))
+    if not (alive & ~own).any():
+        return signs, alive, np.full(n, -1)
+    # bodies among whose faces loose pieces lie, facing as they do
+    loose = alive & ~own & (_counted(areas * (alive & ~own), groups, clusters) >= FEW)[clusters]
+    raised = np.zeros(n)
+    raised[names] = means(system.levels((signs * loose)[names]), system.owners, system.areas, len(names))
+    share = np.bincount(clusters, areas * loose, n)[clusters] / np.maximum(areas, np.finfo(float).tiny)
+    joined = alive & own & (raised > CLOSING * alone * np.minimum(1.0, share)) & (share > ISLANDS)
+    return signs, alive, np.where(loose | joined, clusters, -1)
+
+
+def _counted(areas: NDArray[np.float64], groups: NDArray[np.int64], clusters: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(p,) groups of each cluster of pieces, as if all were alike."""
+    n = len(areas)
+    keys, inverse = np.unique(clusters * n + groups, return_inverse=True)
+    sums, owners = np.bincount(inverse, areas), keys // n
+    squares = np.bincount(owners, sums**2, n)
+    return np.bincount(owners, sums, n) ** 2 / np.maximum(squares, np.finfo(float).tiny)
+
+
+def connected_pieces(chain: Chain, faces: NDArray[np.int64], labels: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(p,) what pieces of some triangles hang together with, by edges that they share or rims along each other.
+
+    Single triangles have no rims, lest noise around a surface hang together.
+    """
+    n = int(labels.max()) + 1
+    first = np.full(n, -1)
+    first[labels[::-1]] = faces[::-1]
+    hubs = np.unique(chain.complexes[first], return_inverse=True)[1]
+    edges, owners = open_edges(chain.faces[faces], labels)
+    several = np.bincount(labels)[owners] > 1
+    ends, owners = chain.positions[edges[several]], np.tile(owners[several], 2)
+    one, other = meeting_edges(np.concatenate([ends, ends[:, ::-1]]))  # which way pieces face is not known yet
+    return connected_components(
+        n + int(hubs.max()) + 1,
+        *(np.concatenate(ends) for ends in ((np.arange(n), owners[one]), (n + hubs, owners[other]))),
+    )[:n]
+
+
+def _directed(chain: Chain, counts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k, 3, 3) the triangles of a chain as often as they are there, reversed where that is negative."""
+    there = np.repeat(np.arange(len(counts)), np.abs(counts).astype(np.int64))
+    triangles = chain.triangles[there]
+    return np.where((counts[there] < 0)[:, None, None], triangles[:, ::-1], triangles)
+
+
+def _along(
+    chain: Chain, pieces: NDArray[np.int64], clusters: NDArray[np.int64], counts: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """(p,) clusters of loose pieces that lie along closed ones, as noisy copies do: half inside, half outside."""
+    chosen = np.flatnonzero(clusters[pieces] >= 0)
+    around = WindingTree.of(_directed(chain, counts)).numbers(chain.triangles[chosen].mean(axis=1))
+    owners = clusters[pieces[chosen]]
+    inside = means(around, owners, chain.areas[chosen], int(owners.max()) + 1)
+    return (clusters >= 0) & (np.abs(inside - np.round(inside)) > ALONG)[clusters]
+
+
+def levels_of_pieces(pieces: Pieces) -> NDArray[np.float64]:
+    """(p,) mean level of each piece by itself."""
+    faces, _ = sampled(pieces, 4096)
+    levels = levels_within(pieces.triangles, pieces.labels, np.ones(len(pieces.labels), dtype=np.int64), faces)
+    owners = pieces.labels[faces]
+    return np.bincount(owners, levels, len(pieces.areas)) / np.bincount(owners, minlength=len(pieces.areas))
+
+
+def clusters_of(pieces: Pieces) -> NDArray[np.int64]:
+    """(p,) cluster of each piece: those of which faces are near each other, for the size of the smaller, are of one."""
+    n = len(pieces.areas)
+    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
+    np.minimum.at(low, pieces.labels, pieces.triangles.min(axis=1))
+    np.maximum.at(high, pieces.labels, pieces.triangles.max(axis=1))
+    radii = 0.5 * np.linalg.norm(high - low, axis=1)
+    faces, places = sampled(pieces, min(len(pieces.labels), PLACES))
+    owners = pieces.labels[faces]
+    away, near = scipy.spatial.cKDTree(places).query(places, min(NEAREST, len(places)), workers=-1)
+    away, others = away.reshape(len(places), -1), owners[near].reshape(len(places), -1)
+    joined = away < 2 * REACH * np.minimum(radii[owners][:, None], radii[others])
+    return connected_components(n, np.repeat(owners, joined.sum(axis=1)), others[joined])

@@ -1,0 +1,457 @@
+"""Gauss's formula: which way the pieces of a surface face, and how much of a closed surface they are together.
+
+The winding number of a closed surface that faces outwards is 0 in front of it and 1 behind it, so that the mean of both
+sides, the *level*, is ½ on every face. Each piece gets an unknown weight s, and least squares ask for that level:
+
+    E(s) = Σ A_i (½ − Σ_j W_ij s_j)² + μ Σ c_ij (s_i − sign(n_i · n_j) s_j)² + λ Σ A_i s_i²
+
+W_ij is the mean winding number of piece j at piece i, its own taken between its two sides. The sign of s orients. The
+second term, between neighbours in one plane, is for points and small pieces, of which each knows little.
+
+For points: Lin et al., Surface reconstruction from point clouds without normals by parametrizing the Gauss formula (TOG
+2022); Lin, Shi and Liu, Fast and globally consistent normal orientation based on the winding number normal consistency
+(TOG 2024).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..compiled import compiled
+from ..frozen import Frozen
+from ..geometry.box_tree import LEAF, BoxTree, morton_codes
+from ..geometry.components import sums_of
+from ..geometry.directions import unit
+from ..geometry.meshes import area_vectors, face_areas
+from ..geometry.winding_tree import WindingTree, mean_angle
+from ..parallel import in_chunks
+
+HELD = 0.01
+"""λ, which keeps weights small that nothing asks for."""
+EMPTY = 1e-12
+"""Share of the area below which a piece counts as this small: of pieces without area weights are not asked for."""
+AGREEMENT = 1.0
+"""μ, the weight of neighbours in one plane."""
+NEIGHBORS = 12
+"""Neighbours that an element is compared with."""
+DENSE = 3000
+"""Pieces up to which W is a matrix; of more, each face is a dipole, and W is applied through a tree."""
+ENTRIES = 5_000_000
+"""Of W: the level is asked for at as many places on all pieces, beyond one for each, as this leaves."""
+SAMPLES = 10_000
+"""Such places at most."""
+MANY = 64
+"""Loose triangles, if all were alike, from which on they are dipoles: exact solid angles tell noise for what it is."""
+STEPS = 12
+"""Steps of conjugate gradients, which give the signs of the direct solution."""
+LARGE = 256
+"""Faces of a piece from which on a tree of its own sums their solid angles."""
+FAR, OPENING = 4.0, 2.5
+"""Distance from a piece, and from a node of the tree, over its radius, from which on it is a dipole."""
+ELEMENTS = 200_000
+"""Dipoles at most; of more faces as many are drawn, evenly."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces(Frozen):
+    """Oriented triangles in pieces, each of which faces one way as a whole.
+
+    Attributes
+    ----------
+    triangles : (m, 3, 3) float
+        Corners.
+    labels : (m,) int
+        Piece of each, from 0 on.
+    """
+
+    triangles: NDArray[np.float64]
+    labels: NDArray[np.int64]
+
+    @cached_property
+    def face_areas(self) -> NDArray[np.float64]:
+        """(m,) areas."""
+        return face_areas(self.triangles)
+
+    @cached_property
+    def areas(self) -> NDArray[np.float64]:
+        """(k,) area of each piece."""
+        return np.bincount(self.labels, self.face_areas)
+
+
+def system_of(pieces: Pieces) -> Matrix | Dipoles:
+    """The system of some pieces: many loose triangles are dipoles, all else has exact solid angles."""
+    sizes, areas = np.bincount(pieces.labels), pieces.areas
+    many = areas.sum() ** 2 > MANY * (areas**2).sum() and areas[sizes == 1].sum() > 0.5 * areas.sum()
+    return Dipoles.of_triangles(pieces) if many or len(areas) > DENSE else Matrix.of(pieces)
+
+
+def means(
+    values: NDArray[np.float64], groups: NDArray[np.int64], weights: NDArray[np.float64], n: int
+) -> NDArray[np.float64]:
+    """(n,) weighted means of values in groups."""
+    total = np.bincount(groups, weights, n)
+    return np.bincount(groups, weights * values, n) / np.maximum(total, np.finfo(float).tiny)
+
+
+@dataclass(frozen=True, eq=False)
+class Matrix:
+    """W of few pieces, by exact solid angles."""
+
+    matrix: NDArray[np.float64]
+    places: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    owners: NDArray[np.int64]
+    areas: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, pieces: Pieces) -> Matrix:
+        faces, places = sampled(pieces, min(SAMPLES, ENTRIES // len(pieces.areas)))
+        order = np.argsort(pieces.labels, kind="stable")
+        starts = np.concatenate([[0], np.cumsum(np.bincount(pieces.labels))])
+        triangles = pieces.triangles[order]
+        rank = np.empty(len(order), dtype=np.int64)
+        rank[order] = np.arange(len(order))
+        k, owners = len(pieces.areas), pieces.labels[faces]
+        vectors = sums_of(area_vectors(pieces.triangles), pieces.labels, k)
+        centres = sums_of(pieces.triangles.mean(axis=1) * pieces.face_areas[:, None], pieces.labels, k)
+        centres /= np.maximum(pieces.areas, np.finfo(float).tiny)[:, None]
+        reaches = np.zeros(k)
+        off = np.linalg.norm(pieces.triangles - centres[pieces.labels][:, None], axis=2).max(axis=1)
+        np.maximum.at(reaches, pieces.labels, off)
+        matrix, balls = np.zeros((len(places), k)), np.c_[centres, reaches]
+        corners = np.ascontiguousarray(triangles).reshape(-1, 9)
+        _small_pieces(corners, starts, vectors, balls, places, rank[faces], matrix)
+        for piece in np.flatnonzero(np.diff(starts) > LARGE):
+            own, begin = owners == piece, starts[piece]
+            tree = WindingTree.of(triangles[begin : starts[piece + 1]])
+            matrix[~own, piece] = tree.numbers(places[~own])
+            matrix[own, piece] = tree.behind(rank[faces[own]] - begin, places[own]) - 0.5
+        counts = np.bincount(owners, minlength=k)
+        normals = unit(area_vectors(pieces.triangles[faces]))
+        return cls(matrix, places, normals, owners, pieces.areas[owners] / counts[owners])
+
+    def chosen(self, kept: NDArray[np.bool_]) -> Matrix:
+        """The system of some of the pieces, numbered anew."""
+        rows = kept[self.owners]
+        owners = (np.cumsum(kept) - 1)[self.owners[rows]]
+        return Matrix(self.matrix[rows][:, kept], self.places[rows], self.normals[rows], owners, self.areas[rows])
+
+    def weights(self) -> NDArray[np.float64]:
+        """(k,) weights of least squares, the signs of which orient."""
+        shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
+        weighted = self.matrix * shares[:, None]
+        normal = weighted.T @ self.matrix
+        normal += agreement(self.places, self.normals, shares, self.owners).toarray()
+        held = np.bincount(self.owners, shares, self.matrix.shape[1])
+        normal[np.diag_indices_from(normal)] += HELD * np.maximum(held, EMPTY)
+        return np.asarray(scipy.linalg.solve(normal, 0.5 * weighted.sum(axis=0), assume_a="pos"))
+
+    def levels(self, signs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) levels at the samples."""
+        return np.asarray(self.matrix @ signs)
+
+    def levels_within(self, signs: NDArray[np.float64], groups: NDArray[np.int64]) -> NDArray[np.float64]:
+        """(n,) levels at the samples that the pieces of the same group, (k,), make."""
+        result = np.empty(len(self.owners))
+        for group in np.unique(groups):
+            members, rows = groups == group, groups[self.owners] == group
+            result[rows] = self.matrix[rows][:, members] @ signs[members]
+        return result
+
+
+def sampled(pieces: Pieces, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Faces and (n, 3) places on them: one for each piece and `count` more, half by area, half alike for all."""
+    areas, k = pieces.face_areas, len(pieces.areas)
+    order = np.lexsort((morton_codes(pieces.triangles.mean(axis=1)), pieces.labels))
+    shares = pieces.areas / max(pieces.areas.sum(), np.finfo(float).tiny)
+    numbers = 1 + np.floor(0.5 * count * (shares + 1 / k)).astype(np.int64)
+    owners = np.repeat(np.arange(k), numbers)
+    before = np.cumsum(numbers) - numbers
+    share = (np.arange(len(owners)) - before[owners] + 0.5) / numbers[owners]
+    ends = np.cumsum(areas[order])
+    lasts = np.cumsum(np.bincount(pieces.labels, minlength=k)) - 1
+    begins = np.concatenate([[0.0], ends[lasts[:-1]]])
+    at = np.searchsorted(ends, begins[owners] + share * (ends[lasts] - begins)[owners])
+    firsts = np.concatenate([[0], lasts[:-1] + 1])
+    faces = order[np.clip(at, firsts[owners], lasts[owners])]
+    # several on one face are spread over it; a single one is at its centre
+    same = np.concatenate([[False], faces[1:] == faces[:-1]])
+    run = np.arange(len(faces)) - np.maximum.accumulate(np.where(same, 0, np.arange(len(faces))))
+    u, v = (1 / 3 + run * 0.7548776662466927) % 1.0, (1 / 3 + run * 0.5698402909980532) % 1.0
+    fold = u + v > 1
+    u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
+    a, b, c = pieces.triangles[faces].transpose(1, 0, 2)
+    return faces, a + u[:, None] * (b - a) + v[:, None] * (c - a)
+
+
+@compiled
+def _small_pieces(
+    corners: NDArray[np.float64],
+    starts: NDArray[np.int64],
+    vectors: NDArray[np.float64],
+    balls: NDArray[np.float64],
+    places: NDArray[np.float64],
+    own: NDArray[np.int64],
+    matrix: NDArray[np.float64],
+) -> None:
+    """Winding numbers of pieces of few faces at places, each of which lies on a face of its own.
+
+    Pieces have area vectors, (k, 3), and lie in balls, (k, 4), beyond `FAR` times whose radius they are dipoles.
+    """
+    for piece in range(len(starts) - 1):
+        begin, end = starts[piece], starts[piece + 1]
+        if end - begin > LARGE:
+            continue
+        beyond = (FAR * balls[piece, 3]) ** 2
+        for p in range(len(places)):
+            dx, dy, dz = balls[piece, 0] - places[p, 0], balls[piece, 1] - places[p, 1], balls[piece, 2] - places[p, 2]
+            square = dx * dx + dy * dy + dz * dz
+            if square > beyond:
+                flux = dx * vectors[piece, 0] + dy * vectors[piece, 1] + dz * vectors[piece, 2]
+                matrix[p, piece] = flux / (4.0 * np.pi * square * np.sqrt(square))
+                continue
+            angle = 0.0
+            for f in range(begin, end):
+                if f != own[p]:
+                    angle += mean_angle(corners, f, places[p, 0], places[p, 1], places[p, 2])
+            matrix[p, piece] = angle / (4.0 * np.pi)
+
+
+@dataclass(frozen=True, eq=False)
+class Dipoles:
+    """W of many small faces, or points: each is a dipole, softened at the scale of the distance to its neighbours.
+
+    Attributes
+    ----------
+    places, normals : (n, 3) float
+        Where they are, and unit normals.
+    areas : (n,) float
+        Of each.
+    owners : (n,) int
+        Pieces that they are of.
+    softening : (n,) float
+        Distance below which the field of a dipole levels off.
+    """
+
+    places: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    areas: NDArray[np.float64]
+    owners: NDArray[np.int64]
+    softening: NDArray[np.float64]
+
+    @classmethod
+    def of_triangles(cls, pieces: Pieces) -> Dipoles:
+        """One for each triangle, or for as many as there is room for."""
+        faces, areas = np.arange(len(pieces.triangles)), pieces.face_areas
+        if len(faces) > ELEMENTS:
+            faces = np.unique(sampled(pieces, ELEMENTS)[0])
+            kept = np.bincount(pieces.labels[faces], areas[faces], len(pieces.areas))
+            areas = areas * (pieces.areas / np.maximum(kept, np.finfo(float).tiny))[pieces.labels]
+        triangles = pieces.triangles[faces]
+        places = triangles.mean(axis=1)
+        return cls(places, unit(area_vectors(triangles)), areas[faces], pieces.labels[faces], spacing(places))
+
+    @cached_property
+    def tree(self) -> BoxTree:
+        """Over the places."""
+        return BoxTree.of(self.places, self.places)
+
+    @cached_property
+    def balls(self) -> NDArray[np.float64]:
+        """(2 · leaves, 4) middle of the box of each node, and the squared distance from which on it is one dipole."""
+        low, high = self.tree.bounds[:, :3], self.tree.bounds[:, 3:]
+        with np.errstate(invalid="ignore"):  # of nothing
+            radii = 0.5 * np.linalg.norm(high - low, axis=1) + float(np.median(self.softening))
+            balls = np.concatenate([0.5 * (low + high), (OPENING * radii[:, None]) ** 2], axis=1)
+        return np.where(np.isfinite(balls), balls, 0.0)
+
+    def chosen(self, kept: NDArray[np.bool_]) -> Dipoles:
+        """The system of some of the pieces, numbered anew."""
+        rows = kept[self.owners]
+        owners = (np.cumsum(kept) - 1)[self.owners[rows]]
+        return Dipoles(self.places[rows], self.normals[rows], self.areas[rows], owners, self.softening[rows])
+
+    def weights(self) -> NDArray[np.float64]:
+        """(k,) weights after some steps of conjugate gradients."""
+        shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
+        smooth = agreement(self.places, self.normals, shares, self.owners)
+        held = HELD * np.bincount(self.owners, shares)
+
+        def system(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+            return self._adjoint(shares * self.levels(weights)) + smooth @ weights + held * weights
+
+        weights = np.zeros(len(held))
+        rest = self._adjoint(0.5 * shares)
+        inverse = 1.0 / np.maximum(smooth.diagonal() + held, np.finfo(float).tiny)
+        ahead = way = inverse * rest
+        steep = float(rest @ ahead)
+        for _ in range(STEPS):
+            image = system(way)
+            step = steep / max(float(way @ image), np.finfo(float).tiny)
+            weights, rest = weights + step * way, rest - step * image
+            ahead, before = inverse * rest, steep
+            steep = float(rest @ ahead)
+            way = ahead + steep / max(before, np.finfo(float).tiny) * way
+        return weights
+
+    def levels(self, signs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) levels at the places."""
+        vectors = self.normals * (self.areas * signs[self.owners])[:, None]
+        nodes = self._sums(vectors)
+        (sums,) = in_chunks(
+            lambda at: (_potentials(self.places, self.softening, vectors, self.tree.items, self.balls, nodes, at),),
+            np.arange(len(self.places)),
+        )
+        return sums / (4.0 * np.pi)
+
+    def levels_within(self, signs: NDArray[np.float64], groups: NDArray[np.int64]) -> NDArray[np.float64]:
+        """(n,) levels at the places that the pieces of the same group, (k,), make: of loose triangles none."""
+        return np.zeros(len(self.owners))
+
+    def _adjoint(self, charges: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k,) what the transpose of W makes of values at the places: the field of charges there, at each dipole."""
+        away = self.places - self.balls[1, :3]
+        nodes = self._sums(np.c_[charges, charges[:, None] * away])
+        nodes[:, 1:] -= nodes[:, :1] * (self.balls[:, :3] - self.balls[1, :3])  # moments about the middles of nodes
+        (field,) = in_chunks(
+            lambda at: (_fields(self.places, self.softening, charges, self.tree.items, self.balls, nodes, at),),
+            np.arange(len(self.places)),
+        )
+        flux = self.areas * (field * self.normals).sum(axis=1) / (4.0 * np.pi)
+        return np.bincount(self.owners, flux)
+
+    def _sums(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(2 · leaves, d) sums of (n, d) values over what is below each node."""
+        leaves = len(self.tree.items) // LEAF
+        sums = np.zeros((2 * leaves, values.shape[1]))
+        there = self.tree.items >= 0
+        np.add.at(sums, leaves + np.flatnonzero(there) // LEAF, values[self.tree.items[there]])
+        level = leaves
+        while level > 1:
+            sums[level // 2 : level] = sums[level : 2 * level].reshape(-1, 2, values.shape[1]).sum(axis=1)
+            level //= 2
+        return sums
+
+
+def agreement(
+    places: NDArray[np.float64], normals: NDArray[np.float64], shares: NDArray[np.float64], owners: NDArray[np.int64]
+) -> sparse.csr_array:
+    """(k, k) Laplacian with signs, times μ, of pieces of which neighbours lie in one plane, more or less.
+
+    Places have normals, and a share of the area; those off each other's plane count less.
+    """
+    n, k = len(places), min(NEIGHBORS, len(places) - 1)
+    near = scipy.spatial.cKDTree(places).query(places, k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
+    tails, heads = np.repeat(np.arange(n), k), near.ravel()
+    apart = owners[tails] != owners[heads]
+    tails, heads = tails[apart], heads[apart]
+    ways = unit(places[heads] - places[tails])
+    cosines = (normals[tails] * normals[heads]).sum(axis=1)
+    rises = [np.abs((ways * normals[ends]).sum(axis=1)) for ends in (tails, heads)]
+    strength = np.maximum(0.0, 1.0 - 2.0 * np.maximum(*rises)) * cosines * np.abs(cosines)
+    total = np.bincount(tails, np.abs(strength), n) + np.bincount(heads, np.abs(strength), n)
+    scale = np.sqrt(shares / np.maximum(total, 1e-12))
+    strength *= AGREEMENT * scale[tails] * scale[heads]
+    size = int(owners.max()) + 1
+    links = sparse.coo_array((strength, (owners[tails], owners[heads])), shape=(size, size)).tocsr()
+    links = links + links.T
+    held = np.asarray(abs(links).sum(axis=1), dtype=np.float64).ravel()
+    return (sparse.diags_array(held) - links).tocsr()
+
+
+def spacing(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) mean distance of each place to its four nearest neighbours."""
+    k = min(4, len(places) - 1)
+    distances = scipy.spatial.cKDTree(places).query(places, k + 1, workers=-1)[0].reshape(len(places), -1)
+    return np.asarray(distances[:, 1:].mean(axis=1)) if k else np.ones(len(places))
+
+
+@compiled
+def _potentials(
+    places: NDArray[np.float64],
+    softening: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    items: NDArray[np.int64],
+    balls: NDArray[np.float64],
+    nodes: NDArray[np.float64],
+    at: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Sums at some places of ``v · d / (|d|² + ε²)^(3/2)`` over all others, d the way there."""
+    leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.zeros(len(at))
+    for row in range(len(at)):
+        p = at[row]
+        x, y, z, total, depth = places[p, 0], places[p, 1], places[p, 2], 0.0, 1
+        stack[0] = 1
+        while depth > 0:
+            depth -= 1
+            node = stack[depth]
+            dx, dy, dz = balls[node, 0] - x, balls[node, 1] - y, balls[node, 2] - z
+            square = dx * dx + dy * dy + dz * dz
+            if square > balls[node, 3]:
+                flux = dx * nodes[node, 0] + dy * nodes[node, 1] + dz * nodes[node, 2]
+                total += flux / (square * np.sqrt(square))
+            elif node < leaves:
+                stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
+                depth += 2
+            else:
+                for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
+                    e = items[k]
+                    if e >= 0 and e != p:
+                        dx, dy, dz = places[e, 0] - x, places[e, 1] - y, places[e, 2] - z
+                        square = dx * dx + dy * dy + dz * dz + softening[e] ** 2
+                        if square > 0.0:
+                            flux = dx * vectors[e, 0] + dy * vectors[e, 1] + dz * vectors[e, 2]
+                            total += flux / (square * np.sqrt(square))
+        result[row] = total
+    return result
+
+
+@compiled
+def _fields(
+    places: NDArray[np.float64],
+    softening: NDArray[np.float64],
+    charges: NDArray[np.float64],
+    items: NDArray[np.int64],
+    balls: NDArray[np.float64],
+    nodes: NDArray[np.float64],
+    at: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Sums at places of ``c d / (|d|² + ε²)^(3/2)`` over all others, d the way from there; ε is the place's own."""
+    leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.zeros((len(at), 3))
+    for row in range(len(at)):
+        p = at[row]
+        x, y, z, soft, depth = places[p, 0], places[p, 1], places[p, 2], softening[p] ** 2, 1
+        stack[0] = 1
+        while depth > 0:
+            depth -= 1
+            node = stack[depth]
+            dx, dy, dz = x - balls[node, 0], y - balls[node, 1], z - balls[node, 2]
+            square = dx * dx + dy * dy + dz * dz
+            if square > balls[node, 3]:
+                cube = square * np.sqrt(square)
+                lean = dx * nodes[node, 1] + dy * nodes[node, 2] + dz * nodes[node, 3]
+                straight = (nodes[node, 0] + 3.0 * lean / square) / cube
+                result[row, 0] += straight * dx - nodes[node, 1] / cube
+                result[row, 1] += straight * dy - nodes[node, 2] / cube
+                result[row, 2] += straight * dz - nodes[node, 3] / cube
+            elif node < leaves:
+                stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
+                depth += 2
+            else:
+                for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
+                    e = items[k]
+                    if e >= 0 and e != p:
+                        dx, dy, dz = x - places[e, 0], y - places[e, 1], z - places[e, 2]
+                        square = dx * dx + dy * dy + dz * dz + soft
+                        if square > 0.0:
+                            share = charges[e] / (square * np.sqrt(square))
+                            result[row, 0] += share * dx
+                            result[row, 1] += share * dy
+                            result[row, 2] += share * dz
+    return result
