@@ -17,9 +17,11 @@ from .domains.given_curves import given_curves
 from .domains.grid import Dimension, Grid
 from .domains.intrinsic_triangulation import triangle_mesh
 from .domains.kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
+from .domains.segments import one_sided
 from .domains.tet_mesh import TetMesh
+from .domains.triangle_mesh import TriangleMesh
 from .domains.validation import positive_number
-from .errors import SignedHeatError, SourceError, UnsupportedTypeError
+from .errors import InexactWarning, SignedHeatError, SourceError, UnsupportedTypeError, warn_user
 from .extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
 from .fields.grid_field import GridField
 from .fields.tet_field import TetField
@@ -178,6 +180,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             discretization = self.discretization
         with stopwatch("sources"):
             listed, left_out = given_curves(self.domain, as_list(sources))
+            _warn_of_one_sided_curves(self.domain, listed)
             discretization, adapted = discretization.adapt(listed)
             sources_by_time = lowered_for_times(discretization, adapted, self._times(discretization))
         with stopwatch("diffuse"):
@@ -264,6 +267,17 @@ def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constrain
 def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constraint: Constraint | None) -> Field:
     """`SignedHeatSolver.distance` for those who measure anew to what it would warn of."""
     return solver._distance(sources, constraint)
+
+
+def _warn_of_one_sided_curves(domain: object, curves: Sequence[Any]) -> None:
+    numbers = one_sided(curves, domain.intrinsic) if isinstance(domain, TriangleMesh) else []
+    if numbers:
+        warn_user(
+            f"curve {numbers[0]}{' and others have' if len(numbers) > 1 else ' has'} one side only: the surface around "
+            "it has no outside, so that left and right change places somewhere along it. Give it normals, or make it "
+            "unoriented",
+            InexactWarning,
+        )
 
 
 def checked(constraint: Constraint | None) -> Constraint:

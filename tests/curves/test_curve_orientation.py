@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from shapes.surface_cases import square
+from shapes.surface_cases import band, square
+from signedheat.errors import InexactWarning
 from signedheat.samples import sphere, torus
 
 
@@ -128,3 +129,14 @@ def test_only_surfaces_have_curves():
     with pytest.raises(sh.errors.UnsupportedTypeError) as caught:
         sh.curve_orientation([], sh.Grid((0, 0), 1.0, (3, 3)))
     assert caught.value.element == "domain"
+
+
+def test_curves_with_one_side_are_announced():
+    strip, cylinder = (band(40, 4, twisted) for twisted in (True, False))
+    middle = [5 * k + 2 for k in range(40)]
+    for measure in (sh.signed_distance, lambda curve, mesh: sh.SignedHeatSolver(mesh).distance(curve)):
+        with pytest.warns(InexactWarning, match="one side"):
+            measure(strip.path(middle, closed=True), strip)
+        measure(cylinder.path(middle, closed=True), cylinder)
+        measure(strip.path(middle[:20]), strip)
+        measure(strip.path(middle, closed=True, oriented=False), strip)

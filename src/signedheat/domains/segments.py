@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SourceError
-from ..geometry.curve_segments import CurveSegments, carried_left, given_directions
+from ..geometry.curve_segments import CurveSegments, carried_left, given_directions, loses_orientation
 from ..geometry.geodesics.paths import join
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import barycentric_in, edges_between, locate_points, shared_faces, unique_points
@@ -95,3 +95,20 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, numb
             )
         vectors = np.abs(steps) * given_directions(triangles, positions, faces, edges, source.normals[segment], name)
     return CurveSegments(located[first], ends, faces, edges, vectors, source.oriented)
+
+
+def one_sided(sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]], triangles: IntrinsicMesh) -> list[int]:
+    """Numbers of the sources with a curve that has one side only: faces along it cannot be turned to agree.
+
+    Curves with normals have the sides that these give them.
+    """
+    if triangles.is_consistently_oriented:
+        return []
+    numbers = []
+    for number, source in enumerate(sources):
+        for curve in source if isinstance(source, Sequence) else [source]:
+            if isinstance(curve, Curve) and curve.oriented and curve.normals is None:
+                part = segments_of(curve, triangles, None, number)
+                if loses_orientation(triangles, part.faces, part.edges):
+                    numbers.append(number)
+    return numbers

@@ -282,6 +282,25 @@ def carried_left(
     curve along which orientation is lost, left changes sides somewhere. On a segment along an edge (`edges`; else −1)
     the first face at the edge decides.
     """
+    telling, links, number = _agreement_around(triangles, faces, edges)
+    signs = signs_of(links, int(number.max(initial=-1)) + 1)[number[telling]]
+    most = float(np.sign(signs @ lengths)) or signs[0]
+    return signs * most
+
+
+def loses_orientation(triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDArray[np.int64]) -> bool:
+    """Whether the faces around a curve cannot all be turned to agree, as those around the middle of a Möbius strip."""
+    _, links, number = _agreement_around(triangles, faces, edges)
+    of_two = np.abs(links.weights) == 1  # of three faces around an edge two cannot agree
+    links = Links(links.tails[of_two], links.heads[of_two], links.weights[of_two])
+    signs = signs_of(links, int(number.max(initial=-1)) + 1)
+    return bool((signs[links.tails] * signs[links.heads] * links.weights < 0).any())
+
+
+def _agreement_around(
+    triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], Links, NDArray[np.int64]]:
+    """The face that decides the left of each segment; which faces around a curve agree; and their numbers there."""
     first = triangles.first_halfedges
     first_faces = np.zeros(triangles.n_edges, dtype=np.int64)
     first_faces[triangles.edges.face_edges.ravel()[first]] = first // 3
@@ -298,9 +317,7 @@ def carried_left(
     agree = np.where(forward[one, sides[:, 0]] != forward[other, sides[:, 1]], 1.0, -1.0)
     near = around[one] & around[other]
     links = Links(number[one[near]], number[other[near]], agree[near] * pairs.shares[near])
-    signs = signs_of(links, int(around.sum()))[number[telling]]
-    most = float(np.sign(signs @ lengths)) or signs[0]
-    return signs * most
+    return telling, links, number
 
 
 def in_layout(
