@@ -14,16 +14,18 @@ from ..diagnostics import Note
 from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from ..domains.given_curves import given_curves
 from ..domains.kinds import AnySurface, SurfaceDomain
-from ..domains.level_sets import is_consistent
+from ..domains.segments import segments_of
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import flag
 from ..errors import ConstraintError, InexactWarning, warn_user
 from ..fields.vertex_field import VertexField
+from ..geometry.components import element_components
 from ..progress import Progress
 from ..sharpening.sharpen import sharpen
 from ..solver import SignedHeatSolver, as_list, distance_unwarned
 from .directions import Decision, Pieces, decide
 from .orientation import with_turned
+from .repaired_mesh import RepairedMesh
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
 
 APART = 0.1
@@ -68,17 +70,17 @@ def distance_to_pieces(
     """Distance to curves that may be pieces of broken ones, and the curves that it was measured to.
 
     The pieces are turned until they bound something together (`curve_orientation`), and those are left out that do not,
-    unless most of them do not. Where faces look either way, as on surfaces with one side, pieces are taken as they are:
-    left of a curve is another side from face to face.
+    unless most of them do not. On parts of a surface where faces cannot agree, as those with one side, and across edges
+    of more than two faces, pieces are taken as they are: left of a curve is another side from face to face.
 
     There is a warning if most of them bound nothing, if loops were turned that might as well be right, if the inside
     hangs on a piece for which wide gaps are closed, and if heat completes the curves otherwise than by what is
     shortest.
     """
     listed = flattened(curves)
-    if isinstance(solver.domain, TriangleMesh) and not is_consistent(solver.domain):
-        return distance_unwarned(solver, listed, constraint), listed
     surface_of(solver).segments(listed)  # refuses curves that do not fit
+    if isinstance(solver.domain, TriangleMesh) and meets_bad_edges(solver.domain, listed):
+        return distance_unwarned(solver, listed, constraint), listed
     once = triangulated_once(solver, listed)
     pieces = Pieces.of(surface_of(once), listed)
     if pieces is None:
@@ -98,6 +100,18 @@ def distance_to_pieces(
     if reason:
         warn_user(reason, InexactWarning)
     return field, taken
+
+
+def meets_bad_edges(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool:
+    """Whether curves run on faces with edges of more than two faces, or on parts of a mesh whose faces do not agree."""
+    edges = mesh.edges
+    disagrees = ((edges.face_counts == 2) & (edges.balance != 0))[edges.face_edges].any(axis=1)
+    bad = (edges.face_counts > 2)[edges.face_edges].any(axis=1)
+    if disagrees.any():
+        labels = element_components(edges.face_edges)
+        bad |= np.isin(labels, labels[disagrees])
+    parts = (segments_of(curve, mesh.intrinsic, mesh.vertices) for curve in curves) if bad.any() else ()
+    return any(bool(bad[part.faces].any()) for part in parts)
 
 
 def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> str:
@@ -171,6 +185,9 @@ def distance_to_curves(
     share = None if progress is None else (lambda done, step: progress(0.7 * done, step))
     solver = SignedHeatSolver(domain, diffusion, share, intrinsic)
     listed, left_out = given_curves(solver.domain, as_list(curves))
+    repaired = RepairedMesh.of(solver.domain)
+    if repaired is not None:
+        solver, listed = SignedHeatSolver(repaired.mesh, diffusion, share, intrinsic), repaired.on_it(listed)
 
     def measured(by: SignedHeatSolver[Any]) -> tuple[VertexField[AnySurface], CurvesAndPoints]:
         if as_oriented:
@@ -180,4 +197,6 @@ def distance_to_curves(
     field, taken = on_resolving_triangles(measured, solver, listed) if intrinsic == "auto" else measured(solver)
     rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))
     sharpened = sharpen(field, taken, progress=rest)
+    if repaired is not None:
+        sharpened = repaired.on_given(sharpened)
     return sharpened if left_out is None else replace(sharpened, diagnostics=sharpened.diagnostics.noting(left_out))

@@ -17,12 +17,20 @@ from .curves import Curve
 from .validation import coordinates, finite_number
 
 
-class PlaceableTriangles(Triangles, Protocol):
-    """Triangles on which points in space are placed and joined; what that takes is made once."""
+class Joined(Protocol):
+    """Triangles along which points are joined."""
 
     @property
     def intrinsic(self) -> IntrinsicMesh:
         """The triangles in the plane."""
+
+
+class PlaceableTriangles(Triangles, Protocol):
+    """Triangles on which points in space are placed and joined; what that takes is made once."""
+
+    @property
+    def joined(self) -> Joined:
+        """The same triangles, with one vertex for those of rims at one place."""
 
     @property
     def search_tree(self) -> TriangleTree:
@@ -50,7 +58,7 @@ def projected_curve(
             remedy="check units and placement, or raise max_distance",
             element=f"point {far}",
         )
-    triangles = mesh.intrinsic
+    triangles = mesh.joined.intrinsic
     start = np.arange(len(points) if closed else len(points) - 1)
     located, starts, ends, _ = join(
         triangles, locate_points(triangles, faces, weights), start, (start + 1) % len(points), "polyline"

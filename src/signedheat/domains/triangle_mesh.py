@@ -13,6 +13,7 @@ from ..geometry.edges import EdgeTable, edge_table
 from ..geometry.intrinsic_mesh import MARGIN, IntrinsicMesh, laid_out
 from ..geometry.meshes import area_vectors
 from ..geometry.nearest import TriangleTree
+from ..geometry.welding import joined_rims
 from .exchange import Elements, Exchangeable
 from .surface import Surface
 from .validation import coordinates, element_ids, used_bounds
@@ -99,6 +100,13 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     def intrinsic(self) -> IntrinsicMesh:
         """The triangles in the plane, edges lengthened by no more than rounding so that every one has an area."""
         return laid_out(self, MARGIN)[0]
+
+    @cached_property
+    def joined(self) -> TriangleMesh:
+        """The same faces, with one vertex for those of rims at one place, as along seams."""
+        places = joined_rims(self.vertices, self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel())
+        whole = (places == np.arange(len(places))).all()
+        return self if whole else TriangleMesh(self.vertices, places[self.faces])
 
     @cached_property
     def search_tree(self) -> TriangleTree:

@@ -58,6 +58,23 @@ def welded_vertices(
     return same
 
 
+def joined_rims(points: NDArray[np.float64], tails: NDArray[np.int64], heads: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n,) first vertex at the place of each that is on a rim, as of a seam; other vertices are on their own.
+
+    Examples
+    --------
+    >>> apart = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> joined_rims(apart, np.array([0, 1, 2, 3, 4, 5]), np.array([1, 2, 0, 4, 5, 3])).tolist()
+    [0, 1, 2, 1, 4, 2]
+    """
+    edges, _, counts, _, _ = find_edges(read_only(tails), read_only(heads), tails != heads, len(points))
+    is_open = (edges >= 0) & (np.append(counts, 0)[edges] == 1)
+    rims, ends = np.unique(np.stack([tails[is_open], heads[is_open]]), return_inverse=True)
+    places = np.arange(len(points))
+    places[rims] = rims[welded_vertices(points[rims], *ends.reshape(2, -1))]
+    return places
+
+
 def _is_single(points: NDArray[np.float64]) -> bool:
     """Whether single precision holds all coordinates without loss."""
     with np.errstate(over="ignore", under="ignore"):

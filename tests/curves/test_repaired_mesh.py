@@ -1,0 +1,91 @@
+"""Distance to curves on meshes with seams, copies, fins, turned faces, and parts that cannot be oriented."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import signedheat as sh
+from shapes.surface_cases import band
+from signedheat.curves.repaired_mesh import MeshRepaired
+from signedheat.errors import UnreachedWarning
+from signedheat.samples import sphere, union
+
+BALL = sphere(3)
+ANGLES = np.linspace(0, 2 * np.pi, 121)
+PARALLEL = np.stack([np.sqrt(0.96) * np.cos(ANGLES), np.sqrt(0.96) * np.sin(ANGLES), 0 * ANGLES + 0.2], axis=1)
+FAR, NEAR = (int(np.argmax(BALL.vertices[BALL.faces].mean(axis=1) @ way)) for way in ([0, 0, 1], [0.98, 0, 0.2]))
+
+
+def strokes(mesh, turned=(15, 75)):
+    """Pieces of a parallel, some of which run the other way."""
+    return [mesh.polyline(PARALLEL[k : k + 12][:: -1 if k in turned else 1]) for k in range(0, 120, 15)]
+
+
+def turned_face(face):
+    faces = BALL.faces.copy()
+    faces[face] = faces[face][::-1]
+    return sh.TriangleMesh(BALL.vertices, faces)
+
+
+def with_fin():
+    corner = np.vstack([BALL.vertices, [[0, 0, 1.5]]])
+    return sh.TriangleMesh(corner, np.vstack([BALL.faces, [[*BALL.faces[FAR][:2], BALL.n_vertices]]]))
+
+
+def with_seam(lift=0.0):
+    """Each half has vertices of its own, which may differ in the last places."""
+    half = BALL.vertices[BALL.faces].mean(axis=1)[:, 0] > 0.3
+    own = BALL.faces + np.where(half, BALL.n_vertices, 0)[:, None]
+    used, faces = np.unique(own, return_inverse=True)
+    return sh.TriangleMesh(np.vstack([BALL.vertices, BALL.vertices * (1 + lift)])[used], faces.reshape(-1, 3))
+
+
+BROKEN = {
+    "turned far away": lambda: turned_face(FAR),
+    "turned below a stroke": lambda: turned_face(NEAR),
+    "doubled": lambda: sh.TriangleMesh(BALL.vertices, np.vstack([BALL.faces, BALL.faces[[FAR, NEAR]]])),
+    "doubled and turned": lambda: sh.TriangleMesh(BALL.vertices, np.vstack([BALL.faces[[FAR], ::-1], BALL.faces])),
+    "fin": with_fin,
+    "seam": with_seam,
+    "seam but for rounding": lambda: with_seam(2.0**-52),
+}
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """Distance on the ball itself."""
+    return sh.signed_distance(strokes(BALL), BALL).values
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_strokes_are_repaired_on_broken_meshes(name, whole):
+    mesh = BROKEN[name]()
+    field = sh.signed_distance(strokes(mesh), mesh)
+    assert field.values.shape == (mesh.n_vertices,)
+    away, same = cKDTree(BALL.vertices).query(mesh.vertices)
+    on_ball = away < 1e-9
+    np.testing.assert_allclose(field.values[on_ball], whole[same[on_ball]], atol=1e-3)
+    assert (field.diagnostics.note(MeshRepaired) is None) == (name == "fin")
+
+
+def test_parts_with_one_side_do_not_matter_elsewhere(whole):
+    strip = band(20, 2, twisted=True)
+    both = union(BALL, sh.TriangleMesh(strip.vertices + 5, strip.faces))
+    with pytest.warns(UnreachedWarning, match="no source"):
+        field = sh.signed_distance(strokes(both), both)
+    np.testing.assert_allclose(field.values[: BALL.n_vertices], whole, atol=1e-4)
+    assert np.isnan(field.values[BALL.n_vertices :]).all()
+
+
+def test_polygons_have_seams():
+    side = np.arange(5.0)
+    x, y = np.meshgrid(side, side, indexing="ij")
+    points = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
+    ids = np.arange(25).reshape(5, 5)
+    quads = np.stack([ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]], axis=-1).reshape(-1, 4)
+    apart = sh.PolygonMesh(points[quads].reshape(-1, 3), np.arange(64).reshape(16, 4))
+    ends = [[0, 1.5, 0], [4, 2.5, 0]]
+    values = sh.signed_distance(apart.polyline(ends), apart).values
+    whole = sh.PolygonMesh(points, quads)
+    expected = sh.signed_distance(whole.polyline(ends), whole).values
+    np.testing.assert_allclose(values, expected[quads.ravel()], atol=1e-9)
