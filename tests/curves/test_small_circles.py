@@ -53,7 +53,7 @@ def test_all_circles_face_the_same_way(radius, pieces):
     given, wrong = circles(mesh, centers, radius, pieces, 0.25)
     assert (np.bincount(np.repeat(np.arange(12), pieces), wrong) >= pieces / 2).any()
     phi = sh.signed_distance(given, mesh)
-    assert phi.diagnostics.note(CurvesTaken).turned.tolist() == np.flatnonzero(wrong).tolist()
+    assert phi.diagnostics.note(CurvesTaken).turned == np.flatnonzero(wrong).tolist()
     out = mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True)
     exact = radius - np.arccos(np.clip(out @ centers.T, -1, 1)).min(axis=1)
     clear = np.abs(exact) > 0.25 * radius
@@ -109,7 +109,7 @@ def test_a_large_broken_curve_among_small_ones():
     wrong = np.isin(np.arange(len(given)), [1, 5, 6, 9])
     given = [c.reversed() if w else c for c, w in zip(given, wrong, strict=True)]
     phi = sh.signed_distance(given, mesh)
-    assert phi.diagnostics.note(CurvesTaken).turned.tolist() == np.flatnonzero(wrong).tolist()
+    assert phi.diagnostics.note(CurvesTaken).turned == np.flatnonzero(wrong).tolist()
     out = mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True)
     exact = np.minimum(
         1.4 - np.arccos(np.clip(out[:, 2], -1, 1)), np.arccos(np.clip(out @ centers.T, -1, 1)).min(axis=1) - radius

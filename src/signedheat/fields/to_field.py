@@ -68,8 +68,9 @@ def _(
     unreached = np.flatnonzero(np.isnan(values))
     if len(unreached):
         warn_user(
-            f"no source is connected to {len(unreached)} of {len(values)} vertices, the first of them number "
-            f"{unreached[0]}: distance there is NaN. Put a source on every part, or join the parts",
+            f"no source is connected to {len(unreached)} of {len(values)} vertices, the first of them "
+            f"{_named(discretization.domain, unreached[0])}: distance there is NaN. Put a source on every part, or "
+            "join the parts",
             UnreachedWarning,
         )
     small = small_loops(source)
@@ -79,6 +80,12 @@ def _(
     if triangulation is not None:
         finer = VertexField(triangulation, everywhere[: triangulation.n_vertices], noted, source)
     return VertexField(discretization.domain, values, noted, source, finer)
+
+
+def _named(domain: object, vertex: int) -> str:
+    """A vertex by its place, which does not depend on how vertices are numbered, or else by its number."""
+    places = getattr(domain, "vertices", getattr(domain, "points", None))
+    return f"number {vertex}" if places is None else f"at ({', '.join(f'{x:.4g}' for x in places[vertex])})"
 
 
 @to_field.register
