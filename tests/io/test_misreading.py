@@ -262,6 +262,18 @@ def test_svg_lengths_have_units(tmp_path):
             drawing(tmp_path / "a.svg", f'<circle r="{word}"/>')
 
 
+@pytest.mark.parametrize("where", ['fill-rule="evenodd"', 'style="stroke:red; fill-rule: evenodd"'])
+@pytest.mark.parametrize("on_group", [False, True])
+def test_svg_rules_of_filling_are_read(tmp_path, where, on_group):
+    rings = "M0,0 h8 v8 h-8 Z M2,2 h4 v4 h-4 Z"
+    element = f'<g {where}><path d="{rings}"/></g>' if on_group else f'<path d="{rings}" {where}/>'
+    points = np.array([[1, -1], [4, -4], [11, -1]])
+    for shapes, inside in ((element, [True, False, False]), (f'<path d="{rings}"/>', [True, True, False])):
+        lines = drawing(tmp_path / "a.svg", shapes + '<rect x="10" width="2" height="2"/>', "")
+        field = sh.signed_distance(lines, resolution=16)
+        np.testing.assert_array_equal(field(points) < 0, [*inside[:2], True])
+
+
 def test_svg_subpaths_without_length_are_left_out(tmp_path):
     data = "M1 1 M2 2 z m3 3 h0 M0 0 L4 0 4 4 z m1 1 l1 0 M7 7 Z"
     square, rest = drawing(tmp_path / "a.svg", f'<path d="{data}"/><path d=""/><path/><polygon points=""/>')

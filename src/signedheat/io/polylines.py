@@ -22,8 +22,9 @@ def read_polylines(path: PathLike) -> list[Polyline]:
     path : str or path
         ``.svg``: all paths, lines, polylines, polygons, rectangles, circles and ellipses, with their transforms, in
         user units, 96 of which are an inch. The y axis, which points down in such files, is turned up, so that the left
-        of a path is its left in the drawing. Subpaths without length are left out. ``.csv``: x and y on each line, an
-        empty line between polylines; a polyline is closed if its last point equals its first.
+        of a path is its left in the drawing. Subpaths without length are left out. Where a file says ``fill-rule:
+        evenodd``, closed subpaths become the outlines of what they fill. ``.csv``: x and y on each line, an empty line
+        between polylines; a polyline is closed if its last point equals its first.
 
     Returns
     -------

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..domains.polyline import Polyline
 from ..errors import FileFormatError
+from ..geometry.outlines import filled_outlines
 from .files import PathLike, contents, damaged
 
 CURVE_PIECES = 64
@@ -34,6 +35,7 @@ AXES = {"x": 0, "x1": 0, "x2": 0, "cx": 0, "rx": 0, "width": 0, "y": 1, "y1": 1,
 """The axes that lengths run along; others have none."""
 DEPTH, MOST_USES = 100, 10**5
 """Groups within groups; and elements that are drawn where others use them, which may be the same many times."""
+FILL_RULE = re.compile(r"fill-rule\s*:\s*(\w+)")
 TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
 
 
@@ -60,9 +62,14 @@ class _Drawing:
     n_used: int = 0
 
     def drawn(
-        self, element: ElementTree.Element, outer: NDArray[np.float64], depth: int = 0, is_used: bool = False
+        self,
+        element: ElementTree.Element,
+        outer: NDArray[np.float64],
+        depth: int = 0,
+        is_used: bool = False,
+        rule: str = "nonzero",
     ) -> Iterator[list[tuple[NDArray[np.float64], bool]]]:
-        """Subpaths of an element and of those in it."""
+        """Subpaths of an element and of those in it; those filled by even and odd as outlines of what they fill."""
         self.n_used += is_used
         if depth > DEPTH or self.n_used > MOST_USES:
             raise damaged("its elements contain themselves, or too many others")
@@ -70,17 +77,22 @@ class _Drawing:
         if element.get("display") == "none" or "display:none" in element.get("style", "").replace(" ", ""):
             return
         matrix = outer @ _transform(element.get("transform", ""))
+        stated = FILL_RULE.search(element.get("style", ""))
+        rule = stated[1] if stated else element.get("fill-rule", rule)
         if kind in CONTAINERS:
             for child in element:
-                yield from self.drawn(child, matrix, depth + 1, is_used)
+                yield from self.drawn(child, matrix, depth + 1, is_used, rule)
         elif kind == "use":
             name = next((value for key, value in element.attrib.items() if key.rpartition("}")[2] == "href"), "")
             if name[1:] in self.named:
                 move = np.eye(3)
                 move[:2, 2] = self._length(element, "x"), self._length(element, "y")
-                yield from self.drawn(self.named[name[1:]], matrix @ move, depth + 1, True)
+                yield from self.drawn(self.named[name[1:]], matrix @ move, depth + 1, True, rule)
         else:
-            parts = _subpaths(self._path(element, kind))
+            parts = list(_subpaths(self._path(element, kind)))
+            if rule == "evenodd" and any(closed for _, closed in parts):
+                filled = filled_outlines([points for points, closed in parts if closed], "evenodd")
+                parts = [*((outline[::-1], True) for outline in filled), *(part for part in parts if not part[1])]
             yield [(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in parts]
 
     def _path(self, element: ElementTree.Element, kind: str) -> str:
