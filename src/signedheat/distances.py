@@ -28,6 +28,7 @@ from .fields.vertex_field import VertexField
 from .geometry.outlines import FillRule
 from .lowering.area_elements import bounds_around
 from .progress import Progress
+from .solids.bounding import Nesting
 from .solids.distance import distance_to_shapes
 from .solids.orient import orient
 from .solids.solid import Solid
@@ -44,6 +45,8 @@ def signed_distance(
     padding: float | None = None,
     band: float | None = None,
     completion: Literal["lids", "heat"] = "lids",
+    lids: Literal["bent", "flat"] = "bent",
+    nested: Nesting = "given",
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
     as_oriented: bool = False,
@@ -72,6 +75,8 @@ def signed_distance(
     *,
     band: float | None = None,
     completion: Literal["lids", "heat"] = "lids",
+    lids: Literal["bent", "flat"] = "bent",
+    nested: Nesting = "given",
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
     as_oriented: bool = False,
@@ -84,6 +89,8 @@ def signed_distance(
     domain: TetMesh,
     *,
     completion: Literal["lids", "heat"] = "lids",
+    lids: Literal["bent", "flat"] = "bent",
+    nested: Nesting = "given",
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
     as_oriented: bool = False,
@@ -142,7 +149,7 @@ def signed_distance(
         Room around the shape, in its units; by default a fifth of its longest side.
     band : float, optional
         In space: only the nodes of the grid whose distance is at most this, in units of length: for fine grids.
-    completion : {"lids", "heat"}
+    completion, lids, nested : str
         In space: see `complete`.
     constraint : Free, ZeroSet or Soft, optional
         Imposed on φ, where it is computed, at the source; `ZeroSet` by default.

@@ -464,3 +464,23 @@ def test_copies_of_faces_along_a_body_bound_nothing():
     solid = sh.complete(joined((vertices, faces), copies))
     assert solid.volume == pytest.approx(1)
     assert any(isinstance(note, BoundsNothing) for note in solid.diagnostics.notes)
+
+
+def test_what_is_nested_is_as_it_was_given_or_as_one_says():
+    """A ball in a ball, both facing outwards, and a third one in that."""
+    balls = [samples.sphere(3, radius) for radius in (1.0, 0.6, 0.3)]
+    volumes = [sh.complete(ball).volume for ball in balls]
+    solids = {way: sh.complete(samples.union(*balls), nested=way) for way in ("given", "cavities", "bodies")}
+    assert solids["given"].volume == pytest.approx(volumes[0])
+    assert solids["bodies"].volume == pytest.approx(volumes[0])
+    assert solids["cavities"].volume == pytest.approx(volumes[0] - volumes[1] + volumes[2])
+    assert solids["cavities"].inside([[0.0, 0, 0.8], [0, 0, 0.45], [0, 0, 0]]).tolist() == [True, False, True]
+
+
+def test_flat_lids_close_half_models_flat():
+    """Bent lids go on as a ball does."""
+    ball = samples.sphere(4)
+    half = sh.TriangleMesh(ball.vertices, ball.faces[ball.vertices[ball.faces][:, :, 2].max(axis=1) < 0.01])
+    flat, bent = (sh.complete(half, lids=lids).volume / sh.complete(ball).volume for lids in ("flat", "bent"))
+    assert flat == pytest.approx(0.5, abs=0.01)
+    assert bent > 0.9

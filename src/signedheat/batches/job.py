@@ -22,6 +22,7 @@ from ..io.figures import describe, shape_figures
 from ..io.files import distinct_names, extension
 from ..io.shapes import read, save
 from ..io.voxels import LABEL_FORMATS, read_labels
+from ..solids.bounding import Nesting
 from ..solids.complete import complete
 from ..solids.distance import distance_to_shapes
 from ..solids.sample_set import Layout
@@ -84,7 +85,7 @@ class Job:
         The grid around each shape, as for `signed_distance`; by default with room for the offsets.
     band : float, optional
         Half width of a band, outside of which the grid is coarse, as for `signed_distance`.
-    constraint, diffusion, as_oriented, keep_overlaps, plain
+    constraint, diffusion, as_oriented, keep_overlaps, lids, nested, plain
         As for `signed_distance`.
 
     Raises
@@ -116,6 +117,8 @@ class Job:
     diffusion: float = 1.0
     as_oriented: bool = False
     keep_overlaps: bool = False
+    lids: Literal["bent", "flat"] = "bent"
+    nested: Nesting = "given"
     plain: bool = False
 
     def __post_init__(self) -> None:
@@ -205,6 +208,7 @@ class Job:
         if self.plain:
             return cast("GridField", plain_distance(shape, grid, self.constraint, self.diffusion, self.as_oriented))
         options: dict[str, Any] = {"as_oriented": self.as_oriented, "keep_overlaps": self.keep_overlaps}
+        options |= {"lids": self.lids, "nested": self.nested}
         options |= {"constraint": self.constraint, "diffusion": self.diffusion}
         return cast("GridField", distance_to_shapes(shape, grid, band=self.band, **options))
 

@@ -269,7 +269,7 @@ def job_of(arguments: Namespace) -> sh.batches.Job:
     if arguments.sample is not None:
         named = {name: getattr(arguments, name) for name in ("near", "seed", "normalize", "layout")}
         sampling = sh.batches.Sampling(n=arguments.sample, widths=tuple(arguments.widths), **named)
-    same = ("info", "padding", "band", "diffusion", "as_oriented", "keep_overlaps", "plain")
+    same = ("info", "padding", "band", "diffusion", "as_oriented", "keep_overlaps", "lids", "nested", "plain")
     spacing = None if arguments.spacing is None else tuple(arguments.spacing)
     return sh.batches.Job(
         volume=f".{arguments.volume}" if arguments.volume else None,

@@ -39,6 +39,8 @@ ABSENT: Mapping[str, Any] = {
     **dict.fromkeys(("origin", "grid_shape", "spacing", "padding", "resolution", "band", "preview")),
     **dict.fromkeys(("tiles", "workers", "scheduler", "label", "units", "transform")),
     **dict.fromkeys(("as_oriented", "keep_overlaps", "plain"), False),
+    "lids": "bent",
+    "nested": "given",
     "constraint": "zero-set",
     "diffusion": 1.0,
 }
@@ -346,6 +348,18 @@ REPAIR = group(
     "steps (all taken by default)",
     option("--as-oriented", action="store_true", help="turn no face, normal or line, put back no face"),
     option("--keep-overlaps", action="store_true", help="count what lies inside other bodies as surface"),
+    option(
+        "--lids",
+        choices=("bent", "flat"),
+        default="bent",
+        help="lids go on as the surface bends towards them, or are flat, as of half models and hulls",
+    ),
+    option(
+        "--nested",
+        choices=("given", "cavities", "bodies"),
+        default="given",
+        help="what closed pieces within others are: as their faces say, cavities as slicers take them, or bodies",
+    ),
 )
 STEPS = group(
     REPAIR.title,

@@ -181,7 +181,7 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
     field: GridField | TetField
     constraint = constraint_of(arguments.constraint)
     options: dict[str, Any] = {"constraint": constraint, "diffusion": arguments.diffusion}
-    repair = {"as_oriented": arguments.as_oriented, "keep_overlaps": arguments.keep_overlaps}
+    repair = {name: getattr(arguments, name) for name in ("as_oriented", "keep_overlaps", "lids", "nested")}
     with ProgressBar(is_quiet(arguments)) as progress:
         if isinstance(domain, Grid) and arguments.band is not None:
             solid = complete(shape, **options, **repair, progress=within(progress, 0.0, COMPLETED))

@@ -21,6 +21,7 @@ from ..lowering.area_elements import bounds_around
 from ..progress import Progress, within
 from ..sharpening.sharpen import sharpen
 from ..solver import SignedHeatSolver, checked
+from .bounding import Nesting
 from .complete import complete
 
 
@@ -33,6 +34,8 @@ def distance_to_shapes(
     padding: float | None = None,
     band: float | None = None,
     completion: Literal["lids", "heat"] = "lids",
+    lids: Literal["bent", "flat"] = "bent",
+    nested: Nesting = "given",
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
     as_oriented: bool = False,
@@ -60,6 +63,8 @@ def distance_to_shapes(
     solid = complete(
         joined,
         completion=completion,
+        lids=lids,
+        nested=nested,
         as_oriented=as_oriented,
         keep_overlaps=keep_overlaps,
         constraint=constraint,
