@@ -106,7 +106,7 @@ def meets_bad_edges(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool
     """Whether curves run on faces with edges of more than two faces, or on parts of a mesh whose faces do not agree."""
     edges = mesh.edges
     disagrees = ((edges.face_counts == 2) & (edges.balance != 0))[edges.face_edges].any(axis=1)
-    bad = (edges.face_counts > 2)[edges.face_edges].any(axis=1)
+    bad: NDArray[np.bool_] = np.asarray((edges.face_counts > 2)[edges.face_edges].any(axis=1))
     if disagrees.any():
         labels = element_components(edges.face_edges)
         bad |= np.isin(labels, labels[disagrees])

@@ -84,8 +84,8 @@ class RepairedMesh:
             return None
         faces = np.where(turned[:, None], faces[:, ::-1], faces)
         to = (corners[:, :, None] == faces[targets][:, None]).argmax(axis=2)
-        mesh = TriangleMesh(given.vertices[used], faces)
-        return cls(given, mesh, vertices, targets, to, MeshRepaired(joined, int(turned.sum()), copies))
+        repaired = TriangleMesh(given.vertices[used], faces)
+        return cls(given, repaired, vertices, targets, to, MeshRepaired(joined, int(turned.sum()), copies))
 
     def on_it(self, source: Any) -> Any:
         """A curve, points, or a sequence of them, on the repaired mesh; what does not fit the given one stays so."""

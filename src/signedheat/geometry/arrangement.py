@@ -342,7 +342,7 @@ def _divided(
     place = np.arange(len(row)) - np.repeat(np.cumsum(high - low) - (high - low), high - low) + low[row]
     face, one, two = records.faces[row], whole[place], whole[place + 1]
 
-    busy = counts[table.face_edges].any(axis=1)
+    busy: NDArray[np.bool_] = np.asarray(counts[table.face_edges].any(axis=1))
     busy[face] = True
     busy[lines.within.owners] = True
     chosen = np.flatnonzero(busy)
@@ -379,7 +379,7 @@ def _divided(
     local = np.arange(len(members)) - np.repeat(member_starts[:-1], np.diff(member_starts))
     keys = members_owner * n + members
     order = np.argsort(keys, kind="stable")
-    ends = [
+    corner_ends = [
         local[order[np.searchsorted(keys[order], segment_faces * n + end)]] for end in (segment_tails, segments.points)
     ]
     pieces, owners, cells = triangulate_faces(
@@ -388,7 +388,7 @@ def _divided(
         members,
         corners,
         np.searchsorted(segment_faces, np.append(chosen, len(faces))),
-        np.stack(ends, axis=1),
+        np.stack(corner_ends, axis=1),
     )
     kept = np.flatnonzero(~busy)
     all_faces = np.concatenate([faces[kept], pieces])

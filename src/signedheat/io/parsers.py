@@ -120,7 +120,7 @@ def nifti(path: str) -> dict[str, Any]:
     import nibabel
 
     nibabel.imageglobals.logger.disabled = True
-    image = nibabel.load(path)
+    image: Any = nibabel.load(path)
     return {"values": np.asarray(image.dataobj), "affine": np.asarray(image.affine, dtype=np.float64)}
 
 
@@ -159,7 +159,7 @@ def answer(found: dict[str, Any], file: Any) -> None:
     about = [[name, array.dtype.newbyteorder("=").str, array.shape] for name, array in arrays.items()]
     file.write(json.dumps({"values": values, "arrays": about}).encode() + b"\n")
     for array in arrays.values():
-        file.write(memoryview(array.astype(array.dtype.newbyteorder("="), copy=False).ravel()).cast("B"))
+        file.write(array.astype(array.dtype.newbyteorder("="), copy=False).tobytes())
     file.flush()
 
 

@@ -300,7 +300,7 @@ def connected_pieces(chain: Chain, faces: NDArray[np.int64], labels: NDArray[np.
     )[:n]
 
 
-def _directed(chain: Chain, counts: NDArray[np.float64]) -> NDArray[np.float64]:
+def _directed(chain: Chain, counts: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.float64]:
     """(k, 3, 3) the triangles of a chain as often as they are there, reversed where that is negative."""
     there = np.repeat(np.arange(len(counts)), np.abs(counts).astype(np.int64))
     triangles = chain.triangles[there]
@@ -308,7 +308,10 @@ def _directed(chain: Chain, counts: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _along(
-    chain: Chain, pieces: NDArray[np.int64], clusters: NDArray[np.int64], counts: NDArray[np.float64]
+    chain: Chain,
+    pieces: NDArray[np.int64],
+    clusters: NDArray[np.int64],
+    counts: NDArray[np.float64] | NDArray[np.int64],
 ) -> NDArray[np.bool_]:
     """(p,) clusters of loose pieces that lie along closed ones, as noisy copies do: half inside, half outside."""
     chosen = np.flatnonzero(clusters[pieces] >= 0)

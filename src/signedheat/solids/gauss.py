@@ -81,7 +81,7 @@ class Pieces(Frozen):
     @cached_property
     def areas(self) -> NDArray[np.float64]:
         """(k,) area of each piece."""
-        return np.bincount(self.labels, self.face_areas)
+        return np.bincount(self.labels, self.face_areas).astype(np.float64)
 
 
 def system_of(pieces: Pieces) -> Matrix | Dipoles:
@@ -324,7 +324,7 @@ class Dipoles:
             np.arange(len(self.places)),
         )
         flux = self.areas * (field * self.normals).sum(axis=1) / (4.0 * np.pi)
-        return np.bincount(self.owners, flux)
+        return np.bincount(self.owners, flux).astype(np.float64)
 
     def _sums(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(2 · leaves, d) sums of (n, d) values over what is below each node."""

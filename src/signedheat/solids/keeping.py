@@ -96,7 +96,7 @@ def given_surface(
         whole = _conforming(whole, windings)
     if not len(whole.bad):
         return whole.mesh, np.zeros((0, 3))
-    best = None if whole.open else (whole, None)
+    best: tuple[Joined, Boxes | None] | None = None if whole.open else (whole, None)
     surface = contour()
     bad = [_far(surface, whole.points[whole.faces], OFF * cell)]
     found: Joined = whole
@@ -115,8 +115,8 @@ def given_surface(
             remedy="leave out keep_faces: the sharp surface is closed",
             element="surface",
         )
-    found, boxes = best
-    return (found.mesh, np.zeros((0, 3))) if boxes is None else (_without_crumbs(found.mesh, boxes), boxes.middles)
+    found, places = best
+    return (found.mesh, np.zeros((0, 3))) if places is None else (_without_crumbs(found.mesh, places), places.middles)
 
 
 def _conforming(whole: Joined, windings: Windings) -> Joined:

@@ -95,9 +95,9 @@ def _cut(whole: Surface, closing: NDArray[np.bool_]) -> Arrangement:
     if closing.all():
         return pieces
     across = pairs[closing[pairs].any(axis=1) & ~both]
-    used = ~closing
-    used[across] = True
-    used = np.flatnonzero(used)
+    asked = ~closing
+    asked[across] = True
+    used = np.flatnonzero(asked)
     number = np.full(len(faces), -1)
     number[used] = np.arange(len(used))
     others = _arranged(points, faces, used, number[across])
