@@ -109,5 +109,5 @@ def test_methods_say_what_they_take_and_return(name, method):
     parameters = [parameter for parameter in signature.parameters if parameter != "self"]
     described = re.findall(r"^\*{0,2}(\w[^:\n]*?) : ", text, re.M) + re.findall(r"^\*(\w+) : ", text, re.M)
     assert set(parameters) <= {word for names in described for word in names.split(", ")}, name
-    assert "Examples" in sections, name
+    assert "Examples" in sections and len(sections) == len(set(sections)), name
     assert "Returns" in sections or signature.return_annotation in ("None", "NoReturn"), name

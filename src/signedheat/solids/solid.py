@@ -572,22 +572,17 @@ class Solid(Displayed, Represented, Frozen):
         `signedheat.io.load` reads the first, without notes, and nothing is completed again. Formats of shapes, such as
         ``.stl``, have ``surface(keep_faces=True)``: the faces that were given and what completes them, closed.
 
+        Parameters
+        ----------
+        path : str or path
+            ``.npz``, or ``.stl``, ``.obj``, ``.ply``, ``.off``, ``.vtp``.
+
         Raises
         ------
         FileFormatError
             If the format is unknown, or the file cannot be written.
         GeometryError
             If a surface is to be written, and nothing is inside.
-
-        Parameters
-        ----------
-        path : str or path
-            ``.npz``.
-
-        Raises
-        ------
-        FileFormatError
-            If the format is another, or the file cannot be written.
 
         Examples
         --------
