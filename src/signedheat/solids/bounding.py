@@ -21,7 +21,7 @@ from ..geometry.meshes import area_vectors
 from ..geometry.part_levels import levels_within
 from ..geometry.winding_tree import WindingTree
 from .chain import Chain
-from .gauss import Pieces, means, sampled, system_of
+from .gauss import Matrix, Pieces, means, sampled, system_of
 from .rims import meeting_edges, open_edges
 
 Nesting = Literal["given", "cavities", "bodies"]
@@ -255,7 +255,8 @@ def open_bounding(
         square = means(values**2, clusters[rows], weights, n)
         amount = _counted(areas * loose, groups, clusters)
         body = (mean * np.sqrt(amount + 1) >= CHANCE) & (mean**2 >= COHERENT * square)
-        least = np.where(body, np.minimum(SHEET, 2 * SHEET * mean), np.inf)[clusters]
+        each = np.minimum(SHEET, 2 * SHEET * mean) if isinstance(system, Matrix) else -np.inf  # noise is no litter
+        least = np.where(body, each, np.inf)[clusters]
         wrong = alive & (levels < np.where(loose, least, SHEET * np.minimum(1.0, 2.0 * by_itself)))
         unexplained = np.where(wrong, areas * (0.5 - levels) ** 2, 0.0)
         if not wrong.any():

@@ -48,11 +48,11 @@ SAMPLES = 10_000
 """Such places at most."""
 MANY = 64
 """Loose triangles, if all were alike, from which on they are dipoles: exact solid angles tell noise for what it is."""
-STEPS = 12
+STEPS = 10
 """Steps of conjugate gradients, which give the signs of the direct solution."""
 LARGE = 256
 """Faces of a piece from which on a tree of its own sums their solid angles."""
-FAR, OPENING = 4.0, 2.5
+FAR, OPENING = 4.0, 2.0
 """Distance from a piece, and from a node of the tree, over its radius, from which on it is a dipole."""
 ELEMENTS = 200_000
 """Dipoles at most; of more faces as many are drawn, evenly."""
