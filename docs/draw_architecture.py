@@ -18,10 +18,9 @@ FLOORS = [
     ),
     (
         "distances   morphology   solids",
-        "complete a shape, and measure exactly to it; offsets, shells",
+        "what bounds a shape, which way it faces, what closes it; exact distance to it",
         "#f7e6d0",
     ),
-    ("orientations", "which way faces, points and curves face", "#f7e6d0"),
     ("curves", "broken curves on surfaces: close them, measure to them, jumps", "#f7e6d0"),
     ("sharpening   tets", "distance to the zero set of φ; tets of a box", "#f7e6d0"),
     ("solver   fields", "SignedHeatSolver; values that know their domain", "#fbf1de"),

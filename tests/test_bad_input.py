@@ -335,7 +335,6 @@ VOLUME = [
     ("ball.ply -o out.vtu --tets ball.ply", 1, "holds no tets"),
 ]
 OTHERS = [
-    ("", 2, "COMMAND"),
     ("inflate", 2, "invalid choice"),
     ("offset arc.csv 0.1 -o out.stl", 1, "lines in the plane"),
     ("morph dilate ball.ply 0.1 -o out.stl --spacing 0.1 --resolution 20", 2, "do not go together"),

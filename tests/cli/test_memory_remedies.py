@@ -81,7 +81,7 @@ def test_files_that_would_not_fit_while_they_are_read_are_refused(tmp_path, endi
         ball.to_trimesh().export(path)
     else:
         (samples.oriented_points(ball, 5000) if ending == ".xyz" else ball).save(path)
-    size, taken = path.stat().st_size, files.TAKEN.get(ending, 20)
+    size, taken = path.stat().st_size, files.TAKEN.get(ending, 40)
     monkeypatch.setattr(memory, "_free", lambda: (taken - 1) * size if ending in files.TAKEN else 900_000)
     with pytest.raises(sh.errors.MemoryLimitError) as caught:
         sh.read(path)

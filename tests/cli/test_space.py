@@ -175,7 +175,7 @@ def test_info_tells_which_way_parts_face(tmp_path, capsys):
             "1 cavity",
         ),
         "sheet.ply": (samples.union(outer, flat), "in 1 sheet without an inside"),
-        "wall.ply": (samples.union(outer, wall), "1 doubled wall"),
+        "wall.ply": (samples.union(outer, wall), "1 duplicate face to merge"),
     }
     for name, (shape, said) in shapes.items():
         path = str(tmp_path / name)

@@ -243,8 +243,8 @@ def test_smooth_surfaces_of_masks_are_closed_and_give_the_mask_back(mask, tmp_pa
     """Also after rounding to 32 bits, far from the origin, as STL writes it."""
     surface = sh.DigitalSurface(mask, 0.7, origin=(0.0, 50.0, -90.0)).smooth_surface
     assert_closed_manifold(surface)
-    sh.io.save(surface, tmp_path / "mask.stl")
-    read = sh.read(tmp_path / "mask.stl")
+    sh.io.save(surface, tmp_path / "mask.ply")
+    read = sh.read(tmp_path / "mask.ply")
     assert_closed_manifold(read)
     assert not len(self_intersections(read.vertices, read.faces))
     centres = np.indices(np.array(mask.shape) + 2).reshape(3, -1).T - 1
