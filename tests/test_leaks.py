@@ -27,8 +27,6 @@ from signedheat import samples
 ball = samples.sphere(1)
 ring = ball.level_set(ball.vertices[:, 2], 0.1)
 box, inside = boxes((2, 2, 2), 1.0), sh.TriangleMesh(0.4 * ball.vertices + 1, ball.faces)
-wall = np.zeros((8, 8, 8), dtype=bool)
-wall[0] = True
 
 def held():
     gc.collect()
@@ -44,7 +42,7 @@ def once(k):
         sh.sharpen(field)
         sh.SignedHeatSolver(sh.Grid((-2, -2, -2), 0.5, (8, 8, 8))).distance(ball)
     if k % 8 == 1:
-        sh.SignedHeatSolver(sh.Grid((-2, -2, -2), 0.5, (8, 8, 8), wall)).distance(ball)
+        sh.SignedHeatSolver(sh.Grid((-2, -2, -2), 0.5, (8, 8, 8))).distance(ball)
     if k % 8 == 2:
         sh.SignedHeatSolver(box).distance(inside)
     if k % 8 == 3:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..domains.validation import flag, numbers, positive_steps
+from ..domains.validation import array_of, flag, numbers, positive_steps
 from ..errors import GeometryError, OutsideError
 from ..operators.grid.zero_contour import distances_to, smoothed_signs, zero_contour
 
@@ -60,10 +60,11 @@ def redistance(
             remedy="fill them in, or use scikit-fmm, whose distance does",
             element="values",
         )
-    given = numbers(np.ma.getdata(values), "values")
+    read = array_of(np.ma.getdata(values) if np.ma.isMaskedArray(values) else values, "values")
+    given = numbers(read, "values")
     if not 1 <= given.ndim <= 4 or given.size < 2:
         raise GeometryError(f"values must have one to four axes, and two nodes, not {given.shape}", element="values")
-    if np.asanyarray(values).dtype == np.bool_:
+    if read.dtype == np.bool_:
         raise GeometryError("booleans have no sign", remedy="pass numpy.where(inside, -1.0, 1.0)", element="values")
     steps, again = positive_steps(spacing, given.ndim), _axes(periodic, given.ndim)
     if not np.isfinite(given).all():
