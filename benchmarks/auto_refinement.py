@@ -19,8 +19,8 @@ import pyvista
 import trimesh
 
 import signedheat as sh
-from signedheat.lowering.surface import intrinsic
 from signedheat.samples import torus
+from signedheat.surfaces import intrinsic_discretization as intrinsic
 
 LIMITS = (intrinsic.COARSEST, 1.25, 2.0, np.inf)
 

@@ -20,8 +20,8 @@ import numpy as np
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.operators.grid.block_contours import block_contour
-from signedheat.operators.grid.blocks import SIDE, Blocks
+from signedheat.grids.block_contours import block_contour
+from signedheat.grids.blocks import SIDE, Blocks
 
 CELLS = 4.0
 """Half width of the band, in cells."""

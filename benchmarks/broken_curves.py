@@ -31,8 +31,8 @@ from scipy.spatial import Delaunay, cKDTree
 
 import signedheat as sh
 from signedheat.discretization import discretize
-from signedheat.geometry.geodesics.exact import distance_to_segments
-from signedheat.geometry.geodesics.sources import PlacedSegments
+from signedheat.geodesics.exact_distance import distance_to_segments
+from signedheat.geodesics.geodesic_sources import PlacedSegments
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from surface_winding import winding_side

@@ -25,7 +25,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 import signedheat as sh
-from signedheat.geometry.geodesics.exact import distance_to_zero_line
+from signedheat.geodesics.exact_distance import distance_to_zero_line
 from signedheat.samples import sphere, torus
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

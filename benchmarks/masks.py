@@ -20,7 +20,7 @@ import scipy
 from skimage.measure import marching_cubes
 
 import signedheat as sh
-from signedheat.geometry.self_intersections import self_intersections
+from signedheat.mesh.self_intersections import self_intersections
 
 Height = Callable[[np.ndarray], np.ndarray]
 TURN = scipy.spatial.transform.Rotation.random(random_state=3).as_matrix()

@@ -18,20 +18,20 @@ import numpy as np
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.curves.piecewise import memory_estimate as piecewise_estimate
-from signedheat.domains.foreign import SurfaceShape
-from signedheat.geometry.surfels import count_surfels
-from signedheat.lowering.grid.discretization import bytes_of_area
-from signedheat.lowering.grid.discretization import memory_estimate as grid_estimate
-from signedheat.lowering.surface.discretization import BYTES_PER_POINT, BYTES_PER_VOXEL, LIGHTER, NEIGHBORS
-from signedheat.lowering.surface.discretization import memory_estimate as surface_estimate
-from signedheat.lowering.surface.intrinsic import BYTES_REFINED
-from signedheat.lowering.tets.discretization import memory_estimate as tet_estimate
+from signedheat.curves.jumping_distance import memory_estimate as piecewise_estimate
+from signedheat.foreign import SurfaceShape
+from signedheat.grids.blocks import NODES
+from signedheat.grids.grid_discretization import bytes_of_area
+from signedheat.grids.grid_discretization import memory_estimate as grid_estimate
 from signedheat.memory import libraries
-from signedheat.operators.grid.blocks import NODES
-from signedheat.solids.complete import bytes_to_complete, complete
-from signedheat.solids.fields import BYTES_AT_WORK, BYTES_IN_BAND, BYTES_PER_NODE, blocks_near
+from signedheat.solids.completion import bytes_to_complete, complete
 from signedheat.solids.sampling import BYTES_PER_SAMPLE
+from signedheat.solids.tiles import BYTES_AT_WORK, BYTES_IN_BAND, BYTES_PER_NODE, blocks_near
+from signedheat.surfaces.intrinsic_discretization import BYTES_REFINED
+from signedheat.surfaces.surface_discretization import BYTES_PER_POINT, BYTES_PER_VOXEL, LIGHTER, NEIGHBORS
+from signedheat.surfaces.surface_discretization import memory_estimate as surface_estimate
+from signedheat.surfaces.surfels import count_surfels
+from signedheat.tets.tet_discretization import memory_estimate as tet_estimate
 
 SIZES = {
     "triangles": (70, 140, 280),

@@ -18,8 +18,8 @@ import signedheat as sh
 from shapes.jump_program import minimize_exactly
 from signedheat.curves.jumps import JumpProblem
 from signedheat.discretization import discretize
-from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
-from signedheat.operators.cotan import cotan_matrix
+from signedheat.mesh.intrinsic_mesh import IntrinsicMesh
+from signedheat.surfaces.cotan import cotan_matrix
 
 ON_CURVE = 1e-2
 """Cost of a jump of v along the curves, relative to elsewhere."""

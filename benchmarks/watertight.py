@@ -30,11 +30,11 @@ import scipy
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.geometry.components import element_components
-from signedheat.geometry.edges import edge_table
-from signedheat.geometry.face_features import FaceFeatures
-from signedheat.geometry.face_tree import FaceTree
-from signedheat.geometry.self_intersections import self_intersections
+from signedheat.mesh.components import element_components
+from signedheat.mesh.edges import edge_table
+from signedheat.mesh.self_intersections import self_intersections
+from signedheat.search.face_features import FaceFeatures
+from signedheat.search.face_tree import FaceTree
 
 Mesh = sh.TriangleMesh
 N_POINTS = 20_000

@@ -11,36 +11,40 @@ from matplotlib.patches import FancyBboxPatch
 from PIL import Image
 
 FLOORS = [
+    ("cli   __main__", "commands", "#f3d9c1"),
+    ("public   results   samples   batches", "public names, many shapes", "#f3d9c1"),
+    ("io   view   torch", "files, pictures, tensors", "#f3d9c1"),
+    ("distances   morphology", "signed_distance in one call; offsets, shells", "#f7e6d0"),
+    ("curves   solids", "broken curves on surfaces, and broken shapes in space: completed, then exact", "#f7e6d0"),
+    ("solver   sharpening", "SignedHeatSolver: a domain and its factors; distance to the zero set of φ", "#fbf1de"),
+    ("surfaces   grids   tets", "slices: domain, operators, sources, discretisation, sharpening, field", "#d3e8ea"),
     (
-        "__main__   cli   view   samples   public   results   batches   io   torch",
-        "commands, pictures, many shapes, files",
-        "#f3d9c1",
+        (
+            "area_elements field_arithmetic field_kinds field_levels foreign inspection joining kinds "
+            "sharpening_methods transforms"
+        ),
+        "one function for all slices, by type",
+        "#d3e8ea",
     ),
     (
-        "distances   morphology   solids",
-        "what bounds a shape, which way it faces, what closes it; exact distance to it",
-        "#f7e6d0",
+        "constraints direct_integration discretization linear_elements method spring_integration",
+        "the paper: diffuse → normalize → integrate, once, on discretisations",
+        "#fff6c9",
     ),
-    ("curves", "broken curves on surfaces: close them, measure to them, jumps", "#f7e6d0"),
-    ("sharpening   tets", "distance to the zero set of φ; tets of a box", "#f7e6d0"),
-    ("solver   fields", "SignedHeatSolver; values that know their domain", "#fbf1de"),
-    ("method   extrapolation   constraints", "diffuse → normalize → integrate, once, on discretisations", "#fff6c9"),
-    ("lowering", "every domain and every source to its discretisation: surface, grid, tets", "#e3efd3"),
-    ("discretization", "the protocols: Discretization, SourceTerm, Integration", "#e3efd3"),
-    ("domains", "frozen data: meshes, polygons, points, voxels, tets, grids, curves", "#d3e8ea"),
-    ("operators   linear", "sparse matrices, matrix-free stencils, factorisations, Krylov", "#c9dcee"),
-    ("geometry", "arrays in, arrays out: intrinsic meshes, geodesics, flips, clipping", "#bccfe8"),
+    ("geodesics", "exact distance on polyhedral surfaces, shortest paths", "#e3efd3"),
+    ("search   linear   exchange", "nearest faces, winding numbers; sparse solvers; other packages", "#c9dcee"),
+    ("mesh", "arrays in, arrays out: edges, welding, components, cutting, intrinsic meshes", "#bccfe8"),
     (
-        "cache compiled diagnostics errors frozen memory packages jobs parallel processes progress reprs",
+        ("cache compiled diagnostics errors frozen jobs memory packages parallel processes progress reprs validation"),
         "used by all",
         "#d9d9e3",
     ),
 ]
 FLOW = [
-    (9, "shapes, curves, grids"),
-    (7, "X₀, t;  M + tL, C;  A"),
-    (6, "X  →  Y  →  φ"),
-    (5, "Field"),
+    (10, "arrays, files of others"),
+    (6, "domain;  X₀, t;  M + tL, C;  A"),
+    (5, "X  →  Y  →  φ:  Field"),
+    (4, "solids, completed curves"),
     (0, "files, pictures, numbers"),
 ]
 """Floor at which each thing is, from the top, in the order in which data pass through."""

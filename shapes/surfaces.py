@@ -3,7 +3,7 @@
 import numpy as np
 
 import signedheat as sh
-from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
+from signedheat.mesh.intrinsic_mesh import IntrinsicMesh
 
 from .triangulated import angles, flat
 

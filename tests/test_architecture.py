@@ -16,26 +16,45 @@ from import_graph import circles, import_graph, upward_imports
 PACKAGE = Path(signedheat.__file__).parent
 
 FLOORS = [
-    {"cache", "compiled", "diagnostics", "errors", "frozen", "memory"}
-    | {"jobs", "packages", "parallel", "processes", "progress", "reprs"},
-    {"geometry"},
-    {"linear"},
-    {"operators"},
-    {"domains"},
-    {"discretization"},
-    {"lowering"},
-    {"constraints"},
-    {"method", "extrapolation"},
-    {"fields"},
-    {"solver"},
-    {"sharpening", "tets"},
-    {"curves"},
-    {"solids"},
+    {
+        "cache",
+        "compiled",
+        "diagnostics",
+        "errors",
+        "frozen",
+        "jobs",
+        "memory",
+        "packages",
+        "parallel",
+        "processes",
+        "progress",
+        "reprs",
+        "validation",
+    },
+    {"mesh"},
+    {"search", "linear", "exchange"},
+    {"geodesics"},
+    {"constraints", "direct_integration", "discretization", "linear_elements", "method", "spring_integration"},
+    {"surfaces", "grids", "tets"}
+    | {
+        "area_elements",
+        "field_arithmetic",
+        "field_kinds",
+        "field_levels",
+        "foreign",
+        "inspection",
+        "joining",
+        "kinds",
+        "sharpening_methods",
+        "transforms",
+    },
+    {"sharpening", "solver"},
+    {"curves", "solids"},
     {"distances", "morphology"},
     {"io", "torch"},
     {"view"},
     {"batches"},
-    {"", "public", "results", "samples"},  # the package itself, with the public names
+    {"", "public", "results", "samples"},
     {"cli", "__main__"},
 ]
 """From the ground up: a module may import what is on its own floor or below. docs/architecture.md shows the same."""
@@ -49,6 +68,25 @@ def test_no_circle_of_imports():
 
 def test_imports_point_down():
     assert upward_imports(import_graph(PACKAGE), FLOORS) == []
+
+
+SLICES = "surfaces", "grids", "tets"
+SHAPES = {"surfaces.triangle_mesh", "surfaces.point_cloud"}
+"""What contours are and what distance in space is measured to: the slices share them."""
+LEFT: set[tuple[str, str]] = {("tets.lattice", "grids.grid"), ("tets.meshers", "grids.grid")}
+"""Imports from slice to slice that are still there."""
+
+
+def test_slices_do_not_import_each_other():
+    graph = import_graph(PACKAGE)
+    between = {
+        (module.removeprefix("signedheat."), imported.removeprefix("signedheat."))
+        for module in graph
+        for imported in graph[module]
+        if module.split(".")[1:2] != imported.split(".")[1:2]
+        if all(any(name.startswith(f"signedheat.{each}.") for each in SLICES) for name in (module, imported))
+    }
+    assert {pair for pair in between if pair[1] not in SHAPES} == LEFT
 
 
 @pytest.mark.parametrize("folder", ["benchmarks", "blender", "examples", "shapes", "tools"])

@@ -12,8 +12,8 @@ from scipy import sparse
 
 import signedheat as sh
 from shapes.public_objects import OBJECTS, SOLVERS, SOURCES
-from signedheat.domains.surface import Surface
 from signedheat.linear import factorize
+from signedheat.surfaces.surface import Surface
 
 WAYS = {"pickle": lambda thing: pickle.loads(pickle.dumps(thing)), "copy": copy.copy, "deepcopy": copy.deepcopy}
 

@@ -11,7 +11,7 @@ import pytest
 
 import signedheat
 from public_names import PUBLIC, methods
-from signedheat.io import shapes
+from signedheat.io import shape_files as shapes
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")])

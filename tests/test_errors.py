@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from signedheat.cli.shapes import prefix_errors
+from signedheat.cli.operands import prefix_errors
 
 TRIANGLE = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
 KINDS = [kind for kind in vars(sh).values() if isinstance(kind, type) and issubclass(kind, sh.errors.SignedHeatError)]

@@ -97,8 +97,8 @@ def test_factors_are_freed_with_their_solver(monkeypatch):
         made.append(weakref.ref(factor))
         return factor
 
-    for module in ("direct_integration", "surface.discretization", "surface.vector_heat"):
-        monkeypatch.setattr(f"signedheat.lowering.{module}.factorize", watched)
+    for module in ("direct_integration", "surfaces.surface_discretization", "surfaces.vector_heat"):
+        monkeypatch.setattr(f"signedheat.{module}.factorize", watched)
     ball = samples.sphere(1)
     solver = sh.SignedHeatSolver(ball)
     for source in (ball.level_set(ball.vertices[:, 2], 0.1), ball.points_at(0)):

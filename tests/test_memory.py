@@ -16,11 +16,11 @@ import signedheat as sh
 from refusals import refused
 from shapes.tet_cases import boxes
 from signedheat import compiled, memory, samples
-from signedheat.curves.piecewise import memory_estimate as piecewise_estimate
-from signedheat.lowering.grid.discretization import bytes_of_area, fitting_spacing, memory_estimate
-from signedheat.lowering.surface import intrinsic
+from signedheat.curves.jumping_distance import memory_estimate as piecewise_estimate
+from signedheat.grids.grid_discretization import bytes_of_area, fitting_spacing, memory_estimate
 from signedheat.memory import available_memory
-from signedheat.tets.tetrahedralize import BYTES_PER_TET
+from signedheat.surfaces import intrinsic_discretization as intrinsic
+from signedheat.tets.lattice import BYTES_PER_TET
 
 
 def test_some_memory_is_free_but_not_more_than_there_is():

@@ -14,7 +14,7 @@ from shapes.bodies import box, distance_to_box
 from shapes.grid_cases import assert_closed_manifold, enclosed_volume
 from signedheat import memory, samples
 from signedheat.cli import main
-from signedheat.geometry.self_intersections import self_intersections
+from signedheat.mesh.self_intersections import self_intersections
 
 BALL = samples.sphere(4)
 

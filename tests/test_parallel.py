@@ -33,7 +33,7 @@ def test_what_the_report_raises_ends_the_wait():
 def test_completion_is_reported_on_and_not_waited_for(monkeypatch):
     """However long one of its steps takes."""
     ended = threading.Event()
-    monkeypatch.setattr("signedheat.solids.complete.completed", lambda *_: ended.wait(60))
+    monkeypatch.setattr("signedheat.solids.completion.completed", lambda *_: ended.wait(60))
     calls = []
 
     def progress(fraction, step):
@@ -69,7 +69,7 @@ def test_sharpening_is_the_same_whoever_watches(seen):
 
 def test_sharpening_stops_when_asked_to(monkeypatch):
     """However long the search for straight lines takes."""
-    monkeypatch.setattr("signedheat.sharpening.grids.redistance", lambda *_: time.sleep(20))
+    monkeypatch.setattr("signedheat.grids.grid_sharpening.redistance", lambda *_: time.sleep(20))
     calls = []
 
     def progress(fraction, step):

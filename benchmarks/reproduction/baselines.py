@@ -11,8 +11,8 @@ from scipy.sparse.linalg import factorized
 
 import signedheat as sh
 from signedheat.discretization import discretize
-from signedheat.geometry.geodesics.exact import distance_to_segments
-from signedheat.geometry.geodesics.sources import PlacedSegments
+from signedheat.geodesics.exact_distance import distance_to_segments
+from signedheat.geodesics.geodesic_sources import PlacedSegments
 
 from .shapes import mean_edge
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .discretization import Integration, Levels, SourceTerm
-from .domains.validation import LARGEST, numbers, positive_number
 from .errors import ConstraintError
 from .reprs import ShortRepr
+from .validation import LARGEST, numbers, positive_number
 
 
 @runtime_checkable

@@ -14,8 +14,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .domains.foreign import TAKEN
 from .errors import UnsupportedTypeError
+from .exchange import TAKEN
 
 
 class SourceTerm(Protocol):

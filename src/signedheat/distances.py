@@ -8,31 +8,31 @@ from typing import Any, Literal, cast, get_args, overload
 
 from numpy.typing import ArrayLike
 
+from .area_elements import bounds_around
 from .constraints import Constraint, Free, Soft, ZeroSet
-from .curves.distance import distance_to_curves
-from .curves.plane import distance_to_lines
-from .domains.curves import Curve, CurvesAndPoints, ElementList, SurfacePoints
-from .domains.foreign import ForeignShape, as_shapes, converted
-from .domains.grid import Dimension, Grid, room_around
-from .domains.kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
-from .domains.polygon_mesh import PolygonMesh
-from .domains.polyline import Polyline
-from .domains.tet_mesh import TetMesh
-from .domains.triangle_mesh import TriangleMesh
+from .curves.curve_distance import distance_to_curves
+from .curves.drawings import distance_to_lines
 from .errors import SourceError, UnsupportedTypeError
-from .extrapolation import Diffusion
-from .fields.grid_field import GridField
-from .fields.tet_field import TetField
-from .fields.to_field import Field
-from .fields.vertex_field import VertexField
-from .geometry.outlines import FillRule
-from .lowering.area_elements import bounds_around
+from .field_kinds import Field
+from .foreign import ForeignShape, as_list, as_shapes, converted
+from .grids.grid import Dimension, Grid, room_around
+from .grids.grid_field import GridField
+from .grids.polyline import Polyline
+from .kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
+from .mesh.outlines import FillRule
 from .progress import Progress
 from .solids.bounding import Nesting
-from .solids.distance import distance_to_shapes
-from .solids.orient import orient
+from .solids.facing import orient
 from .solids.solid import Solid
-from .solver import SignedHeatSolver, as_list
+from .solids.solid_distance import distance_to_shapes
+from .solver import SignedHeatSolver
+from .surfaces.extrapolation import Diffusion
+from .surfaces.polygon_mesh import PolygonMesh
+from .surfaces.surface_curves import Curve, CurvesAndPoints, ElementList, SurfacePoints
+from .surfaces.triangle_mesh import TriangleMesh
+from .surfaces.vertex_field import VertexField
+from .tets.tet_field import TetField
+from .tets.tet_mesh import TetMesh
 
 
 @overload

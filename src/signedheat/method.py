@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .constraints import Constraint, Free
 from .discretization import Discretization, SourceTerm
-from .geometry.directions import unit
+from .mesh.unit_vectors import unit
 
 
 def diffuse(discretization: Discretization, source: SourceTerm) -> Any:

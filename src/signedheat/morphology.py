@@ -15,19 +15,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from .area_elements import area_elements, bounds_around
 from .distances import signed_distance
-from .domains.curves import Curve, CurveOrPoints, CurvesAndPoints
-from .domains.digital_surface import DigitalSurface
-from .domains.foreign import as_shape
-from .domains.grid import RESOLUTION, Grid, room_around
-from .domains.joining import concatenated
-from .domains.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
-from .domains.point_cloud import PointCloud
-from .domains.polygon_mesh import PolygonMesh
-from .domains.polyline import Polyline
-from .domains.tet_mesh import TetMesh
-from .domains.triangle_mesh import TriangleMesh
-from .domains.validation import finite_number, positive_number
 from .errors import (
     GeometryError,
     InexactWarning,
@@ -37,23 +26,34 @@ from .errors import (
     UnsupportedTypeError,
     warn_user,
 )
-from .fields.arithmetic import smooth_difference, smooth_intersection, smooth_union
-from .fields.grid_field import GridField
-from .fields.to_field import Field
-from .fields.vertex_field import VertexField
-from .geometry.face_features import FaceFeatures
-from .geometry.face_tree import FaceTree
-from .geometry.meshes import part_volumes
-from .geometry.nearest import weights_in
-from .lowering.area_elements import area_elements, bounds_around
-from .lowering.grid.discretization import refuse_large_grid
+from .field_arithmetic import smooth_difference, smooth_intersection, smooth_union
+from .field_kinds import Field
+from .foreign import as_list, as_shape
+from .grids.grid import RESOLUTION, Grid, room_around
+from .grids.grid_discretization import refuse_large_grid
+from .grids.grid_field import GridField
+from .grids.polyline import Polyline
+from .joining import concatenated
+from .kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
+from .mesh.triangles import part_volumes
 from .progress import Progress
-from .sharpening.sharpen import sharpen
-from .solids.complete import complete
+from .search.face_features import FaceFeatures
+from .search.face_tree import FaceTree
+from .search.nearest_triangles import weights_in
+from .sharpening import sharpen
+from .solids.completion import complete
 from .solids.contouring import sharp_surface
 from .solids.offsets import Offset, Reach, checked_reach
 from .solids.solid import Solid
-from .solver import SignedHeatSolver, as_list
+from .solver import SignedHeatSolver
+from .surfaces.digital_surface import DigitalSurface
+from .surfaces.point_cloud import PointCloud
+from .surfaces.polygon_mesh import PolygonMesh
+from .surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints
+from .surfaces.triangle_mesh import TriangleMesh
+from .surfaces.vertex_field import VertexField
+from .tets.tet_mesh import TetMesh
+from .validation import finite_number, positive_number
 
 __all__ = [
     "closing",

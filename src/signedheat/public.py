@@ -2,22 +2,11 @@
 
 from . import batches, errors, io, morphology, results, samples, torch, view  # noqa: F401  makes them sh.batches and so on
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
-from .curves.close import close_curves
-from .curves.orientation import curve_orientation
-from .curves.piecewise import piecewise_distance
+from .curves.curve_completion import close_curves
+from .curves.jumping_distance import piecewise_distance
+from .curves.piece_orientation import curve_orientation
+from .curves.piecewise_field import PiecewiseField
 from .distances import signed_distance
-from .domains.common_subdivision import common_subdivision
-from .domains.curves import Curve, SurfacePoints
-from .domains.digital_surface import DigitalSurface
-from .domains.foreign import as_shape
-from .domains.grid import Grid
-from .domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
-from .domains.point_cloud import PointCloud
-from .domains.polygon_mesh import PolygonMesh
-from .domains.polyline import Polyline
-from .domains.tet_mesh import TetMesh
-from .domains.transforms import transform
-from .domains.triangle_mesh import TriangleMesh
 from .errors import (
     CancellingNormalsError,
     ConstraintError,
@@ -33,24 +22,35 @@ from .errors import (
     UnreachedWarning,
     UnsupportedTypeError,
 )
-from .extrapolation import Extrapolated
-from .fields.grid_field import GridField
-from .fields.piecewise_field import PiecewiseField
-from .fields.redistancing import redistance
-from .fields.tet_field import TetField
-from .fields.vertex_field import VertexField
+from .foreign import as_shape
+from .grids.grid import Grid
+from .grids.grid_field import GridField
+from .grids.polyline import Polyline
+from .grids.redistancing import redistance
 from .io import load_field, read, save
 from .morphology import offset
-from .sharpening.methods import Convex, Geodesic
-from .sharpening.sharpen import sharpen
-from .solids.complete import complete
-from .solids.deviation import deviation
-from .solids.orient import orient
-from .solids.orientation import orientation
+from .sharpening import sharpen
+from .sharpening_methods import Convex, Geodesic
+from .solids.completion import complete
+from .solids.deviations import deviation
+from .solids.facing import orient
+from .solids.mesh_orientation import orientation
 from .solids.sampling import sample
 from .solids.solid import Solid
 from .solver import SignedHeatSolver
-from .tets.tetrahedralize import tetrahedralize
+from .surfaces.digital_surface import DigitalSurface
+from .surfaces.extrapolation import Extrapolated
+from .surfaces.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
+from .surfaces.point_cloud import PointCloud
+from .surfaces.polygon_mesh import PolygonMesh
+from .surfaces.subdivision import common_subdivision
+from .surfaces.surface_curves import Curve, SurfacePoints
+from .surfaces.triangle_mesh import TriangleMesh
+from .surfaces.vertex_field import VertexField
+from .tets.lattice import tetrahedralize
+from .tets.tet_field import TetField
+from .tets.tet_mesh import TetMesh
+from .transforms import transform
 
 MODULES = ("batches", "errors", "io", "morphology", "results", "samples", "torch", "view")
 """What is used by the name of its module; ``from signedheat import *`` leaves these alone."""

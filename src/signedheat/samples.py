@@ -8,11 +8,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .domains.grid import Grid
-from .domains.joining import joined_triangles
-from .domains.point_cloud import PointCloud
-from .domains.triangle_mesh import TriangleMesh
-from .fields.grid_field import GridField
+from .grids.grid import Grid
+from .grids.grid_field import GridField
+from .joining import joined_triangles
+from .surfaces.point_cloud import PointCloud
+from .surfaces.triangle_mesh import TriangleMesh
 
 
 def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0, 0)) -> TriangleMesh:

@@ -11,31 +11,30 @@ from typing import Any, Generic, Literal, TypeVar, overload
 from .constraints import Constraint, ZeroSet
 from .diagnostics import Diagnostics
 from .discretization import Adaptable, Discretization, discretize
-from .domains.curves import CurvesAndPoints
-from .domains.foreign import ForeignShape, as_shapes, converted
-from .domains.given_curves import given_curves
-from .domains.grid import Dimension, Grid
-from .domains.intrinsic_triangulation import triangle_mesh
-from .domains.kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
-from .domains.segments import one_sided
-from .domains.tet_mesh import TetMesh
-from .domains.triangle_mesh import TriangleMesh
-from .domains.validation import positive_number
-from .errors import InexactWarning, SignedHeatError, SourceError, UnsupportedTypeError, warn_user
-from .extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
-from .fields.grid_field import GridField
-from .fields.tet_field import TetField
-from .fields.to_field import Field, to_field, warned
-from .fields.vertex_field import VertexField
+from .errors import InexactWarning, SignedHeatError, UnsupportedTypeError, warn_user
+from .field_kinds import Field, to_field, warned
+from .foreign import ForeignShape, as_list, converted
 from .frozen import Frozen
-from .lowering.surface.intrinsic import Retriangulated, lowered_by_angles
+from .grids.grid import Dimension, Grid
+from .grids.grid_field import GridField
+from .kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .progress import Progress, Stopwatch
+from .surfaces.extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
+from .surfaces.given_curves import given_curves
+from .surfaces.intrinsic_discretization import Retriangulated, lowered_by_angles
+from .surfaces.intrinsic_triangulation import triangle_mesh
+from .surfaces.source_segments import one_sided
+from .surfaces.surface_curves import CurvesAndPoints
+from .surfaces.triangle_mesh import TriangleMesh
+from .surfaces.vertex_field import VertexField
+from .tets.tet_field import TetField
+from .tets.tet_mesh import TetMesh
+from .validation import positive_number
 
 _BATCH = 16  # sources diffused at a time
 
 AnyDomain = TypeVar("AnyDomain", bound=Domain | ForeignShape, covariant=True)
-One = TypeVar("One")
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,14 +289,3 @@ def checked(constraint: Constraint | None) -> Constraint:
             remedy="pass Free(), ZeroSet(), EachComponent(), LevelValues(values) or Soft(weight)",
         )
     return constraint
-
-
-def as_list(sources: One | Sequence[One]) -> list[One]:
-    """One source or several sources, as a list, with those of other packages as shapes."""
-    listed: list[One] = as_shapes(sources)
-    if not listed:
-        raise SourceError(
-            "there is no source",
-            remedy="pass at least one curve, point or shape",
-        )
-    return listed

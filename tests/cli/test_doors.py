@@ -106,7 +106,7 @@ def test_what_packages_tell_each_other_is_no_warning_of_a_command(tmp_path, monk
         warnings.warn("a surface\nwith holes", UserWarning, stacklevel=1)
         return samples.sphere(1)
 
-    monkeypatch.setattr("signedheat.io.shapes.READERS", {".ply": deprecated})
+    monkeypatch.setattr("signedheat.io.shape_files.READERS", {".ply": deprecated})
     assert main(["info", "ball.ply"]) == 0
     assert capsys.readouterr().err == "signedheat: a surface with holes\n"
 

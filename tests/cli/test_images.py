@@ -7,7 +7,7 @@ import pytest
 
 import signedheat as sh
 from signedheat.cli import main
-from signedheat.io.images import write_nrrd
+from signedheat.io.image_files import write_nrrd
 
 CENTER, RADIUS = np.array([12.0, 10.0, 8.0]), 6.0
 TURN = np.array([[np.cos(0.4), -np.sin(0.4), 0], [np.sin(0.4), np.cos(0.4), 0], [0, 0, 1]]) * [-1, 1, 1]

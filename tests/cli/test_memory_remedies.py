@@ -7,7 +7,8 @@ import pytest
 import signedheat as sh
 from signedheat import memory, samples
 from signedheat.cli import main
-from signedheat.io import files, shapes
+from signedheat.io import files
+from signedheat.io import shape_files as shapes
 
 LINES = 3
 """Refusals after which a command must be done: its parts are refused one by one."""

@@ -11,7 +11,7 @@ import signedheat as sh
 from refusals import refused
 from signedheat import samples
 from signedheat.cli import main
-from signedheat.domains.inspection import inspect
+from signedheat.inspection import inspect
 
 
 @pytest.fixture

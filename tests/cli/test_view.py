@@ -7,7 +7,8 @@ import socket
 import pytest
 
 from signedheat import samples
-from signedheat.cli import main, view
+from signedheat.cli import main
+from signedheat.cli import view_commands as view
 
 
 @pytest.mark.parametrize("display", ["", ":77", "nonsense", "silent"])

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import signedheat as sh
 from shapes.bodies import box
 from shapes.surface_cases import sphere
-from signedheat.geometry.surface_points import VERTEX
+from signedheat.mesh.surface_points import VERTEX
 
 
 def circle(radius: float, begin: float = 0.0, end: float = 2 * np.pi, n: int = 40) -> np.ndarray:

@@ -10,14 +10,14 @@ from refusals import refused
 from shapes.jump_program import minimize_exactly
 from shapes.surface_cases import flipped
 from shapes.triangulated import cylinder, moebius
-from signedheat.curves import piecewise
+from signedheat.curves import jumping_distance as piecewise
 from signedheat.curves.cut_lines import smoothed
 from signedheat.curves.jumps import JumpProblem, minimize
 from signedheat.diagnostics import Jumps
 from signedheat.discretization import discretize
-from signedheat.geometry.face_pairs import face_pairs
-from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
-from signedheat.geometry.polylines import assemble_polylines
+from signedheat.mesh.face_pairs import face_pairs
+from signedheat.mesh.intrinsic_mesh import IntrinsicMesh
+from signedheat.mesh.segment_chains import assemble_polylines
 from signedheat.samples import sphere, torus
 
 

@@ -8,8 +8,8 @@ from refusals import refused
 from shapes import strokes
 from shapes.bodies import distance_to_box
 from signedheat import samples
-from signedheat.curves.distance import CurvesTaken
-from signedheat.curves.plane import OutlinesFilled
+from signedheat.curves.curve_distance import CurvesTaken
+from signedheat.curves.drawings import OutlinesFilled
 from signedheat.errors import InexactWarning
 
 SQUARE = np.array([[-1.0, -1], [-1, 1], [1, 1], [1, -1]])

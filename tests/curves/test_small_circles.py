@@ -9,7 +9,7 @@ import pytest
 
 import signedheat as sh
 from shapes.surfaces import disk
-from signedheat.curves.distance import CurvesTaken
+from signedheat.curves.curve_distance import CurvesTaken
 from signedheat.samples import sphere
 
 

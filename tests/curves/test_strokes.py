@@ -11,10 +11,10 @@ import pytest
 import signedheat as sh
 from shapes import strokes
 from shapes.surfaces import disk
-from signedheat.curves.directions import Pieces
-from signedheat.curves.distance import CurvesTaken
+from signedheat.curves.curve_distance import CurvesTaken
+from signedheat.curves.minimum_cut import CutGraph
+from signedheat.curves.stroke_directions import Pieces
 from signedheat.discretization import discretize
-from signedheat.geometry.minimum_cut import CutGraph
 from signedheat.samples import sphere, torus, with_flipped_faces
 
 

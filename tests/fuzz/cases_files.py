@@ -23,7 +23,7 @@ import signedheat as sh
 from fuzz.frame import Wrong, family
 from fuzz.mutations import damaged
 from signedheat import samples
-from signedheat.io.meshes import read_obj_elements
+from signedheat.io.mesh_files import read_obj_elements
 
 Files = dict[str, bytes]
 """Contents by name; the first is the one that is read."""

@@ -13,7 +13,7 @@ from fuzz.cases_surfaces import constraint, embedded, source, surface
 from fuzz.frame import Wrong, family
 from fuzz.inputs import chance, one_of, spoiled
 from fuzz.judging import Subject, announced, judge, length_of_edges, subject
-from signedheat.solids.complete import complete
+from signedheat.solids.completion import complete
 
 
 def check_curves(given: Subject) -> str:

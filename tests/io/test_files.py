@@ -20,9 +20,9 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples
-from signedheat.geometry import nearest
 from signedheat.io import files
 from signedheat.io.files import ensure_writable, replacing
+from signedheat.search import nearest_triangles as nearest
 
 BALL = samples.sphere(1)
 posix = pytest.mark.skipif(os.name != "posix", reason="pipes and permissions of POSIX")
@@ -344,7 +344,7 @@ def test_what_cannot_be_compiled_says_nothing_about_the_file(tmp_path, monkeypat
         sh.io.read_curves(path, BALL)
 
 
-@pytest.mark.parametrize("where", ["signedheat.domains.grid", "signedheat.compiled", "signedheat.io.ply", "meshio"])
+@pytest.mark.parametrize("where", ["signedheat.grids.grid", "signedheat.compiled", "signedheat.io.ply", "meshio"])
 def test_faults_of_parsers_are_damage_and_our_own_are_not(where):
     def read():
         namespace = {"__name__": where}

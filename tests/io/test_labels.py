@@ -9,8 +9,8 @@ import pytest
 
 import signedheat as sh
 from signedheat.cli import main
-from signedheat.domains.inspection import inspect
-from signedheat.solids.complete import complete
+from signedheat.inspection import inspect
+from signedheat.solids.completion import complete
 
 nibabel = pytest.importorskip("nibabel")
 

@@ -89,7 +89,7 @@ def test_obj_with_all_it_may_hold(tmp_path):
     )
     mesh = sh.read(tmp_path / "a.obj")
     assert [p.tolist() for p in mesh.polygons] == [[0, 1, 2], [0, 2, 3], [0, 1, 2, 3]]
-    from signedheat.io.meshes import read_obj_elements
+    from signedheat.io.mesh_files import read_obj_elements
 
     vertices, lines, points = read_obj_elements(tmp_path / "a.obj")
     assert len(vertices) == 4

@@ -6,8 +6,8 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from shapes.grid_cases import sphere
+from signedheat.grids.blocks import Blocks
 from signedheat.io.vdb import write_vdb
-from signedheat.operators.grid.blocks import Blocks
 
 tinyvdb = pytest.importorskip("tinyvdb")
 

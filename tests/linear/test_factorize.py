@@ -14,8 +14,8 @@ from shapes.surface_cases import sphere
 from signedheat import linear
 from signedheat.discretization import discretize
 from signedheat.linear import available_backends, elimination_order, factorize, pardiso, upper_triangle, whole
-from signedheat.operators.crouzeix_raviart import vector_heat_matrix
 from signedheat.progress import Announcement
+from signedheat.surfaces.crouzeix_raviart import vector_heat_matrix
 
 backends = pytest.mark.parametrize("backend", available_backends())
 

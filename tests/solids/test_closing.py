@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from signedheat import samples
-from signedheat.geometry.edges import edge_table
+from signedheat.mesh.edges import edge_table
 from signedheat.solids.closing import closed_by
 from signedheat.solids.rims import boundary, loops
 

@@ -8,7 +8,7 @@ import pytest
 import signedheat as sh
 from signedheat import samples
 from signedheat.diagnostics import BoundsNothing, LeftOut
-from signedheat.geometry.edges import edge_table
+from signedheat.mesh.edges import edge_table
 
 
 def grid_sheet(origin, one, other, n=8):

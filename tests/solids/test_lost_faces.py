@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from signedheat import samples
-from signedheat.geometry.edges import edge_table
+from signedheat.mesh.edges import edge_table
 from signedheat.solids.closing import small_lids
 from signedheat.solids.lost_faces import MOST_SIDES
 

@@ -15,8 +15,8 @@ from refusals import refused
 from shapes.bodies import box, sheet
 from shapes.grid_cases import assert_closed_manifold
 from signedheat import memory, samples
-from signedheat.geometry.nearest import away_from_triangle
-from signedheat.solids.complete import complete
+from signedheat.search.nearest_triangles import away_from_triangle
+from signedheat.solids.completion import complete
 
 
 def cup():

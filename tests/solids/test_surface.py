@@ -10,10 +10,11 @@ from shapes.bodies import box
 from shapes.grid_cases import assert_closed_manifold
 from signedheat import samples
 from signedheat.errors import OutsideError
-from signedheat.geometry.edges import edge_table
-from signedheat.geometry.self_intersections import self_intersections
-from signedheat.solids import features, simplification
-from signedheat.solids.complete import complete
+from signedheat.mesh.edges import edge_table
+from signedheat.mesh.self_intersections import self_intersections
+from signedheat.solids import dual_vertices as features
+from signedheat.solids import simplification
+from signedheat.solids.completion import complete
 from signedheat.solids.simplification import is_within
 
 

@@ -6,7 +6,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples, view
-from signedheat.view.slices import cross_section, level_pieces
+from signedheat.view.slice_pictures import cross_section, level_pieces
 
 
 def test_cross_section_of_a_sphere_is_a_circle():

@@ -21,15 +21,15 @@ from unittest.mock import MagicMock
 import numpy as np
 
 import signedheat as sh
-from signedheat.domains.given_curves import curve_of_elements
-from signedheat.geometry.winding_tree import WindingTree
-from signedheat.solids.complete import complete
+from signedheat.search.winding_tree import WindingTree
+from signedheat.solids.completion import complete
+from signedheat.surfaces.given_curves import curve_of_elements
 
 Pairs = list[tuple[Any, Any]]
 """What ours and theirs return."""
 
 EQUAL = 1e-6
-"""By the same definition, over the range: 1e−9 in tests/lowering/surface/, on meshes without slivers."""
+"""By the same definition, over the range: 1e−9 in tests/surfaces/, on meshes without slivers."""
 NEAR = 0.1
 """Where one of both approximates: heat and fast marching are so much off on meshes of 2,500 faces."""
 

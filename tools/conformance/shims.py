@@ -18,7 +18,7 @@ from held import install_igl as install_igl
 from numpy.typing import NDArray
 
 import signedheat as sh
-from signedheat.solids.complete import complete
+from signedheat.solids.completion import complete
 from signedheat.solids.solid import Solid
 
 CALLED: set[str] = set()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..errors import FileFormatError
 from ..io.files import extension
-from ..io.shapes import READERS
+from ..io.shape_files import READERS
 
 MAGIC = frozenset("*?[")
 

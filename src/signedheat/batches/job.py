@@ -10,25 +10,25 @@ from typing import Any, Literal, cast
 
 from ..constraints import Constraint, ZeroSet
 from ..distances import grid_around, plain_distance
-from ..domains.digital_surface import DigitalSurface
-from ..domains.grid import RESOLUTION, Grid
-from ..domains.kinds import ShapeLike
-from ..domains.validation import positive_number, whole_number
 from ..errors import FileFormatError, InexactWarning, SignedHeatError
-from ..fields.grid_field import GridField
-from ..io.arrays import write_npz
-from ..io.fields import BAND_FORMATS
-from ..io.figures import describe, shape_figures
+from ..grids.grid import RESOLUTION, Grid
+from ..grids.grid_field import GridField
+from ..io.field_files import BAND_FORMATS
 from ..io.files import distinct_names, extension
-from ..io.shapes import read, save
-from ..io.voxels import LABEL_FORMATS, read_labels
+from ..io.key_figures import describe, shape_figures
+from ..io.numpy_files import write_npz
+from ..io.shape_files import read, save
+from ..io.voxel_files import LABEL_FORMATS, read_labels
+from ..kinds import ShapeLike
 from ..solids.bounding import Nesting
-from ..solids.complete import complete
-from ..solids.distance import distance_to_shapes
+from ..solids.completion import complete
 from ..solids.sample_set import Layout
 from ..solids.sampling import WIDTHS, sample
+from ..solids.solid_distance import distance_to_shapes
 from ..solids.training import training_points
 from ..solids.watertight import closed_surface, figures_of
+from ..surfaces.digital_surface import DigitalSurface
+from ..validation import positive_number, whole_number
 from .inputs import Input
 
 

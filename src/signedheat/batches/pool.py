@@ -16,11 +16,11 @@ from importlib import import_module
 from pathlib import Path
 
 from ..compiled import MOST_THREADS
-from ..domains.validation import positive_number, whole_number
 from ..errors import FileFormatError, SignedHeatError
 from ..packages import require
 from ..parallel import connected, n_threads
 from ..progress import Progress, logger
+from ..validation import positive_number, whole_number
 from .inputs import expand, named_path
 from .job import Job
 from .manifest import Manifest, Outcome

@@ -7,27 +7,27 @@ from collections.abc import Callable
 import numpy as np
 
 from .. import samples
-from ..curves.close import close_curves
-from ..curves.piecewise import piecewise_distance
+from ..curves.curve_completion import close_curves
+from ..curves.jumping_distance import piecewise_distance
 from ..distances import signed_distance
-from ..domains.common_subdivision import common_subdivision
-from ..domains.curves import Curve
-from ..domains.digital_surface import DigitalSurface
-from ..domains.grid import Grid
-from ..domains.inspection import inspect
-from ..domains.intrinsic_triangulation import intrinsic_delaunay
-from ..domains.point_cloud import PointCloud
-from ..domains.polyline import Polyline
-from ..domains.triangle_mesh import TriangleMesh
-from ..fields.redistancing import redistance
-from ..sharpening.methods import Convex, Geodesic
-from ..sharpening.sharpen import sharpen
-from ..solids.complete import complete
-from ..solids.orientation import orientation
+from ..grids.grid import Grid
+from ..grids.polyline import Polyline
+from ..grids.redistancing import redistance
+from ..inspection import inspect
+from ..sharpening import sharpen
+from ..sharpening_methods import Convex, Geodesic
+from ..solids.completion import complete
+from ..solids.mesh_orientation import orientation
 from ..solids.sampling import sample
 from ..solids.thickness import thickness
 from ..solver import SignedHeatSolver
-from ..tets.tetrahedralize import tetrahedralize
+from ..surfaces.digital_surface import DigitalSurface
+from ..surfaces.intrinsic_triangulation import intrinsic_delaunay
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.subdivision import common_subdivision
+from ..surfaces.surface_curves import Curve
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..tets.lattice import tetrahedralize
 from ..view import draw_shape, new_figure
 
 

@@ -9,30 +9,30 @@ from typing import Any
 
 import numpy as np
 
-from ..domains.curves import Curve
-from ..domains.grid import Grid
-from ..domains.inspection import CloudReport, SurfaceReport, TetReport, inspect
-from ..domains.polygon_mesh import PolygonMesh
-from ..domains.segments import segments_of
-from ..domains.tet_mesh import TetMesh
-from ..domains.triangle_mesh import TriangleMesh
+from ..area_elements import bounds_around
 from ..errors import SourceError, printable
-from ..geometry.geodesics.paths import gaps
-from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.surface_points import EDGE, FACE, VERTEX, locate_points
+from ..geodesics.shortest_paths import gaps
+from ..grids.grid import Grid
+from ..grids.grid_discretization import fitting_spacing, memory_estimate
+from ..inspection import CloudReport, SurfaceReport, TetReport, inspect
 from ..io import read, read_curves, read_polylines
 from ..io.files import extension
-from ..io.meshes import read_obj_elements
+from ..io.mesh_files import read_obj_elements
 from ..io.scenes import unit_of
-from ..io.voxels import LabelImage
-from ..lowering.area_elements import bounds_around
-from ..lowering.grid.discretization import fitting_spacing, memory_estimate
+from ..io.voxel_files import LabelImage
 from ..memory import available_memory
-from ..solids.fields import BYTES_AT_WORK, BYTES_PER_NODE
-from ..solids.orientation import Orientation, orientation
+from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.surface_points import EDGE, FACE, VERTEX, locate_points
+from ..solids.mesh_orientation import Orientation, orientation
 from ..solids.thickness import Thickness, thickness
+from ..solids.tiles import BYTES_AT_WORK, BYTES_PER_NODE
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.source_segments import segments_of
+from ..surfaces.surface_curves import Curve
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..tets.tet_mesh import TetMesh
+from .operands import describe, field_or_image, labels_of
 from .options import Summary, is_planar
-from .shapes import describe, field_or_image, labels_of
 
 NAMES = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
 WHOLE = 0.9999

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..fields.piecewise_field import PiecewiseField
-from ..geometry.components import connected_components
-from ..geometry.face_pairs import FacePairs, split_corners
-from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.polylines import assemble_polylines
 from ..linear import factorize
-from ..operators.cotan import cotan_matrix, divergence
+from ..mesh.components import connected_components
+from ..mesh.face_pairs import FacePairs, split_corners
+from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.segment_chains import assemble_polylines
+from ..surfaces.cotan import cotan_matrix, divergence
+from .piecewise_field import PiecewiseField
 
 FAR = 3.0
 """Somewhere on a cut the jump is at least this many times the longest side of a typical triangle."""

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from threadpoolctl import threadpool_limits
 
-from ..geometry.components import connected_components
 from ..linear import factorize
 from ..linear.splitting import split_rounds
+from ..mesh.components import connected_components
 
 LOOSE = 0.15
 """Gap from which on it is checked whether constants leave a cut. Without one, what is left is below the triangles."""

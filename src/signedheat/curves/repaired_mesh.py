@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import Note
-from ..domains.curves import Curve, SurfacePoints
-from ..domains.polygon_mesh import PolygonMesh
-from ..domains.triangle_mesh import TriangleMesh
-from ..fields.vertex_field import VertexField
-from ..geometry.edges import orient_faces, pair_halfedges
-from ..geometry.welding import coincident_faces, joined_rims
+from ..mesh.edges import orient_faces, pair_halfedges
+from ..mesh.welding import coincident_faces, joined_rims
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.surface_curves import Curve, SurfacePoints
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..surfaces.vertex_field import VertexField
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -8,16 +8,17 @@ from itertools import chain
 from typing import Any, TypeVar
 
 from ..discretization import discretize
-from ..domains.curves import CurveOrPoints, CurvesAndPoints
-from ..domains.kinds import SurfaceDomain
-from ..domains.triangle_mesh import TriangleMesh
 from ..errors import CancellingNormalsError, GeometryError, SourceError
-from ..extrapolation import Diffusion
-from ..lowering.surface.curve_groups import CurveGroups
-from ..lowering.surface.discretization import SurfaceDiscretization
-from ..lowering.surface.intrinsic import Retriangulated, RetriangulatedForZeroSet
+from ..foreign import as_list
+from ..kinds import SurfaceDomain
 from ..progress import Progress
-from ..solver import SignedHeatSolver, as_list
+from ..solver import SignedHeatSolver
+from ..surfaces.curve_groups import CurveGroups
+from ..surfaces.extrapolation import Diffusion
+from ..surfaces.intrinsic_discretization import Retriangulated, RetriangulatedForZeroSet
+from ..surfaces.surface_curves import CurveOrPoints, CurvesAndPoints
+from ..surfaces.surface_discretization import SurfaceDiscretization
+from ..surfaces.triangle_mesh import TriangleMesh
 
 SHORT = 16.0
 """Length of a curve, or of all its pieces, in h, below which triangles are made for them."""

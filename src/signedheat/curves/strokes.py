@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..geometry.components import members_of
-from ..geometry.curve_segments import CurveSegments
-from ..geometry.geodesics.sources import PlacedSegments
-from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.minimum_cut import CutGraph
+from ..geodesics.geodesic_sources import PlacedSegments
 from ..linear import factorize
-from ..lowering.surface.discretization import SurfaceDiscretization
+from ..mesh.components import members_of
+from ..mesh.curve_segments import CurveSegments
+from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..surfaces.surface_discretization import SurfaceDiscretization
+from .minimum_cut import CutGraph
 
 REWARD = 1.0
 """What explaining a stroke is worth, relative to its length: at most 1, since a line round a stroke is as long again.

@@ -1,15 +1,22 @@
 """Reading and writing of shapes, curves and fields."""
 
-from .curves import CURVE_FORMATS, read_curves, write_curves
-from .fields import FIELD_FORMATS, VALUE_FORMATS, VERTEX_FIELD_FORMATS, ensure_field_writable, load_field, save_field
+from .curve_files import CURVE_FORMATS, read_curves, write_curves
+from .drawing_files import POLYLINE_FORMATS, read_polylines, write_polylines
+from .field_files import (
+    FIELD_FORMATS,
+    VALUE_FORMATS,
+    VERTEX_FIELD_FORMATS,
+    ensure_field_writable,
+    load_field,
+    save_field,
+)
 from .files import ensure_writable
-from .polylines import POLYLINE_FORMATS, read_polylines, write_polylines
 from .scenes import read_step
-from .shapes import SHAPE_FORMATS, read, save
-from .solids import SAMPLE_FORMATS, load
-from .tets import TET_FIELD_FORMATS
+from .shape_files import SHAPE_FORMATS, read, save
+from .solid_files import SAMPLE_FORMATS, load
+from .tet_files import TET_FIELD_FORMATS
 from .vdb import write_vdb
-from .voxels import LabelImage, read_labels, read_volume
+from .voxel_files import LabelImage, read_labels, read_volume
 
 __all__ = [
     "CURVE_FORMATS",

@@ -12,8 +12,8 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.joining import Body, placed
 from ..errors import FileFormatError
+from ..joining import Body, placed
 from .files import PathLike, companion_contents, contents, damaged, ensure_fits
 
 NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}

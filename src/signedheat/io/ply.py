@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.exchange import Elements
 from ..errors import FileFormatError
+from ..exchange import Elements
 from .files import PathLike, contents, damaged, ensure_writable, parsed_numbers, replacing
 
 _TYPES = {

@@ -12,11 +12,11 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.joining import Body, concatenated, placed
-from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
-from ..geometry.welding import welded
+from ..joining import Body, concatenated, placed
+from ..mesh.welding import welded
 from ..packages import ensure_installed
+from ..surfaces.triangle_mesh import TriangleMesh
 from . import gltf
 from .files import PathLike, contents, damaged, ensure_fits, extension, reading
 from .sandbox import parsed

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cache import fingerprint
-from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import refuse_extreme
 from ..errors import FileFormatError, GeometryError
-from ..geometry.meshes import face_areas
+from ..mesh.triangles import face_areas
 from ..solids.solid import Solid
 from ..solids.winding import Windings
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import refuse_extreme
 
 NEEDED = ("triangles", "origins", "confidence", "bounding", "closing", "key")
 SOURCE = ("source_vertices", "source_faces")

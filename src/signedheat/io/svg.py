@@ -13,9 +13,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.polyline import Polyline
 from ..errors import FileFormatError
-from ..geometry.outlines import filled_outlines
+from ..grids.polyline import Polyline
+from ..mesh.outlines import filled_outlines
 from .files import PathLike, contents, damaged
 
 CURVE_PIECES = 64

@@ -17,10 +17,10 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.exchange import NAME
 from ..errors import FileFormatError
-from ..fields.grid_field import GridField
-from ..operators.grid.blocks import SIDE, Blocks
+from ..exchange import NAME
+from ..grids.blocks import SIDE, Blocks
+from ..grids.grid_field import GridField
 from .files import PathLike, format_for, replacing
 
 MAGIC, FILE_VERSION, LIBRARY = 0x56444220, 224, (10, 0)

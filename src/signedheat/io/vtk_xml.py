@@ -19,8 +19,8 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.exchange import Elements
 from ..errors import FileFormatError
+from ..exchange import Elements
 from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers, unpacked
 
 _TYPES = {f"{kind}{8 * size}": f"{kind[0].lower()}{size}" for kind in ("Int", "UInt") for size in (1, 2, 4, 8)}

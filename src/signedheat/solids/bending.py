@@ -8,11 +8,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..geometry.box_tree import BoxTree
-from ..geometry.components import connected_components, sums_of
-from ..geometry.directions import unit
-from ..geometry.edges import edge_table
-from ..geometry.meshes import area_vectors, face_areas
+from ..mesh.box_tree import BoxTree
+from ..mesh.components import connected_components, sums_of
+from ..mesh.edges import edge_table
+from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.unit_vectors import unit
 from .lids import Lid, running_mean, vertex_normals
 
 REACH = 0.25

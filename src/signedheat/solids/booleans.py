@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import Diagnostics
-from ..domains.joining import concatenated
-from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
-from ..geometry.arrangement import arranged
-from ..geometry.welding import indexed
-from .keeping import outward
+from ..joining import concatenated
+from ..mesh.arrangement import arranged
+from ..mesh.welding import indexed
+from ..surfaces.triangle_mesh import TriangleMesh
+from .kept_faces import outward
 from .regions import Regions
 from .solid import Solid
 from .winding import Windings

@@ -15,13 +15,13 @@ import scipy
 from numpy.typing import NDArray
 
 from ..frozen import Frozen
-from ..geometry.components import connected_components
-from ..geometry.directions import unit
-from ..geometry.meshes import area_vectors
-from ..geometry.part_levels import levels_within
-from ..geometry.winding_tree import WindingTree
+from ..mesh.components import connected_components
+from ..mesh.triangles import area_vectors
+from ..mesh.unit_vectors import unit
+from ..search.winding_tree import WindingTree
 from .chain import Chain
 from .gauss import Matrix, Pieces, means, sampled, system_of
+from .part_levels import levels_within
 from .rims import meeting_edges, open_edges
 
 Nesting = Literal["given", "cavities", "bodies"]

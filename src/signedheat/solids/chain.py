@@ -12,14 +12,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.triangle_mesh import TriangleMesh
 from ..frozen import Frozen
-from ..geometry.components import element_components
-from ..geometry.directions import unit
-from ..geometry.edges import EdgeTable, FaceOrientation, edge_table, orient_faces, pair_halfedges
-from ..geometry.inner_walls import inner_walls
-from ..geometry.meshes import area_vectors
-from ..geometry.welding import coincident_faces, welded_vertices
+from ..mesh.components import element_components
+from ..mesh.edges import EdgeTable, FaceOrientation, edge_table, orient_faces, pair_halfedges
+from ..mesh.triangles import area_vectors
+from ..mesh.unit_vectors import unit
+from ..mesh.welding import coincident_faces, welded_vertices
+from ..surfaces.triangle_mesh import TriangleMesh
+from .inner_walls import inner_walls
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ..frozen import Frozen
-from ..geometry.box_tree import BoxTree
-from ..geometry.components import element_components
-from ..geometry.directions import unit
-from ..geometry.edges import edge_keys, edge_table
-from ..geometry.meshes import area_vectors, face_areas
+from ..mesh.box_tree import BoxTree
+from ..mesh.components import element_components
+from ..mesh.edges import edge_keys, edge_table
+from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.unit_vectors import unit
 from . import bending, creases, lids, lost_faces, walls
 from .rims import boundary, corners_of, loops
 from .spanning import Frame, frame_of

@@ -12,18 +12,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.grid import Grid
-from ..domains.triangle_mesh import TriangleMesh
 from ..errors import OutsideError
-from ..fields.levels import on_level
-from ..geometry.dual_cells import Crossings, DualCells, cells_around, dual_cells, open_cells, separate_triangles
-from ..geometry.marching import CLEARANCE
-from ..operators.grid.blocks import SIDE, Blocks, BlockValues
+from ..field_levels import on_level
+from ..grids.blocks import SIDE, Blocks, BlockValues
+from ..grids.grid import Grid
+from ..grids.marching import CLEARANCE
+from ..mesh.dual_cells import Crossings, DualCells, cells_around, dual_cells, open_cells, separate_triangles
 from ..progress import Progress
-from .features import divided_along_creases, placed
-from .fields import blocks_where, in_threads, prepared, tiles_of
-from .nodes import solved
+from ..surfaces.triangle_mesh import TriangleMesh
+from .dual_vertices import divided_along_creases, placed
+from .node_distances import solved
 from .offsets import Offset
+from .tiles import blocks_where, in_threads, prepared, tiles_of
 
 WINDOW = 8
 """Blocks along each edge of a window in which crossed edges are looked for together."""

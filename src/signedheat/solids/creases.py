@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.directions import unit
+from ..mesh.unit_vectors import unit
 from .lids import SmoothRim
 from .rims import corners_of
 from .spanning import area_vector, frame_of, points_inside, spanned

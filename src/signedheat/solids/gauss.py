@@ -25,12 +25,12 @@ from scipy import sparse
 
 from ..compiled import compiled
 from ..frozen import Frozen
-from ..geometry.box_tree import LEAF, BoxTree, morton_codes
-from ..geometry.components import sums_of
-from ..geometry.directions import unit
-from ..geometry.meshes import area_vectors, face_areas
-from ..geometry.winding_tree import WindingTree, mean_angle
+from ..mesh.box_tree import LEAF, BoxTree, morton_codes
+from ..mesh.components import sums_of
+from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.unit_vectors import unit
 from ..parallel import in_chunks
+from ..search.winding_tree import WindingTree, mean_angle
 
 HELD = 0.01
 """λ, which keeps weights small that nothing asks for."""

@@ -9,9 +9,9 @@ import scipy
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..geometry.components import sums_of
-from ..geometry.directions import unit
-from ..geometry.meshes import area_vectors, face_areas
+from ..mesh.components import sums_of
+from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.unit_vectors import unit
 from . import spanning
 from .spanning import Frame, Spanned
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..errors import SignedHeatError
-from ..geometry.box_tree import LEAF
-from ..geometry.nearest import foot_on_triangle
+from ..mesh.box_tree import LEAF
 from ..parallel import in_chunks
-from .fields import Evaluated
+from ..search.nearest_triangles import foot_on_triangle
+from .tiles import Evaluated
 
 Reach: TypeAlias = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Signed distance of the surface from each of (n, 3) places of the solid."""

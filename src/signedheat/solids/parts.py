@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.components import element_components
-from ..geometry.edges import edge_table
+from ..mesh.components import element_components
+from ..mesh.edges import edge_table
 
 
 def parts_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.arrangement import TOUCHING, Arrangement
-from ..geometry.components import connected_components, sums_of
-from ..geometry.directions import unit
-from ..geometry.edges import EdgeTable, edge_table
-from ..geometry.meshes import area_vectors, face_areas
-from ..geometry.welding import distinct_rows
+from ..mesh.arrangement import TOUCHING, Arrangement
+from ..mesh.components import connected_components, sums_of
+from ..mesh.edges import EdgeTable, edge_table
+from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.unit_vectors import unit
+from ..mesh.welding import distinct_rows
 from .winding import DEPTH, Windings
 
 SAMPLES = 3

@@ -7,10 +7,10 @@ import scipy
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..geometry.components import grouped, sums_of
-from ..geometry.directions import axes_across, unit
-from ..geometry.edges import edge_table
-from ..geometry.meshes import area_vectors
+from ..mesh.components import grouped, sums_of
+from ..mesh.edges import edge_table
+from ..mesh.triangles import area_vectors
+from ..mesh.unit_vectors import axes_across, unit
 
 PLACES = 8
 """Places on an edge from which edges that run along it are searched for: nearer to each other than `ALONG`."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..packages import lazy_module
 
-files: Any = lazy_module("signedheat.io.solids", "files")
+files: Any = lazy_module("signedheat.io.solid_files", "files")
 
 Layout = Literal["arrays", "deepsdf"]
 """How samples are kept in a file: an array for each attribute, or ``pos`` and ``neg`` with x, y, z and distance."""

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.kinds import Shapes
-from ..domains.validation import finite_number, whole_number
 from ..errors import OutsideError, SignedHeatError, SourceError
-from ..fields.grid_field import GridField
-from ..geometry.meshes import face_areas
+from ..grids.grid_field import GridField
+from ..kinds import Shapes
 from ..memory import refuse_beyond_memory
-from .complete import complete
+from ..mesh.triangles import face_areas
+from ..validation import finite_number, whole_number
+from .completion import complete
 from .sample_set import Samples
 
 WIDTHS = (0.05, 0.0158)

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, InexactWarning, warn_user
-from ..geometry.face_features import FaceFeatures
-from ..geometry.face_tree import FaceTree
-from ..geometry.nearest import foot_on_triangle
-from ..geometry.self_intersections import self_intersections
+from ..mesh.self_intersections import self_intersections
 from ..packages import lazy_module
+from ..search.face_features import FaceFeatures
+from ..search.face_tree import FaceTree
+from ..search.nearest_triangles import foot_on_triangle
+from ..surfaces.triangle_mesh import TriangleMesh
 
 manifold3d: Any = lazy_module("manifold3d", "simplified surfaces")
 

@@ -12,35 +12,35 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics
-from ..domains.exchange import Displayed
-from ..domains.foreign import Represented
-from ..domains.grid import Grid
-from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import finite_number, flag, positive_number, query_points, shaped
 from ..errors import InexactWarning, SignedHeatError, SourceError, warn_user
-from ..fields.grid_field import GridField
-from ..fields.solid_queries import Closest
+from ..exchange import Displayed
+from ..foreign import Represented
 from ..frozen import Frozen
-from ..geometry.box_tree import order_in_space
-from ..geometry.face_features import FaceFeatures
-from ..geometry.face_tree import FaceTree, NearestFaces
-from ..geometry.meshes import area_vectors, face_areas
-from ..geometry.nearest import weights_in
+from ..grids.grid import Grid
+from ..grids.grid_field import GridField
+from ..grids.solid_queries import Closest
+from ..mesh.box_tree import order_in_space
+from ..mesh.triangles import area_vectors, face_areas
 from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..progress import Progress
 from ..reprs import short
+from ..search.face_features import FaceFeatures
+from ..search.face_tree import FaceTree, NearestFaces
+from ..search.nearest_triangles import weights_in
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import finite_number, flag, positive_number, query_points, shaped
 from .contouring import sharp_surface
-from .fields import band_field, dense_field
-from .keeping import given_surface, outward, unjoined
+from .kept_faces import given_surface, outward, unjoined
 from .offsets import Offset, Reach
 from .sample_set import Samples
 from .simplification import simplified
 from .stores import Scheduler
+from .tiles import band_field, dense_field
 from .winding import Windings
 
 booleans: Any = lazy_module("signedheat.solids.booleans", "solids")
-files: Any = lazy_module("signedheat.io.solids", "files")
+files: Any = lazy_module("signedheat.io.solid_files", "files")
 morphology: Any = lazy_module("signedheat.morphology", "solids")
 sampling: Any = lazy_module("signedheat.solids.sampling", "solids")
 
@@ -307,7 +307,7 @@ class Solid(Displayed, Represented, Frozen):
         Examples
         --------
         >>> from signedheat import samples
-        >>> from signedheat.solids.complete import complete
+        >>> from signedheat.solids.completion import complete
         >>> field = complete(samples.sphere(3)).field(resolution=32)
         >>> field.values.shape, field([[0.0, 0.0, 0.9]]).round(2)
         ((32, 32, 32), array([-0.1]))
@@ -376,7 +376,7 @@ class Solid(Displayed, Represented, Frozen):
         Examples
         --------
         >>> from signedheat import samples
-        >>> from signedheat.solids.complete import complete
+        >>> from signedheat.solids.completion import complete
         >>> surface = complete(samples.sphere(3)).surface(-0.2, resolution=32)
         >>> bool(np.abs(np.linalg.norm(surface.vertices, axis=1) - 0.8).max() < 0.01)
         True

@@ -8,8 +8,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..geometry.components import connected_components
-from ..geometry.edges import edge_keys, edge_table
+from ..mesh.components import connected_components
+from ..mesh.edges import edge_keys, edge_table
 
 GROWTH = 0.35
 """How fast triangles grow with their distance from the rim, over that distance."""

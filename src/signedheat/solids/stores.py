@@ -23,14 +23,14 @@ from numpy.typing import NDArray
 
 from ..cache import fingerprint
 from ..diagnostics import Note
-from ..domains.grid import Grid
 from ..errors import FileFormatError, SignedHeatError
-from ..geometry.face_tree import FaceTree
-from ..operators.grid.blocks import SIDE, Blocks
+from ..grids.blocks import SIDE, Blocks
+from ..grids.grid import Grid
 from ..packages import lazy_module
 from ..parallel import connected, n_threads
 from ..progress import Progress
-from .nodes import solved
+from ..search.face_tree import FaceTree
+from .node_distances import solved
 from .winding import Windings
 
 distributed: Any = lazy_module("distributed", "Dask clusters")

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.directions import unit
-from ..geometry.meshes import area_vectors
-from ..geometry.stabbing_lines import LineCrossings, stabbing_lines
-from .orientation import Mesh
+from ..mesh.triangles import area_vectors
+from ..mesh.unit_vectors import unit
+from ..search.stabbing_lines import LineCrossings, stabbing_lines
+from .mesh_orientation import Mesh
 
 N_LINES = 30_000
 """Lines laid through a shape to measure it."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.triangle_mesh import TriangleMesh
-from ..geometry.directions import unit
-from ..geometry.edges import edge_table
-from .complete import complete
+from ..mesh.edges import edge_table
+from ..mesh.unit_vectors import unit
+from ..surfaces.triangle_mesh import TriangleMesh
+from .completion import complete
 from .sampling import WIDTHS, evenly_on
 
 SHARP = np.deg2rad(30.0)

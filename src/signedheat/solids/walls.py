@@ -8,8 +8,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..geometry.components import connected_components
-from ..geometry.directions import unit
+from ..mesh.components import connected_components
+from ..mesh.unit_vectors import unit
 from .lids import cut_to_pieces
 from .rims import corners_of, meeting_edges
 from .spanning import area_vector

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.grid import Grid
-from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, SourceError
-from ..geometry.components import element_components
-from ..geometry.face_tree import FaceTree
-from ..geometry.meshes import face_areas, part_volumes
-from ..geometry.self_intersections import self_intersections
-from .keeping import given_surface, unjoined
+from ..grids.grid import Grid
+from ..mesh.components import element_components
+from ..mesh.self_intersections import self_intersections
+from ..mesh.triangles import face_areas, part_volumes
+from ..search.face_tree import FaceTree
+from ..surfaces.triangle_mesh import TriangleMesh
+from .kept_faces import given_surface, unjoined
 from .simplification import simplified
 from .solid import Solid
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError
 from ..frozen import Frozen
-from ..geometry.edges import edge_table
-from ..geometry.meshes import area_vectors
-from ..geometry.welding import same_positions
-from ..geometry.winding_tree import WindingTree
+from ..mesh.edges import edge_table
+from ..mesh.triangles import area_vectors
+from ..mesh.welding import same_positions
+from ..search.winding_tree import WindingTree
 
 INSIDE = 0.5
 """Winding number above which a point is inside; it is an integer, but for the error of the tree."""

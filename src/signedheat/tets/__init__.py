@@ -1,1 +1,1 @@
-"""Tets around and inside broken shapes."""
+"""Tet meshes, and distance on them: operators, sources, discretisation, meshing, field."""

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.grid import room_around
-from ..domains.point_cloud import PointCloud
-from ..domains.tet_mesh import TetMesh
+from ..area_elements import area_elements, bounds_around
 from ..errors import GeometryError
-from ..lowering.area_elements import area_elements, bounds_around
+from ..grids.grid import room_around
 from ..packages import lazy_module
+from ..surfaces.point_cloud import PointCloud
+from .tet_mesh import TetMesh
 
 pytetwild: Any = lazy_module("pytetwild", "tets of fTetWild")
 tetgen: Any = lazy_module("tetgen", "tets of TetGen")

@@ -10,25 +10,25 @@ from typing import Any
 
 import numpy as np
 
-from ..domains.digital_surface import DigitalSurface
-from ..domains.foreign import converted
-from ..domains.grid import Grid
-from ..domains.kinds import Shape
-from ..domains.point_cloud import PointCloud
-from ..domains.polygon_mesh import PolygonMesh
-from ..domains.polyline import Polyline
-from ..domains.tet_mesh import TetMesh
-from ..domains.triangle_mesh import TriangleMesh
+from ..curves.piecewise_field import PiecewiseField
 from ..errors import MissingPackageError
-from ..fields.grid_field import GridField
-from ..fields.piecewise_field import PiecewiseField
-from ..fields.tet_field import TetField
-from ..fields.vertex_field import VertexField, on_simple_surface
+from ..foreign import converted
+from ..grids.grid import Grid
+from ..grids.grid_field import GridField
+from ..grids.polyline import Polyline
 from ..io.files import PathLike
+from ..kinds import Shape
 from ..packages import lazy_module
+from ..surfaces.digital_surface import DigitalSurface
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..surfaces.vertex_field import VertexField, on_simple_surface
+from ..tets.tet_field import TetField
+from ..tets.tet_mesh import TetMesh
 from .figures import new_figure, picture
-from .slices import clearest_layer, draw_line, draw_plane, draw_slices
-from .surfaces import draw_shape, draw_surface
+from .slice_pictures import clearest_layer, draw_line, draw_plane, draw_slices
+from .surface_pictures import draw_shape, draw_surface
 
 pillow: Any = lazy_module("PIL.Image", "pictures")
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frozen import read_only
-from ..geometry.stabbing_lines import crossings_at_pixels
+from ..search.stabbing_lines import crossings_at_pixels
 
 SIZE = 900
 """Pixels along the longer side."""

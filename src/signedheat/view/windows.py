@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from ..domains.exchange import NAME
-from ..domains.grid import Grid
-from ..domains.polyline import Polyline
-from ..domains.tet_mesh import TetMesh
+from ..curves.piecewise_field import PiecewiseField
 from ..errors import GeometryError, OutsideError
-from ..fields.grid_field import GridField
-from ..fields.piecewise_field import PiecewiseField
-from ..fields.tet_field import TetField
-from ..fields.vertex_field import VertexField
+from ..exchange import NAME
+from ..grids.grid import Grid
+from ..grids.grid_field import GridField
+from ..grids.polyline import Polyline
 from ..packages import lazy_module
+from ..surfaces.vertex_field import VertexField
+from ..tets.tet_field import TetField
+from ..tets.tet_mesh import TetMesh
 from .figures import even_colors, isolines_between
-from .surfaces import INNER_COLOR, OUTER_COLOR
+from .surface_pictures import INNER_COLOR, OUTER_COLOR
 
 pyvista: Any = lazy_module("pyvista", "windows")
 

@@ -1,0 +1,243 @@
+"""Oriented area elements: what a shape in space is to the method, whatever it was made of (Eq. 11 in space).
+
+Triangles, fans of polygons, segments of a polyline and oriented points are all simplices with a vector: area times
+normal. They are bisected until they are no larger than a cell, and merged again per cell and connected component, so
+that neither huge faces nor millions of tiny ones cost more than the cells that they pass through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import singledispatch
+from math import gamma, pi
+from typing import Any
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from .errors import CancellingNormalsError, SourceError
+from .foreign import what_to_pass
+from .grids.binning import merge_in_cells
+from .grids.grid import Grid
+from .grids.node_sources import NodeSources
+from .grids.polyline import Polyline
+from .grids.wavefront import padded_shape
+from .mesh.components import element_components
+from .mesh.triangles import area_vectors
+from .mesh.unit_vectors import unit
+from .mesh.welding import same_positions
+from .surfaces.point_cloud import PointCloud
+from .surfaces.polygon_mesh import PolygonMesh
+from .surfaces.triangle_mesh import TriangleMesh
+from .tets.tet_mesh import TetMesh
+
+NEIGHBOURS = 8
+"""Neighbours from which the area of an oriented point is estimated."""
+SIZE = 1.0
+"""Longest edge, in cells, of the simplices into which the elements of shapes are bisected."""
+ROUNDING = 1e-9
+"""Where normals cancel up to less than this fraction of the area, what is left is rounding error."""
+
+
+@dataclass(frozen=True, eq=False)
+class AreaElements:
+    """Simplices with area vectors.
+
+    Attributes
+    ----------
+    corners : (m, c, d) float
+        Corners: three for triangles, two for segments, one for points.
+    vectors : (m, d) float
+        Area times unit normal.
+    weights : (m,) float
+        Area; negative for the parts of a nonconvex polygon's fan that lie outside it.
+    components : (m,) int
+        Connected component of the shape, from 0.
+    spacing : float
+        Mean distance between points of a cloud; 0 for simplices, which can be sampled as densely as needed.
+    """
+
+    corners: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    components: NDArray[np.int64]
+    spacing: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class AreaSamples:
+    """Area elements merged per cell of a grid and per connected component.
+
+    Attributes
+    ----------
+    positions : (s, d) float
+        Mean position, in cells from the grid's origin.
+    vectors : (s, d) float
+        Sum of area times unit normal.
+    weights : (s,) float
+        Sum of areas.
+    components, source_ids : (s,) int
+        Connected component, and source, that each sample belongs to.
+    spacing : float
+        h_source: the largest of the sources' mean spacings.
+    outside : float
+        Fraction of the area that lies outside the grid.
+    cancelled : float
+        Fraction of the area inside the grid whose normals cancel with others of the same cell and component: sheets
+        thinner than a cell, and faces given twice with opposite orientations.
+    nodes : NodeSources
+        X₀: the vectors spread to the nodes by linear interpolation, up to a common factor.
+    """
+
+    positions: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    components: NDArray[np.int64]
+    source_ids: NDArray[np.int64]
+    spacing: float
+    outside: float
+    cancelled: float
+    nodes: NodeSources
+
+    def chosen(self, rows: NDArray[np.int64]) -> AreaSamples:
+        """Some of the samples; what is said of all of them stays."""
+        each = ("positions", "vectors", "weights", "components", "source_ids")
+        return replace(self, **{name: getattr(self, name)[rows] for name in each})
+
+
+@singledispatch
+def area_elements(shape: Any) -> AreaElements:
+    """Lower a shape in space or in the plane to simplices with area vectors; further kinds of shapes register here."""
+    raise SourceError(
+        f"distance in space is measured to a TriangleMesh, PolygonMesh or PointCloud with normals, in the plane to a "
+        f"Polyline, not to a {type(shape).__name__}",
+        remedy=what_to_pass(shape),
+        element="source",
+    )
+
+
+@area_elements.register
+def _(shape: TriangleMesh) -> AreaElements:
+    corners = shape.vertices[shape.faces]
+    components = components_of(shape.vertices, shape.faces)
+    return AreaElements(corners, shape.face_area_vectors, shape.face_areas, components)
+
+
+@area_elements.register
+def _(shape: TetMesh) -> AreaElements:
+    """The boundary of the tets."""
+    return area_elements(shape.boundary)
+
+
+@area_elements.register
+def _(shape: PolygonMesh) -> AreaElements:
+    """Fans around centroids, whose area vectors add up to that of the polygon, planar and convex or not."""
+    polygon = shape.corner_polygons
+    fans = np.stack([shape.corners, shape.next_corners], axis=1)
+    corners = np.concatenate([shape.polygon_centroids[polygon][:, None], shape.vertices[fans]], axis=1)
+    vectors = area_vectors(corners)
+    weights = np.einsum("ij,ij->i", vectors, unit(shape.polygon_area_vectors)[polygon])
+    return AreaElements(corners, vectors, weights, components_of(shape.vertices, fans))
+
+
+@area_elements.register
+def _(shape: PointCloud) -> AreaElements:
+    if shape.normals is None:
+        raise SourceError(
+            "the point cloud has no normals, which say what is inside",
+            remedy="give them, or estimate and orient them first",
+        )
+    areas = point_areas(shape.points) if shape.areas is None else shape.areas
+    components = np.zeros(shape.n_points, dtype=np.int64)
+    sides = shape.points.shape[1] - 1  # dimension of the boundary; on a line single points bound, and have no spacing
+    spacing = float(np.mean(areas)) ** (1.0 / sides) if sides else 0.0
+    return AreaElements(shape.points[:, None], areas[:, None] * shape.normals, areas, components, spacing)
+
+
+def bounds_around(shapes: Sequence[Any]) -> NDArray[np.float64]:
+    """(2, d) lower and upper corner of the box around shapes that have area elements."""
+    for shape in shapes:
+        if area_elements.dispatch(type(shape)) is area_elements.dispatch(object):
+            area_elements(shape)  # which raises
+    bounds = np.stack([shape.bounds for shape in shapes])
+    return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
+
+
+def point_areas(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) area that each point represents: that of the disk around it up to its k-th neighbour, divided by k.
+
+    Points that coincide share the area of one. In d dimensions the disk is a ball of dimension d − 1.
+    """
+    places, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
+    dimension = points.shape[1] - 1
+    k = min(NEIGHBOURS, len(places) - 1)
+    if dimension == 0 or k == 0:
+        return np.ones(len(points)) / counts[which.ravel()]
+    reach = scipy.spatial.cKDTree(places).query(places, k=[k + 1], workers=-1)[0][:, 0]
+    unit_ball = pi ** (dimension / 2) / gamma(dimension / 2 + 1)
+    areas: NDArray[np.float64] = unit_ball * reach**dimension / k / counts
+    return areas[which.ravel()]
+
+
+def components_of(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m,) connected component of each face; vertices at the same position are one vertex."""
+    return element_components(same_positions(vertices)[faces])
+
+
+def sample_on_grid(shapes: Sequence[Any], grid: Grid) -> AreaSamples:
+    """Bisect the elements of shapes until no edge is longer than `SIZE` cells; merge them per cell and component."""
+    steps = np.zeros(4)
+    steps[4 - grid.dimension :] = grid.spacing
+    nodes = NodeSources.empty(padded_shape(grid.shape), steps)
+    scale = float(np.prod(grid.spacing)) ** ((grid.dimension - 1) / grid.dimension)
+    parts, first, spacing = [], 0, 0.0
+    total = inside = 0.0
+    for owner, shape in enumerate(shapes):
+        elements = area_elements(shape)
+        if elements.corners.shape[2] != grid.dimension:
+            raise SourceError(
+                f"source {owner} lives in {elements.corners.shape[2]} dimensions, and the grid in {grid.dimension}",
+                element=f"source {owner}",
+            )
+        order = np.argsort(elements.components, kind="stable")
+        corners = (elements.corners - grid.origin) / grid.spacing
+        each = corners, elements.vectors, elements.weights, elements.components
+        samples, nodes = merge_in_cells(*each, order, np.array(grid.shape), SIZE, nodes, scale)
+        positions, vectors, weights, components = samples
+        total += float(elements.weights.sum())
+        inside += float(weights.sum())
+        spacing = max(spacing, elements.spacing)
+        parts.append((positions, vectors, weights, components + first, np.full(len(weights), owner)))
+        first += int(elements.components.max()) + 1
+    positions, vectors, weights, components, owners = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    if total <= 0:
+        raise SourceError("the source has no area: every face is degenerate", element="source")
+    if not len(weights):
+        raise SourceError(
+            f"the grid from {grid.origin.tolist()} to {grid.upper.tolist()} misses the shape",
+            remedy="move or enlarge it",
+        )
+    if not nodes.sums.any() and vectors.any():
+        raise SourceError(
+            f"the shape is lost in the cells of the grid, whose spacing {grid.spacing.tolist()} is so much larger",
+            element="source",
+            remedy="choose a smaller spacing, or scale the shape",
+        )
+    left = float(np.linalg.norm(vectors, axis=1).sum() / weights.sum())
+    if left < ROUNDING:
+        raise CancellingNormalsError(
+            "the normals of the source cancel each other everywhere, so that nothing separates inside from outside",
+            remedy="remove or turn one of its coinciding sides",
+        )
+    outside = max(0.0, 1.0 - inside / total)
+    cancelled = max(0.0, 1.0 - left)
+    return AreaSamples(positions, vectors, weights, components, owners, spacing, outside, cancelled, nodes)
+
+
+@area_elements.register
+def _(shape: Polyline) -> AreaElements:
+    tangents = shape.segments[:, 1] - shape.segments[:, 0]
+    normals = np.stack([-tangents[:, 1], tangents[:, 0]], axis=1)
+    return AreaElements(shape.segments, normals, shape.segment_lengths, np.zeros(len(tangents), dtype=np.int64))

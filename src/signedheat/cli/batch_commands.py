@@ -1,0 +1,284 @@
+"""Commands about many shapes: `batch` and `watertight`."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from argparse import Namespace
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import signedheat as sh
+
+from ..errors import SignedHeatError, SourceError, printable
+from .late_imports import files, inputs, pool
+from .late_imports import operands as shapes
+from .options import (
+    LABEL,
+    METHOD,
+    MOST_WORKERS,
+    ROOM,
+    SAMPLING,
+    SCHEDULER,
+    STEPS,
+    Summary,
+    check_grid,
+    command,
+    finite,
+    group,
+    is_quiet,
+    option,
+    output,
+    positive,
+    refuse_together,
+    whole_number,
+    workers,
+)
+from .terminal import ProgressBar, say, write_out
+
+SURFACE_FILES = ("stl", "obj", "ply", "off", "vtp")
+MANY = (
+    option(
+        "inputs",
+        metavar="FILE",
+        nargs="+",
+        help="files, folders with all in them, patterns in quotes; - takes a list from standard input, a line for each",
+    ),
+    option("--surface", choices=SURFACE_FILES, help="files of surfaces (stl)"),
+    workers("processes (one for each processor)"),
+    option("--time-limit", type=positive, metavar="S", help="seconds after which a shape is given up"),
+)
+"""What commands take that make something of many shapes."""
+WANTED = group(
+    "what is made of each shape, one or more of",
+    option(
+        "--volume",
+        nargs="?",
+        const="npz",
+        choices=("npz", "vti", "nrrd", "npy", "vdb"),
+        help="the field, as .npz if nothing is said",
+    ),
+    option("--offset", type=finite, nargs="+", default=[], metavar="D", help="closed surfaces at distances"),
+    option(
+        "--sample", type=whole_number(1), nargs="?", const=250_000, metavar="N", help="points to learn from (250000)"
+    ),
+    option("--info", action="store_true", help="counts and defects, in the manifest"),
+)
+RUNNING = group(
+    "running",
+    option("--threads", type=whole_number(1, MOST_WORKERS), default=1, metavar="N", help="threads of each process (1)"),
+    SCHEDULER,
+)
+
+
+def check_batch(arguments: Namespace) -> None:
+    """Reject a batch that makes nothing, and options that contradict each other."""
+    check_grid(arguments)
+    try:
+        job_of(arguments)
+    except SignedHeatError as problem:
+        arguments.parser.error(str(problem))
+
+
+@command(
+    "batch",
+    "the same for many shapes",
+    "Fields, offsets, samples and reports of many shapes, each in a process of its own, with a manifest of what came "
+    "of each. What is done is skipped when the batch is started again.",
+    output("results, and manifest.jsonl", "FOLDER"),
+    *(*MANY, WANTED, RUNNING, SAMPLING, ROOM, STEPS, METHOD),
+    check=check_batch,
+    usage="FILE [FILE ...] -o FOLDER [--volume] [--offset D ...] [--sample] [--info] [options]",
+)
+def batch(arguments: Namespace) -> Summary:
+    """Do the job for every shape."""
+    options = {"threads": arguments.threads, "scheduler": arguments.scheduler}
+    done = made_of_each(arguments, arguments.output, job_of(arguments), **options)
+    states = [outcome.state for outcome in done.outcomes]
+    counts = {state: states.count(state) for state in dict.fromkeys(states)}
+    seconds = sum(outcome.seconds for outcome in done.outcomes)
+    summary = {
+        "inputs": arguments.inputs,
+        "manifest": str(done.manifest),
+        "shapes": len(done.outcomes),
+        "states": counts,
+        "skipped": done.skipped,
+        "seconds": round(seconds, 3),
+        "failed": len(done.failures),
+    }
+    each = ", ".join(f"{number} {state}" for state, number in counts.items())
+    before = f" ({done.skipped} of them before)" if done.skipped else ""
+    counted = f"{len(states)} shapes, {each}{before}, {pool.duration(seconds)} of work"
+    return summary, f"{printable(str(done.manifest))}: {counted}"
+
+
+def names_surface(output: str) -> bool:
+    """Whether an output is the name of a surface's file, and not of a folder."""
+    is_folder = output.endswith(("/", os.sep)) or os.path.isdir(output)
+    return not is_folder and Path(output).suffix.lower().lstrip(".") in SURFACE_FILES
+
+
+def check_watertight(arguments: Namespace) -> None:
+    """Reject options that contradict each other; take the format from the name of the output."""
+    refuse_together(arguments, "--spacing", "--resolution")
+    if names_surface(arguments.output):
+        ending = Path(arguments.output).suffix.lower().lstrip(".")
+        if arguments.surface not in (None, ending):
+            arguments.parser.error(f"--surface {arguments.surface} and -o {arguments.output} do not go together")
+        arguments.surface = ending
+
+
+@command(
+    "watertight",
+    "closed meshes of broken shapes",
+    "The closed mesh of each shape, and a line that says what it is: bodies, volume, what was completed, how far it is "
+    "from the faces that were given, and back. Faces are kept where they bound the solid and join with its completion; "
+    "elsewhere the surface is contoured with its edges and corners. Sheets are refused unless they are given a "
+    "thickness.",
+    output("a file for one shape; or a folder for the files of many, and manifest.jsonl"),
+    *(*MANY, LABEL),
+    option("--thickness", type=positive, metavar="D", help="of the solids around sheets"),
+    option("--contour", action="store_true", help="contour everything: even triangles in place of few"),
+    option("--tolerance", type=positive, metavar="D", help="fewer triangles, no farther away than this (manifold3d)"),
+    option("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side, for contours (256)"),
+    option("--spacing", type=positive, metavar="H", help="cells of contours, in units of the file"),
+    option(
+        "--sample",
+        type=whole_number(1),
+        metavar="N",
+        help="write N points of each kind, for trainers of generators: on the surface and on sharp edges with normals, "
+        "in the volume and near both with distances",
+    ),
+    option("--normalize", action="store_true", help="move and scale the shape of the samples into the unit sphere"),
+    check=check_watertight,
+    usage="FILE [FILE ...] -o OUT [options]",
+)
+def watertight(arguments: Namespace) -> Summary:
+    """Do it for every shape; a line for each."""
+    job = sh.batches.Watertight(
+        surfaces=f".{arguments.surface or 'stl'}",
+        thickness=arguments.thickness,
+        contoured=arguments.contour,
+        tolerance=arguments.tolerance,
+        resolution=arguments.resolution or 256,
+        spacing=arguments.spacing,
+        samples=arguments.sample,
+        normalize=arguments.normalize,
+        label=arguments.label,
+    )
+    if names_surface(arguments.output):
+        return one_watertight(arguments, job)
+    done = made_of_each(arguments, arguments.output, job, in_words)
+    summary = {
+        "inputs": arguments.inputs,
+        "manifest": str(done.manifest),
+        "shapes": [{"output": each.outputs, **each.figures} for each in done.outcomes if each.is_done],
+        "skipped": done.skipped,
+        "failed": len(done.failures),
+    }
+    closed = len(done.outcomes) - len(done.failures)
+    return summary, f"{printable(str(done.manifest))}: {closed} of {len(done.outcomes)} shapes closed"
+
+
+def one_watertight(arguments: Namespace, job: sh.batches.Watertight) -> Summary:
+    """Do it for one shape, in files that are named after the output."""
+    target = Path(arguments.output)
+    n_shapes = len(inputs.expand(listed(arguments.inputs)))
+    if n_shapes != 1:
+        arguments.parser.error(f"{n_shapes} shapes do not go into one file: name a folder, such as -o {target.stem}/")
+    sh.io.ensure_writable(target, {target.suffix.lower()}, "a surface")
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}-") as folder:
+        done = made_of_each(arguments, folder, job)
+        (outcome,) = done.outcomes
+        stem = Path(outcome.name).name
+        names = {made: target.with_name(target.stem + Path(made).name.removeprefix(stem)) for made in outcome.outputs}
+        for made, name in names.items():
+            files.move_into_place(Path(folder, made), name)
+    written = [str(name) for name in names.values()]
+    summary = {
+        "inputs": arguments.inputs,
+        "manifest": None,
+        "shapes": [{"output": written, **outcome.figures}] if outcome.is_done else [],
+        "skipped": 0,
+        "failed": len(done.failures),
+    }
+    return summary, f"{target}: {in_words(dict(outcome.figures))}" if outcome.is_done else ""
+
+
+def in_words(figures: dict[str, object]) -> str:
+    """One line of what `figures_of` found."""
+    bodies, openings, meeting = (figures[key] for key in ("bodies", "openings", "self_intersections"))
+    share = 100 * float(str(figures["completed_area"])) / max(float(str(figures["area"])), 1e-300)
+    return (
+        f"{bodies} {'body' if bodies == 1 else 'bodies'}, volume {figures['volume']:.4g}, {figures['faces']} faces, "
+        f"{openings} {'opening' if openings == 1 else 'openings'} completed ({share:.2g} % of the area), "
+        f"{figures['to_faces']:.2g} from the faces and {figures['from_faces']:.2g} back at most, "
+        f"{meeting or 'no'} self-intersections; {figures['way']}"
+    )
+
+
+def made_of_each(
+    arguments: Namespace,
+    folder: str,
+    job: Callable[[Path, Path], Mapping[str, object]],
+    line: Callable[[dict[str, object]], str] | None = None,
+    **options: Any,
+) -> sh.batches.Batch:
+    """Do a job for every shape: a line on standard error for each that is not done, and perhaps one for each that is.
+
+    `line` makes the line about a shape that is done, from its figures; `options` are further ones of
+    `signedheat.batches.run`.
+    """
+    with ProgressBar(is_quiet(arguments)) as progress:
+
+        def report(outcome: sh.batches.Outcome) -> None:
+            if not outcome.is_done:
+                progress.clear()
+                say(printable(f"signedheat: {outcome.input}: {outcome.state}: {outcome.message}"))
+            elif line is not None and not is_quiet(arguments):
+                progress.clear()
+                write_out(printable(f"{outcome.outputs[0]}: {line(dict(outcome.figures))}"))
+
+        return sh.batches.run(
+            listed(arguments.inputs),
+            folder,
+            job,
+            workers=arguments.workers,
+            time_limit=arguments.time_limit,
+            progress=progress,
+            report=report,
+            **options,
+        )
+
+
+def listed(inputs: list[str]) -> list[str]:
+    """Inputs, with the lines of standard input in place of ``-``."""
+    if "-" not in inputs:
+        return inputs
+    lines = [line.rstrip("\r\n") for line in (sys.stdin or ()) if line.strip()]
+    if not lines:
+        raise SourceError("there is nothing on standard input", remedy="write a file name on each line", path="-")
+    at = inputs.index("-")
+    return [*inputs[:at], *lines, *(each for each in inputs[at + 1 :] if each != "-")]
+
+
+def job_of(arguments: Namespace) -> sh.batches.Job:
+    """The job that the options describe."""
+    sampling = None
+    if arguments.sample is not None:
+        named = {name: getattr(arguments, name) for name in ("near", "seed", "normalize", "layout")}
+        sampling = sh.batches.Sampling(n=arguments.sample, widths=tuple(arguments.widths), **named)
+    same = ("info", "padding", "band", "diffusion", "as_oriented", "keep_overlaps", "lids", "nested", "plain")
+    spacing = None if arguments.spacing is None else tuple(arguments.spacing)
+    return sh.batches.Job(
+        volume=f".{arguments.volume}" if arguments.volume else None,
+        offsets=tuple(arguments.offset),
+        surfaces=f".{arguments.surface or 'stl'}",
+        samples=sampling,
+        resolution=arguments.resolution or sh.batches.Job.resolution,
+        spacing=spacing[0] if spacing is not None and len(spacing) == 1 else spacing,
+        constraint=shapes.constraint_of(arguments.constraint),
+        **{name: getattr(arguments, name) for name in same},
+    )

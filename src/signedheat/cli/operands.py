@@ -1,0 +1,342 @@
+"""From the arguments of a command to shapes, images, grids and fields, and from these to files."""
+
+from __future__ import annotations
+
+import math
+from argparse import Namespace
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
+from ..curves.drawings import distance_to_lines
+from ..diagnostics import SampledSource
+from ..distances import grid_around, plain_distance
+from ..errors import FileFormatError, GeometryError, SignedHeatError, SourceError, printable
+from ..grids.grid import RESOLUTION, Grid
+from ..grids.grid_field import GridField
+from ..grids.polyline import Polyline
+from ..io import (
+    FIELD_FORMATS,
+    POLYLINE_FORMATS,
+    SHAPE_FORMATS,
+    ensure_writable,
+    load_field,
+    read,
+    read_polylines,
+    save,
+    write_polylines,
+)
+from ..io.field_files import VALUE_FORMATS, save_with_values
+from ..io.files import contents, distinct_names, extension
+from ..io.image_files import CONFIDENCE, NIFTI
+from ..io.key_figures import describe as describe
+from ..io.scenes import METRES, unit_of
+from ..io.voxel_files import LabelImage, read_labels
+from ..memory import refuse_beyond_memory
+from ..progress import Progress, within
+from ..solids.completion import complete
+from ..solids.solid_distance import distance_to_shapes
+from ..surfaces.digital_surface import DigitalSurface
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..tets.lattice import tetrahedralize
+from ..tets.tet_discretization import memory_estimate
+from ..tets.tet_field import TetField
+from ..tets.tet_mesh import TetMesh
+from ..transforms import transform
+from .options import IMAGES, is_planar, is_quiet
+from .terminal import ProgressBar, say
+
+TET_RESOLUTION = 32
+COMPLETED = 0.3
+"""Share of the progress of a band that completing the shape is."""
+CANCELLED = 0.9
+"""Fraction of the area that may cancel without a warning."""
+LISTED = 40
+"""Different whole numbers up to which an image is one of labels."""
+
+
+@contextmanager
+def prefix_errors(path: Any) -> Iterator[None]:
+    """Prefix the messages of errors with the name of the input."""
+    try:
+        yield
+    except SignedHeatError as error:
+        if error.path is not None:
+            raise
+        raise error.at(path) from error
+
+
+def read_source(arguments: Namespace) -> Any:
+    """The source: a shape in space, placed, or a list of polylines in the plane."""
+    path = arguments.shape
+    if is_planar(path):
+        if arguments.transform is not None:
+            raise SourceError("a matrix moves shapes in space, and not drawings", element="--transform", path=path)
+        scale = 1.0 if arguments.units is None else unit_scale(arguments)
+        return [Polyline(scale * line.points, line.closed) for line in read_polylines(path)]
+    shape = read(path)
+    if isinstance(shape, DigitalSurface):
+        shape = shape.smooth_surface
+    matrix = placement(arguments)
+    with prefix_errors(path):
+        return shape if matrix is None else transform(shape, matrix)
+
+
+def placement(arguments: Namespace) -> NDArray[np.float64] | None:
+    """The map of ``--units`` and ``--transform``, units first; None if neither is given."""
+    if arguments.units is None and arguments.transform is None:
+        return None
+    matrix = np.eye(4)
+    if arguments.units is not None:
+        matrix[:3] *= unit_scale(arguments)
+    if arguments.transform is not None:
+        matrix = matrix_of(arguments.transform) @ matrix
+    return matrix
+
+
+def unit_scale(arguments: Namespace) -> float:
+    """What ``--units`` multiplies lengths by: 1 where neither it nor the file names the units that the file is in."""
+    own, _, wanted = arguments.units.rpartition(":")
+    own = own or unit_of(arguments.shape)
+    if own is None and not is_quiet(arguments):
+        cause = f"{printable(arguments.shape)} does not say its units"
+        say(f"signedheat: {cause}: taken as {wanted} (else --units inch:{wanted})")
+    return METRES[own or wanted] / METRES[wanted]
+
+
+def matrix_of(words: list[str]) -> NDArray[np.float64]:
+    """(4, 4) from 16 or 12 numbers, row by row, or from a text file that has them."""
+    if len(words) == 1:
+        words = contents(words[0])[:10_000].decode("utf-8", "replace").replace(",", " ").split()
+    try:
+        numbers = np.array([float(word) for word in words])
+    except ValueError:
+        numbers = np.zeros(0)
+    if len(numbers) not in (12, 16) or not np.isfinite(numbers).all():
+        raise SourceError(
+            "a transform has 16 numbers, or 12 without the last row", element="--transform", remedy="give them by rows"
+        )
+    matrix = np.eye(4)
+    matrix[: len(numbers) // 4] = numbers.reshape(-1, 4)
+    return matrix
+
+
+def grid_for(shape: Any, arguments: Namespace, reach: float | None = None, image: LabelImage | None = None) -> Grid:
+    """The grid of the options; by default that of the image, or one around the shape with room for offsets."""
+    spacing = arguments.spacing
+    if spacing is not None and len(spacing) == 1:
+        spacing = spacing[0]
+    if arguments.origin is not None:
+        return Grid(arguments.origin, spacing, arguments.grid_shape)
+    if image is not None and (arguments.resolution, spacing, arguments.padding) == (None, None, None):
+        if reach is None:
+            return image.grid
+        spacing = image.spacing
+    return grid_around(shape, reach or 0.0, arguments.resolution or RESOLUTION, arguments.padding, spacing)
+
+
+def constraint_of(word: str) -> Constraint:
+    """A constraint from its name on the command line.
+
+    Examples
+    --------
+    >>> constraint_of("soft:0.5")
+    Soft(weight=0.5)
+    """
+    name, _, values = word.partition(":")
+    if name == "levels":
+        return LevelValues([float(value) for value in values.split(",")])
+    if name == "soft":
+        return Soft(float(values)) if values else Soft()
+    named: dict[str, Constraint] = {
+        "free": Free(),
+        "zero-set": ZeroSet(),
+        "hard": ZeroSet(hard=True),
+        "each-component": EachComponent(),
+    }
+    return named[word]
+
+
+def measured(
+    arguments: Namespace, image: LabelImage | None = None, reach: float | None = None
+) -> tuple[Any, GridField]:
+    """The shape of a command, from its file or an image, and the distance to it, with room for offsets."""
+    with prefix_errors(arguments.shape):
+        shape = read_source(arguments) if image is None else image.surface(arguments.label)
+        return shape, compute(shape, grid_for(shape, arguments, reach, image), arguments)
+
+
+@overload
+def compute(shape: Any, domain: Grid, arguments: Namespace) -> GridField: ...
+@overload
+def compute(shape: Any, domain: TetMesh, arguments: Namespace) -> TetField: ...
+def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridField | TetField:
+    """Distance to a solid in space, to polylines in the plane; what matters about it goes to standard error."""
+    field: GridField | TetField
+    constraint = constraint_of(arguments.constraint)
+    options: dict[str, Any] = {"constraint": constraint, "diffusion": arguments.diffusion}
+    repair = {name: getattr(arguments, name) for name in ("as_oriented", "keep_overlaps", "lids", "nested")}
+    with ProgressBar(is_quiet(arguments)) as progress:
+        if isinstance(domain, Grid) and arguments.band is not None:
+            solid = complete(shape, **options, **repair, progress=within(progress, 0.0, COMPLETED))
+            field = in_band(solid, domain, arguments, within(progress, COMPLETED, 1.0))
+        elif arguments.plain or not isinstance(constraint, Free | ZeroSet | Soft):
+            field = plain_distance(shape, domain, **options, as_oriented=arguments.as_oriented, progress=progress)
+        elif isinstance(domain, Grid) and domain.dimension == 2:
+            field = distance_to_lines(shape, domain, **options, as_oriented=arguments.as_oriented, progress=progress)
+        else:
+            field = distance_to_shapes(shape, domain, **options, **repair, progress=progress)
+    if not arguments.quiet:
+        for note in field.diagnostics.important:
+            say(printable(f"signedheat: {note}"))
+    return field
+
+
+def in_band(solid: Any, grid: Grid, arguments: Namespace, progress: Progress | None) -> GridField:
+    """Distance in a band: all of it in memory, or tile by tile."""
+    options = {"grid": grid, "band": arguments.band, "store": arguments.tiles, "progress": progress}
+    if arguments.tiles is None or arguments.workers is None:
+        return solid.field(scheduler=arguments.scheduler, **options)
+    with ThreadPoolExecutor(arguments.workers) as pool:
+        field = solid.field(scheduler=pool, **options)
+        return field
+
+
+def hint(field: GridField) -> str:
+    """A further line of output about sources that may have been given twice, or nothing."""
+    note = field.diagnostics.note(SampledSource)
+    cancelled = note.area_cancelled if note else 0.0
+    if cancelled < CANCELLED:
+        return ""
+    return (
+        f"\n{cancelled:.4%} of the area lies within a cell of area that faces the other way, as on thin sheets: if "
+        "faces are doubled, remove one copy"
+    )
+
+
+def range_in_words(summary: dict[str, Any]) -> str:
+    """The least and the greatest value of a field that `describe` described."""
+    return f"φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}"
+
+
+def on_tets(arguments: Namespace) -> tuple[Any, TetField]:
+    """The shape of a command, and the distance to it on tets: of a file, or around the shape."""
+    shape, mesh = read_source(arguments), read(arguments.tets) if arguments.tets else None
+    if mesh is not None and not isinstance(mesh, TetMesh):
+        raise GeometryError(
+            f"{arguments.tets} holds no tets, but a {type(mesh).__name__}",
+            remedy="use a .mesh, .msh, .vtu or .ele file",
+        )
+    with prefix_errors(arguments.shape):
+        if mesh is None:
+            resolution = arguments.resolution or TET_RESOLUTION
+            mesh = tetrahedralize(shape, resolution=resolution, padding=arguments.padding)
+            n = mesh.n_tets
+            refuse_beyond_memory(  # the number of tets grows at least with the square of the resolution
+                f"distance on {n:,} tets",
+                n,
+                memory_estimate,
+                lambda fits: f"lower the resolution from {resolution} to {int(resolution * math.sqrt(fits / n))}",
+            )
+        return shape, compute(shape, mesh, arguments)
+
+
+def field_or_image(path: str) -> Any:
+    """The field in a file; the image in it, if its axes are not x, y, z; None if the format holds neither."""
+    if extension(path) in NIFTI:
+        return read_labels(path)
+    if extension(path) not in FIELD_FORMATS or (
+        extension(path) == ".npy" and not Path(path).with_suffix(".json").is_file()
+    ):
+        return None  # an array alone holds voxels
+    try:
+        return load_field(path)
+    except FileFormatError as error:
+        if extension(path) == ".nrrd":
+            try:
+                return read_labels(path)
+            except FileFormatError:
+                raise error from None
+        raise
+
+
+def image_of(arguments: Namespace) -> LabelImage | None:
+    """The image of labels that the command is about, if it is about one."""
+    if extension(arguments.shape) not in IMAGES:
+        return None
+    image = read_labels(arguments.shape)
+    if image.labels.size and arguments.label is None and image.labels.dtype == bool:
+        return LabelImage(image.labels.astype(np.uint8), image.axes, image.origin, image.space)
+    return image
+
+
+def labels_of(image: LabelImage) -> list[int] | None:
+    """The labels, if these are few whole numbers; otherwise the image holds a field."""
+    values = image.labels.astype(np.int8) if image.labels.dtype == bool else image.labels
+    found = np.unique(values[np.isfinite(values)])
+    if len(found) > LISTED or (found != np.round(found)).any():
+        return None
+    return [int(label) for label in found]
+
+
+def field_of(image: LabelImage) -> GridField:
+    """The values of an image as a field along its own axes."""
+    return GridField(image.grid, image.labels.astype(np.float64))
+
+
+def thing_of(image: LabelImage) -> GridField | PolygonMesh:
+    """What an image shows, along its own axes: a field, or the boundary of all voxels with a label."""
+    if labels_of(image) is None:
+        return field_of(image)
+    return DigitalSurface(image.labels != 0, image.spacing).squares
+
+
+def place_of(image: LabelImage | None) -> dict[str, Any]:
+    """Where an image is, for ``--json``."""
+    if image is None:
+        return {}
+    return {"image": {"axes": image.axes.tolist(), "origin": image.origin.tolist(), "space": image.space}}
+
+
+def ensure_surface_writable(path: str, planar: bool = False) -> None:
+    """Check before computing that a surface, or polylines in the plane, can be written."""
+    if planar:
+        ensure_writable(path, POLYLINE_FORMATS, "lines in the plane")
+    else:
+        ensure_writable(path, SHAPE_FORMATS - {".xyz", ".pc"}, "a surface")
+
+
+def save_level(what: Any, path: str, image: LabelImage | None = None, field: GridField | None = None) -> None:
+    """Write a surface, or polylines in the plane: a surface in the place of the image that it is from.
+
+    Where the field has a confidence, and the format has room for it, that is written at each vertex.
+    """
+    if isinstance(what, list):
+        return write_polylines(path, what)
+    placed = what if image is None else image.to_world(what)
+    if field is not None and field.confidence is not None and extension(path) in VALUE_FORMATS:
+        save_with_values(placed, path, CONFIDENCE, field.confidence_at(what.vertices))
+    else:
+        save(placed, path)
+
+
+def counts(what: Any) -> dict[str, Any]:
+    """Key figures of a surface, or of polylines in the plane."""
+    if isinstance(what, list):
+        closed = sum(line.closed for line in what)
+        return {"lines": len(what), "closed": closed, "length": float(sum(line.length for line in what))}
+    return {"vertices": what.n_vertices, "faces": what.n_faces}
+
+
+def output_names(output: str, distances: list[float]) -> list[str]:
+    """The given name for one distance; a name with the distance in it for each of several."""
+    path = Path(output)
+    if len(distances) == 1 or not path.name:  # a name that is none is refused as it is
+        return [output]
+    return [str(path.with_name(f"{path.stem}_{number}{path.suffix}")) for number in distinct_names(distances)]

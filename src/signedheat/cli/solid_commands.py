@@ -1,0 +1,292 @@
+"""Commands about shapes in space, and drawings in the plane: `volume`, `offset`, `morph`, `sample`, `contour`."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import Any
+
+import signedheat as sh
+
+from ..errors import printable
+from ..packages import require
+from .late_imports import operands as shapes
+from .options import (
+    FLAT_SHAPE,
+    GRID,
+    LABEL,
+    METHOD,
+    PLACE,
+    REPAIR,
+    ROOM,
+    SAMPLING,
+    SLICES,
+    STEPS,
+    SURFACES,
+    TILES,
+    Summary,
+    check_grid,
+    check_tiles,
+    command,
+    finite,
+    format_option,
+    group,
+    is_planar,
+    option,
+    output,
+    positive,
+    refuse_together,
+    shape_option,
+    whole_number,
+)
+
+DISTANCES = {
+    "dilate": (1, 1),
+    "erode": (1, 1),
+    "opening": (1, 1),
+    "closing": (1, 1),
+    "shell": (2, 2),
+    "thicken": (1, 2),
+}
+"""Operations of `morph`, functions of the package, with the least and the greatest number of distances of each."""
+
+
+def check_volume(arguments: Namespace) -> None:
+    """Reject options that contradict each other."""
+    refuse_together(arguments, "--tets", "--spacing", "--origin", "--shape", "--band")
+    if arguments.tets:  # a mesh of one's own
+        refuse_together(arguments, "--tets", "--resolution", "--padding")
+    check_tiles(arguments)
+
+
+@command(
+    "volume",
+    "signed distance on a grid",
+    "Signed distance to a shape, broken or not, at the nodes of a grid in space; or to polylines, positive to their "
+    "left, in the plane.",
+    FLAT_SHAPE,
+    output("field: .npz .vti .nrrd .npy .vdb"),
+    option(
+        "--tets",
+        nargs="?",
+        const="",
+        metavar="MESH",
+        help="measure on tets, of a .mesh .msh .vtu .vtk .ele file or around the shape; OUT: .vtu .vtk .msh",
+    ),
+    *(LABEL, PLACE, GRID, STEPS, METHOD, SLICES, TILES, format_option("npz")),
+    check=check_volume,
+    usage="SHAPE -o OUT [options]",
+)
+def volume(arguments: Namespace) -> Summary:
+    """Read, check that the result can be written, compute, write."""
+    if arguments.tets is not None:
+        return _on_tets(arguments)
+    image = shapes.image_of(arguments)
+    if image is None:
+        sh.io.ensure_field_writable(arguments.output, in_band=arguments.band is not None)
+    else:
+        image.ensure_writable(arguments.output)
+    shape, field = shapes.measured(arguments, image)
+    if image is None:
+        field.save(arguments.output)
+    else:
+        image.save(field, arguments.output)
+    if arguments.preview:
+        sh.view.save_slices(field, arguments.preview, shape)
+    summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), **shapes.place_of(image)}
+    nodes = " × ".join(map(str, field.grid.shape))
+    there = "" if arguments.band is None else f" ({summary['nodes']:,} of them there)"
+    text = f"{printable(arguments.output)}: {nodes} nodes{there}, {shapes.range_in_words(summary)}"
+    return summary, text + shapes.hint(field)
+
+
+def _on_tets(arguments: Namespace) -> Summary:
+    """The same on tets instead of a grid."""
+    sh.io.ensure_writable(arguments.output, sh.io.TET_FIELD_FORMATS, "a field on tets")
+    require("meshio", "fields on tets")
+    shape, field = shapes.on_tets(arguments)
+    field.save(arguments.output)
+    if arguments.preview:
+        sh.view.save_slices(field, arguments.preview, shape)
+    n_tets = field.mesh.n_tets
+    summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), "n_tets": n_tets}
+    return summary, f"{printable(arguments.output)}: {n_tets} tets, {shapes.range_in_words(summary)}"
+
+
+def check_offset(arguments: Namespace) -> None:
+    """Reject options that contradict each other, and distances beyond a band."""
+    check_tiles(arguments)
+    if arguments.output == "-" and len(arguments.distances) > 1:
+        arguments.parser.error("standard output takes one surface: name a file, or give one distance")
+    reach = max(map(abs, arguments.distances))
+    if arguments.band is not None and reach > arguments.band:
+        arguments.parser.error(f"the band reaches to {arguments.band:g}, and the distances to {reach:g}")
+
+
+@command(
+    "offset",
+    "closed surfaces at given distances",
+    "Closed surfaces at given distances from a shape, broken or not; in the plane, lines. Several distances make "
+    "several files: OUT.stl becomes OUT_+0.2.stl, OUT_-0.1.stl.",
+    FLAT_SHAPE,
+    option(
+        "distances",
+        metavar="DISTANCE",
+        type=finite,
+        nargs="+",
+        help="positive outside, negative inside, 0 the closed shape",
+    ),
+    output(f"{SURFACES}; lines: .svg .csv"),
+    *(LABEL, PLACE, GRID, STEPS, METHOD, SLICES, TILES, format_option("stl")),
+    check=check_offset,
+    usage="SHAPE DISTANCE [DISTANCE ...] -o OUT [options]",
+)
+def offset(arguments: Namespace) -> Summary:
+    """Read, check that the results can be written, compute once, contour and write each."""
+    outputs = shapes.output_names(arguments.output, arguments.distances)
+    planar = is_planar(arguments.shape)
+    for path in outputs:
+        shapes.ensure_surface_writable(path, planar)
+    image = shapes.image_of(arguments)
+    shape, field = shapes.measured(arguments, image, max(map(abs, arguments.distances)))
+    with shapes.prefix_errors(arguments.shape):
+        found = [field.offset(distance) for distance in arguments.distances]
+    for what, path in zip(found, outputs, strict=True):
+        shapes.save_level(what, path, image, field)
+    if arguments.preview:
+        sh.view.save_slices(field, arguments.preview, shape, arguments.distances)
+    written = [
+        {"distance": distance, "output": path, **shapes.counts(what)}
+        for distance, path, what in zip(arguments.distances, outputs, found, strict=True)
+    ]
+    kind = "{lines} lines ({closed} closed), length {length:.6g}" if planar else "closed surface, {faces} faces"
+    text = "\n".join(f"{w['output']}: at {w['distance']:+g}, {kind.format(**w)}" for w in written)
+    summary = {"input": arguments.shape, "lines" if planar else "surfaces": written, "field": shapes.describe(field)}
+    return summary | shapes.place_of(image), text + shapes.hint(field)
+
+
+def check_morph(arguments: Namespace) -> None:
+    """Reject a wrong number of distances, and options that contradict each other."""
+    check_grid(arguments)
+    if arguments.operation == "thicken" and (arguments.as_oriented or arguments.keep_overlaps or arguments.plain):
+        arguments.parser.error("--as-oriented, --keep-overlaps and --plain are for solids, and thicken takes sheets")
+    if arguments.operation != "shell" and (arguments.keep_outside or arguments.drain is not None):
+        arguments.parser.error("--keep-outside and --drain are for shells")
+    fewest, most = DISTANCES[arguments.operation]
+    if not fewest <= len(arguments.distances) <= most:
+        wanted = str(fewest) if fewest == most else f"{fewest} or {most}"
+        given = f"{arguments.operation} takes {wanted}, not {len(arguments.distances)}"
+        arguments.parser.error(f"argument DISTANCE: {given}")
+
+
+@command(
+    "morph",
+    "grow, shrink, open, close, hollow or thicken a shape",
+    "Morphology by offsets of the completed signed distance. dilate, erode, opening, closing take one distance; shell "
+    "takes the signed distances of its two sides; thicken takes its reach on the side of the normals and, if it "
+    "differs, on the other side.",
+    option("operation", metavar="OPERATION", choices=DISTANCES, help=", ".join(DISTANCES)),
+    shape_option(),
+    option("distances", metavar="DISTANCE", type=finite, nargs="+", help="in the units of the file"),
+    output(SURFACES),
+    *(PLACE, ROOM, STEPS, METHOD),
+    group(
+        "shells",
+        option("--keep-outside", action="store_true", help="keep the faces given, and make the inner side only (D 0)"),
+        option("--drain", type=positive, metavar="DIAMETER", help="a hole straight down (-z) from the largest cavity"),
+    ),
+    option("--preview", metavar="PNG", help="draw the distance to the shape in slices, with the offsets"),
+    format_option("stl"),
+    check=check_morph,
+)
+def morph(arguments: Namespace) -> Summary:
+    """Read, check that the result can be written, compute, write."""
+    shapes.ensure_surface_writable(arguments.output)
+    shape = shapes.read_source(arguments)
+    fields: list[sh.GridField] = []
+
+    def measure(part: Any, grid: sh.Grid) -> sh.GridField:
+        fields.append(shapes.compute(part, grid, arguments))
+        return fields[-1]
+
+    options: dict[str, Any] = {} if arguments.operation == "thicken" else {"measure": measure}
+    if arguments.operation == "shell":
+        options |= {"keep_outside": arguments.keep_outside, "drain": arguments.drain}
+    with shapes.prefix_errors(arguments.shape):
+        grid = shapes.grid_for(shape, arguments, max(map(abs, arguments.distances)))
+        surface = getattr(sh.morphology, arguments.operation)(shape, *arguments.distances, domain=grid, **options)
+    shapes.save_level(surface, arguments.output)
+    if arguments.preview and fields:
+        inwards = -1 if arguments.operation in ("erode", "opening") else 1
+        first_offsets = [inwards * distance for distance in arguments.distances]
+        sh.view.save_slices(fields[0], arguments.preview, shape, first_offsets)
+    elif arguments.preview:
+        sh.view.save_scene(surface, arguments.preview)
+    summary = {"input": arguments.shape, "operation": arguments.operation, "distances": arguments.distances}
+    summary |= {"output": arguments.output, **shapes.counts(surface)}
+    summary |= {"field": shapes.describe(fields[0])} if fields else {}
+    return summary, f"{printable(arguments.output)}: {arguments.operation}, closed surface of {surface.n_faces} faces"
+
+
+@command(
+    "sample",
+    "points with distances, to learn from",
+    "Points near a shape and around it, with exact signed distances and gradients: training data for networks that "
+    "learn a distance.",
+    shape_option(),
+    output("samples: .npz"),
+    option("-n", "--samples", type=whole_number(1), default=250_000, metavar="N", help="points (250000)"),
+    *(SAMPLING, PLACE, ROOM, REPAIR, METHOD, format_option("npz")),
+    check=check_grid,
+    usage="SHAPE -o OUT.npz [options]",
+)
+def sample(arguments: Namespace) -> Summary:
+    """Check that the result can be written, read, compute, sample, write."""
+    sh.io.ensure_writable(arguments.output, sh.io.SAMPLE_FORMATS, "samples")
+    _, field = shapes.measured(arguments)
+    with shapes.prefix_errors(arguments.shape):
+        taken = sh.sample(field, arguments.samples, near=arguments.near, widths=arguments.widths, seed=arguments.seed)
+    (taken.normalized() if arguments.normalize else taken).save(arguments.output, arguments.layout)
+    figures = taken.figures
+    summary = {"input": arguments.shape, "output": arguments.output, **figures, "field": shapes.describe(field)}
+    inside = figures["inside_share"]
+    counts = f"{len(taken.points)} points, {figures['near']} near the surface, {inside:.1%} inside"
+    return summary, f"{printable(arguments.output)}: {counts}"
+
+
+@command(
+    "contour",
+    "surface of equal distance in a field",
+    "The closed surface, the curves on a surface or the lines in the plane, on which a field takes a level.",
+    option("field", metavar="FIELD", help=".npz .vti .nrrd .npy"),
+    option("level", metavar="LEVEL", type=finite, help="in the units of the field"),
+    output(f"{SURFACES}; of a field on a surface, curves: .obj .json; in the plane, lines: .svg .csv"),
+    format_option("stl"),
+)
+def contour(arguments: Namespace) -> Summary:
+    """Load, contour, write."""
+    path = arguments.output
+    formats = (sh.io.SHAPE_FORMATS | sh.io.CURVE_FORMATS | sh.io.POLYLINE_FORMATS) - {".xyz", ".pc"}
+    sh.io.ensure_writable(path, formats, "a surface, curves or lines")
+    image: sh.io.LabelImage | None = None
+    field = shapes.field_or_image(arguments.field)
+    if field is None:
+        field = sh.load_field(arguments.field)  # on tets, or refused
+    if isinstance(field, sh.io.LabelImage):
+        image = field
+        field = shapes.field_of(field)
+    on_surface = isinstance(field, sh.VertexField)
+    if on_surface:
+        sh.io.ensure_writable(path, sh.io.CURVE_FORMATS, "curves")
+    else:
+        shapes.ensure_surface_writable(path, isinstance(field, sh.GridField) and field.grid.dimension == 2)
+    with shapes.prefix_errors(arguments.field):
+        found = field.contour(arguments.level)
+    if on_surface:
+        sh.io.write_curves(path, found, field.domain)
+        numbers = {"curves": len(found)}
+    else:
+        shapes.save_level(found, path, image)
+        numbers = shapes.counts(found)
+    kind = next(name for name in ("curves", "lines", "faces") if name in numbers)
+    summary = {"input": arguments.field, "level": arguments.level, "output": path, **numbers}
+    return summary, f"{printable(path)}: {numbers[kind]} {kind}"

@@ -1,0 +1,190 @@
+"""Completion of broken curves on surfaces: the zero set of the distance to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..constraints import Constraint, EachComponent, LevelValues
+from ..discretization import discretize
+from ..errors import SourceError
+from ..foreign import ForeignShape, as_list, converted
+from ..kinds import SurfaceDomain
+from ..mesh.components import connected_components
+from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..progress import Progress
+from ..solver import SignedHeatSolver, distance_unwarned
+from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, SurfacePoints
+from ..surfaces.surface_discretization import SurfaceDiscretization
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..surfaces.vertex_field import VertexField
+from ..validation import flag
+from .curve_distance import distance_to_pieces
+from .resolution import flattened, on_resolving_triangles
+
+ZERO = 1e-7
+"""Value, in mean edge lengths, up to which φ is zero at a vertex of the rim."""
+WHOLE = 0.5
+"""Length of a loop, and how near it comes to the curves given, relative to the shortest of them: shorter ones complete
+nothing, nor do those that are farther away, which are where φ has the wrong sign."""
+
+
+def close_curves(
+    domain: SurfaceDomain | ForeignShape,
+    curves: CurvesAndPoints,
+    *,
+    diffusion: float = 1.0,
+    constraint: Constraint | None = None,
+    as_oriented: bool = False,
+    every_piece: bool = False,
+) -> list[Curve]:
+    """Complete broken curves: the zero set of the signed distance to them, which has no gaps.
+
+    On triangle meshes the method runs on an intrinsic triangulation along whose edges the curves run, so that curves
+    may be smaller than the triangles, and the result follows them where they are there. Pieces are first turned until
+    they agree, and those left out that belong to no other, as by `signed_distance`.
+
+    Parameters
+    ----------
+    domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
+        The surface.
+    curves : Curve or a sequence of them
+        Oriented curves, open or closed, noisy, overlapping, crossing.
+    diffusion : float
+        τ in ``t = τ h²``: larger values close gaps along rounder lines (Fig. 18). On triangle meshes h is at most half
+        the length of the pieces, unless the triangles made along them are larger.
+    constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
+        Imposed on φ at the curves; with `ZeroSet`, the default, the result passes through them. With `EachComponent`
+        and `LevelValues` curves are taken as given.
+    as_oriented : bool
+        Turn no curve, and leave none out.
+    every_piece : bool
+        Leave no curve out.
+
+    Returns
+    -------
+    list of Curve
+        Oriented as the given curves, one for each connected component; closed, or ending at the boundary of the
+        surface.
+
+    Raises
+    ------
+    SourceError
+        If no curve is oriented, or one does not fit the surface.
+
+    Examples
+    --------
+    A straight line with a gap, on a flat strip of triangles.
+
+    >>> import numpy as np, signedheat as sh
+    >>> x, y = np.meshgrid(np.arange(8.0), np.arange(5.0), indexing="ij")
+    >>> corner = np.arange(40).reshape(8, 5)[:-1, :-1].ravel()
+    >>> faces = np.concatenate([corner[:, None] + [0, 5, 6], corner[:, None] + [0, 6, 1]])
+    >>> mesh = sh.TriangleMesh(np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1), faces)
+    >>> broken = [mesh.polyline([[0, 2.5, 0], [2, 2.5, 0]]), mesh.polyline([[4, 2.5, 0], [7, 2.5, 0]])]
+    >>> whole = sh.close_curves(mesh, broken)
+    >>> whole
+    [Curve(21 points, open, oriented)]
+    """
+    listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
+    refuse_without_sides(listed)
+    field = conforming_distance(domain, listed, constraint, diffusion, None, as_oriented, every_piece)
+    return zero_set(field, listed)
+
+
+def conforming_distance(
+    domain: SurfaceDomain | ForeignShape,
+    curves: CurvesAndPoints,
+    constraint: Constraint | None,
+    diffusion: float,
+    progress: Progress | None = None,
+    as_oriented: bool = False,
+    every_piece: bool = False,
+) -> VertexField:
+    """Distance on triangles that have the curves along their edges, so that none is too small to be seen.
+
+    Other domains than triangle meshes, and meshes too thin to be triangulated anew, are taken as they are.
+    """
+    as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
+    own_levels = isinstance(constraint, EachComponent | LevelValues)
+
+    def measured(solver: SignedHeatSolver[SurfaceDomain]) -> VertexField:
+        if as_oriented or own_levels:
+            return distance_unwarned(solver, curves, constraint)
+        return distance_to_pieces(solver, curves, constraint, every_piece)[0]
+
+    solver = SignedHeatSolver(cast("SurfaceDomain", converted(domain)), diffusion, progress)
+    return on_resolving_triangles(measured, solver, curves, always=True)
+
+
+def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> None:
+    """Raise `SourceError` if no curve is oriented: an unsigned distance has no zero set besides its sources."""
+    if all(isinstance(curve, Curve | SurfacePoints) and not getattr(curve, "oriented", False) for curve in curves):
+        raise SourceError(
+            "curves without sides, and points, bound nothing that could be completed",
+            remedy="orient the curves",
+        )
+
+
+def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list[Curve]:
+    """The zero set of a field as curves: those that follow or complete the given ones.
+
+    Where a curve runs along the rim of the surface, φ has one sign next to it, and is zero up to rounding on it: there
+    the rim counts as the other side. Loops that are shorter than what they would complete, or far from it, are left
+    out.
+    """
+    if not isinstance(field.domain, TriangleMesh):
+        return field.contour(0.0)
+    fine = field.finest
+    surface = discretize(fine.domain)
+    assert isinstance(surface, SurfaceDiscretization)
+    values = fine.values.copy()
+    beyond_the_rim(surface.triangles, values)
+    found = replace(fine, values=values).contour(0.0)
+    given = [each for each in flattened(curves) if isinstance(each, Curve) and each.oriented]
+    shortest = min(length(field.domain, each) for each in given)
+    near = scipy.spatial.cKDTree(np.concatenate([field.domain.positions(each) for each in given]))
+    whole = [
+        curve
+        for curve in found
+        if not curve.closed
+        or (
+            length(field.domain, curve) > WHOLE * shortest
+            and near.query(field.domain.positions(curve))[0].min() < WHOLE * shortest
+        )
+    ]
+    return whole or found
+
+
+def beyond_the_rim(triangles: IntrinsicMesh, values: NDArray[np.float64]) -> None:
+    """Give zeros in rows along the rim the sign of the rim beyond both ends; else the one that neighbours lack."""
+    least = ZERO * float(triangles.lengths_of_edges.mean())
+    zero, ends = np.abs(values) <= least, triangles.edges.vertices
+    rim = ends[triangles.edges.face_counts == 1]
+    row = connected_components(len(values), *rim[zero[rim].all(axis=1)].T)
+    in_row = np.zeros(len(values), dtype=bool)
+    in_row[rim[zero[rim]]] = True
+
+    def neighbor_signs(edges: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Sum of the signs at the other ends of edges from each row."""
+        tail, head = np.concatenate([edges, edges[:, ::-1]]).T
+        out = in_row[tail] & ~zero[head]
+        return np.bincount(row[tail[out]], np.sign(values[head[out]]), len(values)).astype(float)
+
+    beyond, nearby = neighbor_signs(rim), neighbor_signs(ends)
+    long = np.bincount(row[in_row], minlength=len(values)) > 1
+    side = np.where(np.abs(beyond) > 1, np.sign(beyond), np.where(long, -np.sign(nearby), 0.0))[row]
+    chosen = in_row & (side != 0)
+    values[chosen] = least * side[chosen]
+
+
+def length(mesh: TriangleMesh, curve: Curve) -> float:
+    """Length of a curve, measured straight between its points."""
+    points = mesh.positions(curve)
+    following = np.roll(points, -1, axis=0) if curve.closed else points[1:]
+    return float(np.linalg.norm(following - points[: len(following)], axis=1).sum())

@@ -1,0 +1,321 @@
+"""Signed distance to drawings in the plane: what outlines fill, strokes, and by heat what completes them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, ClassVar, Literal, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..area_elements import bounds_around
+from ..constraints import Constraint, EachComponent, LevelValues
+from ..diagnostics import Diagnostics, Note
+from ..errors import ConstraintError
+from ..foreign import as_list
+from ..frozen import Frozen
+from ..grids.grid import RESOLUTION, Grid
+from ..grids.grid_field import GridField
+from ..grids.polyline import Polyline
+from ..grids.solid_queries import Closest
+from ..kinds import Sources
+from ..mesh.components import sums_of
+from ..mesh.outlines import LEAST_SHARE, FillRule, filled_outlines
+from ..mesh.unit_vectors import unit
+from ..progress import Progress, within
+from ..search.face_tree import FaceTree
+from ..solver import SignedHeatSolver
+from ..surfaces.extrapolation import Diffusion
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import SMALLEST, flag, query_points, shaped
+from .curve_distance import CurvesTaken, distance_to_pieces
+from .resolution import on_resolving_triangles
+
+FINEST = 1024
+"""Most cells along a drawing on which it is completed, however fine the grid is on which distance is asked. Three
+broken drawings differ by .010 of their radius between 128 and 512 cells, by .007 between 128 and 256."""
+STROKE_NODES = 96
+"""Nodes along the longest side of the triangles on which strokes are compared. Of 150 drawings none is wrong in silence
+and 7 are right with a warning; halved 0 and 5, doubled 0 and 6."""
+CROSSINGS = 10**6
+"""Points times segments that are looked at at a time."""
+NEAR = 1.5
+"""Cells from a line within which it decides the side itself: φ is smooth over about a cell."""
+
+
+def distance_to_lines(
+    lines: Sources,
+    domain: Grid | None = None,
+    *,
+    resolution: int = 128,
+    spacing: ArrayLike | None = None,
+    padding: float | None = None,
+    constraint: Constraint | None = None,
+    diffusion: Diffusion | None = None,
+    fill: FillRule = "nonzero",
+    as_oriented: bool = False,
+    every_piece: bool = False,
+    progress: Progress | None = None,
+) -> GridField:
+    """Signed distance to polylines in the plane: see `signed_distance`, which calls this.
+
+    Closed outlines are filled, and become the boundary of what they fill. Where all lines are closed, that is all.
+    Otherwise strokes are turned until they bound something together, and those left out that do not; the signed heat
+    method decides the sides, and its zero set completes the lines. It runs on a grid around the drawing, however much
+    or little of it is asked for. In other dimensions than two, lines are taken as they are, and φ is returned as the
+    method gives it.
+    """
+    if isinstance(constraint, EachComponent | LevelValues):
+        raise ConstraintError(
+            f"distance to lines is zero on all of them, which {constraint!r} denies",
+            remedy="use SignedHeatSolver.distance",
+        )
+    listed: list[Any] = as_list(lines)
+    if domain is None:
+        domain = Grid.around(bounds_around(listed), resolution, padding, spacing)
+    as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
+    if domain.dimension != 2:
+        return SignedHeatSolver(domain, diffusion, progress).distance(listed, constraint)
+    notes: list[Note] = []
+    if not as_oriented and all(isinstance(line, Polyline) for line in listed):
+        listed, filled = outlines_filled(listed, fill)
+        notes += [filled] if filled else []
+        if filled and all(line.closed for line in listed):
+            return _field_of(Drawing(_segments(listed)), domain, Diagnostics(notes=tuple(notes)), progress)
+        listed, taken = strokes_that_agree(listed, every_piece, within(progress, 0.0, 0.4))
+        notes += [taken] if taken else []
+    solver = SignedHeatSolver(_grid_around(listed, domain), diffusion, within(progress, 0.4, 0.8))
+    phi = cast("GridField[Literal[2]]", solver.distance(listed, constraint))
+    drawing = Drawing.completed(_segments([line for line in listed if isinstance(line, Polyline)]), phi)
+    diagnostics = replace(phi.diagnostics, notes=(*phi.diagnostics.notes, *notes))
+    return _field_of(drawing, domain, diagnostics, progress)
+
+
+def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics, progress: Progress | None) -> GridField:
+    if progress is not None:
+        progress(0.8, "measure")
+    begin = time.perf_counter()
+    values = drawing.distance(grid.points.reshape(-1, 2)).reshape(grid.shape)
+    timings = {**diagnostics.timings, "measure": time.perf_counter() - begin}
+    return GridField(grid, values, replace(diagnostics, timings=timings), solid=drawing)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OutlinesFilled(Note):
+    """How closed outlines were filled: by which rule, how many, and which share of their length lies inside."""
+
+    rule: str
+    outlines: int
+    length_inside: float
+    text: ClassVar[str] = (
+        "closed outlines: {0.outlines}, filled by the rule {0.rule}; {0.length_inside:.2%} of their length lies inside"
+    )
+
+    @property
+    def important(self) -> bool:
+        return self.length_inside > LEAST_SHARE
+
+
+def outlines_filled(lines: Sequence[Polyline], rule: FillRule) -> tuple[list[Polyline], OutlinesFilled | None]:
+    """The outlines of what closed lines fill, and lines that are not closed; and what was done, if any are filled."""
+    closed = [line for line in lines if line.closed]
+    filled = [Polyline(points, closed=True) for points in filled_outlines([line.points for line in closed], rule)]
+    if not filled:
+        return list(lines), None
+    given, left = (sum(line.length for line in outlines) for outlines in (closed, filled))
+    note = OutlinesFilled(rule, len(closed), max(0.0, 1.0 - left / given))
+    return [*filled, *(line for line in lines if not line.closed)], note
+
+
+def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
+    """A grid around all sources, with cells at most as large as those where distance is asked; around a point those."""
+    bounds = bounds_around(sources)
+    size = float(np.ptp(bounds, axis=0).max())
+    if size == 0:
+        return asked
+    return Grid.around(bounds, spacing=float(np.clip(asked.spacing.min(), size / FINEST, size / RESOLUTION)))
+
+
+def strokes_that_agree(
+    lines: Sequence[Polyline], every_piece: bool = False, progress: Progress | None = None
+) -> tuple[list[Polyline], CurvesTaken | None]:
+    """Strokes turned so that together they bound something, without those that bound nothing; and what was done.
+
+    The plane is a surface like others (`distance_to_pieces`): a rectangle of triangles around the drawing, with a rim
+    to which lines may run. It does not depend on where distance is asked.
+    """
+    if all(line.closed for line in lines):
+        return list(lines), None
+    bounds = bounds_around(lines)
+    size = float(np.ptp(bounds, axis=0).max())
+    sheet = _triangles_around((bounds - bounds[0]) / size)
+    curves = [sheet.polyline(np.pad((line.points - bounds[0]) / size, ((0, 0), (0, 1))), line.closed) for line in lines]
+    field, _ = on_resolving_triangles(
+        lambda solver: distance_to_pieces(solver, curves, None, every_piece),
+        SignedHeatSolver(sheet, 1.0, progress),
+        curves,
+    )
+    note = field.diagnostics.note(CurvesTaken)
+    if note is None:
+        return list(lines), None
+    turned, left_out = set(note.turned), set(note.left_out)
+    return [line.reversed() if k in turned else line for k, line in enumerate(lines) if k not in left_out], note
+
+
+def _triangles_around(bounds: NDArray[np.float64]) -> TriangleMesh:
+    """A rectangle around a box, with the usual room: squares that are cut along one diagonal or the other in turn."""
+    nodes = Grid.around(bounds, STROKE_NODES)
+    index = np.arange(nodes.n_nodes).reshape(nodes.shape)
+    a, b, c, d = (each.ravel() for each in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
+    rising = np.indices(index[1:, 1:].shape).sum(axis=0).ravel() % 2 == 0
+    first = np.where(rising, [a, b, c], [a, b, d])
+    second = np.where(rising, [a, c, d], [b, c, d])
+    return TriangleMesh(np.pad(nodes.points.reshape(-1, 2), ((0, 0), (0, 1))), np.hstack([first, second]).T)
+
+
+def _segments(lines: Sequence[Polyline]) -> NDArray[np.float64]:
+    return np.concatenate([np.empty((0, 2, 2)), *(line.segments for line in lines)])
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing(Frozen):
+    """What distance in the plane is measured to, exactly, at any points.
+
+    Attributes
+    ----------
+    lines : (m, 2, 2) float
+        Ends of the segments that were given. Distance is positive to their left.
+    completion : (k, 2, 2) float
+        Segments where lines are missing.
+    phi : GridField, optional
+        Decides the sides of the completion, and away from lines. Without it lines bound what they go around.
+    """
+
+    lines: NDArray[np.float64]
+    completion: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2, 2)))
+    phi: GridField[Literal[2]] | None = None
+
+    @classmethod
+    def completed(cls, lines: NDArray[np.float64], phi: GridField[Literal[2]]) -> Drawing:
+        """Lines, and the zero set of φ where that is far from them."""
+        crosses = bool((phi.values < 0).any() and (phi.values >= 0).any())
+        zero_set = _segments(phi.contour()) if crosses else np.empty((0, 2, 2))
+        if len(lines) and len(zero_set):
+            away = _tree(lines).distances(_in_space(zero_set.mean(axis=1)))
+            zero_set = zero_set[away > NEAR * float(phi.grid.spacing.max())]
+        return cls(lines, zero_set, phi)
+
+    @property
+    def triangles(self) -> NDArray[np.float64]:
+        """(m + k, 3, 2) the segments, as triangles without area."""
+        return self._segments[:, [0, 1, 1]]
+
+    @cached_property
+    def _segments(self) -> NDArray[np.float64]:
+        return np.concatenate([self.lines, self.completion])
+
+    @cached_property
+    def _tree(self) -> FaceTree:
+        return _tree(self._segments)
+
+    @cached_property
+    def _corners(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+        """(m, 2) corners of the lines; sums of the unit normals of the lines that meet there; and their number."""
+        along = self.lines[:, 1] - self.lines[:, 0]
+        normals = unit(np.stack([-along[:, 1], along[:, 0]], axis=1))
+        corners, at = np.unique(self.lines.reshape(-1, 2), axis=0, return_inverse=True)
+        return (
+            at.reshape(-1, 2),
+            sums_of(np.repeat(normals, 2, axis=0), at.ravel(), len(corners)),
+            np.bincount(at.ravel()),
+        )
+
+    def distance(self, points: ArrayLike) -> NDArray[np.float64]:
+        """(...) signed distances of (..., 2) points, negative inside and to the right of lines."""
+        places, shape = query_points(points, 2)
+        return shaped(self._closest(places)[0], shape)
+
+    def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """(...) whether (..., 2) points are inside."""
+        return self.distance(points) < 0
+
+    def closest(self, points: ArrayLike) -> Closest:
+        """The nearest place for each of (..., 2) points; the faces are segments, with weights of their two ends."""
+        places, shape = query_points(points, 2)
+        distances, nearest, segments = self._closest(places)
+        ends = self._segments[segments]
+        along, away = ends[:, 1] - ends[:, 0], places - nearest
+        shares = ((nearest - ends[:, 0]) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), SMALLEST)
+        left = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        gradients = unit(np.where((distances != 0)[:, None], np.sign(distances)[:, None] * away, left))
+        given = segments < len(self.lines)
+        results = (
+            distances,
+            nearest,
+            np.where(given, segments, -1),
+            np.stack([1 - shares, shares], axis=1),
+            gradients,
+            given.astype(np.float32),
+        )
+        return Closest(*(shaped(result, shape) for result in results))
+
+    def _closest(
+        self, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+        """Signed distances of (n, 2) points, the nearest places, and the segments on which they are."""
+        found = self._tree.search(_in_space(points))
+        nearest, places = self._tree.features.ids[found.faces], found.places[:, :2]
+        on_line = nearest < len(self.lines)
+        sides = np.ones(len(points)) if self.phi is None else np.where(self.phi.interpolate(points) < 0, -1.0, 1.0)
+        if self.phi is not None:
+            on_line &= found.distances < NEAR * float(self.phi.grid.spacing.max())
+        sides[on_line] = self._sides(points[on_line], places[on_line], nearest[on_line])
+        return sides * found.distances, places, nearest
+
+    def _sides(
+        self, points: NDArray[np.float64], places: NDArray[np.float64], nearest: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """1 to the left of lines, −1 to their right; at a corner by the sum of the normals of all that meet there."""
+        corners, sums, counts = self._corners
+        ends = self.lines[nearest]
+        along = ends[:, 1] - ends[:, 0]
+        normals, crowded = np.stack([-along[:, 1], along[:, 0]], axis=1), np.zeros(len(points), dtype=bool)
+        reach = 1e-9 * np.linalg.norm(along, axis=1)
+        for end in range(2):
+            is_end = np.linalg.norm(places - ends[:, end], axis=1) <= reach
+            corner = corners[nearest, end]
+            normals = np.where(is_end[:, None], sums[corner], normals)
+            crowded |= is_end & (counts[corner] > 2)
+        sides = np.where(((points - places) * normals).sum(axis=1) < 0, -1.0, 1.0)
+        if self.phi is None and crowded.any():  # outlines touch there, and their normals may cancel
+            sides[crowded] = np.where(_enclosed(self.lines, points[crowded]), -1.0, 1.0)
+        return sides
+
+
+def _in_space(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.pad(points, ((0, 0), (0, 1)))
+
+
+def _tree(segments: NDArray[np.float64]) -> FaceTree:
+    """Of a triangle that stands on each segment, whose nearest place is at its foot."""
+    a, b = segments.transpose(1, 0, 2)
+    corners = np.pad(np.stack([a, b, (a + b) / 2], axis=1), ((0, 0), (0, 0), (0, 1)))
+    corners[:, 2, 2] = np.linalg.norm(b - a, axis=1)
+    return FaceTree.of_triangles(corners)
+
+
+def _enclosed(outlines: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) whether points are within outlines that do not cross: rays from them meet an odd number of segments."""
+    inside = np.zeros(len(points), dtype=bool)
+    a, b = outlines.transpose(1, 0, 2)
+    step = max(1, CROSSINGS // len(outlines))
+    for begin in range(0, len(points), step):
+        x, y = points[begin : begin + step, None].transpose(2, 0, 1)
+        spans = (a[:, 1] <= y) != (b[:, 1] <= y)
+        turn = (b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (b[:, 1] - a[:, 1]) * (x - a[:, 0])
+        crossed = spans & ((turn > 0) == (b[:, 1] > a[:, 1])) & (turn != 0)
+        inside[begin : begin + step] = crossed.sum(axis=1) % 2 == 1
+    return inside

@@ -1,0 +1,222 @@
+"""Step 3 by a factorisation of C: unknowns at the vertices of a mesh, constraints at any sample points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .cache import LastUsed, fingerprint
+from .discretization import Levels, SourceTerm
+from .errors import ConstraintError
+from .frozen import Frozen
+from .linear import Factor, PardisoFactor, factorize, upper_triangle, whole
+from .linear.conjugate_gradients import conjugate_gradients
+
+_MAX_ROUNDS = 12
+_MAX_INNER = 30
+_MOST_GROWTH = 10.0
+SOFTEST, STIFFEST = 1e-10, 1e10
+"""Strengths of springs, relative to C, below and above which their strength makes no difference beyond rounding."""
+BATCH = 32
+"""Right-hand sides solved at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class DirectIntegration(Frozen):
+    """``C φ = b`` on vertices, under the constraints of Sec. 7.1 but for `fit`, which those who inherit it define.
+
+    Parameters
+    ----------
+    stiffness : (n, n) sparse
+        Upper triangle of C, as `upper_triangle` makes it. Its kernel are the constants on each connected component.
+    factorize : callable
+        From the upper triangle of a matrix to an object with a method ``solve``; one that returns a
+        `PardisoFactor` is given the last one as `like`.
+    spring : float
+        ρ of the augmented Lagrangian behind exact constraints, relative to the largest diagonal entry of C. Larger
+        values need fewer rounds, and worsen the condition of the matrix.
+    """
+
+    stiffness: sparse.csr_matrix
+    factorize: Callable[..., Factor] = factorize
+    spring: float = 1e8
+    _pulled: LastUsed[bytes, Factor] = field(default_factory=LastUsed, init=False, repr=False)
+    _of_this_pattern: LastUsed[bytes, list[Factor]] = field(default_factory=LastUsed, init=False, repr=False)
+
+    @cached_property
+    def components(self) -> NDArray[np.int64]:
+        """(n,) connected component of the domain that each unknown lies in."""
+        labels: NDArray[np.int32] = sparse.csgraph.connected_components(self.stiffness, directed=False)[1]
+        return labels.astype(np.int64)
+
+    @cached_property
+    def factor(self) -> Factor:
+        """Factor of C, made definite by grounding one vertex of each connected component."""
+        return self.factorize(_grounded(self.stiffness, self._first_vertices))
+
+    def solve(self, divergence: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+        """Minimise ∫|∇φ − Y|² with nothing imposed: ``C φ = b`` (Eq. 13)."""
+        return self.solve_many([divergence], [source])[0]
+
+    def solve_many(
+        self, divergences: Iterable[NDArray[np.float64]], sources: Sequence[SourceTerm]
+    ) -> list[NDArray[np.float64]]:
+        """The same for several sources at once."""
+        solved = self.factor.solve(np.stack(list(divergences)).T)
+        return [self._centered(values, source) for values, source in zip(solved.T, sources, strict=True)]
+
+    def fit_exactly(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+        """Impose levels at every sample, or levels up to one unknown constant for each group of samples (Eq. 14).
+
+        The constants are those at which the multipliers of each group add up to zero. On each connected component of
+        the domain one constant is arbitrary; it is fixed by the mean over the samples.
+        """
+        rows, values = source.interpolation, levels.values
+        if levels.groups is None:
+            fitted, _ = self._interpolate(rows, divergence[:, None], values[:, None])
+            refuse_contradictions(rows, values, fitted[:, 0], 1e-4 * (np.abs(values).max() + np.ptp(fitted)))
+            return self._reached(fitted[:, 0], rows)
+        group = levels.groups
+        bound = np.flatnonzero(np.bincount(group)[group] > 1)  # a group of one sample constrains nothing
+        rows, values, group = rows[bound], values[bound], np.unique(group[bound], return_inverse=True)[1]
+        fixed = group[np.unique(self._component_of(rows), return_index=True)[1]]
+        free = np.setdiff1d(group, fixed)
+        held = np.flatnonzero(np.isin(group, free))
+        entries = np.ones(len(held)), (held, np.searchsorted(free, group[held]))
+        loads = sparse.csr_matrix(entries, shape=(len(group), len(free)))
+        _, pull = self._interpolate(rows, divergence[:, None], values[:, None])
+        capacitance = np.empty((len(free), len(free)))
+        for begin in range(0, len(free), BATCH):
+            batch = slice(begin, begin + BATCH)
+            lifted = loads[:, batch].toarray()
+            _, multipliers = self._interpolate(rows, np.zeros((len(divergence), lifted.shape[1])), lifted)
+            capacitance[:, batch] = loads.T @ multipliers
+        constants = np.linalg.lstsq(capacitance, -(loads.T @ pull[:, 0]), rcond=None)[0]
+        fitted, _ = self._interpolate(rows, divergence[:, None], (values + loads @ constants)[:, None])
+        return self._centered(fitted[:, 0], source)
+
+    def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the line or area elements of the samples.
+
+        λ → 0 is the solution of Eq. 13, and what exceeds λ = ∞ by less than rounding is solved as well as that.
+        """
+        rows, stiffest = source.interpolation, float(self.stiffness.diagonal().max())
+        if strength * float(source.weights.sum()) < SOFTEST * stiffest:
+            return self.solve(divergence, source)
+        strength = min(strength, STIFFEST * stiffest / float(source.weights.max()))
+        return self._reached(self._pulled_factor(rows, strength * source.weights).solve(divergence), rows)
+
+    def anchored(self, source: SourceTerm) -> Factor:
+        """Factor of C with φ held at zero along the source."""
+        return self._pulled_factor(source.interpolation, self.springs(source))
+
+    def springs(self, source: SourceTerm) -> NDArray[np.float64]:
+        """(s,) stiffness of the springs that hold φ at the samples."""
+        return np.full(len(source.weights), self.spring * self.stiffness.diagonal().max())
+
+    def _interpolate(
+        self, rows: sparse.csr_matrix, forces: NDArray[np.float64], levels: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Minimise ``½ φᵀ C φ − fᵀ φ`` where ``A φ = l``; also the multipliers μ of ``C φ + Aᵀ μ = f`` (Eq. 14).
+
+        An augmented Lagrangian: its matrix ``C + ρ Aᵀ A`` is definite even if rows of A are dependent, and with stiff
+        springs ρ two or three rounds suffice. Every round starts from the true residuals, which also corrects rounding
+        errors due to ρ. Along nearly dependent rows convergence is slow; there, conjugate gradients find the
+        displacements of the springs that close the remaining gaps. Where rows that depend on each other to rounding
+        contradict each other, no φ of this size closes the gap: it is left as it is.
+        """
+        stiffness = whole(self.stiffness)
+        spring = self.spring * self.stiffness.diagonal().max()
+        factor = self._pulled_factor(rows, np.full(rows.shape[0], spring))
+
+        def pull(displacements: NDArray[np.float64]) -> NDArray[np.float64]:
+            return factor.solve(spring * (rows.T @ displacements))
+
+        values, multipliers = np.zeros_like(forces), np.zeros_like(levels)
+        gap, worst, slow = levels, np.inf, False
+        for _ in range(_MAX_ROUNDS):
+            displacements = gap
+            if slow:  # roughly: what remains is left to the next round
+                displacements = conjugate_gradients(lambda d: rows @ pull(d), gap, tolerance=1e-3, limit=_MAX_INNER)
+            step = factor.solve(forces - stiffness @ values - rows.T @ multipliers) + pull(displacements)
+            if worst < np.inf and np.abs(step).max() > _MOST_GROWTH * np.abs(values).max():
+                break
+            values += step
+            multipliers -= spring * (displacements - rows @ step)
+            gap = levels - rows @ values
+            previous, worst = worst, np.abs(gap).max(initial=0.0)
+            if worst <= 1e-13 * np.abs(values).max():
+                break
+            slow = slow or worst > 0.1 * previous
+        return values, multipliers
+
+    def _pulled_factor(self, rows: sparse.csr_matrix, springs: NDArray[np.float64]) -> Factor:
+        """Factor of ``C + Aᵀ S A``; the last one is kept."""
+        key = fingerprint(rows.indptr, rows.indices, rows.data, springs)
+        return self._pulled(key, lambda: self._factorize_pulled(rows, springs))
+
+    def _factorize_pulled(self, rows: sparse.csr_matrix, springs: NDArray[np.float64]) -> Factor:
+        matrix = upper_triangle(self.stiffness + upper_triangle(rows.T @ sparse.diags_array(springs) @ rows))
+        unreached = np.isin(self.components[self._first_vertices], self._component_of(rows[springs > 0]), invert=True)
+        matrix = _grounded(matrix, self._first_vertices[unreached])
+        before: list[Factor] = self._of_this_pattern(fingerprint(matrix.indptr, matrix.indices), list)
+        factor = self.factorize(matrix, like=before[0]) if before else self.factorize(matrix)
+        before[:] = [factor] if isinstance(factor, PardisoFactor) else []  # others have nothing to share
+        return factor
+
+    @cached_property
+    def _first_vertices(self) -> NDArray[np.int64]:
+        """The first vertex of each connected component."""
+        return np.unique(self.components, return_index=True)[1]
+
+    def _component_of(self, rows: sparse.csr_matrix) -> NDArray[np.int64]:
+        """(s,) connected component of the domain that each sample lies in."""
+        return self.components[rows.indices[rows.indptr[:-1]]]
+
+    def _reached(self, values: NDArray[np.float64], rows: sparse.csr_matrix) -> NDArray[np.float64]:
+        """The values, with NaN on connected components without samples."""
+        return np.where(np.isin(self.components, self._component_of(rows)), values, np.nan)
+
+    def _centered(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+        """Shift φ to a weighted mean of zero over the samples of each connected component; NaN on those without any."""
+        rows = source.interpolation
+        part, n_parts = self._component_of(rows), len(self._first_vertices)
+        weight = np.bincount(part, source.weights, n_parts)
+        mean = np.full(n_parts, np.nan)
+        at_samples = source.weights * self._at_samples(values, source)
+        np.divide(np.bincount(part, at_samples, n_parts), weight, out=mean, where=weight > 0)
+        return values - mean[self.components]
+
+    def _at_samples(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+        """(s,) φ on the source."""
+        return source.interpolation @ values
+
+
+def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.csr_matrix:
+    """The matrix, made definite by larger entries at the vertices given.
+
+    Since b sums to zero on each connected component, the solution is zero at these vertices.
+    """
+    data = matrix.data.copy()
+    diagonal = matrix.indptr[vertices]
+    data[diagonal] += np.where(data[diagonal] > 0, data[diagonal], 1.0)
+    return sparse.csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+def refuse_contradictions(
+    rows: sparse.csr_matrix, levels: NDArray[np.float64], values: NDArray[np.float64], allowed: float
+) -> None:
+    """Refuse levels that some sample misses by more than is allowed, unless all are the same."""
+    gap = np.abs(levels - rows @ values)
+    worst = int(gap.argmax())
+    if np.ptp(levels) > 0 and gap[worst] > allowed:
+        raise ConstraintError(
+            f"the levels contradict each other near vertex {rows.indices[rows.indptr[worst]]}: "
+            "sources that meet or cross need the same level",
+            element=f"vertex {rows.indices[rows.indptr[worst]]}",
+        )

@@ -1,0 +1,606 @@
+"""Shapes as objects of trimesh, PyVista, meshio and Open3D, and back; and what they look like there.
+
+All of them give and take the same (`Elements`): positions, faces, normals of points, or tets. Vertices and faces keep
+their number and order in both directions. Each package is imported only where it is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import GeometryError, UnsupportedTypeError
+from .mesh.components import members_of
+from .mesh.tet_shapes import face_table, signed_volumes
+from .packages import lazy_module
+from .validation import array_of, coordinates, element_ids
+
+TAKEN = "a shape of signedheat, trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces)"
+"""What is taken for a shape, for messages."""
+
+if TYPE_CHECKING:
+    import meshio
+    import open3d
+    import pyvista
+else:
+    meshio = lazy_module("meshio", "objects of meshio")
+    open3d = lazy_module("open3d", "objects of Open3D")
+    pyvista = lazy_module("pyvista", "objects of PyVista")
+trimesh: Any = lazy_module("trimesh", "objects of trimesh")
+shapes: Any = lazy_module("signedheat.io.shape_files", "files")
+drawing: Any = lazy_module("signedheat.view.drawing", "pictures")
+windows: Any = lazy_module("signedheat.view.windows", "windows")
+
+Kind = TypeVar("Kind", bound="Exchangeable[Any]")
+Trimesh = TypeVar("Trimesh")
+"""The type of trimesh that corresponds to a kind of shape."""
+NAME = "signed_distance"
+"""Of the values of a field, in objects of PyVista and in files."""
+_SIDES = {"triangle": 3, "quad": 4}
+_VTK_FACES = {5: "triangle", 7: "polygon", 9: "quad"}
+_VTK_TETRA = 10
+
+
+def with_values(thing: Any, values: NDArray[np.floating]) -> Any:
+    """An object of PyVista with the values of a field at its points."""
+    thing.point_data[NAME] = np.array(values)
+    thing.set_active_scalars(NAME)
+    return thing
+
+
+class Displayed:
+    """A shape or a field that can be looked at."""
+
+    def plotter(self) -> pyvista.Plotter:
+        """A `pyvista.Plotter` in which this is drawn, to add more to it, or to make a file of it.
+
+        Fields have the colours of all pictures here: blue for negative distance, orange for positive, light at zero;
+        the surface or line of distance zero is drawn too. Of shapes, outer sides are light and inner sides red.
+
+        Returns
+        -------
+        pyvista.Plotter
+            Not shown yet.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed (``pip install pyvista``).
+
+        Examples
+        --------
+        >>> from signedheat import samples
+        >>> samples.sphere(1).plotter().export_html("ball.html")  # doctest: +SKIP
+        """
+        return windows.plotter_of(self)
+
+    def plot(self) -> object:
+        """Show this in a window, or in the notebook, by PyVista; with trame installed, notebooks can turn it.
+
+        Returns
+        -------
+        object
+            What `pyvista.Plotter.show` returns: nothing after a window, what is displayed in a notebook.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed (``pip install pyvista``).
+
+        Examples
+        --------
+        >>> from signedheat import samples
+        >>> samples.broken_duck().plot()  # doctest: +SKIP
+        """
+        return self.plotter().show()
+
+    def _repr_html_(self) -> str:
+        return drawing.html_of(self)
+
+
+def _no_ids() -> NDArray[np.int64]:
+    return np.empty(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Elements:
+    """What a shape is made of, in this package and in the others.
+
+    Attributes
+    ----------
+    points : (n, 3) float
+        Vertices, or the points of a cloud.
+    corners, counts : (k,), (m,) int
+        Vertex ids of all faces, one face after another, and how many each has. None: a cloud, or tets.
+    normals : (n, 3) float, optional
+        Of points.
+    tets : (t, 4) int, optional
+        Vertex ids, where there are tets and no faces.
+    areas : (n,) float, optional
+        Of points.
+    values : mapping
+        Further numbers at the points, by name.
+    """
+
+    points: NDArray[Any]
+    corners: NDArray[np.int64] = field(default_factory=_no_ids)
+    counts: NDArray[np.int64] = field(default_factory=_no_ids)
+    normals: NDArray[Any] | None = None
+    tets: NDArray[np.int64] | None = None
+    areas: NDArray[Any] | None = None
+    values: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+    @classmethod
+    def of_triangles(cls, points: NDArray[Any], faces: Any, normals: NDArray[Any] | None = None) -> Elements:
+        """With faces as rows of three vertex ids."""
+        rows = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
+        return cls(points, rows.ravel(), np.full(len(rows), 3), normals)
+
+    @property
+    def kind(self) -> str:
+        """The name of the kind of shape that has these elements."""
+        if self.tets is not None:
+            return "TetMesh"
+        if not len(self.counts):
+            return "PointCloud"
+        return "TriangleMesh" if (self.counts == 3).all() else "PolygonMesh"
+
+    @property
+    def faces(self) -> list[NDArray[np.int64]]:
+        """Vertex ids of each face; of tets without faces, of the outer ones."""
+        if self.tets is not None:
+            return list(outer_faces(self.points, self.tets))
+        return np.split(self.corners, np.cumsum(self.counts)[:-1]) if len(self.counts) else []
+
+    @property
+    def triangles(self) -> NDArray[np.int64]:
+        """(m, 3) vertex ids of the faces, which must be triangles; of tets without faces, the outer ones."""
+        if self.tets is not None:
+            return outer_faces(self.points, self.tets)
+        wrong = np.flatnonzero(self.counts != 3)
+        if len(wrong):
+            raise GeometryError(
+                f"face {wrong[0]} has {self.counts[wrong[0]]} corners, not 3",
+                remedy="use PolygonMesh instead",
+                element=f"face {wrong[0]}",
+            )
+        return self.corners.reshape(-1, 3)
+
+
+def outer_faces(points: NDArray[Any], tets: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m, 3) vertex ids of the faces of tets that have a single tet, oriented outward."""
+    ids = element_ids(tets, "tets", 4, len(points))
+    turned = np.where(signed_volumes(coordinates(points, "vertices", 3), ids)[:, None] < 0, ids[:, [0, 1, 3, 2]], ids)
+    table = face_table(turned)
+    return table.vertices[table.tet_counts == 1]
+
+
+class Exchangeable(Displayed, Generic[Trimesh]):
+    """A shape that can be saved, and converted from and to objects of trimesh, PyVista, meshio and Open3D.
+
+    Vertices and faces keep their number and order. Each package is optional, and imported when it is needed.
+    """
+
+    _has_faces = True
+
+    @classmethod
+    def _of(cls: type[Kind], elements: Elements) -> Kind:
+        """The shape with these elements."""
+        raise NotImplementedError
+
+    @property
+    def _elements(self) -> Elements:
+        raise NotImplementedError
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write to a file, in the format given by its extension: see `signedheat.save`.
+
+        Parameters
+        ----------
+        path : str or path
+            ``.stl``, ``.obj``, ``.ply``, ``.off`` or ``.vtp``; points also ``.xyz`` and ``.pc``.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is another, has no place for such a shape, or the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     sh.samples.sphere(1).save(f"{folder}/ball.ply")
+        ...     sh.read(f"{folder}/ball.ply")
+        TriangleMesh(42 vertices, 80 faces)
+        """
+        shapes.save(self, path)
+
+    @classmethod
+    def from_trimesh(cls: type[Kind], thing: object) -> Kind:
+        """Convert a mesh, a cloud or a scene of trimesh.
+
+        Parameters
+        ----------
+        thing : object
+            `trimesh.Trimesh`, `trimesh.PointCloud`, or a `trimesh.Scene`, whose meshes are taken in their places.
+
+        Returns
+        -------
+        TriangleMesh, PolygonMesh or PointCloud
+            Of the class that this was called on.
+
+        Raises
+        ------
+        SignedHeatError
+            If it holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles.
+
+        Examples
+        --------
+        >>> import trimesh
+        >>> import signedheat as sh
+        >>> sh.TriangleMesh.from_trimesh(trimesh.creation.box())
+        TriangleMesh(8 vertices, 12 faces)
+        """
+        return cls._of(from_trimesh(thing))
+
+    def to_trimesh(self) -> Trimesh:
+        """Convert to trimesh.
+
+        Returns
+        -------
+        trimesh.Trimesh or trimesh.PointCloud
+            Not processed: vertices and faces keep their order.
+
+        Raises
+        ------
+        MissingPackageError
+            If trimesh is not installed.
+        GeometryError
+            If it has polygons of more than three corners.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.samples.sphere(1).to_trimesh().is_watertight
+        True
+        """
+        return to_trimesh(self._elements)
+
+    @classmethod
+    def from_pyvista(cls: type[Kind], thing: object) -> Kind:
+        """Convert a surface of PyVista, or the boundary of tets.
+
+        Point data ``Normals`` are the normals of points; the parts of a `pyvista.MultiBlock` become one shape.
+
+        Parameters
+        ----------
+        thing : object
+            `pyvista.PolyData`, `pyvista.UnstructuredGrid`, or a `pyvista.MultiBlock` of them.
+
+        Returns
+        -------
+        TriangleMesh, PolygonMesh or PointCloud
+            Of the class that this was called on.
+
+        Raises
+        ------
+        SignedHeatError
+            If it holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles.
+
+        Examples
+        --------
+        >>> import pyvista
+        >>> import signedheat as sh
+        >>> sh.PolygonMesh.from_pyvista(pyvista.Cube())
+        PolygonMesh(8 vertices, 6 polygons)
+        """
+        return cls._of(from_pyvista(thing))
+
+    def to_pyvista(self) -> pyvista.PolyData:
+        """Convert to PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            The normals of points are point data ``Normals``.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.samples.sphere(1).to_pyvista().n_cells
+        80
+        """
+        return to_pyvista(self._elements)
+
+    @classmethod
+    def from_meshio(cls: type[Kind], thing: object) -> Kind:
+        """Convert the triangles, quadrilaterals and polygons, or the points, of a mesh of meshio.
+
+        Parameters
+        ----------
+        thing : object
+            A `meshio.Mesh`.
+
+        Returns
+        -------
+        TriangleMesh, PolygonMesh or PointCloud
+            Of the class that this was called on.
+
+        Raises
+        ------
+        SignedHeatError
+            If it holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles.
+
+        Examples
+        --------
+        >>> import meshio
+        >>> import signedheat as sh
+        >>> cells = [("triangle", [[0, 1, 2]])]
+        >>> sh.TriangleMesh.from_meshio(meshio.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], cells))
+        TriangleMesh(3 vertices, 1 faces)
+        """
+        return cls._of(from_meshio(thing, as_points=not cls._has_faces))
+
+    def to_meshio(self) -> meshio.Mesh:
+        """Convert to meshio.
+
+        Returns
+        -------
+        meshio.Mesh
+            The normals of points are point data ``nx``, ``ny``, ``nz``.
+
+        Raises
+        ------
+        MissingPackageError
+            If meshio is not installed.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.samples.sphere(1).to_meshio().cells[0].type
+        'triangle'
+        """
+        return to_meshio(self._elements)
+
+    @classmethod
+    def from_open3d(cls: type[Kind], thing: object) -> Kind:
+        """Convert a mesh or a cloud of Open3D.
+
+        Parameters
+        ----------
+        thing : object
+            `TriangleMesh` or `PointCloud` of ``open3d.geometry`` or ``open3d.t.geometry``.
+
+        Returns
+        -------
+        TriangleMesh, PolygonMesh or PointCloud
+            Of the class that this was called on.
+
+        Raises
+        ------
+        SignedHeatError
+            If it holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles.
+
+        Examples
+        --------
+        >>> import open3d  # doctest: +SKIP
+        >>> sh.TriangleMesh.from_open3d(open3d.io.read_triangle_mesh("scan.ply"))  # doctest: +SKIP
+        """
+        return cls._of(from_open3d(thing))
+
+    def to_open3d(self) -> open3d.geometry.Geometry:
+        """Convert to Open3D.
+
+        Returns
+        -------
+        open3d.geometry.TriangleMesh or open3d.geometry.PointCloud
+            In double precision.
+
+        Raises
+        ------
+        MissingPackageError
+            If Open3D is not installed.
+        GeometryError
+            If it has polygons of more than three corners.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.samples.sphere(1).to_open3d()  # doctest: +SKIP
+        """
+        return to_open3d(self._elements)
+
+
+def from_trimesh(thing: Any) -> Elements:
+    """From a `trimesh.Trimesh`, `trimesh.PointCloud`, or all meshes of a `trimesh.Scene`, each in its place."""
+    if hasattr(thing, "geometry") and hasattr(thing, "graph"):
+        thing = thing.to_mesh()
+        if not len(thing.faces):
+            raise GeometryError("the scene holds no mesh", remedy="add one, or pass its geometry itself")
+    if not hasattr(thing, "vertices") or hasattr(thing, "entities"):
+        raise _no_shape(thing, "a Trimesh, PointCloud or Scene", "lines in the plane are a signedheat.Polyline")
+    return Elements.of_triangles(np.asarray(thing.vertices), getattr(thing, "faces", ()))
+
+
+def to_trimesh(shape: Elements) -> Any:
+    """As a `trimesh.Trimesh` (not processed: nothing is merged) or `trimesh.PointCloud`."""
+    if not len(shape.counts):
+        return trimesh.PointCloud(np.array(shape.points))
+    return trimesh.Trimesh(np.array(shape.points), _triangles_only(shape, "trimesh"), process=False)
+
+
+def from_pyvista(thing: Any) -> Elements:
+    """From a `pyvista.PolyData`, `pyvista.UnstructuredGrid` or `pyvista.MultiBlock`."""
+    if hasattr(thing, "n_blocks") and hasattr(thing, "combine"):
+        thing = thing.combine()
+    if hasattr(thing, "celltypes"):
+        return _from_cells(thing)
+    if not hasattr(thing, "faces") or not hasattr(thing, "points"):
+        raise _no_shape(thing, "a PolyData or UnstructuredGrid", "call its extract_surface() or contour() first")
+    if thing.n_lines and not len(thing.faces):
+        raise _no_shape(thing, "one with faces or points", "lines on a surface are its polyline(points)")
+    if getattr(thing, "n_strips", 0):
+        raise GeometryError("the mesh holds triangle strips", remedy="call its triangulate() first")
+    faces = np.asarray(thing.faces, dtype=np.int64)
+    starts, at = [], 0
+    while at < len(faces):
+        starts.append(at)
+        at += 1 + int(faces[at])
+    counts = faces[np.array(starts, dtype=np.int64)]
+    return Elements(np.asarray(thing.points), np.delete(faces, starts), counts, thing.point_data.get("Normals"))
+
+
+def _from_cells(thing: Any) -> Elements:
+    """The faces of an unstructured grid; if there is none, its tets; else its points."""
+    types = np.asarray(thing.celltypes)
+    offsets = np.asarray(thing.cell_offsets if hasattr(thing, "cell_offsets") else thing.offset, dtype=np.int64)
+    corners = np.asarray(thing.cell_connectivity, dtype=np.int64)
+    faces = np.flatnonzero(np.isin(types, list(_VTK_FACES)))
+    if not len(faces) and (types == _VTK_TETRA).any():
+        return Elements(np.asarray(thing.points), tets=tets_of_pyvista(thing))
+    if not len(faces) and not (types <= 2).all():
+        raise GeometryError(
+            f"the grid holds neither faces nor tets among its {len(types)} cells",
+            remedy="call its extract_surface() or triangulate() first",
+        )
+    _, taken = members_of(offsets, np.arange(len(corners)), faces)
+    normals = thing.point_data.get("Normals")
+    return Elements(np.asarray(thing.points), corners[taken], np.diff(offsets)[faces], normals)
+
+
+def tets_of_pyvista(grid: Any) -> NDArray[np.int64]:
+    """(t, 4) the tets of a `pyvista.UnstructuredGrid`."""
+    cells = {int(kind): ids for kind, ids in grid.cells_dict.items()}
+    if _VTK_TETRA not in cells:
+        raise GeometryError(f"the grid holds no tets among its {grid.n_cells} cells", remedy="triangulate it first")
+    return np.asarray(cells[_VTK_TETRA], dtype=np.int64)
+
+
+def to_pyvista(shape: Elements) -> Any:
+    """As a `pyvista.PolyData`; normals of points are point data ``Normals``."""
+    points, corners, counts = np.array(shape.points), shape.corners, shape.counts
+    if len(counts):
+        return pyvista.PolyData(points, np.insert(corners, np.cumsum(counts) - counts, counts))
+    cloud = pyvista.PolyData(points)
+    if shape.normals is not None:
+        cloud.point_data["Normals"] = np.array(shape.normals)
+    return cloud
+
+
+def from_meshio(thing: Any, as_points: bool = False) -> Elements:
+    """From a `meshio.Mesh`: its triangles, quadrilaterals and polygons, block after block; or else its tets.
+
+    With `as_points`, a mesh of other cells alone is a cloud.
+    """
+    if not hasattr(thing, "cells") or not hasattr(thing, "points"):
+        raise _no_shape(thing, "a Mesh", "read it with meshio.read")
+    blocks = [block.data for block in thing.cells if block.type in _SIDES or block.type.startswith("polygon")]
+    if not blocks and any(block.type == "tetra" for block in thing.cells):
+        return Elements(thing.points, tets=tets_of_meshio(thing))
+    others = [block.type for block in thing.cells if block.type != "vertex"]
+    if not blocks and others and not as_points:
+        raise _no_shape(thing, "one of faces, tets or points", f"extract the surface of its cells of type {others[0]}")
+    corners = [np.asarray(face, dtype=np.int64) for block in blocks for face in block]
+    counts = np.array([len(face) for face in corners], dtype=np.int64)
+    data = thing.point_data
+    normals = np.stack([data[name] for name in ("nx", "ny", "nz")], axis=1) if "nx" in data else data.get("Normals")
+    return Elements(thing.points, np.concatenate(corners) if corners else _no_ids(), counts, normals)
+
+
+def tets_of_meshio(mesh: Any) -> NDArray[np.int64]:
+    """(t, 4) the tets of a `meshio.Mesh`."""
+    blocks = [block.data for block in mesh.cells if block.type == "tetra"]
+    if not blocks:
+        kinds = sorted({block.type for block in mesh.cells}) or ["no cells"]
+        raise GeometryError(f"the mesh holds no tets, but {', '.join(kinds)}", remedy="convert it to tetrahedra first")
+    for block in blocks:
+        if block.ndim != 2 or block.shape[1] != 4:
+            raise GeometryError(f"tets are rows of four vertices, not an array of {block.shape}", element="tets")
+    return np.concatenate(blocks)
+
+
+def to_meshio(shape: Elements) -> Any:
+    """As a `meshio.Mesh`; normals of points are point data ``nx``, ``ny``, ``nz``."""
+    points, corners, counts = np.array(shape.points), shape.corners, shape.counts
+    if not len(counts):
+        normals = {} if shape.normals is None else dict(zip(("nx", "ny", "nz"), shape.normals.T.copy(), strict=True))
+        return meshio.Mesh(points, [("vertex", np.arange(len(points))[:, None])], point_data=normals)
+    starts = np.cumsum(counts) - counts
+    change = np.flatnonzero(np.diff(counts, prepend=-1))  # a block has faces of one kind; the order is kept
+    cells = []
+    for first, last in zip(change, [*change[1:], len(counts)], strict=True):
+        sides = int(counts[first])
+        name = next((name for name, n in _SIDES.items() if n == sides), "polygon")
+        cells.append((name, corners[starts[first] : starts[first] + sides * (last - first)].reshape(-1, sides)))
+    return meshio.Mesh(points, cells)
+
+
+def from_open3d(thing: Any) -> Elements:
+    """From a `TriangleMesh` or `PointCloud` of ``open3d.geometry`` or ``open3d.t.geometry``."""
+    tensors = getattr(thing, "vertex", None) or getattr(thing, "point", None)
+    if tensors is not None:
+        normals = tensors.normals.numpy() if "normals" in tensors else None
+        faces = thing.triangle.indices.numpy() if hasattr(thing, "triangle") else ()
+        return Elements.of_triangles(tensors.positions.numpy(), faces, normals)
+    if not (hasattr(thing, "triangles") or (hasattr(thing, "points") and hasattr(thing, "normals"))):
+        raise _no_shape(thing, "a TriangleMesh or PointCloud", "sample points from it, or extract a mesh first")
+    points = np.asarray(thing.vertices if hasattr(thing, "triangles") else thing.points)
+    normals = np.asarray(thing.normals) if hasattr(thing, "normals") and thing.has_normals() else None
+    return Elements.of_triangles(points, np.asarray(getattr(thing, "triangles", ())), normals)
+
+
+def to_open3d(shape: Elements) -> Any:
+    """As a `TriangleMesh` or `PointCloud` of ``open3d.geometry``, with the normals of points."""
+    points = open3d.utility.Vector3dVector(np.array(shape.points))
+    if not len(shape.counts):
+        cloud = open3d.geometry.PointCloud(points)
+        if shape.normals is not None:
+            cloud.normals = open3d.utility.Vector3dVector(np.array(shape.normals))
+        return cloud
+    faces = open3d.utility.Vector3iVector(_triangles_only(shape, "Open3D").astype(np.int32))
+    return open3d.geometry.TriangleMesh(points, faces)
+
+
+def from_arrays(pair: Any) -> Elements:
+    """From a pair (vertices, faces): rows of positions, and rows of vertex ids of equal length or not."""
+    points, faces = (array_of(part, "vertices and faces") if np.ma.isMaskedArray(part) else part for part in pair)
+    rows = faces if isinstance(faces, list | tuple) else list(np.asarray(faces))
+    counts = np.array([len(row) for row in rows], dtype=np.int64)
+    flat = np.concatenate([np.asarray(row, dtype=np.int64) for row in rows]) if len(rows) else _no_ids()
+    return Elements(np.asarray(points), flat, counts)
+
+
+def _triangles_only(shape: Elements, package: str) -> NDArray[np.int64]:
+    if (shape.counts != 3).any():
+        raise GeometryError(
+            f"{package} holds triangles only, and this has polygons", remedy="use to_pyvista or to_meshio"
+        )
+    return np.array(shape.corners.reshape(-1, 3))
+
+
+def _no_shape(thing: object, taken: str, remedy: str) -> UnsupportedTypeError:
+    kind = type(thing)
+    return UnsupportedTypeError(
+        f"{kind.__module__}.{kind.__name__} is no shape: {taken} is", remedy=remedy, element=kind.__name__
+    )
+
+
+ELEMENTS_OF: dict[str, Callable[[Any], Elements]] = {
+    "meshio": from_meshio,
+    "numpy": from_arrays,
+    "open3d": from_open3d,
+    "pyvista": from_pyvista,
+    "trimesh": from_trimesh,
+}
+"""What an object of a package is made of, by the package; a pair (vertices, faces) is one of NumPy."""

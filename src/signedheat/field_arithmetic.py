@@ -1,0 +1,307 @@
+"""Fields as arrays, arithmetic of fields with numbers, and unions, intersections and differences of their solids."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from .errors import GeometryError, UnsupportedTypeError
+from .grids.grid import Grid
+from .validation import finite_number
+
+Change = Callable[[NDArray[Any]], NDArray[Any]]
+Rule = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+Number = float | np.number[Any]
+NUMBERS = (int, float, np.number)
+
+
+class HasValues(Protocol):
+    """What arithmetic with numbers needs of a field."""
+
+    @property
+    def values(self) -> NDArray[Any]:
+        """φ at the unknowns."""
+
+    def _mapped(self: AnyField, change: Change) -> AnyField:
+        """The field with changed values."""
+
+    def _scaled(self: AnyField, factor: float) -> AnyField:
+        """The field times a number."""
+
+
+class SolidField(HasValues, Protocol):
+    """What a field has to be for its solid to be combined with others: a `GridField`, `TetField` or `VertexField`."""
+
+    @property
+    def domain(self) -> object:
+        """Where the unknowns are."""
+
+    def with_values(self: Solid, values: NDArray[np.float64]) -> Solid:
+        """A field with other values on the same domain."""
+
+    def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
+        """The field whose values a rule makes of the values of two, wherever both have one."""
+
+
+@runtime_checkable
+class HasFields(Protocol):
+    """What distance can be computed to where a field has it, such as a `Solid`."""
+
+    def field_on(self, field: Any) -> Any:
+        """Distance at the nodes that a field has."""
+
+
+AnyField = TypeVar("AnyField", bound=HasValues)
+Solid = TypeVar("Solid", bound=SolidField)
+
+
+class Arithmetic:
+    """A field of which ``-field``, ``2 * field``, ``field / 2`` and ``field + 1`` are fields, and ``numpy.asarray`` φ.
+
+    So ``field - 0.1`` is the offset by 0.1, and ``-field`` the field of the other side. NumPy's functions take fields
+    for arrays of their values. A `GridField` that is exact between its nodes, as it holds its solid, stays so when it
+    is negated or multiplied, and when 0 is added; sums, unions, intersections and differences are interpolated.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> field = sh.GridField(sh.Grid(0.0, 1.0, 3), [-1.0, 0.0, 1.0])
+    >>> (1 - 2 * field).values
+    array([ 3.,  1., -1.])
+    >>> np.asarray(-field), float(np.max(field)), np.abs(field)
+    (array([ 1., -0., -1.]), 1.0, array([1., 0., 1.]))
+    """
+
+    __array_priority__: float = 1000.0  # numbers of NumPy leave operators to the field
+
+    def __array__(self: HasValues, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self.values, dtype=dtype, copy=copy)
+
+    def __neg__(self: AnyField) -> AnyField:
+        return self._scaled(-1.0)
+
+    def __mul__(self: AnyField, factor: Number) -> AnyField:
+        return self._scaled(float(factor)) if isinstance(factor, NUMBERS) else NotImplemented
+
+    def __truediv__(self: AnyField, divisor: Number) -> AnyField:
+        if not isinstance(divisor, NUMBERS):
+            return NotImplemented
+        return self._scaled(1.0 / float(divisor)) if divisor else self._mapped(lambda phi: phi / divisor)
+
+    def __add__(self: AnyField, summand: Number) -> AnyField:
+        if not isinstance(summand, NUMBERS):
+            return NotImplemented
+        return self._mapped(lambda phi: phi + summand) if summand else self._scaled(1.0)
+
+    def __sub__(self: AnyField, level: Number) -> AnyField:
+        return Arithmetic.__add__(self, -float(level)) if isinstance(level, NUMBERS) else NotImplemented
+
+    def __rsub__(self: AnyField, level: Number) -> AnyField:
+        return self._mapped(lambda phi: level - phi) if isinstance(level, NUMBERS) else NotImplemented
+
+    def _scaled(self: AnyField, factor: float) -> AnyField:
+        return self._mapped(lambda phi: phi * factor)
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+
+class Combinable(Arithmetic):
+    """A field that is negative inside a solid or a region: ``a | b``, ``a & b``, ``a - b`` and ``~a`` are fields again.
+
+    Where two fields overlap the result has the right sign and zero set, but is a bound of the distance, not distance
+    itself, on one side of the boundary (inside a union, outside an intersection or a difference); `sharpen` turns it
+    into distance. The confidence of fields that were sharpened to a shape is not carried on.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> grid = sh.Grid((-2, -2), 0.5, (9, 9))
+    >>> left, right = (sh.GridField(grid, np.linalg.norm(grid.points - [x, 0], axis=-1) - 1) for x in (-0.5, 0.5))
+    >>> both, common, bite = left | right, left & right, left - right
+    >>> [float(field([0.75, 0.0]).round(2)) for field in (both, common, bite, ~both)]
+    [-0.75, 0.25, 0.75, 0.75]
+    """
+
+    def __or__(self: Solid, other: Solid) -> Solid:
+        """Union: inside where one of the two is."""
+        return combined(self, other, np.less_equal, 0.0)
+
+    def __and__(self: Solid, other: Solid) -> Solid:
+        """Intersection: inside where both are."""
+        return combined(self, other, np.greater_equal, 0.0)
+
+    def __sub__(self: Solid, other: Solid | Number) -> Solid:
+        """Difference: inside where this is and the other is not. Of a number, it is taken from the values."""
+        if isinstance(other, NUMBERS):
+            return Arithmetic.__sub__(self, other)
+        return combined(self, _checked(self, other)._mapped(np.negative), np.greater_equal, 0.0)
+
+    def __invert__(self: Solid) -> Solid:
+        """Complement: inside and outside exchanged."""
+        return self._scaled(-1.0)
+
+    def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
+        """The field whose values a rule makes of those of two fields on one domain.
+
+        Parameters
+        ----------
+        other : Combinable
+            On the same domain.
+        rule : callable
+            Takes two arrays of values and returns one, such as `np.minimum`.
+
+        Returns
+        -------
+        Combinable
+            With the values of the rule.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> tet = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+        >>> phi = sh.TetField(tet, [0.0, 1.0, 2.0, 3.0])
+        >>> phi.combined_with(3.0 - phi, np.minimum).values.tolist()
+        [0.0, 1.0, 1.0, 0.0]
+        """
+        return self.with_values(rule(self.values, other.values))
+
+    def _mapped(self: Solid, change: Change) -> Solid:
+        """The field with changed values, without the diagnostics of this one."""
+        return self.combined_with(self, lambda phi, _: change(phi))
+
+
+def smooth_union(a: Solid, b: Solid, width: float) -> Solid:
+    """The union of two solids, with a round transition where they meet.
+
+    Where the two differ by less than w, the width, φ is the polynomial smooth minimum
+    ``min(a, b) − (w − |a − b|)² / 4w``; elsewhere it is the smaller of the two. The concave edge where they meet
+    becomes a fillet of about that size.
+
+    Parameters
+    ----------
+    a, b : GridField, TetField or VertexField
+        On the same domain.
+    width : float
+        Of the transition, in the units of the domain; 0 gives ``a | b``.
+
+    Returns
+    -------
+    GridField, TetField or VertexField
+        A field whose sign and zero set are those of the blend. `sharpen` turns it into distance.
+
+    Raises
+    ------
+    GeometryError
+        If the fields lie on different domains.
+    SignedHeatError
+        If the width is negative or not finite.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> grid = sh.Grid((-2, -2), 0.5, (9, 9))
+    >>> left, right = (sh.GridField(grid, np.linalg.norm(grid.points - [x, 0], axis=-1) - 1) for x in (-1, 1))
+    >>> float((left | right)([0.0, 0.5]).round(3)), float(smooth_union(left, right, 0.4)([0.0, 0.5]).round(3))
+    (0.118, 0.018)
+    """
+    return combined(a, b, np.less_equal, -finite_number(width, "the width of the blend", least=0))
+
+
+def smooth_intersection(a: Solid, b: Solid, width: float) -> Solid:
+    """The intersection of two solids, with a rounded edge where they meet; see `smooth_union`.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> grid = sh.Grid((-2, -2), 0.5, (9, 9))
+    >>> left, right = (sh.GridField(grid, np.linalg.norm(grid.points - [x, 0], axis=-1) - 1) for x in (-0.5, 0.5))
+    >>> float((left & right)([0.0, 0.5]).round(3)), float(smooth_intersection(left, right, 0.4)([0.0, 0.5]).round(3))
+    (-0.293, -0.193)
+    """
+    return combined(a, b, np.greater_equal, finite_number(width, "the width of the blend", least=0))
+
+
+def smooth_difference(a: Solid, b: Solid, width: float) -> Solid:
+    """The first solid without the second, with a rounded edge where they meet; see `smooth_union`.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> grid = sh.Grid((-2, -2), 0.5, (9, 9))
+    >>> disk = sh.GridField(grid, np.linalg.norm(grid.points, axis=-1) - 1)
+    >>> half = smooth_difference(disk, sh.GridField(grid, grid.points[..., 0]), 0.2)  # without the left side
+    >>> half([[0.5, 0.0], [-0.5, 0.0]]).round(2)
+    array([-0.45,  0.5 ])
+    """
+    return smooth_intersection(a, _checked(a, b)._mapped(np.negative), width)
+
+
+def combined(
+    a: Solid,
+    b: Solid,
+    takes_first: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]],
+    bulge: float,
+) -> Solid:
+    """Everywhere the values of one of two fields, moved where they are nearly equal.
+
+    Parameters
+    ----------
+    a, b : GridField, TetField or VertexField
+        On the same domain, or a field on a grid in space and a solid; the result is NaN where one of them is.
+    takes_first : callable
+        From the values of both, where those of `a` are taken.
+    bulge : float
+        Width of the transition: negative adds to the inside, positive takes from it.
+    """
+    b = _checked(a, b)
+
+    def rule(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+        values = np.where(takes_first(one, other), one, other)
+        if bulge:
+            near = np.maximum(abs(bulge) - np.abs(one - other), 0.0)
+            values = values + near**2 / (4 * bulge)
+        values[np.isnan(one) | np.isnan(other)] = np.nan
+        return values
+
+    return a.combined_with(b, rule)
+
+
+def _checked(a: Solid, b: Solid) -> Solid:
+    """The second field, if it can be combined with the first."""
+    if not (hasattr(a, "with_values") and hasattr(a, "domain")):
+        raise UnsupportedTypeError(
+            f"fields of type {type(a).__name__} are not combined",
+            remedy="compute both on one whole grid, without a band",
+            element=type(a).__name__,
+        )
+    if isinstance(b, HasFields) and isinstance(a.domain, Grid):
+        b = b.field_on(a)
+    if type(a) is not type(b):
+        raise UnsupportedTypeError(
+            f"a field of type {type(a).__name__} cannot be combined with {type(b).__name__}",
+            remedy="combine fields on one domain",
+            element=type(b).__name__,
+        )
+    if not _same_domain(a.domain, b.domain):
+        raise GeometryError(
+            f"the fields lie on different domains: {a.domain!r} and {b.domain!r}",
+            remedy="compute both on one, such as a Grid.around the bounds of both",
+            element="second field",
+        )
+    return b
+
+
+def _same_domain(one: object, other: object) -> bool:
+    """Whether two domains have the same unknowns at the same places; grids may differ by rounding."""
+    if one is other:
+        return True
+    if isinstance(one, Grid) and isinstance(other, Grid):
+        if one.shape != other.shape or not np.allclose(one.spacing, other.spacing, rtol=1e-12, atol=0):
+            return False
+        return bool((np.abs(one.origin - other.origin) <= 1e-9 * one.spacing).all())
+    names = [name for name in ("points", "vertices", "faces", "corners", "tets") if hasattr(one, name)]
+    return type(one) is type(other) and all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)

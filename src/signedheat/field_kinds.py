@@ -1,0 +1,182 @@
+"""From the unknowns of a discretisation to a field on its domain, one function for each kind of discretisation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import singledispatch
+from typing import Any, TypeVar
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
+from .errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
+from .grids.grid_discretization import GridDiscretization
+from .grids.grid_field import GridField
+from .grids.grid_source import GridSource
+from .mesh.components import connected_components
+from .surfaces.point_cloud import PointCloud
+from .surfaces.surface_discretization import SurfaceDiscretization
+from .surfaces.surface_source import SurfaceSource, joined
+from .surfaces.vertex_field import VertexField
+from .tets.tet_discretization import TetDiscretization
+from .tets.tet_field import TetField
+from .tets.tet_source import TetSource
+
+Field = GridField | VertexField | TetField
+"""What a solver returns."""
+
+AnyField = TypeVar("AnyField", GridField, VertexField, TetField, Field)
+SMALL_LOOP = 3.5
+"""Length of a loop, in sides of the triangles that it crosses, below which a quarter or more of its heat cancels."""
+NEAREST = 8
+"""Nearest points that a point is joined to, if it is among theirs: on a surface about six lie round a point."""
+
+
+@singledispatch
+def to_field(discretization: Any, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics) -> Field:
+    """The field with the values of a discretisation's unknowns, and with its notes added to the diagnostics."""
+    raise UnsupportedTypeError(f"there is no field for {type(discretization).__name__}", element="domain")
+
+
+@to_field.register
+def _(
+    discretization: GridDiscretization, values: NDArray[np.float64], source: GridSource, diagnostics: Diagnostics
+) -> GridField:
+    return GridField(discretization.grid, values, diagnostics.noting(sampled(source)))
+
+
+@to_field.register
+def _(
+    discretization: SurfaceDiscretization,
+    values: NDArray[np.float64],
+    source: SurfaceSource,
+    diagnostics: Diagnostics,
+) -> VertexField:
+    """φ at the vertices of the domain; NaN where diffusion did not reach, such as behind a single shared vertex."""
+    values = np.where(discretization.reached_by(source.vectors), values, np.nan)
+    triangulation, everywhere = discretization.triangulation, values
+    if discretization.restriction is not None:
+        values = values[discretization.restriction]
+    if isinstance(discretization.domain, PointCloud) and np.isnan(values).any():  # its triangles may have gaps
+        cloud = discretization.domain
+        used = np.zeros(cloud.n_points, dtype=bool)
+        used[cloud.triangulation.faces] = True
+        values = spread(cloud.points, values, used)[cloud.representatives]
+    unreached = np.flatnonzero(np.isnan(values))
+    if len(unreached):
+        warn_user(
+            f"no source is connected to {len(unreached)} of {len(values)} vertices, the first of them "
+            f"{_named(discretization.domain, unreached[0])}: distance there is NaN. Put a source on every part, or "
+            "join the parts",
+            UnreachedWarning,
+        )
+    small = small_loops(source)
+    notes = (*discretization.notes, *([SmallLoops(small)] if small else []))
+    noted = replace(diagnostics, unreached=unreached).noting(*notes)
+    finer = None
+    if triangulation is not None:
+        finer = VertexField(triangulation, everywhere[: triangulation.n_vertices], noted, source)
+    return VertexField(discretization.domain, values, noted, source, finer)
+
+
+def _named(domain: object, vertex: int) -> str:
+    """A vertex by its place, which does not depend on how vertices are numbered, or else by its number."""
+    places = getattr(domain, "vertices", getattr(domain, "points", None))
+    return f"number {vertex}" if places is None else f"at ({', '.join(f'{x:.4g}' for x in places[vertex])})"
+
+
+@to_field.register
+def _(
+    discretization: TetDiscretization, values: NDArray[np.float64], source: TetSource, diagnostics: Diagnostics
+) -> TetField:
+    """φ at the vertices of the mesh."""
+    mesh, at_vertices = discretization.mesh, discretization.at_vertices(values)
+    unreached = np.flatnonzero(np.isnan(at_vertices))
+    if np.isnan(values).any():
+        warn_user(
+            f"{np.isnan(values[discretization.unknowns]).any(axis=1).sum()} of {mesh.n_tets} tets are not connected to "
+            "any source through faces: the distance there is NaN",
+            UnreachedWarning,
+        )
+    turned = (TetsTurned(len(mesh.reoriented)),) if len(mesh.reoriented) else ()
+    noted = replace(diagnostics, unreached=unreached).noting(*source.notes, *turned)
+    return TetField(mesh, at_vertices, noted, source)
+
+
+def sampled(source: GridSource) -> SampledSource:
+    return SampledSource(len(source.weights), source.samples.outside, source.samples.cancelled)
+
+
+def warned(field: AnyField) -> AnyField:
+    """The field; with a warning if it is that of the method, and curves are too small for its triangles."""
+    note = field.diagnostics.note(SmallLoops)
+    if note:
+        warn_user(
+            f"{note}. The method hardly sees them: sh.signed_distance measures to the curves themselves, as does, on "
+            "triangle meshes, intrinsic=True by triangles that have them along edges",
+            InexactWarning,
+        )
+    return field
+
+
+def small_loops(source: SurfaceSource) -> int:
+    """How many closed oriented curves are shorter than `SMALL_LOOP` sides of the triangles that they cross.
+
+    Distance to them is several times less accurate than triangles of this size allow.
+    """
+    parts = [part for part in source.parts if part.oriented and len(part.ends)]
+    if not parts:
+        return 0
+    triangles = source.triangles
+    nodes, ends = joined(parts)
+    label = connected_components(len(nodes), ends[:, 0], ends[:, 1])[ends[:, 0]]
+    lengths = np.concatenate([part.lengths for part in parts])
+    faces = np.concatenate([part.faces for part in parts])
+    inside = np.concatenate([part.edges < 0 for part in parts])
+    sides = np.where(inside, np.sqrt(4 / 3**0.5 * triangles.face_areas[faces]), 0.0)  # edges see what runs along them
+    length, weighted = np.bincount(label, lengths), np.bincount(label, lengths * sides)
+    is_open = np.zeros(len(length), dtype=bool)
+    odd = np.bincount(ends.ravel(), minlength=len(nodes)) % 2 == 1
+    is_open[label[odd[ends].any(axis=1)]] = True
+    return int(((length > 0) & ~is_open & (length**2 < SMALL_LOOP * weighted)).sum())
+
+
+def spread(points: NDArray[np.float64], values: NDArray[np.float64], used: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(n,) signed distances, continued from point to neighbouring point where they are NaN.
+
+    The shortest way to a point with a value adds to its absolute value; the sign stays. Points that are not used, and
+    those that no way leads to, stay NaN.
+    """
+    lacking = np.isnan(values) & used
+    ids = np.flatnonzero(used)
+    if not lacking.any() or len(ids) <= NEAREST:
+        return values
+    far, near = scipy.spatial.cKDTree(points[ids]).query(points[ids], k=NEAREST + 1)
+    rows = np.repeat(np.arange(len(ids)), NEAREST)
+    graph = sparse.csr_matrix(
+        (np.maximum(far[:, 1:].ravel(), 1e-300), (rows, near[:, 1:].ravel())), shape=(len(ids),) * 2
+    )
+    graph = sparse.csr_matrix(graph.minimum(graph.T))  # joined from both sides
+    finite = np.flatnonzero(~lacking[ids])
+    start = np.abs(values[ids[finite]])
+    tail, head = finite, np.full(len(finite), len(ids))
+    coo = graph.tocoo()
+    whole = sparse.csr_matrix(
+        (
+            np.concatenate([coo.data, start + 1e-300, start + 1e-300]),
+            (np.concatenate([coo.row, tail, head]), np.concatenate([coo.col, head, tail])),
+        ),
+        shape=(len(ids) + 1,) * 2,
+    )
+    away, before = sparse.csgraph.dijkstra(whole, indices=len(ids), return_predecessors=True)
+    result: NDArray[np.float64] = values.copy()
+    sign = np.where(values[ids] < 0, -1.0, 1.0)
+    for k in np.argsort(away, kind="stable").tolist():
+        if k == len(ids) or not lacking[ids[k]] or not np.isfinite(away[k]):
+            continue
+        sign[k] = sign[before[k]]
+        result[ids[k]] = sign[k] * away[k]
+    return result

@@ -1,1 +1,0 @@
-"""Fields: the results, values of φ with the domain that they belong to."""

@@ -1,0 +1,248 @@
+"""What is taken for a shape: ours, objects of other packages (`signedheat.exchange`), pairs of arrays."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from os import PathLike, fspath
+from types import MappingProxyType
+from typing import Protocol, TypeAlias, TypeVar, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import SourceError, UnsupportedTypeError
+from .exchange import ELEMENTS_OF, TAKEN, Elements
+from .surfaces.digital_surface import DigitalSurface
+from .surfaces.point_cloud import PointCloud
+from .surfaces.polygon_mesh import PolygonMesh
+from .surfaces.triangle_mesh import TriangleMesh
+from .tets.tet_mesh import TetMesh
+
+One = TypeVar("One")
+
+Thing = TypeVar("Thing")
+
+PACKAGES = frozenset({"meshio", "open3d", "pyvista", "trimesh"})
+"""Packages whose objects are taken, by the name with which the modules of their classes begin."""
+
+
+class Represented(ABC):
+    """What has a surface, and is taken wherever a shape is: solids, images of labels."""
+
+    @property
+    @abstractmethod
+    def boundary(self) -> TriangleMesh:
+        """Its surface."""
+
+
+class HasVertices(Protocol):
+    """A `trimesh.Trimesh` or `trimesh.PointCloud`, seen by a type checker."""
+
+    @property
+    def vertices(self) -> object: ...
+    @property
+    def metadata(self) -> object: ...
+
+
+class HasGeometry(Protocol):
+    """A `trimesh.Scene`, seen by a type checker."""
+
+    @property
+    def geometry(self) -> object: ...
+    @property
+    def graph(self) -> object: ...
+
+
+class HasPointData(Protocol):
+    """A `meshio.Mesh` or an object of PyVista, seen by a type checker."""
+
+    @property
+    def points(self) -> object: ...
+    @property
+    def point_data(self) -> object: ...
+
+
+class HasTriangles(Protocol):
+    """An `open3d.geometry.TriangleMesh`, seen by a type checker."""
+
+    @property
+    def vertices(self) -> object: ...
+    @property
+    def triangles(self) -> object: ...
+
+
+SurfaceShape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud
+"""The kinds of shapes that most file formats support."""
+Shape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh
+"""What a file of a shape may hold. In space points need normals, and volumes are refused: give their boundary."""
+ForeignShape: TypeAlias = (
+    Represented | HasVertices | HasGeometry | HasPointData | HasTriangles | tuple[ArrayLike, ArrayLike]
+)
+"""Solids, images, objects of trimesh, PyVista, meshio and Open3D, and pairs (vertices, faces)."""
+
+
+def what_to_pass(thing: object) -> str:
+    """The remedy where something is no shape: files are read first, and bare points are a cloud.
+
+    Examples
+    --------
+    >>> what_to_pass("part.stl")
+    'pass sh.read("part.stl")'
+    """
+    if isinstance(thing, str | PathLike):
+        return f'pass sh.read("{fspath(thing)!s}")'
+    if isinstance(thing, np.ndarray) and thing.ndim == 2:
+        return f"for points alone pass sh.PointCloud(points), otherwise {TAKEN}"
+    return f"pass {TAKEN}"
+
+
+def package_of(thing: object) -> str | None:
+    """The package that made an object, among those whose objects are taken; classes derived from theirs count.
+
+    Examples
+    --------
+    >>> package_of([1, 2]) is None
+    True
+    """
+    roots = (kind.__module__.partition(".")[0] for kind in type(thing).__mro__)
+    return next((root for root in roots if root in PACKAGES), None)
+
+
+def is_pair(thing: object) -> bool:
+    """Whether something is a pair of arrays (vertices, faces), and not two sources or two numbers.
+
+    Examples
+    --------
+    >>> is_pair(([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])), is_pair(([0.0, 1], [0.0, 1]))
+    (True, False)
+    """
+    if not (isinstance(thing, tuple | list) and len(thing) == 2 and all(_like_array(part) for part in thing)):
+        return False
+    points, faces = thing
+    try:
+        positions = np.asanyarray(points, dtype=np.float64)
+    except (TypeError, ValueError, RuntimeError):
+        return False
+    return positions.ndim == 2 and positions.shape[1] == 3 and _like_ids(faces)
+
+
+def as_shape(thing: Shape | ForeignShape) -> Shape:
+    """The shape that an object of another package, a pair of arrays, a solid or an image describes; a shape as it is.
+
+    Every function that takes a shape does this by itself. Of a `Solid` it is the ``boundary``.
+
+    Faces keep their number, order and defects. A shape without faces becomes a `PointCloud`, one of triangles alone a
+    `TriangleMesh`, any other a `PolygonMesh`; tets become a `TetMesh`.
+
+    Parameters
+    ----------
+    thing : shape, Solid, LabelImage, object of trimesh, PyVista, meshio or Open3D, or (vertices, faces)
+        Vertices are (n, 3) float, faces (m, 3) int or rows of ids of any length.
+
+    Returns
+    -------
+    TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or TetMesh
+        The shape.
+
+    Raises
+    ------
+    UnsupportedTypeError
+        If it is no shape, such as lines, or an object of another package.
+    GeometryError
+        If the shape is invalid.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> as_shape(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+    TriangleMesh(3 vertices, 1 faces)
+    """
+    shape = converted(thing)
+    if not isinstance(shape, TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh):
+        if isinstance(thing, tuple | list):
+            refuse_arrays(thing)
+        raise UnsupportedTypeError(f"a {type(thing).__name__} is no shape", remedy=what_to_pass(thing))
+    return shape
+
+
+def converted(thing: Thing) -> Thing:
+    """A shape of another package, a solid or an image as a shape; everything else, such as curves, as it is."""
+    if isinstance(thing, Represented):
+        return cast("Thing", thing.boundary)
+    package = "numpy" if is_pair(thing) else package_of(thing)
+    return thing if package is None else cast("Thing", shape_of(ELEMENTS_OF[package](thing)))
+
+
+def shape_of(elements: Elements) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh:
+    """The shape of the kind that fits."""
+    if elements.tets is not None:
+        return TetMesh(elements.points, elements.tets)
+    kinds = {kind.__name__: kind for kind in (TriangleMesh, PolygonMesh, PointCloud)}
+    return kinds[elements.kind]._of(elements)
+
+
+def refuse_arrays(things: Sequence[object]) -> None:
+    """Raise if things are arrays that were meant for a shape, and say what is wrong with them."""
+    arrays = [np.asarray(thing) for thing in things if _like_array(thing)]
+    if not arrays or len(arrays) < len(things) or any(array.dtype.kind not in "biuf" for array in arrays):
+        return
+    if len(arrays) != 2 or any(array.ndim != 2 for array in arrays):
+        raise UnsupportedTypeError(
+            "arrays of numbers alone are no shape",
+            remedy="pass sh.PointCloud(points), or a pair (vertices, faces)",
+            element="shape",
+        )
+    vertices, faces = arrays
+    if vertices.dtype.kind in "iu" and faces.dtype.kind == "f" and vertices.max(initial=-1) < len(faces):
+        cause, remedy = "the faces come before the vertices", "pass (vertices, faces)"
+    elif vertices.shape[1] != 3:
+        cause = f"vertices have {vertices.shape[1]} coordinates each, and lie in space with 3"
+        remedy = "add z = 0; for drawings in the plane pass sh.Polyline"
+    else:
+        cause, remedy = f"faces are rows of vertex numbers, not of {faces.dtype}", "pass faces.astype(int)"
+    raise UnsupportedTypeError(cause, remedy=remedy, element="shape")
+
+
+def as_shapes(things: Thing | Sequence[Thing]) -> list[Thing]:
+    """One thing or several, as a list, with every shape of another package among them converted (see `as_shape`)."""
+    several = isinstance(things, Sequence) and not isinstance(things, str)
+    if is_pair(things) or package_of(things) is not None:
+        several = False
+    listed = list(cast("Sequence[Thing]", things)) if several else [things]
+    return [converted(cast("Thing", thing)) for thing in listed]
+
+
+def _like_array(part: object) -> bool:
+    return isinstance(part, list | tuple) or hasattr(part, "__array__")
+
+
+def _like_ids(faces: object) -> bool:
+    """Whether something is rows of whole numbers, of equal length or not."""
+    rows = faces if hasattr(faces, "__array__") else list(cast("Sequence[object]", faces))
+    if isinstance(rows, list):
+        return bool(rows) and all(
+            isinstance(row, list | tuple | np.ndarray) and _whole(np.asarray(row), 1) for row in rows
+        )
+    return _whole(np.asarray(rows), 2)
+
+
+def _whole(ids: NDArray[np.generic], axes: int) -> bool:
+    return ids.ndim == axes and bool(np.issubdtype(ids.dtype, np.integer))
+
+
+def elements(shape: SurfaceShape, values: Mapping[str, NDArray[np.floating]] = MappingProxyType({})) -> Elements:
+    """The inverse of `shape_of`, with named values at the points."""
+    return replace(shape._elements, values=values)
+
+
+def as_list(sources: One | Sequence[One]) -> list[One]:
+    """One source or several sources, as a list, with those of other packages as shapes."""
+    listed: list[One] = as_shapes(sources)
+    if not listed:
+        raise SourceError(
+            "there is no source",
+            remedy="pass at least one curve, point or shape",
+        )
+    return listed

@@ -1,0 +1,1 @@
+"""Distance along polyhedral surfaces: exact, and the shortest paths."""

@@ -1,0 +1,307 @@
+"""Sources of exact distance on a polyhedral surface: beams from segments, and fans from their ends.
+
+The waves that leave a segment are two parallel beams, one to each side, and at its ends circular waves. Of these only
+the fan between the beams of neighbouring segments can be shortest, so that curves of many segments start few windows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..mesh.components import grouped, members_of
+from ..mesh.curve_segments import CurveSegments, MergedSources
+from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.surface_points import (
+    EDGE,
+    FACE,
+    VERTEX,
+    LocatedPoints,
+    barycentric_in,
+    barycentric_on_edges,
+    concatenated,
+    crossed_sides,
+    edges_between,
+    locate_points,
+    unique_points,
+)
+
+Mask = NDArray[np.bool_]
+Ids = NDArray[np.int64]
+Points = NDArray[np.complex128]
+
+
+class GeodesicSources(NamedTuple):
+    """Where distance is zero, and the directions in which it grows. Positions are in the layouts of the faces.
+
+    Attributes
+    ----------
+    vertices : (v,) int
+        Vertices at which distance is zero; those of curves among them.
+    beam_faces, beam_starts, beam_stops : (b,) int, complex, complex
+        Segments from which a parallel beam leaves to the left.
+    fan_faces, fan_points, fan_firsts, fan_seconds : (a,) int, complex, complex, complex
+        Points from which circular waves leave, in directions of more than 90° from the first and the second given; 0
+        for none.
+    """
+
+    vertices: Ids
+    beam_faces: Ids
+    beam_starts: Points
+    beam_stops: Points
+    fan_faces: Ids
+    fan_points: Points
+    fan_firsts: Points
+    fan_seconds: Points
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedSegments:
+    """Segments with the positions of their ends in the layouts of faces; unlike nodes, these are never ambiguous.
+
+    Attributes
+    ----------
+    nodes : LocatedPoints
+        (s,) distinct points.
+    ends : (k, 2) int
+        The nodes that each segment joins.
+    faces : (k,) int
+        The face that each segment lies in. A segment along an edge is listed once for every face at the edge.
+    positions : (k, 2) complex
+        Of both ends, in the layout of the face; along an edge in the direction that has the face to its left.
+    along_edge : (k,) bool
+        Whether the segment runs along an edge of its face.
+    sides : (k,) int
+        1 where φ grows to the left of the segment, −1 where it grows to the right, 0 where it does so on both sides.
+    given : (k,) int
+        Index of the segment among those given.
+    """
+
+    nodes: LocatedPoints
+    ends: Ids
+    faces: Ids
+    positions: Points
+    along_edge: Mask
+    sides: Ids
+    given: Ids
+
+    @classmethod
+    def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> PlacedSegments:
+        """Place the segments of curves that run as they like: across faces, along edges and through vertices."""
+        merged = MergedSources.of(parts)
+        oriented = np.array([part.oriented for part in parts])[merged.owners]
+        both = cls._inside(triangles, merged, oriented), cls._adjacent(triangles, merged, oriented)
+        return cls(merged.nodes, *(np.concatenate(each) for each in zip(*both, strict=True)))
+
+    @staticmethod
+    def _inside(
+        triangles: IntrinsicMesh, merged: MergedSources, oriented: Mask
+    ) -> tuple[Ids, Ids, Points, Mask, Ids, Ids]:
+        nodes, rows = merged.nodes, np.flatnonzero(merged.edges < 0)
+        ends, faces, vectors = merged.ends[rows], merged.faces[rows], merged.vectors[rows]
+        corners = triangles.corner_positions[faces]
+        positions = np.stack(
+            [(barycentric_in(triangles, faces, nodes[ends[:, k]]) * corners).sum(axis=1) for k in range(2)], axis=1
+        )
+        steps = positions[:, 1] - positions[:, 0]
+        for i in np.flatnonzero(np.abs(np.abs(steps) - np.abs(vectors)) > 1e-6 * np.abs(corners).max(axis=1)).tolist():
+            positions[i] = best_match(triangles, faces[i], nodes, ends[i], abs(vectors[i]))
+            steps[i] = positions[i, 1] - positions[i, 0]
+        sides = np.sign((np.conj(1j * steps) * vectors).real).astype(np.int64) * oriented[rows]
+        return ends, faces, positions, np.zeros(len(rows), dtype=bool), sides, rows
+
+    @staticmethod
+    def _adjacent(
+        triangles: IntrinsicMesh, merged: MergedSources, oriented: Mask
+    ) -> tuple[Ids, Ids, Points, Mask, Ids, Ids]:
+        nodes, rows = merged.nodes, np.flatnonzero(merged.edges >= 0)
+        ends, edges, vectors = merged.ends[rows], merged.edges[rows], merged.vectors[rows]
+        along = np.stack([fractions_along_edges(triangles, nodes[ends[:, k]], edges) for k in range(2)], axis=1)
+        loops = triangles.edges.vertices[edges, 0] == triangles.edges.vertices[edges, 1]
+        vertex = nodes.kinds[ends] == VERTEX
+        along[loops & vertex.all(axis=1)] = (0.0, 1.0)
+        for k in range(2):
+            i = np.flatnonzero(loops & vertex[:, k] & ~vertex[:, 1 - k])
+            shares = np.abs(vectors[i]) / triangles.lengths_of_edges[edges[i]]
+            along[i, k] = np.where(np.abs(along[i, 1 - k] - shares) < np.abs(1 - along[i, 1 - k] - shares), 0.0, 1.0)
+        which, halfedges = halfedges_of(triangles, edges)
+        faces, at = halfedges // 3, halfedges % 3
+        forward = triangles.edges.forward[faces, at]
+        along, ends = along[which], ends[which]
+        swapped = (along[:, 1] < along[:, 0]) == forward
+        along[swapped], ends[swapped] = along[swapped, ::-1], ends[swapped, ::-1]
+        positions = on_sides(triangles, faces, at, along)
+        seen = vectors[which]
+        seen = triangles.edge_directions[faces, at] * np.where(triangles.reflected[faces, at], np.conj(seen), seen)
+        sides = np.sign((np.conj(1j * triangles.edge_vectors[faces, at]) * seen).real).astype(np.int64)
+        return ends, faces, positions, np.ones(len(faces), dtype=bool), sides * oriented[rows][which], rows[which]
+
+    @cached_property
+    def lengths(self) -> NDArray[np.float64]:
+        """(k,) length of each segment."""
+        return np.abs(self.positions[:, 1] - self.positions[:, 0])
+
+    def sources(self, triangles: IntrinsicMesh) -> GeodesicSources:
+        """The waves that leave the segments, and points that no segment ends at."""
+        inside = np.flatnonzero(~self.along_edge)
+        faces = np.concatenate([self.faces, self.faces[inside]])
+        starts = np.concatenate([self.positions[:, 0], self.positions[inside, 1]])
+        stops = np.concatenate([self.positions[:, 1], self.positions[inside, 0]])
+        at_vertex = self.nodes.kinds == VERTEX
+        return GeodesicSources(self.nodes.elements[at_vertex], faces, starts, stops, *self._fans(triangles))
+
+    def _fans(self, triangles: IntrinsicMesh) -> tuple[Ids, Points, Points, Points]:
+        """Fans at nodes inside faces and on edges; at the latter one in every face at the edge."""
+        nodes = self.nodes
+        first, second = self._directions(triangles)
+        inside, on_edge = np.flatnonzero(nodes.kinds == FACE), np.flatnonzero(nodes.kinds == EDGE)
+        which, halfedges = halfedges_of(triangles, nodes.elements[on_edge])
+        faces, k, node = halfedges // 3, halfedges % 3, on_edge[which]
+        turns, over = triangles.edge_directions[faces, k], triangles.reflected[faces, k]
+        home = nodes.elements[inside]
+        points = (nodes.barycentric[inside] * triangles.corner_positions[nodes.faces[inside]]).sum(axis=1)
+        firsts, seconds = (
+            np.concatenate([d[inside], turns * np.where(over, np.conj(d[node]), d[node])]) for d in (first, second)
+        )
+        across = on_sides(triangles, faces, k, nodes.along[node][:, None])[:, 0]
+        return np.concatenate([home, faces]), np.concatenate([points, across]), firsts, seconds
+
+    def _directions(self, triangles: IntrinsicMesh) -> tuple[Points, Points]:
+        """(s,) directions away from each node of the first and of the last segment that ends there.
+
+        As complex numbers in the layout of the node's face, or in the frame of its edge; 0 where there is no segment.
+        At an edge of three faces or more, segments inside faces count as none: how they go on there is ambiguous.
+        """
+        nodes, kinds = self.nodes, self.nodes.kinds
+        steps = self.positions[:, 1] - self.positions[:, 0]
+        steps /= np.abs(steps)
+        node, seg = self.ends.T.ravel(), np.tile(np.arange(len(self.ends)), 2)
+        away = np.concatenate([steps, -steps])
+        at_edge = np.flatnonzero(kinds[node] == EDGE)
+        faces, edges = self.faces[seg[at_edge]], nodes.elements[node[at_edge]]
+        places = on_sides(
+            triangles,
+            np.repeat(faces, 3),
+            np.tile(np.arange(3), len(faces)),
+            np.repeat(nodes.along[node[at_edge]], 3)[:, None],
+        )
+        gap = np.abs(places.reshape(-1, 3) - self.positions.T.ravel()[at_edge][:, None])
+        k = np.where(triangles.edges.face_edges[faces] == edges[:, None], gap, np.inf).argmin(axis=1)
+        away[at_edge] = triangles.in_edge_frames(away[at_edge], faces, k)
+        branching = (triangles.edges.face_counts[edges] > 2) & ~self.along_edge[seg[at_edge]]
+        away[at_edge[branching]] = 0
+        away, node = away[away != 0], node[away != 0]
+        starts, order = grouped(node, len(nodes))
+        has = np.flatnonzero(np.diff(starts))  # of a segment along an edge both copies have the same direction
+        found = np.zeros((2, len(nodes)), dtype=np.complex128)
+        found[0, has], found[1, has] = away[order[starts[has]]], away[order[starts[has + 1] - 1]]
+        return found[0], found[1]
+
+
+def zero_line(triangles: IntrinsicMesh, values: NDArray[np.float64], among: Mask | None = None) -> PlacedSegments:
+    """Zero set, within faces `among`, of a function linear in faces: zero at no vertex, NaN where it is not known."""
+    here = values[triangles.corner_vertices]
+    faces, sides = crossed_sides(here > 0, ~np.isnan(here).any(axis=1) & (True if among is None else among))
+    edges = triangles.edges.face_edges[faces[:, None], sides]
+    used, first, ends = np.unique(edges, return_index=True, return_inverse=True)
+    tail, head = values[triangles.edges.vertices[used]].T
+    along = tail / (tail - head)
+    at_face, at_side = faces[first // 2], sides.ravel()[first]
+    weights = barycentric_on_edges(triangles.edges, at_face, at_side, along)
+    ends = ends.reshape(-1, 2)
+    flat = on_sides(triangles, np.repeat(faces, 2), sides.ravel(), along[ends].reshape(-1, 1))
+    keep = np.flatnonzero(np.abs(np.diff(flat.reshape(-1, 2), axis=1)[:, 0]) > 0)
+    return PlacedSegments(
+        LocatedPoints(at_face, weights, np.full(len(used), EDGE), used, along),
+        ends[keep],
+        faces[keep],
+        flat.reshape(-1, 2)[keep],
+        np.zeros(len(keep), dtype=bool),
+        np.ones(len(keep), dtype=np.int64),
+        np.arange(len(keep)),
+    )
+
+
+def halfedges_of(triangles: IntrinsicMesh, edges: Ids) -> tuple[Ids, Ids]:
+    """All halfedges ``3 face + side`` of each of some edges, as pairs: index into `edges`, and halfedge."""
+    return members_of(*triangles.edges.halfedges, edges)
+
+
+def on_sides(triangles: IntrinsicMesh, faces: Ids, sides: Ids, along: NDArray[np.float64]) -> Points:
+    """(n, k) positions at fractions (n, k) along the edges, tail to head, that are given sides of faces."""
+    share = np.where(triangles.edges.forward[faces, sides][:, None], along, 1 - along)
+    return triangles.corner_positions[faces, sides][:, None] + share * triangles.edge_vectors[faces, sides][:, None]
+
+
+def fractions_along_edges(triangles: IntrinsicMesh, located: LocatedPoints, edges: Ids) -> NDArray[np.float64]:
+    """(n,) fraction of the way from tail to head at which point k lies on edge k."""
+    return np.where(
+        located.kinds == EDGE, located.along, (triangles.edges.vertices[edges, 0] != located.elements).astype(float)
+    )
+
+
+def best_match(triangles: IntrinsicMesh, face: int, nodes: LocatedPoints, ends: Ids, length: float) -> Points:
+    """(2,) the positions of two nodes in a face that are closest to a given distance apart.
+
+    In intrinsic triangulations a vertex may be two corners of one face, and an edge two of its sides.
+    """
+    places = []
+    for node in ends:
+        kind, element = nodes.kinds[node], nodes.elements[node]
+        if kind == VERTEX:
+            places.append(triangles.corner_positions[face, triangles.corner_vertices[face] == element])
+        elif kind == EDGE:
+            sides = np.flatnonzero(triangles.edges.face_edges[face] == element)
+            along = np.full((len(sides), 1), nodes.along[node])
+            places.append(on_sides(triangles, np.full(len(sides), face), sides, along)[:, 0])
+        else:
+            places.append((nodes.barycentric[[node]] * triangles.corner_positions[face]).sum(axis=1))
+    gap = np.abs(np.abs(places[1][None] - places[0][:, None]) - length)
+    i, j = np.unravel_index(int(gap.argmin()), gap.shape)
+    return np.array([places[0][i], places[1][j]])
+
+
+NEAR = 1e-6
+"""Barycentric coordinates below which a point of a source is put on the edge or at the vertex."""
+
+
+def through_vertices(triangles: IntrinsicMesh, placed: PlacedSegments) -> PlacedSegments:
+    """Segments through the vertices that they all but pass, and along edges; without sides where any moves."""
+    nodes = placed.nodes
+    on_edge, inside = nodes.kinds == EDGE, nodes.kinds == FACE
+    near = on_edge & (np.minimum(nodes.along, 1 - nodes.along) < NEAR) | inside & (nodes.barycentric < NEAR).any(axis=1)
+    curve = as_curve(triangles, placed) if near.any() else None
+    return placed if curve is None else PlacedSegments.of(triangles, [curve])
+
+
+def as_curve(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSegments | None:
+    """Placed segments as a curve without sides, each once, and its points; None where a face is glued to itself."""
+    once = np.unique(placed.given, return_index=True)[1]
+    faces, nodes = placed.faces[once], placed.nodes
+    at = np.stack([barycentric_in(triangles, faces, nodes[placed.ends[once, k]]) for k in range(2)])
+    corners = triangles.corner_positions[faces]
+    apart = np.abs((at * corners).sum(axis=2) - placed.positions[once].T)
+    if (apart > NEAR * triangles.edge_lengths[faces].max(axis=1)).any():
+        return None
+    at = rounded(at)
+    alone = np.setdiff1d(np.arange(len(nodes)), placed.ends)
+    ends = locate_points(triangles, np.tile(faces, 2), at.reshape(-1, 3))
+    points = locate_points(triangles, nodes.faces[alone], rounded(nodes.barycentric[alone]))
+    located = concatenated([ends, points])
+    first, who = unique_points(located)
+    joined = who[: 2 * len(faces)].reshape(2, -1).T
+    steps = ((at[1] - at[0]) * corners).sum(axis=1)
+    edges, _ = edges_between(triangles, faces, *at)
+    normals = 1j * np.where(edges < 0, steps, np.abs(steps))  # in the layout of the face, or in the frame of the edge
+    kept = (joined[:, 0] != joined[:, 1]) & (np.abs(steps) > 0)
+    return CurveSegments(located[first], joined[kept], faces[kept], edges[kept], normals[kept], False)
+
+
+def rounded(barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
+    kept = np.where(barycentric < NEAR, 0.0, barycentric)
+    return kept / kept.sum(axis=-1, keepdims=True)

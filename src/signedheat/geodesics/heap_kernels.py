@@ -1,0 +1,82 @@
+"""Kernels: a priority queue of numbered items, each in it at most once, so that its size is known beforehand."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+
+
+class Queue(NamedTuple):
+    """A binary heap: items by position, the position of each item (−1 outside), their keys, and how many are in it."""
+
+    items: NDArray[np.int64]
+    places: NDArray[np.int64]
+    keys: NDArray[np.float64]
+    size: NDArray[np.int64]
+
+    @classmethod
+    def empty(cls, n_items: int) -> Queue:
+        """A queue for items 0 to n_items − 1.
+
+        Examples
+        --------
+        >>> queue = Queue.empty(3)
+        >>> for item, key in ((0, 2.0), (1, 5.0), (2, 3.0), (1, 1.0)):
+        ...     push(queue, item, key)
+        >>> [pop(queue) for _ in range(3)]
+        [1, 0, 2]
+        """
+        return cls(np.empty(n_items, np.int64), np.full(n_items, -1), np.empty(n_items), np.zeros(1, np.int64))
+
+
+@compiled
+def before(keys: NDArray[np.float64], a: int, b: int) -> bool:
+    """Whether item a leaves the queue before item b; equal keys go by number, so results are the same each time."""
+    return bool(keys[a] < keys[b] or (keys[a] == keys[b] and a < b))
+
+
+@compiled
+def push(queue: Queue, item: int, key: float) -> None:
+    """Put an item into the queue, or move it forward if its key has become smaller."""
+    items, places, keys, size = queue
+    place = places[item]
+    if place < 0:
+        place = size[0]
+        size[0] += 1
+    elif key >= keys[item]:
+        return
+    keys[item] = key
+    while place > 0:
+        above = items[(place - 1) // 2]
+        if before(keys, above, item):
+            break
+        items[place], places[above] = above, place
+        place = (place - 1) // 2
+    items[place], places[item] = item, place
+
+
+@compiled
+def pop(queue: Queue) -> int:
+    """Take out the item with the smallest key."""
+    items, places, keys, size = queue
+    first = items[0]
+    places[first] = -1
+    size[0] -= 1
+    n = size[0]
+    if n > 0:
+        last, place = items[n], 0
+        while 2 * place + 1 < n:
+            below = 2 * place + 1
+            if below + 1 < n and before(keys, items[below + 1], items[below]):
+                below += 1
+            if before(keys, last, items[below]):
+                break
+            items[place] = items[below]
+            places[items[place]] = place
+            place = below
+        items[place], places[last] = last, place
+    return int(first)

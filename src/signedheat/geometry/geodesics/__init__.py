@@ -1,1 +1,0 @@
-"""Shortest paths and exact distance on polyhedral surfaces, and any-angle distance in tet meshes."""

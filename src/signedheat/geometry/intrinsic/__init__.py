@@ -1,1 +1,0 @@
-"""Intrinsic triangulations: edge flips, refinement, and the transfer of points and curves to them."""

@@ -1,0 +1,1 @@
+"""Regular grids, and distance on them: diffusion, Poisson equations, contours, redistancing, field."""

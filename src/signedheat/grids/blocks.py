@@ -1,0 +1,200 @@
+"""Sparse grids: blocks of 8³ nodes where there is something, and tables that find them.
+
+A grid of any size is divided into blocks of `SIDE` nodes along each axis, those into cubes of `CUBE` blocks. Cubes that
+hold blocks have a table of their own: memory grows with the blocks, not with the grid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+
+SIDE = 8
+"""Nodes along each edge of a block."""
+CUBE = 16
+"""Blocks along each edge of a cube."""
+NODES = SIDE**3
+"""Nodes of a block."""
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Which blocks of a grid are there.
+
+    Attributes
+    ----------
+    places : (n, 3) int32
+        Their first nodes, divided by `SIDE`, in the order of cubes and within each of rows.
+    shape : tuple of 3 int
+        Nodes of the grid along each axis.
+    """
+
+    places: NDArray[np.int32]
+    shape: tuple[int, int, int]
+
+    @classmethod
+    def of(cls, places: NDArray[np.integer], shape: tuple[int, ...]) -> Blocks:
+        """Blocks at (n, 3) places, each once, in order.
+
+        Examples
+        --------
+        >>> blocks = Blocks.of(np.array([[1, 0, 0], [0, 0, 0], [1, 0, 0]]), (16, 16, 16))
+        >>> blocks.places.tolist(), blocks.rows(np.array([[1, 0, 0], [1, 1, 0]])).tolist()
+        ([[0, 0, 0], [1, 0, 0]], [1, -1])
+        """
+        cubes = -(-np.array(shape) // (SIDE * CUBE))
+        ranked = np.asarray(places, dtype=np.int64).reshape(-1, 3)
+        cube = np.ravel_multi_index(tuple((ranked // CUBE).T), tuple(cubes))
+        within = np.ravel_multi_index(tuple((ranked % CUBE).T), (CUBE,) * 3)
+        _, order = np.unique(cube * CUBE**3 + within, return_index=True)
+        return cls(ranked[order].astype(np.int32), (int(shape[0]), int(shape[1]), int(shape[2])))
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    @cached_property
+    def tables(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Number of each cube, −1 where it holds nothing; and (cubes, 16, 16, 16) the block in each place of a cube."""
+        cubes = np.full(tuple(-(-n // (SIDE * CUBE)) for n in self.shape), -1, dtype=np.int32)
+        if not len(self):
+            return cubes, np.full((0, CUBE, CUBE, CUBE), -1, dtype=np.int32)
+        places = self.places.astype(np.int64)
+        flat = np.ravel_multi_index(tuple((places // CUBE).T), cubes.shape)
+        taken, number = np.unique(flat, return_inverse=True)
+        cubes.ravel()[taken] = np.arange(len(taken))
+        rows = np.full((len(taken), CUBE, CUBE, CUBE), -1, dtype=np.int32)
+        a, b, c = (places % CUBE).T
+        rows[number, a, b, c] = np.arange(len(self))
+        return cubes, rows
+
+    def rows(self, places: NDArray[np.integer]) -> NDArray[np.int32]:
+        """(k,) number of the block at each of (k, 3) places; −1 where there is none, or no grid."""
+        at = np.asarray(places, dtype=np.int64)
+        limit = -(-np.array(self.shape) // SIDE)
+        inside = np.flatnonzero(((at >= 0) & (at < limit)).all(axis=1))
+        cubes, rows = self.tables
+        result = np.full(len(at), -1, dtype=np.int32)
+        number = cubes[tuple((at[inside] // CUBE).T)]
+        held = number >= 0
+        a, b, c = (at[inside[held]] % CUBE).T
+        result[inside[held]] = rows[number[held], a, b, c]
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class BlockValues:
+    """Values at the nodes of blocks, indexed by nodes as an array of the whole grid is.
+
+    Attributes
+    ----------
+    blocks : Blocks
+        Which nodes have a value.
+    values : (n, 8, 8, 8) float
+        Their values; NaN where they have none.
+
+    Examples
+    --------
+    >>> blocks = Blocks.of(np.zeros((1, 3), dtype=int), (16, 16, 16))
+    >>> heights = BlockValues(blocks, np.full((1, 8, 8, 8), 0.5, dtype=np.float32))
+    >>> heights[np.array([3, 9]), np.array([0, 0]), np.array([7, 7])].tolist()
+    [0.5, nan]
+    """
+
+    blocks: Blocks
+    values: NDArray[np.floating[Any]]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Nodes of the grid."""
+        return self.blocks.shape
+
+    def __getitem__(self, nodes: tuple[NDArray[np.integer], ...]) -> NDArray[np.float64]:
+        """(k,) values at nodes, given by their three indices; NaN where there is no block."""
+        at = np.stack(nodes, axis=1)
+        row = self.blocks.rows(at // SIDE)
+        result = np.full(len(row), np.nan)
+        held = row >= 0
+        a, b, c = (at[held] % SIDE).T
+        result[held] = self.values[row[held], a, b, c]
+        return result
+
+    def interpolated(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k,) linear interpolation at (k, 3) points in cells; NaN where one of the nodes around has no value."""
+        result = np.empty(len(points))
+        limit = np.array(self.shape, dtype=np.float64) - 1
+        _interpolate(*self.blocks.tables, self.values, np.ascontiguousarray(points, dtype=np.float64), limit, result)
+        return result
+
+    def window(self, first: NDArray[np.integer], shape: tuple[int, int, int]) -> NDArray[np.float32]:
+        """(*shape) values in a box of nodes from `first` on; NaN where there are none."""
+        result = np.full(shape, np.nan, dtype=np.float32)
+        _gather(*self.blocks.tables, self.values, np.asarray(first, dtype=np.int64), np.array(self.shape), result)
+        return result
+
+
+@compiled
+def row_of_node(cubes: NDArray[np.int32], rows: NDArray[np.int32], i: int, j: int, k: int) -> np.int32:
+    """The block that holds a node; −1 if there is none. The node is on the grid."""
+    cube = cubes[i // 128, j // 128, k // 128]
+    return rows[cube, i // 8 % 16, j // 8 % 16, k // 8 % 16] if cube >= 0 else np.int32(-1)
+
+
+@compiled
+def _interpolate(
+    cubes: NDArray[np.int32],
+    rows: NDArray[np.int32],
+    values: NDArray[np.float32],
+    points: NDArray[np.float64],
+    limit: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> None:
+    for p in range(len(points)):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        out[p] = np.nan
+        if not (0.0 <= x <= limit[0] and 0.0 <= y <= limit[1] and 0.0 <= z <= limit[2]):
+            continue
+        i = min(np.int64(x), np.int64(limit[0]) - 1)
+        j = min(np.int64(y), np.int64(limit[1]) - 1)
+        k = min(np.int64(z), np.int64(limit[2]) - 1)
+        f, g, h = x - i, y - j, z - k
+        total = 0.0
+        for corner in range(8):
+            a, b, c = corner >> 2 & 1, corner >> 1 & 1, corner & 1
+            part = (f if a else 1.0 - f) * (g if b else 1.0 - g) * (h if c else 1.0 - h)
+            if part > 0.0:
+                row = row_of_node(cubes, rows, i + a, j + b, k + c)
+                if row < 0:
+                    total = np.nan
+                    break
+                total += part * values[row, (i + a) % 8, (j + b) % 8, (k + c) % 8]
+        out[p] = total
+
+
+@compiled
+def _gather(
+    cubes: NDArray[np.int32],
+    rows: NDArray[np.int32],
+    values: NDArray[np.float32],
+    first: NDArray[np.int64],
+    limit: NDArray[np.int64],
+    out: NDArray[np.float32],
+) -> None:
+    for a in range(out.shape[0]):
+        for b in range(out.shape[1]):
+            i, j = first[0] + a, first[1] + b
+            if not (0 <= i < limit[0] and 0 <= j < limit[1]):
+                continue
+            row, held = np.int32(-1), np.int64(-1)
+            for c in range(out.shape[2]):
+                k = first[2] + c
+                if 0 <= k < limit[2]:
+                    if k // 8 != held:
+                        row, held = row_of_node(cubes, rows, i, j, k), k // 8
+                    if row >= 0:
+                        out[a, b, c] = values[row, i % 8, j % 8, k % 8]

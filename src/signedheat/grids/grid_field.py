@@ -1,0 +1,646 @@
+"""Distance on a grid."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Generic, Literal, cast, overload
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike, NDArray
+
+from ..diagnostics import Diagnostics
+from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError
+from ..exchange import Displayed, with_values
+from ..field_arithmetic import Combinable, Rule
+from ..field_levels import on_level, refuse_beyond_walls
+from ..frozen import Frozen
+from ..mesh.edge_flips import flipped_along_creases
+from ..packages import lazy_module
+from ..parallel import in_chunks
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import contiguous, finite_number, query_points, shaped
+from .block_contours import Refine, block_contour, contour_parts
+from .blocks import SIDE, Blocks, BlockValues
+from .grid import Dimension, Grid
+from .marching import closed_surface, level_lines
+from .polyline import Polyline
+from .solid_queries import Closest, SolidQueries, scaled
+
+files: Any = lazy_module("signedheat.io.field_files", "files")
+ply: Any = lazy_module("signedheat.io.ply", "files")
+
+if TYPE_CHECKING:
+    import pyvista
+
+
+@dataclass(frozen=True, eq=False)
+class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
+    """Signed distance at the nodes of a grid.
+
+    Parameters
+    ----------
+    grid : Grid
+        Where the nodes are.
+    values : (*grid.shape) float
+        φ at the nodes, in the units of the grid: ``values[i, j, k]`` at ``grid.points[i, j, k]``. Positive on the
+        side that the source normals point to, so negative inside a shape with outward normals.
+    diagnostics : Diagnostics
+        Timings, diffusion time, and notes on the computation.
+    confidence : (*grid.shape) float, optional
+        From 0 to 1: how far the surface that is nearest to each node was there (1), or had to be completed (less, the
+        farther from any face), where the field was sharpened to a shape.
+    solid : Solid, optional
+        What the values are distances to: calls are exact then, and contours lie on their level exactly. ``.npz`` files,
+        negation and multiplication keep it; ``repr`` says whether it is there.
+    blocks : Blocks, optional
+        Blocks of 8³ nodes that have values, those of a band around the surface; by default all nodes have. Values and
+        confidence are then (n, 8, 8, 8), in single and half precision, NaN at nodes of the last blocks beyond the grid.
+    coarse : GridField, optional
+        φ on the whole box, which a field in a band has, for what lies beyond the band.
+    width : float
+        Half width of the band: up to which distance all nodes are there.
+
+    Raises
+    ------
+    GeometryError
+        If the values do not have the shape of the grid, or that of the blocks.
+
+    Examples
+    --------
+    >>> grid = Grid(origin=(-1, -1, -1), spacing=0.1, shape=(21, 21, 21))
+    >>> phi = GridField(grid, np.linalg.norm(grid.points, axis=-1) - 0.5)
+    >>> phi([[0.7, 0.0, 0.0]]).round(3)
+    array([0.2])
+    >>> phi.gradient([[0.7, 0.0, 0.0]]).round(2)
+    array([[1., 0., 0.]])
+    >>> phi.contour(0.0).n_faces > 0
+    True
+    """
+
+    grid: Grid[Dimension]
+    values: NDArray[np.float64]
+    diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
+    confidence: NDArray[np.float32] | None = field(default=None, repr=False)
+    solid: SolidQueries | None = field(default=None, repr=False)
+    blocks: Blocks | None = field(default=None, repr=False)
+    coarse: GridField[Dimension] | None = field(default=None, repr=False)
+    width: float = math.inf
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.grid, Grid):
+            raise UnsupportedTypeError(f"{self.grid!r:.80} is not a Grid", element="grid")
+        if self.blocks is not None:
+            self._check_blocks(self.blocks)
+            return
+        values = contiguous(self.values, "values")
+        if values.shape != self.grid.shape:
+            raise GeometryError(
+                f"values have shape {values.shape}, but the grid has {self.grid.shape} nodes", element="values"
+            )
+        object.__setattr__(self, "values", values)
+        if self.confidence is not None:
+            confidence = np.asarray(self.confidence, dtype=np.float32)
+            if confidence.shape != values.shape:
+                raise GeometryError(
+                    f"confidence has shape {confidence.shape}, and the values {values.shape}", element="confidence"
+                )
+            object.__setattr__(self, "confidence", confidence)
+
+    def _check_blocks(self, blocks: Blocks) -> None:
+        if self.values.shape != (len(blocks), SIDE, SIDE, SIDE) or blocks.shape != self.grid.shape:
+            raise GeometryError(
+                f"{len(blocks)} blocks of a grid of {blocks.shape} nodes have values of shape {self.values.shape} on "
+                f"one of {self.grid.shape}",
+                element="values",
+            )
+        if self.coarse is None:
+            raise GeometryError("a field in a band has a coarse one for what lies beyond", element="coarse")
+
+    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
+        """φ at points in space: exact where the field has its solid, else that of `interpolate`.
+
+        Parameters
+        ----------
+        points : (..., d) float
+            Positions, in the units of the grid.
+
+        Returns
+        -------
+        (...) float
+            Signed distances, in the shape of the points: one number for one point.
+        """
+        return self.interpolate(points) if self.solid is None else self.solid.distance(points)
+
+    def interpolate(self, points: ArrayLike) -> NDArray[np.float64]:
+        """φ at points in space, by multilinear interpolation between nodes; beyond a band between the coarse ones.
+
+        Outside the grid φ is extrapolated linearly from the nearest point of the bounding box of the grid, along the
+        gradient there. This is continuous, and for a convex shape inside the box a lower bound of the distance.
+
+        Parameters
+        ----------
+        points : (..., d) float
+            Positions, in the units of the grid.
+
+        Returns
+        -------
+        (...) float
+            Signed distances, interpolated from the nodes around that have a value; NaN where none has one.
+
+        Examples
+        --------
+        >>> line = GridField(Grid([0.0], 1.0, [3]), np.array([0.0, 1.0, 3.0]))
+        >>> line.interpolate([[0.5], [2.5]])  # between nodes, and beyond the last one
+        array([0.5, 4. ])
+        """
+        places, shape = query_points(points, self.grid.dimension)
+        (values,) = in_chunks(self._values_at, places)
+        return shaped(values, shape)
+
+    def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
+        """∇φ at points in space: exact where the field has its solid, else central differences, interpolated.
+
+        Outside the grid these are the gradient at the nearest point of the bounding box of the grid.
+
+        Parameters
+        ----------
+        points : (..., d) float
+            Positions, in the units of the grid.
+
+        Returns
+        -------
+        (..., d) float
+            Gradients; of length about 1, since φ is a distance.
+
+        Examples
+        --------
+        >>> line = GridField(Grid([0.0], 1.0, [3]), np.array([0.0, 1.0, 3.0]))
+        >>> line.gradient([[0.0], [1.0]])  # one-sided at the end
+        array([[1. ],
+               [1.5]])
+        """
+        if self.solid is not None:
+            return self.solid.closest(points).gradients
+        places, shape = query_points(points, self.grid.dimension)
+        (slopes,) = in_chunks(lambda chunk: (self._slopes(self._into_box(chunk)),), places)
+        return shaped(slopes, shape)
+
+    def closest(self, points: ArrayLike) -> Closest:
+        """The nearest place of the solid's surface for points in space: `Solid.closest`.
+
+        Parameters
+        ----------
+        points : (..., 3) float
+            Positions, in the units of the grid; they may lie outside of it.
+
+        Returns
+        -------
+        Closest
+            Distances, places, faces and where in them, gradients, confidence.
+
+        Raises
+        ------
+        SourceError
+            If the field has no solid: it was read from a file, or computed otherwise.
+
+        Examples
+        --------
+        >>> from signedheat import samples, signed_distance
+        >>> phi = signed_distance(samples.sphere(2), resolution=16)
+        >>> phi.closest([[0.0, 0.0, 3.0]]).points.round(3).tolist()
+        [[0.0, 0.0, 1.0]]
+        """
+        if self.solid is None:
+            raise SourceError(
+                "the field has no solid that it is the distance to",
+                remedy="take it from signed_distance or Solid.field, not from a file",
+                element="field",
+            )
+        return self.solid.closest(points)
+
+    @property
+    def whole(self) -> GridField[Dimension]:
+        """A field on the whole box: of one in a band the coarse one, else itself."""
+        return self if self.coarse is None else self.coarse
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes that are there."""
+        return int(self.values.size)
+
+    @property
+    def domain(self) -> Grid[Dimension]:
+        """The grid."""
+        return self.grid
+
+    @overload
+    def contour(self: GridField[Literal[3]], level: float = 0.0) -> TriangleMesh: ...
+    @overload
+    def contour(self: GridField[Literal[2]], level: float = 0.0) -> list[Polyline]: ...
+    @overload
+    def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]: ...
+    def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]:
+        """The level set φ = level.
+
+        In space, a surface: closed, manifold, with normals pointing to greater φ. Where it leaves the grid, as the
+        completion of an open shape may do, it is closed along the box of the grid (1 % of a cell outside); where it
+        meets nodes without a value, it is closed along the last nodes before them.
+
+        In the plane, polylines, one for each connected component, open or closed, with greater φ to their left. Open
+        ones end at the box of the grid, and at nodes without a value.
+
+        Parameters
+        ----------
+        level : float
+            The level, in the units of the grid.
+
+        Returns
+        -------
+        TriangleMesh, or list of Polyline
+            The surface in space, or the polylines in the plane.
+
+        Raises
+        ------
+        OutsideError
+            If φ does not take the level anywhere on the grid.
+        GeometryError
+            If the grid has neither 2 nor 3 dimensions, or values are infinite.
+
+        Examples
+        --------
+        >>> grid = Grid((-1, -1), 0.1, (21, 21))
+        >>> disk = GridField(grid, np.linalg.norm(grid.points, axis=-1) - 0.5)
+        >>> [circle] = disk.contour(0.25)
+        >>> circle.closed, round(circle.length / (2 * np.pi), 2)
+        (True, 0.75)
+        """
+        grid, level = self.grid, finite_number(level, "level")
+        refine = self._refined(level)
+        if grid.dimension == 2:
+            lines = level_lines(self.values, grid.origin, grid.spacing, level)
+            return [Polyline(points if refine is None else refine(points), closed) for points, closed in lines]
+        if self.blocks is None:
+            vertices, faces = closed_surface(self.values, grid.origin, grid.spacing, level, refine)
+        else:
+            self._refuse_beyond_band(level)
+            vertices, faces = block_contour(
+                BlockValues(self.blocks, self.values), grid.spacing, level, self._placed(refine)
+            )
+        return TriangleMesh(vertices, faces if refine is None else flipped_along_creases(vertices, faces))
+
+    def _refined(self, level: float) -> Refine | None:
+        """A function that moves points of a level onto it; None if the field has no solid."""
+        if self.solid is None:
+            return None
+        distance = self.solid.distance
+        values = self.values if self.blocks is None else BlockValues(self.blocks, self.values)
+        return lambda points: on_level(distance, points, values, self.grid, level)
+
+    def _placed(self, refine: Refine | None) -> Refine:
+        """From points in cells to places in space, moved onto the level if there is a way to."""
+
+        def placed(cells: NDArray[np.float64]) -> NDArray[np.float64]:
+            points = self.grid.origin + cells * self.grid.spacing
+            return points if refine is None else refine(points)
+
+        return placed
+
+    def _refuse_beyond_band(self, level: float) -> None:
+        if abs(level) > self.width:
+            raise OutsideError(
+                f"level {level:g} lies outside the band, which reaches to {self.width:g}",
+                remedy=f"use a band of at least {abs(level):g}",
+                element=f"level {level:g}",
+            )
+
+    def save_contour(self, path: str | PathLike[str], level: float = 0.0) -> tuple[int, int]:
+        """Write the level set φ = level in space to a file; that of a band part by part, larger than memory.
+
+        Parameters
+        ----------
+        path : str or path
+            A ``.ply`` file. An existing one survives a failure.
+        level : float
+            See `contour`. Creases of bands are left as the cells cut them.
+
+        Returns
+        -------
+        vertices, faces : int
+            How many there are.
+
+        Raises
+        ------
+        OutsideError
+            As `contour`.
+        FileFormatError
+            If the file is of another kind, or cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from signedheat import complete, samples
+        >>> ball = complete(samples.sphere(4)).field(spacing=0.02, band=0.1)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     vertices, faces = ball.save_contour(f"{folder}/ball.ply", 0.05)
+        >>> 2 * vertices - faces  # closed, without handles
+        4
+        """
+        level = finite_number(level, "level")
+        if self.blocks is None:
+            surface = cast("TriangleMesh", self.contour(level))
+            parts = iter([(surface.vertices, surface.faces)])
+        else:
+            self._refuse_beyond_band(level)
+            placed = self._placed(self._refined(level))
+            parts = contour_parts(BlockValues(self.blocks, self.values), self.grid.spacing, level, placed)
+        return ply.write_parts(parts, path)
+
+    def dense(self) -> GridField[Dimension]:
+        """The field at all nodes of its grid, those beyond a band interpolated from the coarse ones.
+
+        Returns
+        -------
+        GridField
+            Without a band; this field itself if it has none.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> band = complete(samples.sphere(2)).field(resolution=48, band=0.2)
+        >>> band.n_nodes < band.dense().n_nodes == band.grid.n_nodes
+        True
+        """
+        if self.blocks is None:
+            return self
+        values = np.empty(self.grid.shape)
+        for i, x in enumerate(self.grid.axes[0]):  # plane by plane, in bounded memory
+            plane = np.stack(np.meshgrid([x], *self.grid.axes[1:], indexing="ij"), axis=-1).reshape(-1, 3)
+            values[i] = self.whole.interpolate(plane).reshape(self.grid.shape[1:])
+        for place, block in zip(self.blocks.places.astype(np.int64) * SIDE, self.values, strict=True):
+            part = tuple(slice(p, min(p + SIDE, n)) for p, n in zip(place, self.grid.shape, strict=True))
+            values[part] = block[tuple(slice(0, s.stop - s.start) for s in part)]
+        return GridField(self.grid, values, self.diagnostics, solid=self.solid)
+
+    @overload
+    def offset(self: GridField[Literal[3]], distance: float) -> TriangleMesh: ...
+    @overload
+    def offset(self: GridField[Literal[2]], distance: float) -> list[Polyline]: ...
+    @overload
+    def offset(self, distance: float) -> TriangleMesh | list[Polyline]: ...
+    def offset(self, distance: float) -> TriangleMesh | list[Polyline]:
+        """The offset of the shape at a signed distance: `contour`, but refused if the grid is too small for it.
+
+        Parameters
+        ----------
+        distance : float
+            Signed distance, positive outward, in the units of the grid.
+
+        Returns
+        -------
+        TriangleMesh, or list of Polyline
+            As `contour`.
+
+        Raises
+        ------
+        OutsideError
+            If φ does not take the value on the grid, or the offset leaves the grid although the shape itself does not:
+            the grid then needs more padding.
+
+        Examples
+        --------
+        >>> grid = Grid((-1, -1), 0.1, (21, 21))
+        >>> disk = GridField(grid, np.linalg.norm(grid.points, axis=-1) - 0.5)
+        >>> disk.offset(-0.1)
+        [Polyline(32 points, closed)]
+        """
+        distance = finite_number(distance, "distance")
+        walls = np.concatenate([self.whole.values.take([0, -1], axis).ravel() for axis in range(self.grid.dimension)])
+        padding = f"use a padding of more than {abs(distance):g}, or a larger diffusion where wide gaps stay open"
+        refuse_beyond_walls(walls, distance, "grid", padding)
+        return self.contour(distance)
+
+    def with_values(self, values: NDArray[np.float64]) -> GridField[Dimension]:
+        """Other values on the same grid, without what belongs to these.
+
+        Parameters
+        ----------
+        values : (n,) float
+            Of the shape of `values`.
+
+        Returns
+        -------
+        GridField
+            Without diagnostics, confidence and solid.
+
+        Examples
+        --------
+        >>> line = GridField(Grid([0.0], 1.0, [2]), np.array([0.0, 1.0]))
+        >>> line.with_values(line.values**2).values.tolist()
+        [0.0, 1.0]
+        """
+        return GridField(self.grid, values)
+
+    def combined_with(self, other: GridField[Dimension], rule: Rule) -> GridField[Dimension]:
+        """The field whose values a rule makes of those of two fields on one grid.
+
+        Parameters
+        ----------
+        other : GridField
+            On the same domain.
+        rule : callable
+            Takes two arrays of values and returns one, such as `np.minimum`.
+
+        Returns
+        -------
+        GridField
+            With the values of the rule.
+
+        Raises
+        ------
+        GeometryError
+            If they are fields in different bands.
+
+        Examples
+        --------
+        >>> line = GridField(Grid([0.0], 1.0, [2]), np.array([0.0, 1.0]))
+        >>> line.combined_with(1.0 - line, np.minimum).values.tolist()
+        [0.0, 0.0]
+        """
+        if self.blocks is None and other.blocks is None:
+            return self.with_values(rule(self.values, other.values))
+        ours, theirs = (None if each.blocks is None else each.blocks.places for each in (self, other))
+        if ours is None or theirs is None or not np.array_equal(ours, theirs):
+            raise GeometryError(
+                "fields in bands have values at different nodes",
+                remedy="compute both on one whole grid",
+                element="blocks",
+            )
+        coarse = self.whole.combined_with(other.whole, rule)
+        values = np.asarray(rule(self.values, other.values), dtype=self.values.dtype)
+        return GridField(self.grid, values, blocks=self.blocks, coarse=coarse, width=self.width)
+
+    def _scaled(self, factor: float) -> GridField[Dimension]:
+        """The field times a number; exact as this one is, if it is neither 0 nor infinite."""
+        solid = None if self.solid is None or not factor or not math.isfinite(factor) else scaled(self.solid, factor)
+        coarse = None if self.coarse is None else self.coarse._scaled(factor)
+        return replace(
+            self,
+            values=self.values * factor,
+            diagnostics=Diagnostics(),
+            solid=solid,
+            coarse=coarse,
+            width=abs(factor) * self.width,
+        )
+
+    def to_pyvista(self) -> pyvista.ImageData:
+        """Convert to an image of PyVista.
+
+        A field in the plane has z = 0; of one in a band it is the coarse field, and ``dense()`` has all nodes.
+
+        Returns
+        -------
+        pyvista.ImageData
+            With point data ``signed_distance``, and ``confidence`` where there is one.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> GridField(Grid((0, 0), 1.0, (2, 2)), np.zeros((2, 2))).to_pyvista().array_names
+        ['signed_distance']
+        """
+        if self.blocks is not None:
+            return self.whole.to_pyvista()
+        image: pyvista.ImageData = self.grid.to_pyvista()
+        if self.confidence is not None:
+            image.point_data["confidence"] = self.confidence.ravel(order="F")
+        with_values(image, self.values.ravel(order="F"))
+        return image
+
+    def confidence_at(self, points: ArrayLike) -> NDArray[np.float32]:
+        """How far the surface that is nearest was there (1), or had to be completed (less), interpolated.
+
+        Parameters
+        ----------
+        points : (..., d) float
+            Positions, such as the vertices of an offset.
+
+        Returns
+        -------
+        (...) float
+            From 0 to 1; at points outside the grid, that of the nearest point of its box; 1 if the field has none.
+
+        Examples
+        --------
+        >>> line = GridField(Grid([0.0], 1.0, [2]), np.array([0.0, 1.0]), confidence=np.array([1.0, 0.5]))
+        >>> line.confidence_at([[0.5]]).tolist()
+        [0.75]
+        """
+        if self.solid is not None:
+            return self.solid.closest(points).confidence
+        places, shape = query_points(points, self.grid.dimension)
+        if self.confidence is None:
+            return np.ones(shape, dtype=np.float32)[()]
+        inside = self._into_box(places)
+        index = (inside - self.grid.origin) / self.grid.spacing
+        if self.blocks is None:
+            found = scipy.ndimage.map_coordinates(self.confidence, index.T, np.float32, order=1, mode="nearest")
+        else:
+            found = BlockValues(self.blocks, self.confidence.astype(np.float32)).interpolated(index)
+            beyond = np.isnan(found)
+            found[beyond] = self.whole.confidence_at(inside[beyond])
+        return shaped(np.clip(found, 0, 1).astype(np.float32), shape)
+
+    @property
+    def surface_confidence(self) -> float | None:
+        """Mean confidence at the nodes within a cell of the zero set, one number for the whole field; or None."""
+        cell = float(self.grid.spacing.max())
+        near = (self.values < cell) & (self.values > -cell)
+        if self.confidence is None or not near.any():
+            return None
+        return float(self.confidence[near].mean(dtype=np.float64))
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write to a file, in the format given by its extension; `signedheat.load_field` reads it.
+
+        Parameters
+        ----------
+        path : str or path
+            ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` or ``.vdb``; in a band ``.npz`` or ``.vdb``.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is another, or the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from signedheat import load_field
+        >>> line = GridField(Grid([0.0], 1.0, [2]), np.array([0.0, 1.0]))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     line.save(f"{folder}/line.npz")
+        ...     load_field(f"{folder}/line.npz").values.tolist()
+        [0.0, 1.0]
+        """
+        files.write_field(self, path)
+
+    def _into_box(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.clip(points, self.grid.origin, self.grid.upper)
+
+    def _values_at(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
+        """φ at (n, d) points, within the box and outside of it."""
+        inside = self._into_box(points)
+        values = self._interpolate(inside)
+        away = points - inside
+        outside = np.flatnonzero(away.any(axis=-1))
+        if len(outside):
+            slopes = self._slopes(inside[outside])
+            values[outside] += np.einsum("ij,ij->i", slopes, away[outside])
+        return (values,)
+
+    def _interpolate(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        index = ((points - self.grid.origin) / self.grid.spacing).T
+        if self.blocks is not None:
+            values = BlockValues(self.blocks, self.values).interpolated(index.T)
+            beyond = np.isnan(values)
+            values[beyond] = self.whole.interpolate(points[beyond])
+            return values
+        if self._defined is None:
+            return scipy.ndimage.map_coordinates(self.values, index, order=1, mode="nearest")
+        filled, defined = self._defined
+        sums = scipy.ndimage.map_coordinates(filled, index, order=1, mode="nearest")
+        weights = scipy.ndimage.map_coordinates(defined, index, order=1, mode="nearest")
+        return np.where(weights > 0, sums / np.where(weights > 0, weights, 1.0), np.nan)
+
+    @cached_property
+    def _defined(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Values with 0 where there is none, and 1 where there is one, else 0; or None if all nodes have one."""
+        defined = ~np.isnan(self.values)
+        return None if defined.all() else (np.where(defined, self.values, 0.0), defined.astype(np.float64))
+
+    def _slopes(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Central differences of the interpolant, which are those at the nodes, interpolated."""
+        slopes = np.empty_like(points)
+        for axis, step in enumerate(self.grid.spacing):
+            ahead, behind = points.copy(), points.copy()
+            ahead[:, axis] = np.minimum(ahead[:, axis] + step, self.grid.upper[axis])
+            behind[:, axis] = np.maximum(behind[:, axis] - step, self.grid.origin[axis])
+            rise = self._interpolate(ahead) - self._interpolate(behind)
+            slopes[:, axis] = rise / (ahead[:, axis] - behind[:, axis])
+        return slopes
+
+    def __repr__(self) -> str:
+        how = "interpolated" if self.solid is None else "exact"
+        if self.blocks is not None:
+            band = f"{len(self.blocks)} blocks, {self.width:g} on either side"
+            return f"GridField({how} between nodes, {self.grid!r}, {band})"
+        low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
+        return f"GridField({how} between nodes, {self.grid!r}, values from {low:.4g} to {high:.4g})"

@@ -1,0 +1,324 @@
+"""Diffusion from sources on a grid, on a hierarchy of coarser grids.
+
+X falls by a factor of e over the length √t. Farther than a few √t from the source its direction varies slowly, and a
+grid of twice the spacing, with the diffusion time of its own spacing (``t = τ max(h, h_source)²``, as on the finest
+grid), continues it at an eighth of the cost in space. So every level is swept only within `BAND` of its sources, and
+the coarsest level everywhere.
+
+A coarser level takes the values that the finer one found within its band: the directions of X, with lengths raised to
+the power that turns the decay rate of the finer level into its own, so that a path from the source to a node has the
+same weight wherever it leaves the band. Where a level is skipped, its sources are restricted to the next by the
+transpose of linear interpolation, which keeps sums and first moments: the two sides of a sheet thinner than a coarse
+cell do not cancel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+from ..memory import untouched_zeros
+from .node_sources import STRETCH, NodeSources
+from .stencil import by_slabs
+from .sweeps import TINY, diffuse_by_sweeps
+
+BAND = 14.0
+"""Half width, in √t, of the band around the source in which a level is swept."""
+MARGIN = 3
+"""Width, in nodes, of the rim of the band whose values are taken from the coarser level."""
+SMALL = 0.125
+"""A first band that is a smaller fraction of the grid than this is swept twice as often: it costs little there."""
+COARSEST = 32
+"""A grid with no more nodes than this along any axis is not coarsened."""
+FEW = 4
+"""Axes with no more nodes than this are not halved."""
+ROUNDS = 2
+"""How often each combination of sweep directions is used within a band, by default."""
+BEYOND = 2
+"""Levels that start from values of a finer level are swept so many times as often."""
+ROUNDS_EVERYWHERE = 12
+"""The same on the coarsest grid, where paths from the source are longer and sweeps are cheap."""
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """The diffused vectors on one grid of the hierarchy.
+
+    Attributes
+    ----------
+    vectors : (l₀, l₁, l₂, n, 4) float32, or None on a level that was skipped
+        X, within the band.
+    inside : (l₀, l₁, l₂, stretches) bool, or None
+        Stretches of lines in which these values are valid; elsewhere those of the coarser level are.
+    factors : (4,) int
+        Cells of this grid per cell of the next coarser one: see `coarsening`.
+    """
+
+    vectors: NDArray[np.float32] | None
+    inside: NDArray[np.bool_] | None
+    factors: NDArray[np.int64]
+
+
+Guess = tuple[NDArray[np.float32], NDArray[np.bool_]]
+"""X on a level, taken from a finer one, and the stretches in which it is known and not swept."""
+
+
+def diffuse_multilevel(
+    sources: NodeSources, time: Callable[[float], float], finest: int = 0, rounds: int = ROUNDS
+) -> list[Level]:
+    """Solve ``(1 − tΔ) X = B``, Eq. 12 on a grid, on every level from `finest` (0: the sources' grid) to the coarsest.
+
+    `time` is the diffusion time t on a grid of a given mean spacing. Where a coarser solution suffices, some of the
+    finest levels are skipped. Each combination of sweep directions is used so many rounds within a band.
+    """
+    levels: list[Level] = []
+    guess = None
+    while True:
+        factors = coarsening(sources.shape, sources.steps)
+        last = not (factors > 1).any()
+        if len(levels) >= finest or last:
+            often = ROUNDS_EVERYWHERE if last else rounds if guess is None else BEYOND * rounds
+            levels.append(_diffuse_level(sources, guess, time, factors, often, last))
+        else:
+            levels.append(Level(None, None, factors))
+        if last:
+            return levels
+        shape, steps = _coarser(sources.shape, sources.steps)
+        guess = None
+        if levels[-1].vectors is not None:
+            power = np.sqrt(time(_mean_step(sources.steps)) / time(_mean_step(steps)))
+            guess = _carried(levels[-1], shape, power)
+        sources = sources.restricted(factors, shape, steps) if guess is None else NodeSources.empty(shape, steps)
+
+
+def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(4,) cells of a grid per cell of the next coarser one: 2 along its finest axes, 1 along the others.
+
+    An axis with few nodes whose whole length is below the spacing along the others is reduced to one node; its factor
+    is then the number of its nodes or more.
+
+    Examples
+    --------
+    >>> coarsening((1, 64, 64, 3), np.array([0.0, 1.0, 1.0, 0.5])).tolist()
+    [1, 2, 2, 4]
+    """
+    counts = np.array(shape)
+    factors = np.ones(4, dtype=np.int64)
+    wide = counts > FEW
+    if counts.max() > COARSEST:
+        least = steps[wide].min()
+        factors[wide & (steps < 1.5 * least)] = 2
+        short = (counts > 1) & ~wide & ((counts - 1) * steps <= least)
+        factors[short] = counts[short] + 1
+    return factors
+
+
+def skip_finest(
+    shape: tuple[int, ...], steps: NDArray[np.float64], finest: int
+) -> tuple[list[Level], tuple[int, ...], NDArray[np.float64]]:
+    """The first `finest` levels of the hierarchy, empty; and shape and spacing of the grid that follows."""
+    levels: list[Level] = []
+    while len(levels) < finest and ((factors := coarsening(shape, steps)) > 1).any():
+        levels.append(Level(None, None, factors))
+        shape, steps = _coarser(shape, steps)
+    return levels, shape, steps
+
+
+def _diffuse_level(
+    sources: NodeSources,
+    guess: Guess | None,
+    time: Callable[[float], float],
+    factors: NDArray[np.int64],
+    rounds: int,
+    last: bool,
+) -> Level:
+    t = time(_mean_step(sources.steps))
+    real = sources.steps > 0
+    ratios = np.where(real, t / np.where(real, sources.steps, 1) ** 2, 0.0)
+    given, known = (None, None) if guess is None else guess
+    start = sources.places >= 0 if known is None else known
+    if last:
+        active = inside = np.ones_like(start)
+    else:
+        width = np.ceil(BAND * np.sqrt(ratios)).astype(int)
+        active = _dilated(start, width)
+        inside = _dilated(start, np.maximum(width - MARGIN, 0))
+    if known is not None:
+        active = active & ~known
+    elif not last and active.mean() < SMALL:
+        rounds *= 2
+    vectors = diffuse_by_sweeps(sources, active, ratios, rounds, given)
+    return Level(vectors, inside, factors)
+
+
+def _mean_step(steps: NDArray[np.float64]) -> float:
+    return float(steps[steps > 0].mean())
+
+
+def _dilated(mask: NDArray[np.bool_], width: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """The mask dilated by a box of this half width, in nodes."""
+    grown = mask.astype(np.uint8)
+    for axis, reach in enumerate((*width[:3], -(-int(width[3]) // STRETCH))):
+        size = 2 * min(int(reach), mask.shape[axis]) + 1
+        grown = scipy.ndimage.maximum_filter1d(grown, size, axis, mode="constant")
+    return grown.astype(np.bool_)
+
+
+def _coarser(shape: tuple[int, ...], steps: NDArray[np.float64]) -> tuple[tuple[int, ...], NDArray[np.float64]]:
+    """Shape and spacing of the next coarser grid."""
+    factors, counts = coarsening(shape, steps), np.array(shape)
+    coarse = np.where(factors == 2, counts // 2 + 1, np.where(factors == 1, counts, 1))
+    return tuple(int(n) for n in coarse), np.where(coarse > 1, steps * factors, 0.0)
+
+
+def _carried(level: Level, shape: tuple[int, ...], power: float) -> Guess | None:
+    """The values of a level, for the next coarser one: in stretches of which all nodes have a value."""
+    assert level.vectors is not None and level.inside is not None
+    vectors = untouched_zeros((*shape, 4), np.float32)
+    counts = np.zeros((*shape[:3], -(-shape[3] // STRETCH)), dtype=np.int64)
+    _carry(level.vectors, level.inside, level.factors, np.float32(power), vectors, counts)
+    full = np.full(counts.shape[3], STRETCH)
+    full[-1] = shape[3] - STRETCH * (len(full) - 1)
+    where = counts >= full
+    return (vectors, where) if where.any() else None
+
+
+def collapse(
+    levels: list[Level], shape: tuple[int, ...], components: int, extract: Callable[..., None]
+) -> NDArray[np.float32]:
+    """(components, *shape) a function of X at each node, evaluated on the finest level whose values are valid there.
+
+    The kernel ``extract(vectors, inside, out, axis, start, stop)`` fills `out` where `inside` is true.
+    """
+    shapes = [tuple(shape)]
+    for level in levels[:-1]:
+        halves = [n if f == 1 else n // 2 + 1 if f == 2 else 1 for n, f in zip(shapes[-1], level.factors, strict=True)]
+        shapes.append(tuple(halves))
+    result: NDArray[np.float32] = np.empty((components, 1, 1, 1, 1), dtype=np.float32)
+    for depth in range(len(levels) - 1, -1, -1):
+        level = levels[depth]
+        fine_shape = shapes[depth]
+        coarsest = depth == len(levels) - 1
+        out = (np.zeros if coarsest else np.empty)((components, *fine_shape), dtype=np.float32)
+        if not coarsest:
+            by_slabs(fine_shape, _interpolate, result, level.factors, out)
+        if level.vectors is not None:
+            by_slabs(fine_shape, extract, level.vectors, level.inside, out)
+        result = out
+    return result
+
+
+@compiled
+def _carry(
+    vectors: NDArray[np.float32],
+    inside: NDArray[np.bool_],
+    factors: NDArray[np.int64],
+    power: np.float32,
+    coarse: NDArray[np.float32],
+    counts: NDArray[np.integer],
+) -> None:
+    """Copy vectors to the nodes of both grids, lengths raised to a power; count the known nodes of each stretch."""
+    n0, n1, n2, n3 = vectors.shape[:4]
+    for i in range(0, n0, 2 if factors[0] == 2 else 1):
+        for j in range(0, n1, 2 if factors[1] == 2 else 1):
+            for k in range(0, n2, 2 if factors[2] == 2 else 1):
+                a, b, c = i // factors[0], j // factors[1], k // factors[2]
+                for s in range(inside.shape[3]):
+                    if not inside[i, j, k, s]:
+                        continue
+                    for m in range(STRETCH * s, min(STRETCH * (s + 1), n3)):
+                        line, d = vectors[i, j, k, m], m // factors[3]
+                        largest = max(max(abs(line[0]), abs(line[1])), max(abs(line[2]), abs(line[3])))
+                        if (m % 2 and factors[3] == 2) or largest < TINY:
+                            continue
+                        scale = largest ** (power - np.float32(1))
+                        for q in range(4):
+                            coarse[a, b, c, d, q] = scale * line[q]
+                        counts[a, b, c, d // STRETCH] += 1
+
+
+@compiled
+def _interpolate(
+    coarse: NDArray[np.float32], factors: NDArray[np.int64], out: NDArray[np.float32], axis: int, start: int, stop: int
+) -> None:
+    """Interpolate the values of a coarser grid to all nodes, linearly along every axis that was coarsened."""
+    _, n0, n1, n2, n = out.shape
+    row = np.empty(coarse.shape[4], dtype=np.float32)
+    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
+        a = i // factors[0]
+        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
+            b = j // factors[1]
+            for k in range(n2):
+                c = k // factors[2]
+                more0 = 1 + (1 if factors[0] == 2 and i % 2 else 0)
+                more1 = 1 + (1 if factors[1] == 2 and j % 2 else 0)
+                more2 = 1 + (1 if factors[2] == 2 and k % 2 else 0)
+                share = np.float32(1.0 / (more0 * more1 * more2))
+                for q in range(out.shape[0]):
+                    for m in range(row.shape[0]):
+                        row[m] = np.float32(0)
+                    for x in range(more0):
+                        for y in range(more1):
+                            for z in range(more2):
+                                line = coarse[q, a + x, b + y, c + z]
+                                for m in range(row.shape[0]):
+                                    row[m] += share * line[m]
+                    into = out[q, i, j, k]
+                    if factors[3] != 2:
+                        for m in range(n):
+                            into[m] = row[m // factors[3]]
+                    else:
+                        for m in range((n + 1) // 2):
+                            into[2 * m] = row[m]
+                        for m in range(n // 2):
+                            into[2 * m + 1] = np.float32(0.5) * (row[m] + row[m + 1])
+
+
+@compiled
+def unit_vectors(
+    vectors: NDArray[np.float32], inside: NDArray[np.bool_], out: NDArray[np.float32], axis: int, start: int, stop: int
+) -> None:
+    """The vectors scaled to length one; where they have underflowed, `out` keeps the values of a coarser level."""
+    dimension, n0, n1, n2, n = out.shape
+    stretches = inside.shape[3]
+    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
+        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
+            for k in range(n2):
+                line = vectors[i, j, k]
+                for s in range(stretches):
+                    if not inside[i, j, k, s]:
+                        continue
+                    for m in range(STRETCH * s, min(STRETCH * (s + 1), n)):
+                        square = np.float32(0)
+                        largest = max(max(abs(line[m, 0]), abs(line[m, 1])), max(abs(line[m, 2]), abs(line[m, 3])))
+                        if largest < TINY:
+                            continue
+                        factor = np.float32(1) / largest
+                        for d in range(dimension):
+                            square += (factor * line[m, d]) ** 2
+                        factor /= np.sqrt(square)
+                        for d in range(dimension):
+                            out[d, i, j, k, m] = factor * line[m, d]
+
+
+@compiled
+def quotients(
+    vectors: NDArray[np.float32], inside: NDArray[np.bool_], out: NDArray[np.float32], axis: int, start: int, stop: int
+) -> None:
+    """The second component divided by the first; `out` keeps its values where the first has underflowed."""
+    _, n0, n1, n2, n = out.shape
+    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
+        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
+            for k in range(n2):
+                line = vectors[i, j, k]
+                for s in range(inside.shape[3]):
+                    if not inside[i, j, k, s]:
+                        continue
+                    for m in range(STRETCH * s, min(STRETCH * (s + 1), n)):
+                        if line[m, 0] > TINY:
+                            out[0, i, j, k, m] = line[m, 1] / line[m, 0]

@@ -1,0 +1,177 @@
+"""Polylines in the plane: sources on two-dimensional grids."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import GeometryError
+from ..exchange import Displayed
+from ..frozen import Frozen
+from ..packages import lazy_module
+from ..validation import boolean, coordinates, flag, numbers, positive_steps
+from .marching import level_lines
+
+if TYPE_CHECKING:
+    import pyvista
+else:
+    pyvista = lazy_module("pyvista", "objects of PyVista")
+
+
+@dataclass(frozen=True, eq=False)
+class Polyline(Displayed, Frozen):
+    """Points in the plane, joined in order by straight segments; φ is positive to the left.
+
+    A closed polyline that runs clockwise has φ < 0 inside, like a shape whose normals point outward.
+
+    Parameters
+    ----------
+    points : (n, 2) float
+        Positions. Points may coincide and segments may cross one another.
+    closed : bool
+        Whether a last segment joins the last point to the first. A last point equal to the first is dropped.
+
+    Raises
+    ------
+    GeometryError
+        If a coordinate is NaN or infinite, or there are fewer than two distinct points.
+
+    Examples
+    --------
+    >>> square = Polyline([[0, 0], [0, 1], [1, 1], [1, 0]], closed=True)
+    >>> square.length, square.signed_area
+    (4.0, -1.0)
+    """
+
+    points: NDArray[np.float64]
+    closed: bool
+
+    def __init__(self, points: ArrayLike, closed: bool = False) -> None:
+        positions, closed = coordinates(points, "points", 2), flag(closed, "closed")
+        if closed and len(positions) > 2 and (positions[0] == positions[-1]).all():
+            positions = coordinates(positions[:-1], "points", 2)
+        if len(positions) < 2:
+            raise GeometryError(f"a polyline needs at least 2 points, not {len(positions)}", element="points")
+        if (positions == positions[0]).all():
+            raise GeometryError(
+                f"the polyline has no length: its {len(positions)} points are the same", element="points"
+            )
+        vars(self).update(points=positions, closed=closed)
+
+    @classmethod
+    def from_mask(cls, mask: ArrayLike, origin: ArrayLike = (0.0, 0.0), spacing: ArrayLike = 1.0) -> list[Polyline]:
+        """The boundary of the True region of a boolean image, with φ < 0 inside.
+
+        Lines pass halfway between pixels with different values. An image whose rows run downwards is brought into the
+        order [x, y] by ``image[::-1].T``.
+
+        Parameters
+        ----------
+        mask : (nx, ny) bool
+            ``mask[i, j]`` is at ``origin + (i, j) * spacing``, as on a `Grid`; outside the image it counts as False.
+        origin, spacing : (2,) float
+            Position of the first pixel, and distance between pixels.
+
+        Returns
+        -------
+        list of Polyline
+            Closed lines, the region to their right.
+
+        Raises
+        ------
+        GeometryError
+            If the mask is not a boolean image, or nothing in it is True.
+
+        Examples
+        --------
+        >>> [dot] = Polyline.from_mask([[False, False], [False, True]])
+        >>> dot.points.tolist(), dot.closed
+        ([[1.0, 1.5], [1.5, 1.0], [1.0, 0.5], [0.5, 1.0]], True)
+        """
+        inside = boolean(mask, "mask")
+        if inside.ndim != 2 or not inside.any():
+            raise GeometryError(
+                f"a mask is a boolean image with something True in it, not {inside.dtype} of shape {inside.shape}",
+                remedy="compare the image with a threshold first",
+            )
+        steps = positive_steps(spacing, 2)
+        start = coordinates(np.atleast_2d(numbers(origin, "origin")), "origin", 2)[0]
+        padded = np.pad(inside, 1)
+        lines = level_lines(np.float64(0.5) - padded.astype(np.float64), start - steps, steps, 0.0)
+        return [cls(points, closed) for points, closed in lines]
+
+    @property
+    def n_points(self) -> int:
+        """Number of points."""
+        return len(self.points)
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 2) lower and upper corner of the box around the points."""
+        return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
+
+    @cached_property
+    def segments(self) -> NDArray[np.float64]:
+        """(m, 2, 2) start and end of every segment."""
+        ends = np.roll(self.points, -1, axis=0)
+        count = self.n_points if self.closed else self.n_points - 1
+        return np.stack([self.points[:count], ends[:count]], axis=1)
+
+    @cached_property
+    def segment_lengths(self) -> NDArray[np.float64]:
+        """(m,) lengths."""
+        return np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1)
+
+    @property
+    def length(self) -> float:
+        """Sum of the lengths of all segments."""
+        return float(self.segment_lengths.sum())
+
+    @property
+    def signed_area(self) -> float:
+        """Area that the polyline, closed, encloses; positive if it runs counter-clockwise."""
+        x, y = np.moveaxis(self.segments - self.points[0], -1, 0)
+        return float(0.5 * (x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum())
+
+    def reversed(self) -> Polyline:
+        """The polyline in opposite direction, for which φ has the opposite sign.
+
+        Returns
+        -------
+        Polyline
+            With the same points from last to first.
+
+        Examples
+        --------
+        >>> Polyline([[0, 0], [1, 0]]).reversed().points.tolist()
+        [[1.0, 0.0], [0.0, 0.0]]
+        """
+        return Polyline(self.points[::-1], self.closed)
+
+    def to_pyvista(self) -> pyvista.PolyData:
+        """Convert to a line of PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            A line with z = 0.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> Polyline([[0, 0], [1, 0], [1, 1]]).to_pyvista().n_points
+        3
+        """
+        points = np.column_stack([self.points, np.zeros(self.n_points)])
+        return pyvista.lines_from_points(points, close=self.closed)
+
+    def __repr__(self) -> str:
+        return f"Polyline({self.n_points} points, {'closed' if self.closed else 'open'})"

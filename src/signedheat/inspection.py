@@ -1,0 +1,249 @@
+"""Defects of a shape: open, nonmanifold and inconsistent edges, degenerate and duplicate elements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .foreign import Shape
+from .mesh.components import connected_components
+from .mesh.edges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
+from .mesh.tetrahedral import FLAT
+from .mesh.triangle_kernels import areas_of_polygons
+from .mesh.welding import coincident_faces, same_positions
+from .surfaces.digital_surface import DigitalSurface
+from .surfaces.point_cloud import PointCloud
+from .surfaces.polygon_mesh import PolygonMesh
+from .surfaces.triangle_mesh import TriangleMesh
+from .tets.tet_mesh import TetMesh
+from .validation import used_bounds
+
+
+@dataclass(frozen=True)
+class SurfaceReport:
+    """Counts of the elements and defects of a surface. No defect is an error: every such surface has a signed distance.
+
+    Attributes
+    ----------
+    n_vertices, n_faces, n_edges : int
+        Numbers of elements; an edge joins two different vertices.
+    corners_per_face : (int, int)
+        Least and greatest number of corners.
+    components : int
+        Connected components through shared vertices, unreferenced vertices not counted.
+    open_edges, borders : int
+        Edges with a single face; boundary curves, that is connected sets of open edges.
+    nonmanifold_edges, nonmanifold_vertices : int
+        Edges with more than two faces; vertices at which the faces do not form a single fan or disk.
+    inconsistent_edges : int
+        Edges whose two faces run along them in the same direction, so that one of the faces is flipped.
+    degenerate_faces, duplicate_faces : int
+        Faces without area, or with a repeated vertex; faces with the same vertices as an earlier one, in the same or in
+        the opposite order.
+    duplicate_vertices, unreferenced_vertices : int
+        Vertices at exactly the position of an earlier one; vertices without a face.
+    area : float
+        Total area.
+    lower, upper : tuple of float
+        Corners of the bounding box of the faces.
+    """
+
+    n_vertices: int
+    n_faces: int
+    n_edges: int
+    corners_per_face: tuple[int, int]
+    components: int
+    open_edges: int
+    borders: int
+    nonmanifold_edges: int
+    nonmanifold_vertices: int
+    inconsistent_edges: int
+    degenerate_faces: int
+    duplicate_faces: int
+    duplicate_vertices: int
+    unreferenced_vertices: int
+    area: float
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether no edge is open."""
+        return self.open_edges == 0
+
+    @property
+    def is_manifold(self) -> bool:
+        """Whether every edge has at most two faces, and the faces at every vertex form a single fan or disk."""
+        return self.nonmanifold_edges == 0 and self.nonmanifold_vertices == 0
+
+
+@dataclass(frozen=True)
+class CloudReport:
+    """Counts and properties of a point cloud.
+
+    Attributes
+    ----------
+    n_points : int
+        Number of points.
+    has_normals, has_areas : bool
+        Whether the points have normals, and areas.
+    duplicate_points : int
+        Points at exactly the position of an earlier one.
+    lower, upper : tuple of float
+        Corners of the bounding box.
+    """
+
+    n_points: int
+    has_normals: bool
+    has_areas: bool
+    duplicate_points: int
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class TetReport:
+    """Counts of the elements and defects of a tet mesh.
+
+    Attributes
+    ----------
+    n_vertices, n_tets, parts : int
+        Numbers of vertices, of tets, and of connected components through shared faces.
+    inside_out_tets : int
+        Tets that were given with negative volume; `TetMesh` has turned them.
+    flat_tets : int
+        Tets with nearly zero volume.
+    nonmanifold_faces : int
+        Faces with more than two tets.
+    boundary_faces : int
+        Faces with a single tet.
+    volume : float
+        Sum of the tets' volumes.
+    lower, upper : (3,) float
+        Corners of the bounding box.
+    """
+
+    n_vertices: int
+    n_tets: int
+    parts: int
+    inside_out_tets: int
+    flat_tets: int
+    nonmanifold_faces: int
+    boundary_faces: int
+    volume: float
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+
+def inspect(shape: Shape) -> SurfaceReport | CloudReport | TetReport:
+    """Count the elements and defects of a shape, in O(n) time.
+
+    Examples
+    --------
+    >>> report = inspect(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 2, 3]]))
+    >>> report.open_edges, report.inconsistent_edges, report.borders
+    (4, 1, 1)
+    """
+    if isinstance(shape, PointCloud):
+        return CloudReport(
+            n_points=shape.n_points,
+            has_normals=shape.normals is not None,
+            has_areas=shape.areas is not None,
+            duplicate_points=_n_repeated(shape.points),
+            lower=_tuple(shape.bounds[0]),
+            upper=_tuple(shape.bounds[1]),
+        )
+    if isinstance(shape, TetMesh):
+        return _inspect_tets(shape)
+    return _inspect_surface(shape.squares if isinstance(shape, DigitalSurface) else shape)
+
+
+def _inspect_tets(mesh: TetMesh) -> TetReport:
+    counts = mesh.faces.tet_counts
+    return TetReport(
+        n_vertices=mesh.n_vertices,
+        n_tets=mesh.n_tets,
+        parts=int(mesh.parts.max()) + 1,
+        inside_out_tets=len(mesh.reoriented),
+        flat_tets=int((mesh.geometry.thickness < FLAT).sum()),
+        nonmanifold_faces=int((counts > 2).sum()),
+        boundary_faces=int((counts == 1).sum()),
+        volume=float(mesh.tet_volumes.sum()),
+        lower=_tuple(mesh.bounds[0]),
+        upper=_tuple(mesh.bounds[1]),
+    )
+
+
+def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
+    if isinstance(mesh, TriangleMesh):
+        corners, offsets = mesh.faces.ravel(), np.arange(0, 3 * mesh.n_faces + 1, 3)
+    else:
+        corners, offsets = mesh.corners, mesh.offsets
+    following = following_corners(offsets)
+    heads, sides = corners[following], np.diff(offsets)
+    pairs = pair_halfedges(corners, heads, mesh.n_vertices)
+    duplicates = 0
+    if may_coincide(pairs, corners, following):
+        first, _ = coincident_faces(corners, offsets)
+        duplicates = int(((first >= 0) & (first != np.arange(len(sides)))).sum())
+    lonely = pairs.around == 1
+    areas, degenerate = areas_of_polygons(mesh.vertices, corners, offsets)
+    lower, upper = used_bounds(mesh.vertices, corners)
+    two = pairs.counts == 2
+    return SurfaceReport(
+        n_vertices=mesh.n_vertices,
+        n_faces=len(sides),
+        n_edges=len(pairs.counts),
+        corners_per_face=(int(sides.min()), int(sides.max())),
+        components=_n_components(mesh.n_vertices, corners, heads),
+        open_edges=int((pairs.counts == 1).sum()),
+        borders=_n_components(mesh.n_vertices, corners[lonely], heads[lonely]),
+        nonmanifold_edges=int((pairs.counts > 2).sum()),
+        nonmanifold_vertices=_n_nonmanifold(mesh.n_vertices, corners, following, pairs),
+        inconsistent_edges=int((corners[pairs.first[two]] == corners[pairs.second[two]]).sum()),
+        degenerate_faces=int(degenerate.sum()),
+        duplicate_faces=duplicates,
+        duplicate_vertices=_n_repeated(mesh.vertices),
+        unreferenced_vertices=mesh.n_vertices - _n_marked(mesh.n_vertices, corners),
+        area=float(areas.sum()),
+        lower=_tuple(lower),
+        upper=_tuple(upper),
+    )
+
+
+def _n_marked(n: int, ids: NDArray[np.int64]) -> int:
+    """How many of the numbers below n are named."""
+    marked = np.zeros(n, dtype=bool)
+    marked[ids] = True
+    return int(marked.sum())
+
+
+def _n_components(n: int, tails: NDArray[np.int64], heads: NDArray[np.int64]) -> int:
+    """How many connected sets halfedges make; vertices of none do not count."""
+    return _n_marked(n, connected_components(n, tails, heads)[tails])
+
+
+def _n_nonmanifold(n: int, tails: NDArray[np.int64], following: NDArray[np.int32], pairs: HalfedgePairs) -> int:
+    """Vertices at which the faces are no single fan, or that end an edge of more than two faces."""
+    two = pairs.counts == 2
+    one, other = pairs.first[two], pairs.second[two]
+    alike = tails[one] == tails[other]
+    next_one, next_other = following[one], following[other]
+    links = np.where(alike, other, next_other), np.where(alike, next_other, other)
+    fans = connected_components(len(tails), np.concatenate([one, next_one]), np.concatenate(links))
+    fan = np.empty(n, dtype=np.int64)
+    fan[tails] = fans
+    crowded = np.flatnonzero(pairs.around > 2)
+    bad = [tails[fans != fan[tails]], tails[crowded], tails[following[crowded]]]
+    return _n_marked(n, np.concatenate(bad))
+
+
+def _n_repeated(points: NDArray[np.float64]) -> int:
+    """How many points are at exactly the place of an earlier one."""
+    return int(np.count_nonzero(same_positions(points) != np.arange(len(points))))
+
+
+def _tuple(values: NDArray[np.float64]) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)

@@ -1,0 +1,310 @@
+"""Fields to files and back, exact to the last bit: on grids, in bands, on surfaces and on tets."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError, GeometryError
+from ..exchange import NAME, Elements
+from ..field_kinds import Field
+from ..foreign import SurfaceShape, elements, shape_of
+from ..grids.blocks import SIDE, Blocks
+from ..grids.grid import Grid
+from ..grids.grid_discretization import refuse_large_grid
+from ..grids.grid_field import GridField
+from ..grids.solid_queries import Scaled, SolidQueries, scaled
+from ..solids.solid import Solid
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..surfaces.vertex_field import VertexField, on_simple_surface
+from ..tets.tet_field import TetField
+from ..tets.tet_mesh import TetMesh
+from .files import PathLike, contents, damaged, ensure_writable, extension, format_for, reading, replacing
+from .image_files import CONFIDENCE, read_image, write_nrrd
+from .mesh_files import write_obj
+from .numpy_files import names_in_npz, read_npz, write_npz
+from .ply import read_ply, write_ply
+from .solid_arrays import NEEDED, SOURCE, arrays_of, solid_of
+from .tet_files import TET_FIELD_FORMATS, load_cells, store_cells
+from .vdb import write_vdb
+from .vtk_xml import read_vtp, write_vti, write_vtp
+
+PREFIX = "solid_"
+"""Of the names of the arrays of a solid, in the archive of a field that holds it."""
+CONVENTION = (
+    "signed distance, positive on the side that the normals point to (negative inside an outward-oriented shape); "
+    "values[i, j, k] at origin + (i, j, k) * spacing, axes x, y, z, in the units of the shape"
+)
+OF_BANDS = (
+    "signed distance, negative inside; values[n, i, j, k] at origin + (8 * places[n] + (i, j, k)) * spacing, axes "
+    "x, y, z, in the units of the shape; elsewhere coarse_values[i, j, k] at origin + (i, j, k) * coarse_spacing"
+)
+CLIPPED = "signed distance, negative inside, in the units of the shape; beyond the band plus or minus its half width"
+BYTES_PER_NODE = 20.0
+"""Of bands written whole: values, their copy in the order of the file, and what is written."""
+_DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}
+"""Numbers of axes that a format supports; the others support any number."""
+
+
+def write_field(field: GridField | TetField | VertexField, path: PathLike) -> None:
+    """Write a field of any kind, in the format given by the extension."""
+    if isinstance(field, GridField):
+        save_field(field, path)
+    elif isinstance(field, TetField):
+        format_for(path, dict.fromkeys(TET_FIELD_FORMATS), "a field on tets")
+        store_cells(field.mesh.to_meshio({NAME: field.values}), path)
+    elif isinstance(field, VertexField):
+        write = format_for(path, {".npz": None, ".obj": write_obj, **VALUE_FORMATS}, "a field on a surface")
+        simple = on_simple_surface(field)
+        if write is None:
+            return _write_vertex_npz(simple, path)
+        with replacing(path) as temporary:
+            temporary.write_bytes(write(elements(simple.domain, {NAME: simple.values}), path))
+
+
+def save_field(field: GridField, path: PathLike) -> None:
+    """Write a field on a grid, in the format given by the extension.
+
+    ``.npz`` (NumPy), ``.vti`` (VTK, ParaView), ``.nrrd`` (3D Slicer, medical imaging), ``.npy`` with a ``.json`` of the
+    same name next to it, ``.vdb`` (OpenVDB; single precision; not read back).
+    """
+    if not isinstance(field, GridField):
+        raise FileFormatError(f"a {type(field).__name__} is no field on a grid: it has formats of its own", path=path)
+    if field.grid.dimension not in _DIMENSIONS.get(extension(path), (field.grid.dimension,)):
+        raise FileFormatError(
+            f"the field has {field.grid.dimension} axes, too many or few", remedy="save it as .npz", path=path
+        )
+    ensure_field_writable(path, in_band=field.blocks is not None)
+    write = (_GRID_WRITERS if field.blocks is None else _BAND_WRITERS)[extension(path)]
+    if extension(path) == ".npy":
+        about = {"origin": field.grid.origin.tolist(), "spacing": field.grid.spacing.tolist(), "convention": CONVENTION}
+        with replacing(Path(path).with_suffix(".json")) as companion, replacing(path) as temporary:
+            companion.write_text(json.dumps(about, indent=1) + "\n")
+            write(field, temporary)
+    else:
+        with replacing(path) as temporary:
+            write(field, temporary)
+
+
+def ensure_field_writable(path: PathLike, in_band: bool = False) -> None:
+    """Check before a long computation that a field can be written, in a band or whole."""
+    ensure_writable(path, BAND_FORMATS if in_band else FIELD_FORMATS, "a field in a band" if in_band else "a field")
+
+
+def load_field(path: PathLike) -> Field:
+    """Read a field, exactly as it was written: values and transform.
+
+    Parameters
+    ----------
+    path : str or path
+        A ``.npz``, ``.vti``, ``.nrrd`` or ``.npy`` (with its ``.json``) file; images of other programs can be read if
+        their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file has a field on tets; ``.ply``, ``.vtp``,
+        or ``.npz`` with vertices, one on a surface; ``.npz`` with blocks one in a band.
+
+    Returns
+    -------
+    GridField, TetField or VertexField
+        The field; its diagnostics are empty. From ``.npz`` it has the solid that it was the distance to, and is exact
+        between nodes as before; from all other formats it is interpolated.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of unknown format, truncated, damaged, or has no scalar image along x, y, z.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, signedheat as sh
+    >>> phi = GridField(sh.Grid((0, 0, 0), (0.1, 0.2, 0.3), (2, 3, 4)), np.random.default_rng(0).random((2, 3, 4)))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_field(phi, f"{folder}/phi.vti")
+    ...     bool((load_field(f"{folder}/phi.vti").values == phi.values).all())
+    True
+    """
+    if extension(path) in TET_FIELD_FORMATS:
+        return _load_tet_field(path)
+    names = names_in_npz(path) if extension(path) == ".npz" else set()
+    if extension(path) in _VALUES or {"values", "vertices"} <= names:
+        return load_vertex_field(path)
+    if "coarse_values" in names:
+        return _load_band(path)
+    if extension(path) == ".vdb":
+        raise FileFormatError(
+            "OpenVDB files are written and not read",
+            remedy="keep the field as .npz too; of others' files, read the values by OpenVDB, which Blender's Python "
+            "has, and pass them to sh.GridField",
+            path=path,
+        )
+    image = read_image(path, FIELD_FORMATS - {".vdb"}, "a field")
+    if extension(path) == ".npy":
+        contents(Path(path).with_suffix(".json"))  # which says where the values are
+    with reading(path):
+        if image.values.dtype == bool:
+            raise FileFormatError("the values are no real numbers but bool: it holds no field")
+        grid = _made(Grid, image.origin, image.spacing, image.values.shape)
+        solid = _held_solid(path) if extension(path) == ".npz" else None
+        return _made(GridField, grid, np.ascontiguousarray(image.values), confidence=image.confidence, solid=solid)
+
+
+def _made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
+    """A grid or a field of what a file holds; what is wrong with it is wrong with the file."""
+    try:
+        return kind(*parts, **options)
+    except GeometryError as error:
+        raise FileFormatError(error.cause, remedy=error.remedy, element=error.element) from error
+
+
+def load_vertex_field(path: PathLike) -> VertexField:
+    """A surface with φ at its vertices: what `VertexField.save` wrote, except as ``.obj``."""
+    with reading(path):
+        if extension(path) in _VALUES:
+            found = _VALUES[extension(path)](path, (NAME,))
+            if NAME not in found.values:
+                raise FileFormatError(f"its vertices have no {NAME}: it holds a shape, and no field")
+            return VertexField(cast("SurfaceShape", shape_of(found)), np.asarray(found.values[NAME], np.float64))
+        arrays = read_npz(path, ("faces", "offsets", "normals"), needed=("vertices", "values"))
+        vertices, values = arrays["vertices"], arrays["values"]
+        if "offsets" in arrays:
+            domain: SurfaceShape = PolygonMesh(vertices, np.split(arrays["faces"], arrays["offsets"][1:-1]))
+        elif "faces" in arrays:
+            domain = TriangleMesh(vertices, arrays["faces"])
+        else:
+            domain = PointCloud(vertices, arrays.get("normals"))
+        if values.shape != (len(vertices),):
+            raise damaged(f"{values.shape} values for {len(vertices)} vertices: the file is damaged")
+        return VertexField(domain, values)
+
+
+def _load_tet_field(path: PathLike) -> TetField:
+    with reading(path):
+        cells = load_cells(path)
+        if NAME not in cells.point_data:
+            raise FileFormatError(f"it has no point data '{NAME}': it was not written as a field")
+        values = np.asarray(cells.point_data[NAME], dtype=np.float64)
+        return _made(TetField, _made(TetMesh.from_meshio, cells), values)
+
+
+def _load_band(path: PathLike) -> GridField:
+    needed = ("places", "values", "origin", "spacing", "shape", "width", "coarse_values", "coarse_spacing")
+    with reading(path):
+        found = read_npz(path, (CONFIDENCE,), needed)
+        grid = _made(Grid, found["origin"], found["spacing"], found["shape"])
+        far = found["coarse_values"]
+        coarse = _made(GridField, _made(Grid, found["origin"], found["coarse_spacing"], far.shape), far)
+        places = found["places"]
+        if places.ndim != 2 or places.dtype.kind not in "iu" or places.shape[1] != len(grid.shape):
+            raise damaged("its blocks have no places", element="places")
+        if len(places) and not ((places >= 0) & (places * SIDE < grid.shape)).all():
+            raise damaged("its blocks lie outside of the grid", element="places")
+        blocks = Blocks.of(places, grid.shape)
+        if not np.array_equal(blocks.places, places):
+            raise damaged("its blocks are not in order", element="places")
+        options = {"blocks": blocks, "coarse": coarse, "width": float(found["width"]), "solid": _held_solid(path)}
+        return _made(GridField, grid, found["values"], confidence=found.get(CONFIDENCE), **options)
+
+
+def _write_npz(field: GridField, path: Path) -> None:
+    """Of a band its blocks, and the coarse field around them."""
+    arrays: dict[str, Any] = {"values": field.values, "origin": field.grid.origin, "spacing": field.grid.spacing}
+    arrays |= {CONFIDENCE: field.confidence, "convention": CONVENTION}
+    if field.blocks is not None:
+        arrays |= {"places": field.blocks.places, "shape": field.grid.shape, "width": field.width}
+        arrays |= {"coarse_values": field.whole.values, "coarse_spacing": field.whole.grid.spacing}
+        arrays["convention"] = OF_BANDS
+    solid = field.solid.solid if isinstance(field.solid, Scaled) else field.solid
+    if isinstance(solid, Solid):
+        arrays["solid_factor"] = field.solid.factor if isinstance(field.solid, Scaled) else 1.0
+        arrays |= {PREFIX + name: array for name, array in arrays_of(solid).items()}
+    write_npz(path, **arrays)
+
+
+def _held_solid(path: PathLike) -> SolidQueries | None:
+    """The solid that a field in an archive is the distance to, if it holds one."""
+    if "solid_factor" not in names_in_npz(path):
+        return None
+    found = read_npz(path, [PREFIX + name for name in SOURCE], ["solid_factor", *(PREFIX + name for name in NEEDED)])
+    factor = found.pop("solid_factor")
+    if factor.shape or not np.isfinite(factor) or not factor:
+        raise damaged("its solid is scaled by no number", element="solid_factor")
+    return scaled(solid_of({name.removeprefix(PREFIX): array for name, array in found.items()}), float(factor))
+
+
+def _write_npy(field: GridField, path: Path) -> None:
+    with path.open("wb") as file:
+        np.save(file, field.values, allow_pickle=False)
+
+
+def _write_for_vtk(field: GridField, path: Path) -> None:
+    """Of a band all nodes of its grid, for ParaView and solvers."""
+    grid, convention = field.grid, CONVENTION
+    values: dict[str, NDArray[np.floating]] = {NAME: field.values}
+    if field.blocks is not None:
+        refuse_large_grid(grid, BYTES_PER_NODE, 0.0)
+        values, convention = {NAME: whole_values(field)}, CLIPPED
+    elif field.confidence is not None:
+        values[CONFIDENCE] = field.confidence
+    path.write_bytes(write_vti(grid.origin, grid.spacing, values, convention))
+
+
+def _write_nrrd(field: GridField, path: Path) -> None:
+    axes = np.diag(field.grid.spacing)
+    write_nrrd(path, field.values, axes, field.grid.origin, content=NAME, convention=CONVENTION)
+
+
+def whole_values(field: GridField) -> NDArray[np.float32]:
+    """Values of a band at all nodes of its grid; beyond it, plus or minus its half width."""
+    assert field.blocks is not None
+    grid, width = field.grid, np.float32(field.width)
+    counts = -(-np.array(grid.shape) // SIDE)
+    places = np.argwhere(np.ones(counts, dtype=bool))
+    rows = field.blocks.rows(places)
+    middles = np.minimum(places[rows < 0] * SIDE + 0.5 * (SIDE - 1), np.array(grid.shape) - 1)
+    parts = np.full((len(places), SIDE, SIDE, SIDE), width, dtype=np.float32)
+    parts[rows < 0] *= np.where(field(grid.origin + middles * grid.spacing) < 0, -1, 1)[:, None, None, None]
+    parts[rows >= 0] = np.clip(field.values[rows[rows >= 0]], -width, width)
+    a, b, c = counts
+    whole = parts.reshape(a, b, c, SIDE, SIDE, SIDE).transpose(0, 3, 1, 4, 2, 5).reshape(a * SIDE, b * SIDE, c * SIDE)
+    return np.ascontiguousarray(whole[tuple(slice(0, n) for n in grid.shape)])
+
+
+def save_with_values(shape: SurfaceShape, path: PathLike, name: str, values: NDArray[np.floating]) -> None:
+    """Write a surface with a named value at each vertex, in a format of `VALUE_FORMATS`."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(VALUE_FORMATS[extension(path)](elements(shape, {name: values}), path))
+
+
+def _write_vertex_npz(field: VertexField[SurfaceShape], path: PathLike) -> None:
+    domain = field.domain
+    arrays: dict[str, Any] = {"values": field.values, "vertices": elements(domain).points}
+    if isinstance(domain, TriangleMesh):
+        arrays["faces"] = domain.faces
+    elif isinstance(domain, PolygonMesh):
+        arrays |= {"faces": domain.corners, "offsets": domain.offsets}
+    else:
+        arrays["normals"] = domain.normals
+    write_npz(path, **arrays)
+
+
+_VALUES: dict[str, Callable[[PathLike, tuple[str, ...]], Elements]] = {".ply": read_ply, ".vtp": read_vtp}
+VALUE_FORMATS: dict[str, Callable[[Elements, PathLike], bytes]] = {
+    ".ply": write_ply,
+    ".vtp": write_vtp,
+}
+"""Formats of surfaces with values at their vertices."""
+_GRID_WRITERS: dict[str, Callable[[GridField, Path], None]] = {
+    ".npy": _write_npy,
+    ".npz": _write_npz,
+    ".nrrd": _write_nrrd,
+    ".vdb": write_vdb,
+    ".vti": _write_for_vtk,
+}
+_BAND_WRITERS = {ending: _GRID_WRITERS[ending] for ending in (".npz", ".vdb", ".vti")}
+FIELD_FORMATS, BAND_FORMATS = frozenset(_GRID_WRITERS), frozenset(_BAND_WRITERS)
+VERTEX_FIELD_FORMATS = frozenset({".npz", ".obj", *VALUE_FORMATS})

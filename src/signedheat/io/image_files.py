@@ -1,0 +1,259 @@
+"""Images: values on a lattice, and where that lies; all formats of fields on grids, voxels and labels.
+
+No more is read or unpacked than a header announces. NIfTI is read by nibabel.
+"""
+
+from __future__ import annotations
+
+import bz2
+import io
+import json
+import math
+import re
+import zlib
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError
+from ..packages import lazy_module
+from .files import (
+    PathLike,
+    companion_contents,
+    contents,
+    damaged,
+    ensure_fits,
+    format_for,
+    parsed_numbers,
+    reading,
+    unpacked,
+)
+from .numpy_files import read_npy, read_npz
+from .sandbox import parsed
+from .vtk_xml import read_vti
+
+NIBABEL = ("nibabel", "NIfTI files")
+nibabel: Any = lazy_module(*NIBABEL)
+
+CONFIDENCE = "confidence"
+NIFTI = (".nii", ".nii.gz")
+SHORT = {"RAS": "right-anterior-superior", "LPS": "left-posterior-superior", "LAS": "left-anterior-superior"}
+"""Spaces by their short names in NRRD files."""
+JOINED = {"datafile": "data file", "lineskip": "line skip", "byteskip": "byte skip", "centerings": "centers"}
+"""Other names of fields of NRRD files."""
+PACKED = 4000
+"""Memory that a NIfTI file may take for each of its bytes: gzip packs a thousand into one."""
+_CODES = {
+    name: code
+    for names, code in (
+        ("signed char,int8,int8_t", "i1"),
+        ("uchar,unsigned char,uint8,uint8_t", "u1"),
+        ("short,short int,signed short,signed short int,int16,int16_t", "i2"),
+        ("ushort,unsigned short,unsigned short int,uint16,uint16_t", "u2"),
+        ("int,signed int,int32,int32_t", "i4"),
+        ("uint,unsigned int,uint32,uint32_t", "u4"),
+        ("longlong,long long,long long int,signed long long,signed long long int,int64,int64_t", "i8"),
+        ("ulonglong,unsigned long long,unsigned long long int,uint64,uint64_t", "u8"),
+        ("float", "f4"),
+        ("double", "f8"),
+    )
+    for name in names.split(",")
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """Values on a lattice of d axes, and where it lies.
+
+    Attributes
+    ----------
+    values : (n₁, …, n_d) number
+        One for each place, indexed [x, y, z].
+    axes : (d, d) float
+        The step from one place to the next along each axis of the image, in columns.
+    origin : (d,) float
+        The first place.
+    space : str, optional
+        What the axes of the world are, as in NRRD files: ``"left-posterior-superior"``.
+    confidence : (n₁, …, n_d), optional
+        What a field has in addition to its values.
+    """
+
+    values: NDArray[Any]
+    axes: NDArray[np.float64]
+    origin: NDArray[np.float64]
+    space: str | None = None
+    confidence: NDArray[Any] | None = None
+
+    @property
+    def spacing(self) -> NDArray[np.float64]:
+        """(d,) distance between places, of an image along x, y, z; raises `FileFormatError` where it is turned."""
+        spacing = np.diag(self.axes) if self.axes.ndim == 2 else np.zeros(self.values.ndim)
+        if not np.array_equal(self.axes, np.diag(spacing)):
+            raise FileFormatError("its axes are not x, y, z", remedy="resample the image along them")
+        return spacing
+
+
+def read_image(path: PathLike, formats: Collection[str], purpose: str) -> Image:
+    """An image of real numbers, in one of some formats."""
+    read = format_for(path, {ending: READERS[ending] for ending in formats}, purpose)
+    with reading(path):
+        image = read(path)
+        if image.values.dtype.kind not in "biuf":
+            raise FileFormatError(f"the values are no real numbers but {image.values.dtype}: it holds no image")
+        return image
+
+
+def _aligned(values: NDArray[Any], origin: Any, spacing: Any, **others: Any) -> Image:
+    """An image along x, y, z."""
+    steps = np.asarray(spacing, dtype=np.float64)
+    steps = np.full(values.ndim, steps) if steps.ndim == 0 else steps
+    return Image(values, np.diag(steps), np.asarray(origin, dtype=np.float64), **others)
+
+
+def _read_npy(path: PathLike) -> Image:
+    """An array; origin and spacing from the ``.json`` of the same name, if there is one."""
+    values, companion = read_npy(path), Path(path).with_suffix(".json")
+    if not companion.exists():
+        return _aligned(values, np.zeros(values.ndim), np.ones(values.ndim))
+    text = contents(companion)
+    with reading(companion):
+        about = json.loads(text)
+        return _aligned(values, about["origin"], about["spacing"])
+
+
+def _read_npz(path: PathLike) -> Image:
+    found = read_npz(path, (CONFIDENCE,), needed=("values", "origin", "spacing"))
+    return _aligned(found.pop("values"), found.pop("origin"), found.pop("spacing"), **found)
+
+
+def _read_vti(path: PathLike) -> Image:
+    values, origin, spacing, confidence = read_vti(path, CONFIDENCE)
+    return _aligned(values, origin, spacing, confidence=confidence)
+
+
+def _read_nrrd(path: PathLike) -> Image:
+    """A file that the header names must lie in the same folder or below it."""
+    header, rest = _nrrd_header(contents(path))
+    companion = header.get("data file")
+    if companion is not None:
+        if companion.startswith("LIST") or "%" in companion:
+            raise FileFormatError("its data are in several files", remedy="save it as one")
+        rest = companion_contents(path, companion)
+    sizes = parsed_numbers(header["sizes"].split(), "sizes", int).tolist()
+    code = _CODES.get(header["type"].lower())
+    if code is None or [str(len(sizes))] != header["dimension"].split() or min(sizes, default=0) < 1:
+        raise damaged(f"its type '{header['type']}', dimension {header['dimension']} and sizes {sizes} make no image")
+    dtype = np.dtype(code).newbyteorder(">" if header.get("endian") == "big" else "<")
+    for _ in range(int(header.get("line skip", 0))):
+        rest = rest.partition(b"\n")[2]
+        if not rest:
+            break
+    values = _nrrd_values(rest, header, math.prod(sizes), dtype, path).reshape(sizes, order="F")
+    spacings = np.nan_to_num(parsed_numbers(header.get("spacings", "1 " * values.ndim).split(), "spacings"), nan=1.0)
+    steps = _nrrd_vectors(header["space directions"]) if "space directions" in header else np.diag(spacings)
+    origin = _nrrd_vectors(header.get("space origin", f"({','.join('0' * values.ndim)})"))[0]
+    space = header.get("space")
+    return Image(values, steps.T, origin, None if space is None else SHORT.get(space, space.lower()))
+
+
+def _nrrd_header(data: bytes) -> tuple[dict[str, str], bytes]:
+    """Fields by name in lower case, of which some may be written without a space, and what follows the header."""
+    if not data.startswith(b"NRRD"):
+        raise damaged("it does not begin with NRRD")
+    fields: dict[str, str] = {}
+    lines = io.BytesIO(data)
+    for line in lines:
+        name, separator, value = line.decode("utf-8", errors="replace").strip().partition(": ")
+        if not name:
+            break
+        if separator and not name.startswith("#"):
+            fields[JOINED.get(name.lower(), name.lower())] = value.strip()
+    return fields, data[lines.tell() :]
+
+
+def _nrrd_vectors(text: str) -> NDArray[np.float64]:
+    """(n, d) vectors like ``(1,0,0) (0,1,0)``; those of axes outside of space, ``none``, are NaN."""
+    words = re.findall(r"\([^)]*\)|none", text)
+    rows = [[math.nan] if word == "none" else word.strip("()").split(",") for word in words]
+    width = max(map(len, rows))
+    return parsed_numbers([row if len(row) == width else width * [math.nan] for row in rows], "vectors")
+
+
+def _nrrd_values(data: bytes, header: dict[str, str], count: int, dtype: np.dtype[Any], path: PathLike) -> NDArray[Any]:
+    """The values in a row; they are `count`."""
+    encoding, size = header["encoding"].lower(), count * dtype.itemsize
+    skip = int(header.get("byte skip", 0))
+    if encoding in ("ascii", "text", "txt"):
+        words = data[max(skip, 0) :].split()
+        if len(words) < count:
+            raise _truncated(len(words), count)
+        return parsed_numbers(words[:count], "values").astype(dtype.newbyteorder("="))
+    ensure_fits(size, path)
+    if encoding in ("gzip", "gz"):
+        data = unpacked(data, zlib.decompressobj(zlib.MAX_WBITS | 16), size + max(skip, 0))
+    elif encoding in ("bzip2", "bz2"):
+        data = unpacked(data, bz2.BZ2Decompressor(), size + max(skip, 0))
+    elif encoding != "raw":
+        raise FileFormatError(f"packed by '{encoding}'", remedy="save it as raw or gzip")
+    start = len(data) - size if skip == -1 else max(skip, 0)
+    if start < 0 or len(data) - start < size:
+        raise _truncated(max(len(data) - start, 0), size)
+    return np.frombuffer(data, dtype, count, start).astype(dtype.newbyteorder("="))
+
+
+def _truncated(there: int, announced: int) -> FileFormatError:
+    return damaged(f"it announces {announced}, and {there} are there: it is truncated")
+
+
+def write_nrrd(
+    path: PathLike,
+    values: NDArray[Any],
+    axes: NDArray[np.float64],
+    origin: NDArray[np.float64],
+    space: str | None = None,
+    **keys: str,
+) -> None:
+    """Write values, indexed [x, y, z]; the columns of `axes` are the steps along x, y, z. `keys` go into the header."""
+    data = np.asfortranarray(values).astype(values.dtype.newbyteorder("<"), copy=False)
+    header = {
+        "type": next(name for name, code in _CODES.items() if code == data.dtype.str[1:]),
+        "dimension": values.ndim,
+        **({"space dimension": values.ndim} if space is None else {"space": space}),
+        "sizes": " ".join(map(str, values.shape)),
+        "space directions": " ".join(map(_nrrd_vector, axes.T.tolist())),
+        "kinds": " ".join(["domain"] * values.ndim),
+        "endian": "little",
+        "encoding": "raw",
+        "space origin": _nrrd_vector(origin.tolist()),
+    }
+    fields = [f"{name}: {value}" for name, value in header.items()]
+    fields += [f"{name}{': ' if name == 'content' else ':='}{value}" for name, value in keys.items()]
+    with open(path, "wb") as file:
+        file.write("\n".join(["NRRD0005", *fields, "", ""]).encode())
+        file.write(data.tobytes(order="F"))
+
+
+def _nrrd_vector(numbers: list[float]) -> str:
+    return f"({','.join(map(repr, numbers))})"
+
+
+def _read_nifti(path: PathLike) -> Image:
+    found = parsed("nifti", path, *NIBABEL, bytes_per_byte=PACKED)
+    values, affine = found["values"], found["affine"]
+    while values.ndim > 3 and values.shape[-1] == 1:
+        values = values[..., 0]
+    return Image(values, affine[:3, :3], affine[:3, 3], "right-anterior-superior")
+
+
+READERS: dict[str, Callable[[PathLike], Image]] = {
+    ".npy": _read_npy,
+    ".npz": _read_npz,
+    ".nrrd": _read_nrrd,
+    ".vti": _read_vti,
+    **dict.fromkeys(NIFTI, _read_nifti),
+}

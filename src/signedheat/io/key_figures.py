@@ -1,0 +1,67 @@
+"""Key figures of fields and shapes, ready for JSON."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from ..diagnostics import SampledSource
+from ..grids.grid_field import GridField
+from ..inspection import inspect
+from ..kinds import Shape
+from ..solids.mesh_orientation import orientation
+from ..solids.thickness import thickness
+from ..surfaces.digital_surface import DigitalSurface
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.triangle_mesh import TriangleMesh
+
+
+def describe(field: Any) -> dict[str, Any]:
+    """Key figures of a field, for ``--json``."""
+    if isinstance(field, GridField):
+        note = field.diagnostics.note(SampledSource)
+        where = {
+            "origin": field.grid.origin.tolist(),
+            "spacing": field.grid.spacing.tolist(),
+            "shape": list(field.grid.shape),
+            "area_outside": note.area_outside if note else 0.0,
+            "area_cancelled": note.area_cancelled if note else 0.0,
+            "confidence": field.surface_confidence,
+        }
+        if field.blocks is not None:
+            where |= {"band": field.width, "blocks": len(field.blocks), "nodes": field.n_nodes}
+    else:
+        where = {"n_vertices": len(field.values)}
+    return {
+        **where,
+        "minimum": float(np.nanmin(field.values)),
+        "maximum": float(np.nanmax(field.values)),
+        "notes": {snake(type(note).__name__): note.as_dict() for note in field.diagnostics.notes},
+        "seconds": {step: round(seconds, 4) for step, seconds in field.diagnostics.timings.items()},
+    }
+
+
+def snake(name: str) -> str:
+    """A class name as a key of JSON.
+
+    Examples
+    --------
+    >>> snake("BoundsNothing")
+    'bounds_nothing'
+    """
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+
+
+def shape_figures(shape: Shape) -> dict[str, object]:
+    """Counts and defects of a shape; of meshes also which way their parts face, and how thin walls and gaps are."""
+    counted = shape.squares if isinstance(shape, DigitalSurface) else shape
+    figures: dict[str, object] = {"kind": type(shape).__name__, **asdict(inspect(counted))}
+    if isinstance(shape, TriangleMesh | PolygonMesh):
+        found = orientation(shape)
+        widths = thickness(found.shape)
+        figures["orientation"] = found.summary
+        figures["thickness"] = {**asdict(widths), "spacing": widths.spacing}
+    return figures

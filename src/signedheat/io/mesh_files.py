@@ -1,0 +1,271 @@
+"""Meshes and points as text and in STL: Wavefront OBJ (``.obj``, and ``.pc`` of the published demo), OFF, STL."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections.abc import Callable, Iterator
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError, InexactWarning, warn_user
+from ..exchange import Elements
+from ..mesh.unit_vectors import unit
+from ..mesh.welding import distinct_rows, same_positions
+from ..surfaces.triangle_mesh import TriangleMesh
+from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers, reading, refuse_kind, text
+
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+FACET_WORDS = 15
+"""Words from the beginning of a facet to its end, at least: a loop of three vertices with three numbers each."""
+KEYWORDS = frozenset(
+    "v vt vn vp f fo l p o g s mg lod mtllib usemtl maplib usemap cstype deg bmat step curv curv2 surf parm trim hole "
+    "scrv sp end con bevel c_interp d_interp shadow_obj trace_obj ctech stech call csh bsp bzp cdc cdp res".split()
+)
+"""What lines of OBJ files begin with."""
+NUMBERS = re.compile(r"[-+.eE\d/ ]+")
+"""What data look like, whatever their keyword."""
+BYTES = 400
+"""Measured: what each line of an OBJ file takes while it is read."""
+MOVED = 1e-4
+"""Share of the size of a shape by which rounding may move vertices without a warning."""
+_HEADER = 84  # of STL, in bytes: 80 of comment, 4 that count the facets
+
+
+def read_stl(path: PathLike) -> TriangleMesh:
+    """All facets of an STL file, of all its solids; stored normals are ignored.
+
+    Corners with exactly the same coordinates become one vertex: STL has no other way to express that facets meet.
+    """
+    data = contents(path).removeprefix(codecs.BOM_UTF8)
+    announced = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else 0
+    is_text = data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:1000].lower()
+    if is_text and len(data) != _HEADER + 50 * announced:
+        corners = _text_corners(data)
+    elif len(data) < _HEADER + 50 * announced or len(data) < _HEADER:
+        raise FileFormatError(
+            f"{announced} facets need {_HEADER + 50 * announced} bytes, the file has {len(data)}: it "
+            "is truncated, or no STL file"
+        )
+    else:
+        corners = np.frombuffer(data, _FACET, announced, _HEADER)["corners"].astype(np.float32)
+    return _indexed(corners.reshape(-1, 3))
+
+
+def write_stl(shape: Elements, path: PathLike) -> bytes:
+    """Binary STL, in single precision; a warning if that is too little for the shape."""
+    if shape.kind != "TriangleMesh":
+        kinds = ".obj, .ply, .off or .vtp" if len(shape.counts) else ".ply or .xyz"
+        raise refuse_kind(shape.kind, path, "triangles", kinds)
+    corners = shape.points[shape.triangles]
+    facets = np.zeros(len(corners), dtype=_FACET)
+    facets["corners"] = corners
+    if not np.isfinite(facets["corners"]).all():
+        raise FileFormatError(
+            "coordinates are too large for the single precision of STL", remedy="save it as .ply", path=path
+        )
+    warn_of_rounding(shape.points, shape.points.astype(np.float32).astype(np.float64))
+    facets["normal"] = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    return b"signedheat".ljust(80) + len(facets).to_bytes(4, "little") + facets.tobytes()
+
+
+def warn_of_rounding(points: NDArray[np.float64], rounded: NDArray[np.float64]) -> None:
+    """Warn if rounding joins vertices of a shape, or moves them far for its size."""
+    largest_move = float(np.abs(points - rounded).max())
+    places, rounded_places = (np.count_nonzero(same_positions(p) == np.arange(len(p))) for p in (points, rounded))
+    if places > rounded_places or largest_move > MOVED * float(np.ptp(points, axis=0).max()):
+        joined = f" and joins {places - rounded_places:,} of them to others" if places > rounded_places else ""
+        warn_user(
+            f"the single precision of STL moves vertices by up to {largest_move:.2g}{joined}: save it as .ply, or move "
+            "it to the origin first",
+            InexactWarning,
+        )
+
+
+def _text_corners(data: bytes) -> NDArray[np.float64]:
+    """(3 m, 3) corners of the facets of all solids, each of which must have three."""
+    ends = len(re.findall(rb"(?mi)^[ \t]*endsolid\b", data))
+    words = re.sub(rb"(?mi)^[ \t]*(end)?solid\b[^\r\n]*", b"", data).lower().split()  # names may be any words
+    places: dict[bytes, list[int]] = {b"facet": [], b"endfacet": [], b"vertex": []}
+    for place, word in enumerate(words):
+        if word in places:
+            places[word].append(place)
+    begins, stops, corners = places.values()
+    if not ends or len(begins) != len(stops):
+        raise damaged(
+            f"{len(begins)} facets begin, {len(stops)} and {ends} solids end: the file is truncated or damaged"
+        )
+    counts = np.searchsorted(corners, stops) - np.searchsorted(corners, begins)
+    rooms = np.array(stops) - np.array(begins)
+    wrong = np.flatnonzero((counts != 3) | (rooms < FACET_WORDS))
+    if len(wrong) or len(corners) != 3 * len(begins):
+        number = int(wrong[0]) if len(wrong) else len(begins)
+        cause = f"facet {number} has {counts[number] if len(wrong) else 'other'} corners, and facets of STL have 3"
+        raise FileFormatError(cause, remedy="export it again, as triangles", element=f"facet {number}")
+    return parsed_numbers([words[k + 1 : k + 4] for k in corners], "vertices").reshape(-1, 3)
+
+
+def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:
+    if not len(corners):
+        return TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
+    corners = corners + corners.dtype.type(0)  # adding zero turns −0 into 0
+    ids, firsts = distinct_rows(corners.view(f"u{corners.itemsize}"))
+    return TriangleMesh(corners[firsts].astype(np.float64), ids.reshape(-1, 3))
+
+
+def _rows_of_words(words: list[str], counts: NDArray[np.int64]) -> Iterator[str]:
+    """As many words on each line as it counts."""
+    return (" ".join(islice(left, count)) for left in [iter(words)] for count in counts.tolist())
+
+
+def read_obj(path: PathLike) -> Elements:
+    """The faces of an OBJ file, or its points if it has none; texture coordinates and normals of faces are ignored."""
+    lines = _lines_by_keyword(path)
+    vertices = _coordinates(lines.get("v", []), "vertices")
+    if "f" in lines:
+        return Elements(vertices, *_elements(lines["f"]))
+    if "l" in lines:
+        raise FileFormatError(
+            f"there are {len(lines['l'])} line elements and no face",
+            remedy="read them with sh.io.read_curves(path, mesh)",
+        )
+    normals = _coordinates(lines["vn"], "normals") if "vn" in lines else None
+    return Elements(vertices, normals=normals)
+
+
+def read_obj_elements(path: PathLike) -> tuple[NDArray[np.float64], list[list[int]], list[list[int]]]:
+    """All vertices of an OBJ file, and the vertex ids, from 0, of each of its lines, and of its sets of points."""
+    with reading(path):
+        lines = _lines_by_keyword(path)
+        found: dict[str, list[list[int]]] = {}
+        for keyword in ("l", "p"):
+            corners, counts = _elements(lines.get(keyword, []))
+            ids = iter(corners.tolist())
+            found[keyword] = [list(islice(ids, count)) for count in counts.tolist()]
+        return _coordinates(lines["v"], "vertices"), found["l"], found["p"]
+
+
+def write_obj(shape: Elements, path: PathLike) -> bytes:
+    """OBJ text: ``v`` lines, with ``vn`` lines if points have normals; the first value is a texture coordinate."""
+    rows = ["v {!r} {!r} {!r}".format(*p) for p in shape.points.tolist()]
+    if shape.normals is not None:
+        rows += ["vn {!r} {!r} {!r}".format(*n) for n in shape.normals.tolist()]
+    values = next(iter(shape.values.values()), None)
+    words = list(map(str, (shape.corners + 1).tolist()))
+    if values is not None:
+        rows += [f"vt {value!r} 0" for value in values.tolist()]
+        words = [f"{word}/{word}" for word in words]
+    rows += [f"f {row}" for row in _rows_of_words(words, shape.counts)]
+    return ("\n".join(rows) + "\n").encode()
+
+
+def write_pc(shape: Elements, path: PathLike) -> bytes:
+    """Oriented points, as OBJ text."""
+    if shape.kind != "PointCloud":
+        raise refuse_kind(shape.kind, path, "points", ".obj or .ply")
+    return write_obj(shape, path)
+
+
+def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
+    """The words on the lines of each keyword, in place of which is the number of vertices so far."""
+    lines: dict[str, list[list[Any]]] = {"v": [], "vn": [], "f": [], "l": [], "p": []}
+    content = text(path)
+    ensure_fits(BYTES * sum(content.count(f"\n{keyword} ") for keyword in lines), path)
+    for number, line in enumerate(re.sub(r"\\[ \t]*\n", " ", content).split("\n"), start=1):
+        words: list[Any] = line.partition("#")[0].split()
+        if words and words[0] in lines:
+            lines[words[0]].append(words)
+            words[0] = len(lines["v"])
+        elif words and words[0] not in KEYWORDS and NUMBERS.fullmatch(" ".join(words[1:])):
+            raise FileFormatError(
+                f"line {number} begins with '{words[0]:.20}', which OBJ does not know: later lines may count it",
+                remedy="mend or remove it",
+                element=f"line {number}",
+            )
+    if not lines["v"]:
+        raise FileFormatError("there is no line 'v x y z': this holds no shape in OBJ format")
+    return {keyword: rest for keyword, rest in lines.items() if rest}
+
+
+def _coordinates(rows: list[list[Any]], what: str) -> NDArray[np.float64]:
+    """(n, 3) numbers, three from each line; further ones (weights, colours) are ignored."""
+    short = next((k for k, row in enumerate(rows) if len(row) < 4), None)
+    if short is not None:
+        cause = f"number {short} of the {what} has {len(rows[short]) - 1} coordinates instead of 3: it may be truncated"
+        raise damaged(cause, element=f"number {short}")
+    return parsed_numbers([row[1:4] for row in rows], what).reshape(-1, 3)
+
+
+def _elements(words: list[list[Any]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Vertex ids from 0 of all elements, and their number in each; ``v/vt/vn`` means v, and −1 the vertex before."""
+    counts = np.array([len(element) - 1 for element in words], dtype=np.int64)
+    flat = [word for element in words for word in element[1:]]
+    if any("/" in word for word in flat):
+        flat = [word.partition("/")[0] for word in flat]
+    ids = parsed_numbers(flat, "vertex ids", int)
+    if (ids == 0).any():
+        raise damaged("a face names vertex 0, but OBJ counts from 1: the file is damaged")
+    before = np.array([element[0] for element in words], dtype=np.int64)
+    return np.where(ids > 0, ids - 1, ids + np.repeat(before, counts)), counts
+
+
+def read_off(path: PathLike) -> Elements:
+    """The faces of an OFF file (also COFF, NOFF, STOFF, …), or its points if it has none."""
+    rows = [row for line in text(path).split("\n") if (row := line.partition("#")[0].split())]
+    kind = rows[0][0].upper() if rows else ""
+    if not kind.endswith("OFF") or "BINARY" in [word.upper() for word in rows[0]]:
+        raise FileFormatError("it does not begin with OFF as text: this is no file that can be read as OFF")
+    rows[0] = rows[0][1:]
+    rows = rows if rows[0] else rows[1:]
+    if not rows or len(rows[0]) < 2:
+        raise damaged("the numbers of vertices and faces are missing: it may be truncated")
+    n_vertices, n_faces = parsed_numbers(rows[0][:2], "counts", int).tolist()
+    if n_vertices < 0 or n_faces < 0:
+        raise damaged(f"{n_vertices} vertices and {n_faces} faces are announced: the file is damaged")
+    lines = iter(rows[1:])
+    vertex_rows = list(islice(_records(lines, lambda row: 3), n_vertices))
+    face_rows = list(islice(_records(lines, lambda row: 1 + _corner_count(row[0])), n_faces))
+    if len(vertex_rows) < n_vertices or len(face_rows) < n_faces:
+        raise damaged(
+            f"{n_vertices} vertices and {n_faces} faces are announced, {len(vertex_rows)} and "
+            f"{len(face_rows)} are there: the file is truncated"
+        )
+    if any(len(row) < 3 for row in vertex_rows):
+        raise damaged("a vertex has fewer than 3 coordinates: it may be truncated")
+    vertices = parsed_numbers([row[:3] for row in vertex_rows], "vertices").reshape(-1, 3)
+    if not n_faces:
+        has_normals = "N" in kind[:-3] and all(len(row) >= 6 for row in vertex_rows)
+        normals = parsed_numbers([row[3:6] for row in vertex_rows], "normals") if has_normals else None
+        return Elements(vertices, normals=normals)
+    counts = parsed_numbers([row[0] for row in face_rows], "numbers of corners", int)
+    if any(len(row) <= count for row, count in zip(face_rows, counts.tolist(), strict=True)):
+        raise damaged("a face has fewer corners than it says: it may be truncated")
+    corners = [word for row, count in zip(face_rows, counts.tolist(), strict=True) for word in row[1 : 1 + count]]
+    return Elements(vertices, parsed_numbers(corners, "vertex ids", int), counts)
+
+
+def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> Iterator[list[str]]:
+    """Lines joined until each holds as many words as its beginning says; more words on its last line stay."""
+    for row in lines:
+        wanted = length(row)
+        while len(row) < wanted and (more := next(lines, None)) is not None:
+            row += more
+        yield row
+
+
+def _corner_count(word: str) -> int:
+    """Number of corners of a face; 0 for what is no number, which is refused later."""
+    return int(word) if word.isdecimal() and len(word) < 19 else 0
+
+
+def write_off(shape: Elements, path: PathLike) -> bytes:
+    """OFF text; oriented points as NOFF."""
+    columns = shape.points if shape.normals is None else np.hstack([shape.points, shape.normals])
+    rows = ["OFF" if shape.normals is None else "NOFF", f"{len(columns)} {len(shape.counts)} 0"]
+    rows += [" ".join(map(repr, row)) for row in columns.tolist()]
+    corners = _rows_of_words(list(map(str, shape.corners.tolist())), shape.counts)
+    rows += [f"{count} {row}" for count, row in zip(shape.counts.tolist(), corners, strict=True)]
+    return ("\n".join(rows) + "\n").encode()

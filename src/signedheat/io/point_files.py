@@ -1,0 +1,274 @@
+"""Lists of points: text with one on each line (XYZ, CSV), PCD of the Point Cloud Library, scans (LAS, LAZ, E57)."""
+
+from __future__ import annotations
+
+import codecs
+import re
+import struct
+from collections.abc import Sequence
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError
+from ..exchange import Elements
+from ..packages import ensure_installed
+from ..surfaces.point_cloud import PointCloud
+from .files import PathLike, contents, damaged, extension, reading, refuse_kind, text
+from .sandbox import parsed
+
+SEPARATORS, DECIMAL_COMMAS = str.maketrans(",;", "  "), str.maketrans(",;", ". ")
+"""What commas and semicolons mean in a table."""
+WITH_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
+NUMBERS = {"F": "f", "I": "i", "U": "u"}
+"""Types of fields, and their letters for NumPy."""
+PACKED = 1000
+"""Memory that a LAZ file may take for each of its bytes."""
+CHECKSUM = 4
+"""Bytes at the end of each page of an E57 file."""
+SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance "
+"""Namespace of the attributes by which XML names schemas."""
+
+
+def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[NDArray[np.float64]]:
+    """Numbers of each block of lines, between empty lines: all lines have as many, one of `widths`.
+
+    They are separated by commas, semicolons, tabs or spaces; where all commas stand between digits, and something else
+    separates the numbers, they are decimal commas. What follows ``#`` and a header line are skipped.
+
+    Raises
+    ------
+    FileFormatError
+        If a line has other numbers, or there is no line of numbers.
+    """
+    blocks: list[list[list[float]]] = [[]]
+    columns = 0
+    content = text(path)
+    meaning = DECIMAL_COMMAS if _has_decimal_commas(content) else SEPARATORS
+    for number, line in enumerate(content.split("\n"), start=1):
+        words = line.partition("#")[0].translate(meaning).split()
+        if not words:
+            if not line.strip():
+                blocks.append([])
+            continue
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            values = []
+        if values and len(values) == (columns or len(values)) and len(values) in widths:
+            columns = len(values)
+            blocks[-1].append(values)
+        elif values or columns:
+            wanted = " or ".join(map(str, [columns] if columns else widths))
+            raise FileFormatError(
+                f"line {number}, '{line.strip()[:60]}', does not hold {wanted} numbers",
+                remedy="give one point a line",
+                element=f"line {number}",
+            )
+    if not columns:
+        raise FileFormatError("there is no point in it", remedy=f"give {' or '.join(map(str, widths))} numbers a line")
+    return [np.array(block) for block in blocks if block]
+
+
+def _has_decimal_commas(content: str) -> bool:
+    """Whether each line of numbers has several, apart from one another by other characters than their commas."""
+    if "," not in content:
+        return False
+    lines = (line.partition("#")[0].replace(";", " ").split() for line in content.split("\n"))
+    rows = [words for words in lines if words and words[0][0] in "+-0123456789,."]
+    return bool(rows) and all(len(words) > 1 and all(map(WITH_COMMA.fullmatch, words)) for words in rows)
+
+
+def read_point_lists(path: PathLike, dimension: int) -> list[tuple[NDArray[np.float64], bool]]:
+    """Points (n, dimension) of each polyline, and whether it is closed (its last point equals its first)."""
+    lists = read_rows(path, (dimension,))
+    closed = [len(points) > 3 and bool((points[0] == points[-1]).all()) for points in lists]
+    return [(points[:-1] if end else points, end) for points, end in zip(lists, closed, strict=True)]
+
+
+def write_point_lists(lists: Sequence[tuple[NDArray[np.float64], bool]]) -> str:
+    """The text that `read_point_lists` reads."""
+    blocks = []
+    for points, closed in lists:
+        rows = [*points.tolist(), *([points[0].tolist()] if closed else [])]
+        blocks.append("".join(",".join(map(repr, row)) + "\n" for row in rows))
+    return "\n".join(blocks)
+
+
+def read_xyz(path: PathLike) -> Elements:
+    """Lines of 3 numbers (positions) or 6 (positions and normals)."""
+    table = np.concatenate(read_rows(path, (3, 6)))
+    return Elements(table[:, :3], normals=table[:, 3:] if table.shape[1] == 6 else None)
+
+
+def write_xyz(shape: Elements, path: PathLike) -> bytes:
+    """One line per point."""
+    if shape.kind != "PointCloud":
+        raise refuse_kind(shape.kind, path, "points", ".obj or .ply")
+    table = shape.points if shape.normals is None else np.hstack([shape.points, shape.normals])
+    return "".join(" ".join(map(repr, row)) + "\n" for row in table.tolist()).encode()
+
+
+def read_pcd(path: PathLike) -> Elements:
+    """Points whose DATA are ascii, binary or binary_compressed; those without a position (NaN) are left out."""
+    content = contents(path).removeprefix(codecs.BOM_UTF8)
+    header: dict[str, list[str]] = {}
+    at = 0
+    while "DATA" not in header:
+        end = content.find(b"\n", at)
+        if end < 0:
+            raise FileFormatError("there is no line DATA: this is no PCD file, or it is truncated")
+        words = content[at:end].decode("ascii", "replace").partition("#")[0].split()
+        if words:
+            header[words[0].upper()] = words[1:]
+        at = end + 1
+    table = _table(header, content[at:])
+    if not {"x", "y", "z"} <= table.keys():
+        raise FileFormatError(f"the fields are {', '.join(table)}, without x, y and z")
+    points = np.column_stack([table[axis] for axis in "xyz"])
+    finite = np.isfinite(points).all(axis=1)
+    names = [f"normal_{axis}" for axis in "xyz"]
+    normals = np.column_stack([table[name] for name in names]) if set(names) <= table.keys() else None
+    whole = normals is not None and np.isfinite(normals[finite]).all()
+    return Elements(points[finite], normals=normals[finite] if normals is not None and whole else None)
+
+
+def _table(header: dict[str, list[str]], body: bytes) -> dict[str, NDArray[np.float64]]:
+    """Columns of numbers by name of the field."""
+    try:
+        names, kind = header["FIELDS"], header["DATA"][0].lower()
+        counts = [int(word) for word in header.get("COUNT", ["1"] * len(names))]
+        n = int(header["POINTS"][0]) if "POINTS" in header else int(header["WIDTH"][0]) * int(header["HEIGHT"][0])
+        types = [NUMBERS[letter] + size for letter, size in zip(header["TYPE"], header["SIZE"], strict=True)]
+        fields = [(f"{k}", f"<{code}", (count,)) for k, (code, count) in enumerate(zip(types, counts, strict=True))]
+        row = np.dtype(fields)
+        if len(names) != len(fields) or n < 0:
+            raise ValueError
+    except (KeyError, ValueError, IndexError, TypeError):
+        raise FileFormatError("the header of the PCD file is not complete, or contradicts itself") from None
+    if kind == "binary":
+        if len(body) < n * row.itemsize:
+            raise FileFormatError(f"{n} points take {n * row.itemsize} bytes, and {len(body)} follow")
+        rows = np.frombuffer(body, row, n)
+        return {name: rows[f"{k}"][:, 0].astype(np.float64) for k, name in enumerate(names)}
+    if kind == "binary_compressed":  # one field after another
+        body, at = _unpacked(body, n * row.itemsize), 0
+        table = {}
+        for name, code, count in zip(names, types, counts, strict=True):
+            table[name] = np.frombuffer(body, f"<{code}", n * count, at).reshape(n, count)[:, 0].astype(np.float64)
+            at += n * count * np.dtype(code).itemsize
+        return table
+    if kind != "ascii":
+        raise FileFormatError(f"data are {kind}", remedy="write them as ascii, binary or binary_compressed")
+    try:
+        numbers = np.array([line.decode("ascii").split() for line in body.splitlines() if line.strip()], dtype=float)
+        numbers = numbers.reshape(n, sum(counts))
+    except (ValueError, UnicodeDecodeError):
+        raise FileFormatError(f"there are no {n} lines of {sum(counts)} numbers") from None
+    begins = np.concatenate([[0], np.cumsum(counts)])
+    return {name: numbers[:, begins[k]] for k, name in enumerate(names)}
+
+
+def read_las(path: PathLike) -> PointCloud:
+    """Points of a LAS or LAZ file, with its scale and offset; it has no normals.
+
+    Raises
+    ------
+    MissingPackageError
+        If laspy is not installed, or for LAZ no package that it decompresses with.
+    """
+    found = parsed("las", path, "laspy", f"{extension(path)} files", bytes_per_byte=PACKED)
+    return _cloud(found["points"], path)
+
+
+def read_e57(path: PathLike) -> PointCloud:
+    """Points of all scans of an E57 file, in its own place for each; those that are marked invalid are left out.
+
+    Raises
+    ------
+    FileFormatError
+        If its description defines entities or names schemas: pye57 would open what these refer to, here or elsewhere.
+    """
+    ensure_installed("pye57", ".e57 files")
+    with reading(path):
+        _refuse_references(_e57_description(contents(path)))
+        return _cloud(parsed("e57", path, "pye57", ".e57 files")["points"], path)
+
+
+def _e57_description(data: bytes) -> bytes:
+    """The XML of an E57 file, whose pages each end with a checksum."""
+    if data[:8] != b"ASTM-E57" or len(data) < 48:
+        raise damaged("it does not begin as E57 files do")
+    offset, length, page = struct.unpack_from("<QQQ", data, 24)
+    if not CHECKSUM < page <= len(data) or max(offset, length) > len(data):
+        raise damaged(f"it announces {length} bytes of description at {offset}, and has {len(data)} bytes")
+    payload = page - CHECKSUM
+    first, begin = divmod(offset, page)
+    n_pages = -(-(begin + length) // payload)
+    pages = (data[k * page : k * page + payload] for k in range(first, first + n_pages))
+    return b"".join(pages)[begin : begin + length]
+
+
+def _refuse_references(description: bytes) -> None:
+    """Raise `FileFormatError` if XML refers to anything outside itself, or is not in UTF-8, as E57 wants it."""
+
+    def refuse(*_: object) -> None:
+        raise FileFormatError("its description defines entities or names a schema", remedy="export the scan again")
+
+    def begin(version: str, encoding: str | None, standalone: int) -> None:
+        if (encoding or "utf-8").lower() != "utf-8":
+            raise FileFormatError(f"its description is in {encoding}", remedy="export the scan again, in UTF-8")
+
+    def element(name: str, attributes: dict[str, str]) -> None:
+        if any(attribute.startswith(SCHEMA_INSTANCE) for attribute in attributes):
+            refuse()
+
+    parser = expat.ParserCreate("utf-8", " ")
+    parser.XmlDeclHandler, parser.StartDoctypeDeclHandler, parser.StartElementHandler = begin, refuse, element
+    try:
+        parser.Parse(description, True)
+    except expat.ExpatError as error:
+        raise damaged(f"its description is no XML ({error})") from error
+
+
+def _cloud(points: NDArray[np.float64], path: PathLike) -> PointCloud:
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        raise FileFormatError("it has no points", path=path)
+    return PointCloud(points)
+
+
+def _unpacked(body: bytes, size: int) -> bytes:
+    """What LZF has packed, behind two numbers of four bytes: how long it is packed, and unpacked.
+
+    A byte below 32 is followed by one more byte than it says. Others have the length of a part that comes again, less
+    two, in three bits (seven: the next byte is added), and in the other five and a byte how far back it is, less one.
+    """
+    ends = struct.unpack_from("<II", body) if len(body) >= 8 else (0, -1)
+    if ends[1] != size or len(body) < 8 + ends[0]:
+        raise FileFormatError(f"{size} bytes were to be unpacked from {ends[0]}: it is damaged or truncated")
+    packed, result, at = body[8 : 8 + ends[0]], bytearray(), 0
+    try:
+        while at < len(packed) and len(result) <= size:
+            control = packed[at]
+            at += 1
+            if control < 32:
+                result += packed[at : at + control + 1]
+                at += control + 1
+                continue
+            length = 2 + (control >> 5)
+            if length == 9:
+                length += packed[at]
+                at += 1
+            back = ((control & 31) << 8) + packed[at] + 1
+            at += 1
+            if back > len(result):
+                raise IndexError
+            part = bytes(result[len(result) - back : len(result) - back + length])
+            result += (part * (length // len(part) + 1))[:length]  # it may come again within itself
+    except IndexError:
+        raise FileFormatError("what is packed is damaged") from None
+    if len(result) != size:
+        raise FileFormatError(f"{len(result)} bytes were unpacked, not {size}: it is damaged")
+    return bytes(result)

@@ -1,0 +1,152 @@
+"""Reading and writing of shapes, with one table of formats for each direction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..exchange import Elements
+from ..foreign import ForeignShape, as_shape, elements, shape_of
+from ..kinds import Shape
+from ..memory import refuse_beyond_memory
+from ..solids.solid import Solid
+from ..surfaces.digital_surface import DigitalSurface
+from ..tets.tet_mesh import TetMesh
+from .files import PathLike, format_for, reading, replacing
+from .mesh_files import read_obj, read_off, read_stl, write_obj, write_off, write_pc, write_stl
+from .ply import read_ply, write_ply
+from .point_files import read_e57, read_las, read_pcd, read_xyz, write_xyz
+from .scenes import read_3mf, read_dae, read_glb, step_mesh
+from .tet_files import TET_FORMATS, read_tets, store_cells
+from .voxel_files import read_volume
+from .vtk_xml import read_vtp, write_vtp
+
+READERS: dict[str, Callable[[PathLike], Elements | Shape]] = {
+    ".3mf": read_3mf,
+    ".dae": read_dae,
+    ".e57": read_e57,
+    ".glb": read_glb,
+    ".gltf": read_glb,
+    ".las": read_las,
+    ".laz": read_las,
+    ".npy": read_volume,
+    ".nrrd": read_volume,
+    ".obj": read_obj,
+    ".off": read_off,
+    ".pc": read_obj,
+    ".pcd": read_pcd,
+    ".ply": read_ply,
+    ".step": step_mesh,
+    ".stl": read_stl,
+    ".stp": step_mesh,
+    ".vti": read_volume,
+    ".vtp": read_vtp,
+    ".xyz": read_xyz,
+    **dict.fromkeys(TET_FORMATS, read_tets),
+}
+
+WRITERS: dict[str, Callable[[Elements, PathLike], bytes]] = {
+    ".obj": write_obj,
+    ".off": write_off,
+    ".pc": write_pc,
+    ".ply": write_ply,
+    ".stl": write_stl,
+    ".vtp": write_vtp,
+    ".xyz": write_xyz,
+}
+
+SHAPE_FORMATS = frozenset(WRITERS)
+
+MANY, BYTES_PER_FACE = 100_000, 250
+"""Faces from which on their memory is looked at; and measured: what each takes at least, whatever is done with it."""
+
+
+def read(path: PathLike) -> Shape:
+    """Read a shape, in the format given by the extension.
+
+    STL, OBJ, PLY, OFF, VTP, GLB, DAE, 3MF and STEP files have surfaces; XYZ, PCD, LAS, LAZ, E57 and PC files have
+    points, and so have PLY, OBJ, OFF and VTP files without faces. Vertices and faces keep their number and order,
+    whatever their defects: nothing is merged, dropped, split or turned. STL has no vertices; corners with exactly the
+    same coordinates become one. NPY, NRRD and VTI files have volumes of voxels, booleans or zeros and ones. MESH, MSH,
+    VTU, VTK and TetGen's NODE with ELE have tets.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+
+    Returns
+    -------
+    TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or TetMesh
+        A triangle mesh if all faces are triangles, otherwise a polygon mesh; a point cloud if there is no face; the
+        boundary of a volume of voxels; or a tet mesh.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of unknown format, truncated or damaged.
+    MemoryLimitError
+        If too little memory is free for so large a file, or to do anything with so many faces.
+    GeometryError
+        If the shape is invalid: no element, NaN or infinite coordinates, a vertex id that does not exist.
+
+    Examples
+    --------
+    >>> import tempfile, signedheat as sh
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).save(f"{folder}/one.ply")
+    ...     sh.read(f"{folder}/one.ply")
+    TriangleMesh(3 vertices, 1 faces)
+    """
+    read_shape = format_for(path, READERS, "a shape")
+    with reading(path):
+        found = read_shape(path)
+        shape = shape_of(found) if isinstance(found, Elements) else found
+        faces = getattr(shape, "n_faces", 0) or len(getattr(shape, "corners", ()))
+        if faces >= MANY:
+            refuse_beyond_memory(
+                f"a surface of {faces:,} faces",
+                faces,
+                lambda n: float(BYTES_PER_FACE * n),
+                lambda n: f"use at most {n:,} faces, coarsened or in parts",
+            )
+        return shape
+
+
+def save(shape: Shape | ForeignShape, path: PathLike) -> None:
+    """Write a shape, in the format given by the extension.
+
+    OBJ, OFF, PLY, VTP, XYZ and PC keep every bit of the coordinates; STL has single precision. The
+    file is written under a temporary name and renamed, so that an existing file survives a failure.
+
+    Parameters
+    ----------
+    shape : TriangleMesh, PolygonMesh, PointCloud, TetMesh or Solid
+        The shape; of a solid its surface, or in ``.npz`` itself: `Solid.save`.
+    path : str or path
+        The file.
+
+    Raises
+    ------
+    FileFormatError
+        If the format is unknown, does not support this kind of shape, or the file cannot be written.
+    UnsupportedTypeError
+        If it is no shape.
+
+    Examples
+    --------
+    >>> import tempfile, signedheat as sh
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save(sh.PointCloud([[0, 0, 0], [1, 0, 0]]), f"{folder}/two.xyz")
+    ...     read(f"{folder}/two.xyz").n_points
+    2
+    """
+    if isinstance(shape, Solid):
+        return shape.save(path)
+    shape = as_shape(shape)
+    if isinstance(shape, TetMesh):
+        return store_cells(shape.to_meshio(), path)
+    write = format_for(path, WRITERS, "a shape")
+    if isinstance(shape, DigitalSurface):
+        shape = shape.squares
+    with replacing(path) as temporary:
+        temporary.write_bytes(write(elements(shape), path))

@@ -1,0 +1,133 @@
+"""Tet meshes, and fields on them, by meshio; VTK's XML is read by ourselves.
+
+meshio reads in a process of its own: on some damaged files it does not end, and it allocates what they announce.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+import warnings
+from contextlib import redirect_stderr
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileFormatError, GeometryError
+from ..exchange import NAME
+from ..packages import require
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..tets.tet_mesh import TetMesh
+from .files import (
+    PathLike,
+    contents,
+    damaged,
+    extension,
+    format_for,
+    parsed_numbers,
+    replacing,
+    writing,
+)
+from .sandbox import parsed
+from .vtk_xml import Block, Cells, read_vtu
+
+MODULES = {
+    ".mesh": "medit",
+    ".meshb": "medit",
+    ".msh": "gmsh",
+    ".vtk": "vtk",
+    ".vtu": "vtu",
+    ".ele": "tetgen",
+    ".node": "tetgen",
+}
+"""meshio's module for each extension."""
+TETGEN = (".node", ".ele")
+"""Extensions of the files of TetGen, which are read and written as a pair."""
+TET_FORMATS = frozenset(MODULES)
+
+TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
+
+
+COUNTED = {
+    "PhysicalNames": 1,
+    "Entities": 4,
+    "Nodes": 2,
+    "Elements": 2,
+    "Periodic": 1,
+    "NodeData": 1,
+    "ElementData": 1,
+}
+"""Sections, and how many numbers at the beginning of each count what is in it (in version 2 there is but one)."""
+IN_TEXT = ("PhysicalNames", "NodeData", "ElementData")
+"""Sections that begin with text in binary files, too."""
+
+
+def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
+    """Read a `TetMesh`; or, from a file without tets, its surface."""
+    mesh = load_cells(path)
+    kinds = {block.type for block in mesh.cells}
+    if "tetra" in kinds:
+        return TetMesh.from_meshio(mesh)
+    if kinds & {"tetra10", "hexahedron", "wedge", "hierarchy"} or not kinds & {"triangle", "quad"}:
+        found = ", ".join(sorted(kinds)) or "no cells"
+        raise GeometryError(f"{path} holds no tets, but {found}", remedy="convert it to linear tetrahedra first")
+    return (TriangleMesh if "quad" not in kinds else PolygonMesh).from_meshio(mesh)
+
+
+def load_cells(path: PathLike) -> Any:
+    """Points, cells and values at the points, as a `meshio.Mesh` has them."""
+    if extension(path) == ".vtu":
+        return read_vtu(path, (NAME,))
+    for file in _files(path):
+        if all(line.startswith(b"#") for line in contents(file).split(b"\n") if line.strip()):  # meshio would look on
+            raise FileFormatError("there is nothing in it", remedy="write it again", path=file)
+    if extension(path) == ".msh":
+        _refuse_announcements(path)
+    found = parsed("cells", path, "meshio", "tet meshes", module=MODULES[extension(path)])
+    blocks = [Block(kind, found[f"cells {k}"]) for k, kind in enumerate(found["kinds"])]
+    values = {name: found[f"values {k}"] for k, name in enumerate(found["names"])}
+    return Cells(found["points"], blocks, values)
+
+
+def store_cells(mesh: Any, path: PathLike) -> None:
+    """Write a `meshio.Mesh`."""
+    module = _module(path)
+    with writing(path), tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), redirect_stderr(StringIO()):
+        warnings.simplefilter("ignore")
+        made = Path(folder, f"mesh{extension(path)}")
+        module.write(str(made), mesh)
+        for file in _files(path):
+            with replacing(file) as temporary:
+                shutil.copyfile(made.with_suffix(file.suffix.lower()), temporary)
+
+
+def _files(path: PathLike) -> list[Path]:
+    """The file that is named, after the other one of a pair."""
+    named = Path(path)
+    return [*(named.with_suffix(end) for end in TETGEN if extension(path) in TETGEN and end != extension(path)), named]
+
+
+def _module(path: PathLike) -> Any:
+    return require(f"meshio.{format_for(path, MODULES, 'a tet mesh')}", "tet meshes")
+
+
+def _refuse_announcements(path: PathLike) -> None:
+    """Raise `FileFormatError` if a Gmsh file announces more things than it has bytes: meshio would count to them."""
+    data = contents(path)
+    form = re.search(rb"\$MeshFormat\s+(\S+)\s+([01])\s+([48])\s", data)
+    if form is None:
+        return  # meshio says so
+    is_raw, kind = form[2] == b"1" and form[1].startswith(b"4"), np.dtype(f"<u{form[3].decode()}")
+    for section in re.finditer(rb"^\$(\w+)[ \t]*\r?\n", data, re.MULTILINE):
+        name, begin = section[1].decode(), section.end()
+        if is_raw and name in COUNTED and name not in IN_TEXT:
+            counts = np.frombuffer(data, kind, COUNTED[name], begin).tolist()
+        else:
+            words = data[begin : begin + 100].split(b"\n")[0].split()[: COUNTED.get(name, 0)]
+            counts = parsed_numbers(words, f"counts of {name}", int).tolist()
+        if max(counts, default=0) > len(data):
+            raise damaged(f"it has {len(data)} bytes, and announces {max(counts)} {name}", element=name)

@@ -1,0 +1,315 @@
+"""Voxels from images: digital surfaces, grids with walls, and labels with their place in the world."""
+
+from __future__ import annotations
+
+import gzip
+from dataclasses import dataclass
+from typing import Any, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError, GeometryError
+from ..exchange import NAME
+from ..grids.grid import Grid
+from ..grids.grid_field import GridField
+from ..packages import require
+from ..surfaces.digital_surface import DigitalSurface
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..transforms import transform
+from .field_files import CONVENTION, ensure_field_writable, save_field
+from .files import PathLike, ensure_writable, extension, reading, replacing
+from .image_files import NIBABEL, NIFTI, nibabel, read_image, write_nrrd
+
+Mesh = TypeVar("Mesh", TriangleMesh, PolygonMesh)
+
+VOLUME_FORMATS = (".npy", ".nrrd", ".vti")
+LABEL_FORMATS = (*VOLUME_FORMATS, *NIFTI)
+SQUARE = 1e-4
+"""Cosine between axes up to which they are at right angles: NIfTI files keep them in single precision."""
+SPACES = {
+    "right-anterior-superior": (1, 1, 1),
+    "left-posterior-superior": (-1, -1, 1),
+    "left-anterior-superior": (-1, 1, 1),
+}
+"""Signs that turn the axes of a space, as NRRD files name it, into those of NIfTI files."""
+
+
+@dataclass(frozen=True, eq=False)
+class LabelImage:
+    """Labels of voxels, and where these are.
+
+    Distance is measured along the axes of the image (`grid`, `surface`), and written back into its place (`save`,
+    `to_world`): that does not change it, as the axes are at right angles.
+
+    Attributes
+    ----------
+    labels : (nx, ny, nz) number
+        One for each voxel.
+    axes : (3, 3) float
+        The step from one voxel to the next along each axis of the image, in columns.
+    origin : (3,) float
+        Centre of the first voxel.
+    space : str, optional
+        What the axes of the world are, as in NRRD files: ``"left-posterior-superior"``.
+
+    Examples
+    --------
+    >>> image = LabelImage(np.full((3, 4, 5), 7), axes=2.0 * np.eye(3), origin=np.zeros(3))
+    >>> image.grid.upper.tolist(), image.surface(7).bounds.round()[1].tolist()
+    ([4.0, 6.0, 8.0], [5.0, 7.0, 9.0])
+    """
+
+    labels: NDArray[np.generic]
+    axes: NDArray[np.float64]
+    origin: NDArray[np.float64]
+    space: str | None = None
+
+    @property
+    def spacing(self) -> NDArray[np.float64]:
+        """(3,) distance between the centres of neighbouring voxels."""
+        return np.linalg.norm(self.axes, axis=0)
+
+    @property
+    def grid(self) -> Grid:
+        """The centres of the voxels, along the axes of the image, the first one at 0."""
+        return Grid((0.0, 0.0, 0.0), self.spacing, self.labels.shape)
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """(4, 4) from positions along the axes of the image to those in the world."""
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = self.axes / self.spacing, self.origin
+        return matrix
+
+    def surface(self, label: float | None = None) -> TriangleMesh:
+        """The smooth surface around the voxels with a label, along the axes of the image: closed and manifold.
+
+        Parameters
+        ----------
+        label : number, optional
+            Which; may be left out where the image has zeros and one other label.
+
+        Returns
+        -------
+        TriangleMesh
+            Closed and manifold.
+
+        Raises
+        ------
+        GeometryError
+            If no voxel has it, or it is left out and there are several.
+
+        Examples
+        --------
+        >>> image = LabelImage(np.pad(np.full((2, 2, 2), 7), 1), axes=2.0 * np.eye(3), origin=np.zeros(3))
+        >>> image.surface(7).bounds.tolist() == image.surface().bounds.tolist()
+        True
+        """
+        if label is None:
+            found = np.unique(self.labels)
+            others = found[found != 0]
+            if len(others) != 1:
+                raise GeometryError(
+                    f"the image has {_listed(found)}", remedy="choose one with --label", element="labels"
+                )
+            label = float(others[0])
+        inside = self.labels == label
+        if not inside.any():
+            raise GeometryError(
+                f"no voxel has the label {label:g}, but {_listed(np.unique(self.labels))}",
+                remedy="choose another one",
+                element=f"label {label:g}",
+            )
+        return DigitalSurface(inside, self.spacing).smooth_surface
+
+    def to_world(self, surface: Mesh) -> Mesh:
+        """Move a mesh along the axes of the image to its place in the world; outside stays outside.
+
+        Parameters
+        ----------
+        surface : TriangleMesh or PolygonMesh
+            As `surface` returns it.
+
+        Returns
+        -------
+        TriangleMesh or PolygonMesh
+            In the world.
+
+        Examples
+        --------
+        >>> image = LabelImage(np.pad(np.full((2, 2, 2), 7), 1), axes=2.0 * np.eye(3), origin=np.zeros(3))
+        >>> image.to_world(image.surface(7)).n_vertices == image.surface(7).n_vertices
+        True
+        """
+        return cast("Mesh", transform(surface, self.matrix))
+
+    def save(self, field: GridField, path: PathLike) -> None:
+        """Write a field along the axes of the image into its place in the world.
+
+        Parameters
+        ----------
+        field : GridField
+            On `grid`, or another one along the same axes.
+        path : str or path
+            ``.nrrd`` or ``.nii`` or ``.nii.gz`` (with nibabel); other formats of fields where the axes of the image are
+            those of the world.
+
+        Raises
+        ------
+        FileFormatError
+            If the format has no place for turned axes, or for the space of the image, or the file cannot be written.
+
+        Examples
+        --------
+        >>> image = LabelImage(np.pad(np.full((2, 2, 2), 7), 1), axes=2.0 * np.eye(3), origin=np.zeros(3))
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     image.save(sh.signed_distance(image.surface(7), image.grid), f"{folder}/distance.nrrd")
+        """
+        self.ensure_writable(path)
+        first = self.matrix[:3, :3] @ field.grid.origin + self.origin
+        axes = self.axes * (field.grid.spacing / self.spacing)
+        if extension(path) in NIFTI:
+            with replacing(path) as temporary:
+                temporary.write_bytes(self._nifti(field, axes, first, path))
+        elif extension(path) == ".nrrd":
+            with replacing(path) as temporary:
+                write_nrrd(temporary, field.values, axes, first, self.space, content=NAME, convention=CONVENTION)
+        else:
+            save_field(GridField(Grid(first, field.grid.spacing, field.grid.shape), field.values), path)
+
+    def ensure_writable(self, path: PathLike) -> None:
+        """Check before a long computation that a field can be written into the place of the image.
+
+        Parameters
+        ----------
+        path : str or path
+            As for `save`.
+
+        Raises
+        ------
+        FileFormatError
+            If the format has no place for turned axes, or for the space of the image, or the file cannot be written.
+
+        Examples
+        --------
+        >>> image = LabelImage(np.pad(np.full((2, 2, 2), 7), 1), axes=2.0 * np.eye(3), origin=np.zeros(3))
+        >>> image.ensure_writable("distance.nrrd")
+        """
+        if extension(path) in NIFTI:
+            require(*NIBABEL)
+            ensure_writable(path, {extension(path)}, "a field")
+            if self.space is not None and self.space not in SPACES:
+                raise FileFormatError(
+                    f"NIfTI files have no space '{self.space}'", remedy="write a .nrrd file", path=path
+                )
+            return
+        ensure_field_writable(path)
+        if extension(path) != ".nrrd" and not np.array_equal(self.axes, np.diag(self.spacing)):
+            raise FileFormatError(
+                "the axes of the image are turned, for which this format has no place",
+                remedy="write a .nrrd or .nii file",
+                path=path,
+            )
+
+    def _nifti(self, field: GridField, axes: NDArray[np.float64], first: NDArray[np.float64], path: PathLike) -> bytes:
+        affine = np.eye(4)
+        affine[:3, :3], affine[:3, 3] = axes, first
+        signs = SPACES[self.space] if self.space is not None else (1, 1, 1)
+        image = nibabel.Nifti1Image(field.values, np.diag([*signs, 1]) @ affine)
+        packed: bytes = image.to_bytes()
+        return gzip.compress(packed, mtime=0) if extension(path) == ".nii.gz" else packed
+
+
+def read_labels(path: PathLike) -> LabelImage:
+    """Read an image of labels, as segmentation makes them, with its place in the world.
+
+    Parameters
+    ----------
+    path : str or path
+        ``.nrrd``, ``.nii`` or ``.nii.gz`` (with nibabel), ``.vti``, ``.npy``. Axes may be turned and mirrored.
+
+    Returns
+    -------
+    LabelImage
+        Labels and place.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of unknown format, damaged, has not three axes, or they are not at right angles.
+    MissingPackageError
+        If it is a NIfTI file, and nibabel is not installed.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.save(f"{folder}/labels.npy", np.array([[[0, 3]], [[3, 3]]]))
+    ...     read_labels(f"{folder}/labels.npy").surface(3).n_faces
+    28
+    """
+    image = read_image(path, LABEL_FORMATS, "labels")
+    with reading(path):
+        if image.values.ndim != 3:
+            raise FileFormatError(f"the image has {image.values.ndim} axes, not 3")
+        if image.axes.shape != (3, 3) or image.origin.shape != (3,):
+            raise FileFormatError("its axes or its origin are not those of space", remedy="write it again")
+        lengths = np.linalg.norm(image.axes, axis=0)
+        if not (np.isfinite(image.axes).all() and (lengths > 0).all() and np.isfinite(image.origin).all()):
+            raise FileFormatError("its axes have no directions", remedy="write it again")
+        cosines = (image.axes / lengths).T @ (image.axes / lengths) - np.eye(3)
+        if np.abs(cosines).max() > SQUARE:
+            raise FileFormatError(
+                f"its axes are not at right angles, but off by {np.degrees(np.arcsin(np.abs(cosines).max())):.3g}°",
+                remedy="resample the image along right angles",
+            )
+        return LabelImage(image.values, image.axes, image.origin, image.space)
+
+
+def read_volume(path: PathLike, level: float | None = None, radius: float | None = None) -> DigitalSurface:
+    """Read a set of voxels from an image, as a digital surface.
+
+    Parameters
+    ----------
+    path : str or path
+        ``.npy`` (voxels of size 1, or with origin and spacing in a ``.json`` of the same name), ``.nrrd`` or ``.vti``.
+    level : float, optional
+        Voxels with larger values are inside. Without it the image must have booleans, or zeros and ones.
+    radius : float, optional
+        Passed to `DigitalSurface`.
+
+    Returns
+    -------
+    DigitalSurface
+        The boundary of the voxels.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of unknown format, truncated or damaged.
+    GeometryError
+        If the image is not a set of voxels.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.save(f"{folder}/one.npy", np.ones((1, 1, 1), dtype=bool))
+    ...     read_volume(f"{folder}/one.npy").n_vertices
+    8
+    """
+    image = read_image(path, VOLUME_FORMATS, "a volume")
+    with reading(path):
+        if image.values.ndim != 3:
+            raise FileFormatError(f"the image has {image.values.ndim} axes, and a volume has 3")
+        inside = image.values if level is None else image.values > level
+        return DigitalSurface(inside, image.spacing, image.origin, radius)
+
+
+def _listed(labels: NDArray[Any]) -> str:
+    some = ", ".join(f"{label:g}" for label in labels[:12].tolist())
+    return f"the labels {some}{', …' if len(labels) > 12 else ''}"

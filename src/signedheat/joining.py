@@ -1,0 +1,85 @@
+"""Several meshes as one shape."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import SourceError
+from .foreign import SurfaceShape, as_shape, as_shapes, refuse_arrays
+from .grids.polyline import Polyline
+from .kinds import ShapeLike
+from .surfaces.point_cloud import PointCloud
+from .surfaces.polygon_mesh import PolygonMesh
+from .surfaces.surface_curves import Curve, SurfacePoints
+from .surfaces.triangle_mesh import TriangleMesh
+from .tets.tet_mesh import TetMesh
+
+Body: TypeAlias = tuple[NDArray[np.float64], NDArray[np.int64]]
+"""(n, 3) vertices and (m, 3) faces."""
+
+
+def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
+    """The shape itself, or one mesh of several; tets are their boundary."""
+    shapes = as_shapes(shape)
+    if not shapes:
+        raise SourceError("there is no shape", remedy="pass at least one")
+    if len(shapes) == 1:
+        whole = shapes[0]
+        if isinstance(whole, TetMesh):
+            return whole.boundary
+        if not isinstance(whole, TriangleMesh | PolygonMesh | PointCloud):
+            if not isinstance(whole, Curve | SurfacePoints | Polyline):
+                as_shape(cast("SurfaceShape", whole))  # which refuses paths and bare arrays
+            raise SourceError(
+                f"distance in space is measured to meshes and points, not to a {type(whole).__name__}",
+                remedy="pass a mesh, or a point cloud; curves are measured on their surface",
+                element="source 0",
+            )
+        return whole
+    refuse_arrays(shapes)
+    meshes = []
+    for index, each in enumerate(shapes):
+        if not isinstance(each, TriangleMesh | PolygonMesh):
+            raise SourceError(
+                f"several meshes make one solid, and shape {index} is a {type(each).__name__}",
+                element=f"shape {index}",
+            )
+        meshes.append(each)
+    return TriangleMesh(*joined_triangles(meshes))
+
+
+def joined_triangles(parts: Sequence[TriangleMesh | PolygonMesh], origin: NDArray[np.float64] | float = 0.0) -> Body:
+    """(n, 3) vertices, relative to `origin`, and (m, 3) triangles of all meshes together."""
+    meshes = [part.triangulation for part in parts]
+    return concatenated([(mesh.vertices - origin, mesh.faces) for mesh in meshes])
+
+
+def concatenated(bodies: Sequence[Body]) -> Body:
+    """Vertices and faces of several bodies, one after another; nothing is merged.
+
+    Examples
+    --------
+    >>> corners, triangle = np.eye(3), np.array([[0, 1, 2]])
+    >>> concatenated([(corners, triangle), (corners, triangle)])[1].tolist()
+    [[0, 1, 2], [3, 4, 5]]
+    """
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
+    faces = [own + start for (_, own), start in zip(bodies, starts, strict=False)]
+    return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
+
+
+def placed(body: Body, matrix: NDArray[np.float64]) -> Body:
+    """A body moved by a (4, 3) matrix that multiplies rows from the right; what is mirrored keeps its outside.
+
+    Examples
+    --------
+    >>> mirror = np.vstack([np.diag([-1.0, 1, 1]), [5, 0, 0]])
+    >>> placed((np.eye(3), np.array([[0, 1, 2]])), mirror)[0][0].tolist()
+    [4.0, 0.0, 0.0]
+    """
+    vertices, faces = body
+    return vertices @ matrix[:3] + matrix[3], faces if np.linalg.det(matrix[:3]) >= 0 else faces[:, ::-1]

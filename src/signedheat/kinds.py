@@ -1,0 +1,41 @@
+"""The kinds of domains and of sources, as types: what a function takes is said by one of these names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias, TypeVar
+
+from .foreign import ForeignShape
+from .foreign import Shape as Shape
+from .grids.grid import Grid
+from .grids.polyline import Polyline
+from .surfaces.digital_surface import DigitalSurface
+from .surfaces.intrinsic_triangulation import IntrinsicTriangulation
+from .surfaces.point_cloud import PointCloud
+from .surfaces.polygon_mesh import PolygonMesh
+from .surfaces.surface_curves import CurveOrPoints
+from .surfaces.triangle_mesh import TriangleMesh
+from .tets.tet_mesh import TetMesh
+
+EmbeddedSurface: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface
+"""Surfaces with positions in space, on which curves and points are given."""
+SurfaceDomain: TypeAlias = EmbeddedSurface | IntrinsicTriangulation
+"""What distance along a surface is measured on."""
+Domain: TypeAlias = SurfaceDomain | TetMesh | Grid[int]
+"""What distance is measured on."""
+AnySurface = TypeVar("AnySurface", bound=SurfaceDomain)
+"""A surface of one kind."""
+ShapeLike: TypeAlias = Shape | ForeignShape
+"""What is taken for a shape: also objects of trimesh, PyVista, meshio and Open3D, and pairs (vertices, faces)."""
+Shapes: TypeAlias = ShapeLike | Sequence[ShapeLike]
+"""One shape in space or several."""
+Polylines: TypeAlias = Polyline | Sequence[Polyline]
+"""One line in the plane or several."""
+SpaceSource: TypeAlias = ShapeLike | Polyline
+"""What distance on grids is measured to."""
+SpaceSources: TypeAlias = SpaceSource | Sequence[SpaceSource]
+"""One of them or several."""
+Source: TypeAlias = SpaceSource | CurveOrPoints
+"""What distance is measured to, on any domain."""
+Sources: TypeAlias = Source | Sequence[Source | Sequence[CurveOrPoints]]
+"""One source or several."""

@@ -1,0 +1,90 @@
+"""Functions that are linear in every cell: all that the convex problem of Eq. 17 and Eq. 18 needs of a domain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .mesh.intrinsic_mesh import IntrinsicMesh
+from .mesh.tetrahedral import Tetrahedra
+
+
+@dataclass(frozen=True, eq=False)
+class LinearElements:
+    """Linear finite elements on triangles or tets.
+
+    Attributes
+    ----------
+    corners : (m, d + 1) int
+        Unknown at each corner of each cell.
+    sizes : (m,) float
+        Areas or volumes of the cells.
+    slope_matrix : (m d, n) sparse
+        Maps values at the unknowns to the d components of ∇φ in every cell, cell after cell.
+    """
+
+    corners: NDArray[np.int64]
+    sizes: NDArray[np.float64]
+    slope_matrix: sparse.csr_matrix
+
+    @classmethod
+    def of(
+        cls, corners: NDArray[np.int64], sizes: NDArray[np.float64], hats: NDArray[np.float64], n: int
+    ) -> LinearElements:
+        """From the gradients (m, d + 1, d) of the hat functions of each cell, one at a corner and zero at the others.
+
+        Examples
+        --------
+        >>> hats = np.array([[[-1.0], [1.0]], [[-0.5], [0.5]]])
+        >>> line = LinearElements.of(np.array([[0, 1], [1, 2]]), np.array([1.0, 2.0]), hats, 3)
+        >>> line.slopes(np.array([0.0, 1.0, 4.0])).ravel().tolist(), line.masses.tolist()
+        ([1.0, 1.5], [0.5, 1.5, 1.0])
+        """
+        m, k = corners.shape
+        d = hats.shape[2]
+        columns = np.repeat(corners[:, None], d, axis=1)
+        entries = hats.transpose(0, 2, 1).ravel(), columns.ravel(), k * np.arange(m * d + 1)
+        return cls(corners, sizes, sparse.csr_matrix(entries, shape=(m * d, n)))
+
+    @classmethod
+    def on_triangles(cls, triangles: IntrinsicMesh) -> LinearElements:
+        """Elements of a surface; gradients are in the layout of each face."""
+        slopes = 1j * np.roll(triangles.edge_vectors, -1, axis=1) / (2.0 * triangles.face_areas)[:, None]
+        hats = np.stack([slopes.real, slopes.imag], axis=2)
+        return cls.of(triangles.corner_vertices, triangles.face_areas, hats, triangles.n_vertices)
+
+    @classmethod
+    def on_tets(cls, tets: Tetrahedra, corners: NDArray[np.int64], n: int) -> LinearElements:
+        """Elements of a tet mesh; thin tets have a reduced weight, as they have in C, and flat ones none."""
+        flat = tets.thickness < 1e-10
+        hats = tets.area_vectors / np.where(flat, -np.inf, -3.0 * tets.volumes)[:, None, None]
+        return cls.of(corners, np.where(flat, 0.0, tets.weights * tets.volumes), hats, n)
+
+    @property
+    def masses(self) -> NDArray[np.float64]:
+        """(n,) integrals of the hat functions: A_i of Eq. 18."""
+        share = np.repeat(self.sizes / self.corners.shape[1], self.corners.shape[1])
+        return np.asarray(np.bincount(self.corners.ravel(), share, self.slope_matrix.shape[1]), np.float64)
+
+    def slopes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, d) ∇φ in every cell, whose length Eq. 17 bounds by one."""
+        return np.asarray(self.slope_matrix @ values).reshape(len(self.sizes), -1)
+
+    def divergence(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """b of Eq. 13, ``b_i = ∫ ⟨∇λ_i, Y⟩``, for one vector per cell."""
+        return self.slope_matrix.T @ (self.sizes[:, None] * vectors).ravel()
+
+    def slope_error(self, values: NDArray[np.float64]) -> float:
+        """Root mean square of ``|∇φ| − 1`` over the cells in which φ is known."""
+        return float(np.sqrt(self._mean((np.linalg.norm(self.slopes(values), axis=1) - 1.0) ** 2)))
+
+    def bounded_slope_error(self, values: NDArray[np.float64]) -> float:
+        """Mean of ``min(| |∇φ| − 1 |, 1)``: hardly moved by cells without height, nor by the kinks of a distance."""
+        return self._mean(np.minimum(np.abs(np.linalg.norm(self.slopes(values), axis=1) - 1.0), 1.0))
+
+    def _mean(self, errors: NDArray[np.float64]) -> float:
+        finite = np.isfinite(errors) & (self.sizes > 0)
+        return float(np.average(errors[finite], weights=self.sizes[finite])) if finite.any() else float("nan")

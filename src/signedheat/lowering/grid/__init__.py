@@ -1,1 +1,0 @@
-"""Lowering of regular grids, and of shapes in them, to stencils and node vectors."""

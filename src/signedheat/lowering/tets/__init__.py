@@ -1,1 +1,0 @@
-"""Lowering of tet meshes, and of shapes in them, to Crouzeix–Raviart elements."""

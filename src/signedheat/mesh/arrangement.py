@@ -1,0 +1,714 @@
+"""Triangles divided where others pass through them or lie in their planes, so that all meet in whole edges.
+
+Where faces meet there are points that belong to both: an edge and a face have one, two edges that touch, and three
+faces. All that is nearer than rounding is one point, and pieces are made from these points alone, so that they have
+whole edges in common, whatever rounding does, and what was closed still is. Time grows with the number of these points.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+from .box_tree import BoxTree
+from .edges import EdgeTable, edge_table
+from .planar_triangulation import triangulate_faces
+from .self_intersections import overlapping_faces
+from .triangles import face_areas
+from .welding import distinct_rows, welded
+
+TOUCHING = 1e-8
+"""Distance, over the size of a shape, up to which what is near is one: what its coordinates are rounded to."""
+STRAIGHT = 4.0
+"""Distance, over that up to which points are one, up to which points that two faces have in common are on a line."""
+PARALLEL = 1e-9
+"""Sine of the angle between edges below which they are parallel."""
+ON_EDGE, IN_FACE, EDGES, EDGE_AND_FACE = range(4)
+"""What is met: a vertex is on an edge or in a face, two edges touch, or an edge passes through a face."""
+
+
+class Arrangement(NamedTuple):
+    """Pieces of faces that meet in whole edges.
+
+    Attributes
+    ----------
+    points : (n, 3) float
+        Those that were given, and where faces meet.
+    faces : (p, 3) int
+        Pieces, in order of the faces.
+    origins : (p,) int
+        Face that each is a piece of, ascending.
+    cells : (p,) int
+        Pieces of a face that hang together without a line between them have the same.
+    """
+
+    points: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    origins: NDArray[np.int64]
+    cells: NDArray[np.int64]
+
+
+class Incidence(NamedTuple):
+    """Points that lie on lines or faces: numbers of both, each pair once, in order."""
+
+    owners: NDArray[np.int64]
+    points: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, *pairs: tuple[NDArray[np.int64], NDArray[np.int64]]) -> Incidence:
+        """The pairs of several lists."""
+        owners, points = (np.concatenate(column).astype(np.int64) for column in zip(*pairs, strict=True))
+        order = np.lexsort((points, owners))
+        owners, points = owners[order], points[order]
+        new = np.append(True, (owners[1:] != owners[:-1]) | (points[1:] != points[:-1]))[: len(owners)]
+        return cls(owners[new], points[new])
+
+    def starts(self, n: int) -> NDArray[np.int64]:
+        """(n + 1,) where the points of each of n owners begin."""
+        return np.searchsorted(self.owners, np.arange(n + 1))
+
+    def without(self, *others: tuple[NDArray[np.int64], NDArray[np.int64]]) -> Incidence:
+        """The pairs that are in none of several lists."""
+        owners, points = (np.concatenate(column) for column in zip(*others, strict=True))
+        return self.select(~_are_among((self.owners, self.points), (owners, points)))
+
+    def select(self, chosen: NDArray[np.bool_]) -> Incidence:
+        """Some of the pairs."""
+        return Incidence(self.owners[chosen], self.points[chosen])
+
+    def along(self, points: NDArray[np.float64], ends: NDArray[np.int64]) -> Incidence:
+        """The points of lines in order from the first end of each to the other."""
+        tails, heads = points[ends[self.owners, 0]], points[ends[self.owners, 1]]
+        ahead = ((points[self.points] - tails) * (heads - tails)).sum(axis=1)
+        order = np.lexsort((ahead, self.owners))
+        return Incidence(self.owners, self.points[order])
+
+
+def meeting_faces(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(k, 2) pairs of faces that cross, cover each other in one plane, or touch without a vertex in common."""
+    slack = TOUCHING * float(np.ptp(points, axis=0).max())
+    return overlapping_faces(points, faces, slack, -slack)
+
+
+def arranged(
+    points: NDArray[np.float64], faces: NDArray[np.int64], pairs: NDArray[np.int64] | None = None
+) -> Arrangement:
+    """Divide faces where pairs of them, (k, 2), meet, and where edges that do not cancel end on others.
+
+    Points nearer than rounding are one, those that are this near to edges and faces lie on them, and triangles that are
+    thinner are left out. What has no part in any of this stays as it is. By default all faces that meet are divided.
+
+    Examples
+    --------
+    >>> points = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [1, -1, -1], [1, 3, -1], [1, 1, 3]])
+    >>> pieces = arranged(points, np.array([[0, 1, 2], [3, 4, 5]]))
+    >>> np.bincount(pieces.origins).tolist(), pieces.points[6:].tolist()
+    ([3, 5], [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
+    """
+    slack = TOUCHING * float(np.ptp(points, axis=0).max())
+    pairs = meeting_faces(points, faces) if pairs is None else pairs
+    busy = np.unique(faces[pairs.ravel()])
+    faces = _welded(points, busy, slack)[faces]
+    proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
+    proper = proper[_heights(points[faces[proper]]) > slack]
+    number = np.full(int(faces.size), -1)
+    number[proper] = np.arange(len(proper))
+    faces, pairs = faces[proper], number[pairs]
+    pairs = pairs[(pairs >= 0).all(axis=1)]
+    table = edge_table(faces)
+    on_open = _on_open_edges(points, table, slack)
+
+    kinds, owners, others, places = _meet(points, faces, table.vertices, table.face_edges, pairs, slack)
+    points, ids = _with_new(points, np.stack([kinds, owners, others], axis=1), places, kinds >= EDGES, others)
+    on_edge, edges, pierced, in_face = kinds == ON_EDGE, kinds == EDGES, kinds == EDGE_AND_FACE, kinds == IN_FACE
+    along = on_edge | edges | pierced
+    lines = Lines(
+        table.vertices,
+        Incidence.of(on_open, (owners[along], ids[along]), (others[edges], ids[edges])),
+        Incidence.of((owners[in_face], ids[in_face]), (others[pierced], ids[pierced])),
+    )
+    lines = lines.renamed(_welded(points, np.concatenate([busy, np.unique(ids)]), slack))
+    lines, records = _with_segments(points, faces, table, pairs, lines, slack)
+    points, lines, records = _with_crossings(points, faces, lines, records, slack, busy)
+    return _divided(points, faces, proper, table, lines, records)
+
+
+class Lines(NamedTuple):
+    """Edges, and after them segments along which two faces meet.
+
+    Attributes
+    ----------
+    ends : (l, 2) int
+        Points at which each line begins and ends.
+    on : Incidence
+        Points on lines, but for their ends.
+    within : Incidence
+        Points in faces, beside those on their edges.
+    sides : (s, 2) int
+        The two faces of each segment.
+    """
+
+    ends: NDArray[np.int64]
+    on: Incidence
+    within: Incidence
+    sides: NDArray[np.int64] = np.zeros((0, 2), dtype=np.int64)
+
+    def renamed(self, rename: NDArray[np.int64]) -> Lines:
+        """With points that have become one."""
+        ends = rename[self.ends]
+        on = Incidence.of((self.on.owners, rename[self.on.points]))
+        on = on.select((on.points[:, None] != ends[on.owners]).all(axis=1))
+        return self._replace(ends=ends, on=on, within=Incidence.of((self.within.owners, rename[self.within.points])))
+
+
+def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m,) of triangles above their longest sides."""
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
+    return 2.0 * face_areas(corners) / np.maximum(sides, 1e-300)
+
+
+def _welded(points: NDArray[np.float64], chosen: NDArray[np.int64], slack: float) -> NDArray[np.int64]:
+    """(n,) the first of the chosen points that each of them is one with; all others stay."""
+    rename = np.arange(len(points))
+    chosen = np.unique(chosen)
+    rename[chosen] = chosen[welded(points[chosen], slack)]
+    return rename
+
+
+def _with_new(
+    points: NDArray[np.float64],
+    names: NDArray[np.int64],
+    places: NDArray[np.float64],
+    new: NDArray[np.bool_],
+    ids: NDArray[np.int64],
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points, with one for each different name that is new, and the number of the point of each name."""
+    numbers, first = distinct_rows(names[new])
+    ids = ids.copy()
+    ids[new] = len(points) + numbers
+    return np.concatenate([points, places[new][first]]), ids
+
+
+def _are_among(
+    pairs: tuple[NDArray[np.int64], NDArray[np.int64]], others: tuple[NDArray[np.int64], NDArray[np.int64]]
+) -> NDArray[np.bool_]:
+    """(n,) whether pairs of numbers are among others."""
+    shift = 1 + max(int(pairs[1].max(initial=0)), int(others[1].max(initial=0)))
+    return np.isin(pairs[0] * shift + pairs[1], others[0] * shift + others[1])
+
+
+def _listed(starts: NDArray[np.int64], rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """For lists that begin somewhere: which of the rows each member is of, and its place."""
+    counts = starts[rows + 1] - starts[rows]
+    owners = np.repeat(np.arange(len(rows)), counts)
+    return owners, np.arange(len(owners)) + np.repeat(starts[rows] - np.cumsum(counts) + counts, counts)
+
+
+def _on_open_edges(
+    points: NDArray[np.float64], table: EdgeTable, slack: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Edges that do not cancel, and ends of others that lie on them."""
+    edges = np.flatnonzero(table.balance != 0)
+    if not len(edges):
+        return edges, edges
+    ends = table.vertices[edges]
+    tails, heads = points[ends].swapaxes(0, 1)
+    tree = BoxTree.of(np.minimum(tails, heads), np.maximum(tails, heads))
+    rim = np.unique(ends)
+    starts, near = tree.meeting(np.repeat(points[rim][:, None], 3, axis=1), slack)
+    vertex = np.repeat(rim, np.diff(starts))
+    away, way = points[vertex] - tails[near], (heads - tails)[near]
+    share = (away * way).sum(axis=1) / np.maximum((way * way).sum(axis=1), 1e-300)
+    on = (np.linalg.norm(away - share[:, None] * way, axis=1) <= slack) & (share > 0) & (share < 1)
+    on &= (vertex[:, None] != ends[near]).all(axis=1)
+    return edges[near[on]], vertex[on]
+
+
+def _members(faces: NDArray[np.int64], table: EdgeTable, lines: Lines, chosen: NDArray[np.int64]) -> Incidence:
+    """All points of chosen faces: corners, those on edges and those within."""
+    starts = lines.on.starts(len(lines.ends))
+    owners, places = _listed(starts, table.face_edges[chosen].ravel())
+    return Incidence.of(
+        (np.repeat(chosen, 3), faces[chosen].ravel()), (chosen[owners // 3], lines.on.points[places]), lines.within
+    )
+
+
+class Records(NamedTuple):
+    """Parts of lines that lie in faces: the face, the line, and the points between which it does, (r,) each."""
+
+    faces: NDArray[np.int64]
+    lines: NDArray[np.int64]
+    tails: NDArray[np.int64]
+    heads: NDArray[np.int64]
+
+
+def _with_segments(
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    table: EdgeTable,
+    pairs: NDArray[np.int64],
+    lines: Lines,
+    slack: float,
+) -> tuple[Lines, Records]:
+    """Add the segments along which pairs of faces meet, from the points that they have in common."""
+    members = _members(faces, table, lines, np.unique(pairs))
+    found, sides, within, on = _segments(
+        points,
+        members.starts(len(faces)),
+        members.points,
+        table.face_edges,
+        lines.ends,
+        lines.on.starts(len(lines.ends)),
+        lines.on.points,
+        lines.on.along(points, lines.ends).points,
+        pairs,
+        STRAIGHT * slack,
+    )
+    own = found[:, 1] >= len(lines.ends)
+    ends = np.zeros((len(sides), 2), dtype=np.int64)
+    ends[found[own, 1] - len(lines.ends)] = found[own, 2:]
+    lines = Lines(
+        np.concatenate([lines.ends, ends]),
+        Incidence.of(lines.on, tuple(on.T)),
+        Incidence.of(lines.within, tuple(within.T)),
+        sides,
+    )
+    return lines, Records(*found.T)
+
+
+def _with_crossings(
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    lines: Lines,
+    records: Records,
+    slack: float,
+    busy: NDArray[np.int64],
+) -> tuple[NDArray[np.float64], Lines, Records]:
+    """Add the points where lines meet within faces."""
+    if not len(records.faces):
+        return points, lines, records
+    ends = np.stack([records.tails, records.heads], axis=1)
+    corners = points[ends[:, [0, 1, 1]]]
+    tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
+    starts, near = tree.meeting(corners, slack)
+    touching, crossing, places = _cross(points, records.faces, records.lines, ends, starts, near, slack)
+    first, second = records.lines[crossing].T
+    n_edges = len(lines.ends) - len(lines.sides)
+    names = np.stack([np.minimum(first, second), np.maximum(first, second), np.full(len(first), -1)], axis=1)
+    three = names[:, 0] >= n_edges  # two segments: the face that they are in, and one more of each
+    of_faces = np.sort(lines.sides[names[three][:, :2] - n_edges].reshape(-1, 4), axis=1)
+    twice = np.append(of_faces[:, 1:] == of_faces[:, :-1], np.zeros((len(of_faces), 1), dtype=bool), axis=1)
+    single = twice.sum(axis=1) == 1
+    names[np.flatnonzero(three)[single]] = of_faces[single][~twice[single]].reshape(-1, 3) + len(lines.ends)
+    points, ids = _with_new(points, names, places, np.ones(len(names), dtype=bool), first)
+    lines = lines._replace(on=Incidence.of(lines.on, tuple(touching.T), (first, ids), (second, ids)))
+    rename = _welded(points, np.concatenate([busy, lines.on.points, lines.within.points, lines.ends.ravel()]), slack)
+    records = records._replace(tails=rename[records.tails], heads=rename[records.heads])
+    return points, lines.renamed(rename), records
+
+
+def _divided(
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    origins: NDArray[np.int64],
+    table: EdgeTable,
+    lines: Lines,
+    records: Records,
+) -> Arrangement:
+    """Triangulate all faces that have points on edges or lines within."""
+    n_lines = len(lines.ends)
+    on = Incidence.of(lines.on).along(points, lines.ends)
+    counts = np.bincount(on.owners, minlength=n_lines)
+    starts = np.append(0, np.cumsum(counts + 2))  # of all points of each line, with its ends
+    whole = np.empty(starts[-1], dtype=np.int64)
+    whole[starts[:-1]], whole[starts[1:] - 1] = lines.ends.T
+    rest = np.ones(len(whole), dtype=bool)
+    rest[starts[:-1]] = rest[starts[1:] - 1] = False
+    whole[rest] = on.points
+    line_of = np.repeat(np.arange(n_lines), counts + 2)
+
+    # parts of lines in faces, from point to point
+    n = len(points)
+    keys = line_of * n + whole
+    order = np.argsort(keys, kind="stable")
+    tails, heads = (
+        order[np.searchsorted(keys[order], records.lines * n + end)] for end in (records.tails, records.heads)
+    )
+    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
+    row = np.repeat(np.arange(len(low)), high - low)
+    place = np.arange(len(row)) - np.repeat(np.cumsum(high - low) - (high - low), high - low) + low[row]
+    face, one, two = records.faces[row], whole[place], whole[place + 1]
+
+    busy: NDArray[np.bool_] = np.asarray(counts[table.face_edges].any(axis=1))
+    busy[face] = True
+    busy[lines.within.owners] = True
+    chosen = np.flatnonzero(busy)
+    if not len(chosen):
+        return Arrangement(points, faces, origins, np.arange(len(faces)))
+    # points on rims, in order
+    edges, forward = table.face_edges[chosen].ravel(), table.forward[chosen].ravel()
+    side, place = _listed(starts, edges)
+    backwards = ~forward[side]
+    place = np.where(backwards, starts[edges[side]] + starts[edges[side] + 1] - 1 - place, place)
+    last = np.append(side[1:] != side[:-1], True)
+    side, rim = side[~last], whole[place][~last]
+    owner = chosen[side // 3]
+    corner = np.append(True, side[1:] != side[:-1])
+
+    inner = Incidence.of(lines.within, (face, one), (face, two)).without((owner, rim))
+    segments = Incidence.of((face * n + np.minimum(one, two), np.maximum(one, two)))
+    following = np.empty_like(rim)
+    following[:-1] = rim[1:]
+    ends = np.append(owner[1:] != owner[:-1], True)
+    begins = np.append(True, ends[:-1])
+    following[ends] = rim[begins]
+    segments = segments.without((owner * n + np.minimum(rim, following), np.maximum(rim, following)))
+    segment_faces, segment_tails = np.divmod(segments.owners, n)
+
+    members_owner = np.concatenate([owner, inner.owners])
+    members = np.concatenate([rim, inner.points])
+    order = np.argsort(members_owner, kind="stable")
+    members_owner, members = members_owner[order], members[order]
+    member_starts = np.searchsorted(members_owner, np.append(chosen, len(faces)))
+    rims = np.bincount(np.searchsorted(chosen, owner), minlength=len(chosen))
+    corners = np.flatnonzero(corner).reshape(-1, 3) - np.flatnonzero(begins)[:, None]
+    corners = np.stack([corners[:, 1], corners[:, 2], rims], axis=1)
+    local = np.arange(len(members)) - np.repeat(member_starts[:-1], np.diff(member_starts))
+    keys = members_owner * n + members
+    order = np.argsort(keys, kind="stable")
+    corner_ends = [
+        local[order[np.searchsorted(keys[order], segment_faces * n + end)]] for end in (segment_tails, segments.points)
+    ]
+    pieces, owners, cells = triangulate_faces(
+        points,
+        member_starts,
+        members,
+        corners,
+        np.searchsorted(segment_faces, np.append(chosen, len(faces))),
+        np.stack(corner_ends, axis=1),
+    )
+    kept = np.flatnonzero(~busy)
+    all_faces = np.concatenate([faces[kept], pieces])
+    all_origins = np.concatenate([kept, chosen[owners]])
+    order = np.argsort(all_origins, kind="stable")
+    all_cells = np.concatenate([np.arange(len(kept)), len(kept) + cells])
+    return Arrangement(points, all_faces[order], origins[all_origins[order]], all_cells[order])
+
+
+@compiled
+def _is_on(points: NDArray[np.float64], v: int, a: int, b: int, slack: float) -> bool:
+    """Whether a point lies on an edge, between its ends."""
+    square, ahead = 0.0, 0.0
+    for d in range(3):
+        way = points[b, d] - points[a, d]
+        square += way * way
+        ahead += way * (points[v, d] - points[a, d])
+    if not (0.0 < ahead < square):
+        return False
+    share, off = ahead / square, 0.0
+    for d in range(3):
+        off += (points[v, d] - points[a, d] - share * (points[b, d] - points[a, d])) ** 2
+    return off <= slack * slack
+
+
+@compiled
+def _closest(points: NDArray[np.float64], a: int, b: int, c: int, d: int, place: NDArray[np.float64]) -> float:
+    """Distance between two edges where they pass each other, and the place there; infinity if they do not."""
+    u, v, w = points[b] - points[a], points[d] - points[c], points[c] - points[a]
+    n, square, s, t = np.empty(3), 0.0, 0.0, 0.0
+    for k in range(3):
+        p, q = (k + 1) % 3, (k + 2) % 3
+        n[k] = u[p] * v[q] - u[q] * v[p]
+        square += n[k] * n[k]
+    if not square > PARALLEL**2 * (u * u).sum() * (v * v).sum():
+        return np.inf
+    for k in range(3):
+        p, q = (k + 1) % 3, (k + 2) % 3
+        s += n[k] * (w[p] * v[q] - w[q] * v[p]) / square
+        t += n[k] * (w[p] * u[q] - w[q] * u[p]) / square
+    if not (0.0 < s < 1.0 and 0.0 < t < 1.0):
+        return np.inf
+    off = 0.0
+    for k in range(3):
+        x, y = points[a, k] + s * u[k], points[c, k] + t * v[k]
+        off += (x - y) ** 2
+        place[k] = 0.5 * (x + y)
+    return np.sqrt(off)
+
+
+@compiled
+def _normal(points: NDArray[np.float64], face: NDArray[np.int64]) -> NDArray[np.float64]:
+    u, v = points[face[1]] - points[face[0]], points[face[2]] - points[face[0]]
+    n = np.empty(3)
+    n[0], n[1], n[2] = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+    return n / np.sqrt((n * n).sum())
+
+
+@compiled
+def _is_over(
+    points: NDArray[np.float64], x: NDArray[np.float64], face: NDArray[np.int64], n: NDArray[np.float64]
+) -> bool:
+    """Whether a place lies over a face, within its edges."""
+    for k in range(3):
+        a, b = face[k], face[(k + 1) % 3]
+        turn = 0.0
+        for d in range(3):
+            p, q = (d + 1) % 3, (d + 2) % 3
+            turn += n[d] * (
+                (points[b, p] - points[a, p]) * (x[q] - points[a, q])
+                - (points[b, q] - points[a, q]) * (x[p] - points[a, p])
+            )
+        if not turn > 0.0:
+            return False
+    return True
+
+
+@compiled
+def _meet(
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    edges: NDArray[np.int64],
+    face_edges: NDArray[np.int64],
+    pairs: NDArray[np.int64],
+    slack: float,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """What pairs of faces have in common: of which kind, the two that meet, and where if that is a new point."""
+    size = 4 * len(pairs) + 64
+    events, places, count = np.empty((size, 3), np.int64), np.zeros((size, 3)), 0
+    touch = np.empty((2, 3, 3), np.bool_)  # whether a corner of one lies on an edge of the other
+    on, hit, heights = np.empty((2, 3), np.bool_), np.empty((2, 3), np.bool_), np.empty((2, 3))
+    normals, place = np.empty((2, 3)), np.empty(3)
+    for r in range(len(pairs)):
+        if count + 64 > size:
+            size = 2 * size + 64
+            more, where = np.empty((size, 3), np.int64), np.zeros((size, 3))
+            more[:count], where[:count] = events[:count], places[:count]
+            events, places = more, where
+        touch[:], on[:], hit[:], heights[:] = False, False, False, 0.0
+        for s in range(2):
+            normals[s] = _normal(points, faces[pairs[r, s]])
+        for s in range(2):
+            one, other = faces[pairs[r, s]], faces[pairs[r, 1 - s]]
+            for i in range(3):
+                v = one[i]
+                if v == other[0] or v == other[1] or v == other[2]:
+                    on[s, i] = True
+                    continue
+                for k in range(3):
+                    if _is_on(points, v, other[k], other[(k + 1) % 3], slack):
+                        events[count, 0], events[count, 1], events[count, 2] = (
+                            ON_EDGE,
+                            face_edges[pairs[r, 1 - s], k],
+                            v,
+                        )
+                        count += 1
+                        touch[s, i, k], on[s, i], hit[1 - s, k] = True, True, True
+                for d in range(3):
+                    heights[s, i] += normals[1 - s, d] * (points[v, d] - points[other[0], d])
+                if not on[s, i] and abs(heights[s, i]) <= slack and _is_over(points, points[v], other, normals[1 - s]):
+                    events[count, 0], events[count, 1], events[count, 2] = IN_FACE, pairs[r, 1 - s], v
+                    count += 1
+                    on[s, i] = True
+        f, g = pairs[r, 0], pairs[r, 1]
+        for i in range(3):
+            e = face_edges[f, i]
+            a, b = edges[e, 0], edges[e, 1]
+            for k in range(3):
+                h = face_edges[g, k]
+                c, d = edges[h, 0], edges[h, 1]
+                if a == c or a == d or b == c or b == d:
+                    continue
+                if touch[0, i, k] or touch[0, (i + 1) % 3, k] or touch[1, k, i] or touch[1, (k + 1) % 3, i]:
+                    continue
+                if e < h:
+                    off = _closest(points, a, b, c, d, place)
+                else:
+                    off = _closest(points, c, d, a, b, place)
+                if off <= slack:
+                    events[count, 0], events[count, 1], events[count, 2] = EDGES, min(e, h), max(e, h)
+                    places[count] = place
+                    count += 1
+                    hit[0, i], hit[1, k] = True, True
+        for s in range(2):
+            for i in range(3):
+                k = (i + 1) % 3
+                low, high = heights[s, i], heights[s, k]
+                if on[s, i] or on[s, k] or hit[s, i] or not low * high < 0.0:
+                    continue
+                e = face_edges[pairs[r, s], i]
+                v, w = faces[pairs[r, s], i], faces[pairs[r, s], k]
+                for d in range(3):
+                    place[d] = points[v, d] + low / (low - high) * (points[w, d] - points[v, d])
+                if _is_over(points, place, faces[pairs[r, 1 - s]], normals[1 - s]):
+                    events[count, 0], events[count, 1], events[count, 2] = EDGE_AND_FACE, e, pairs[r, 1 - s]
+                    places[count] = place
+                    count += 1
+    return events[:count, 0].copy(), events[:count, 1].copy(), events[:count, 2].copy(), places[:count].copy()
+
+
+@compiled
+def _shared_edge(
+    face_edges: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    on: NDArray[np.int64],
+    f: int,
+    a: int,
+    b: int,
+) -> int:
+    """The edge of a face that two points lie on, or −1."""
+    for k in range(3):
+        e = face_edges[f, k]
+        first = (
+            a == ends[e, 0]
+            or a == ends[e, 1]
+            or (starts[e] < starts[e + 1] and _within(on, starts[e], starts[e + 1], a))
+        )
+        second = (
+            b == ends[e, 0]
+            or b == ends[e, 1]
+            or (starts[e] < starts[e + 1] and _within(on, starts[e], starts[e + 1], b))
+        )
+        if first and second:
+            return e
+    return -1
+
+
+@compiled
+def _within(sorted_points: NDArray[np.int64], begin: int, end: int, p: int) -> bool:
+    """Whether a number is in a part of a list that is in order."""
+    stop = end
+    while begin < end:
+        middle = (begin + end) // 2
+        if sorted_points[middle] < p:
+            begin = middle + 1
+        else:
+            end = middle
+    return begin < stop and sorted_points[begin] == p
+
+
+@compiled
+def _segments(
+    points: NDArray[np.float64],
+    starts: NDArray[np.int64],
+    members: NDArray[np.int64],
+    face_edges: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    line_starts: NDArray[np.int64],
+    on: NDArray[np.int64],
+    along: NDArray[np.int64],
+    pairs: NDArray[np.int64],
+    straight: float,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Parts of lines in faces, as rows of face, line and ends; faces of new lines; and points in faces and on edges."""
+    records, sides = [(0, 0, 0, 0)], [(0, 0)]
+    within, extra = [(0, 0)], [(0, 0)]
+    n_lines = len(ends)
+    for r in range(len(pairs)):
+        f, g = pairs[r, 0], pairs[r, 1]
+        common = [np.int64(0)]
+        common.pop()
+        i, j = starts[f], starts[g]
+        while i < starts[f + 1] and j < starts[g + 1]:
+            if members[i] == members[j]:
+                common.append(members[i])
+                i += 1
+                j += 1
+            elif members[i] < members[j]:
+                i += 1
+            else:
+                j += 1
+        if len(common) < 2:
+            continue
+        p, q = common[0], common[0]
+        for _ in range(2):
+            most = -1.0
+            for c in common:
+                square = ((points[c] - points[p]) ** 2).sum()
+                if square > most:
+                    q, most = c, square
+            p, q = q, p
+        p, q = q, p
+        way = points[q] - points[p]
+        square, widest = (way * way).sum(), 0.0
+        shares = np.empty(len(common))
+        for c in range(len(common)):
+            away = points[common[c]] - points[p]
+            shares[c] = (away * way).sum() / square
+            widest = max(widest, np.sqrt(((away - shares[c] * way) ** 2).sum()))
+        if widest <= straight:
+            order = np.argsort(shares)
+            for c in range(len(order) - 1):
+                a, b = common[order[c]], common[order[c + 1]]
+                e = _shared_edge(face_edges, ends, line_starts, on, f, a, b)
+                h = _shared_edge(face_edges, ends, line_starts, on, g, a, b)
+                if e < 0 and h < 0:
+                    line = n_lines + len(sides) - 1
+                    sides.append((f, g))
+                    records.append((f, line, a, b))
+                    records.append((g, line, a, b))
+                elif h < 0:
+                    records.append((g, e, a, b))
+                elif e < 0:
+                    records.append((f, h, a, b))
+            continue
+        for s in range(2):
+            inner, outer = (f, g) if s == 0 else (g, f)
+            for k in range(3):  # edges of the one that lie in the other
+                e = face_edges[inner, k]
+                first, last = np.int64(-1), np.int64(-1)
+                for c in common:
+                    if c == ends[e, 0] or c == ends[e, 1] or _within(on, line_starts[e], line_starts[e + 1], c):
+                        if first < 0:
+                            first = last = c
+                            continue
+                        way = points[ends[e, 1]] - points[ends[e, 0]]
+                        ahead = ((points[c] - points[first]) * way).sum()
+                        if ahead < 0.0:
+                            first = c
+                        elif ((points[c] - points[last]) * way).sum() > 0.0:
+                            last = c
+                if first == last or _shared_edge(face_edges, ends, line_starts, on, outer, first, last) >= 0:
+                    continue
+                records.append((outer, e, first, last))
+    return (
+        np.array(records)[1:],
+        np.array(sides)[1:],
+        np.array(within)[1:],
+        np.array(extra)[1:],
+    )
+
+
+@compiled
+def _cross(
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    lines: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    near: NDArray[np.int64],
+    slack: float,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Lines and points that lie on them; and pairs of parts of lines that cross within a face, and where."""
+    touching, crossing, places = [(0, 0)], [(0, 0)], [(0.0, 0.0, 0.0)]
+    place = np.empty(3)
+    for r in range(len(faces)):
+        for s in near[starts[r] : starts[r + 1]]:
+            if s <= r or faces[s] != faces[r] or lines[s] == lines[r]:
+                continue
+            met = False
+            for one, other in ((r, s), (s, r)):
+                for k in range(2):
+                    v, a, b = ends[one, k], ends[other, 0], ends[other, 1]
+                    if v == a or v == b:
+                        met = True
+                    elif _is_on(points, v, a, b, slack):
+                        touching.append((lines[other], v))
+                        met = True
+            if not met and _closest(points, ends[r, 0], ends[r, 1], ends[s, 0], ends[s, 1], place) < np.inf:
+                crossing.append((r, s))
+                places.append((place[0], place[1], place[2]))
+    return np.array(touching)[1:], np.array(crossing)[1:], np.array(places)[1:]

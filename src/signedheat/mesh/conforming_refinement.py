@@ -1,0 +1,361 @@
+"""Conforming refinement: cut triangles so that curves run along edges and points lie at vertices."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import breadth_first_order
+
+from ..errors import SourceError
+from .constrained_triangulation import Triangulation, edges_of
+from .curve_segments import CurveSegments, MergedSources
+from .delaunay import flip_all, glue, lay_out
+from .edges import EdgeTable
+from .intrinsic_mesh import IntrinsicMesh
+from .surface_points import EDGE, FACE, VERTEX, LocatedPoints, barycentric_on_edges, points_at_vertices
+
+
+def refine_to_conform(
+    triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
+) -> tuple[IntrinsicMesh, list[list[CurveSegments]]]:
+    """Cut faces wherever an unoriented curve crosses them, and put vertices at isolated points; sources on the result.
+
+    All other segments in a face that is cut, or on an edge that is split, become edges too; other faces and segments
+    stay as they are. Edges of the cut faces that no segment uses are then flipped to Delaunay, which removes slivers.
+    The old vertices come first; nothing to cut gives the very same triangles.
+    """
+    parts = [part for group in groups for part in group]
+    if all(part.is_conforming for part in parts):
+        return triangles, [list(group) for group in groups]
+    finer, moved, is_new, _ = cut_along(triangles, parts, [not part.is_conforming for part in parts])
+    finer, moved = flip_new_faces(finer, moved, is_new)
+    pieces = iter(moved.parts([part.oriented for part in parts]))
+    return finer, [[next(pieces) for _ in group] for group in groups]
+
+
+def cut_along(
+    triangles: IntrinsicMesh,
+    parts: Sequence[CurveSegments],
+    unfit: Sequence[bool] | None = None,
+    begin: NDArray[np.int64] | None = None,
+) -> tuple[IntrinsicMesh, MergedSources, NDArray[np.bool_], NDArray[np.int64]]:
+    """Cut faces so that sources run along edges.
+
+    Parameters
+    ----------
+    triangles : IntrinsicMesh
+        The surface.
+    parts : sequence of CurveSegments
+        The sources.
+    unfit : sequence of bool, optional
+        Which of them must run along edges; all by default. Others are cut only in faces, and at edges, that these cut.
+    begin : (m,) int, optional
+        The corner at which each face begins, on which the triangles that it is cut into depend; the first by default.
+
+    Returns
+    -------
+    triangles : IntrinsicMesh
+        After the cuts; the same where there are none.
+    merged : MergedSources
+        The sources on them.
+    is_new, parents : (m,) bool, (m,) int
+        Faces that are parts of others, and the face before the cuts that each is part of.
+    """
+    merged = MergedSources.of(parts)
+    faces, edges = affected_elements(triangles, merged, [True] * len(parts) if unfit is None else unfit)
+    if not len(faces) and not len(edges):
+        return triangles, merged, np.zeros(triangles.n_faces, dtype=bool), np.arange(triangles.n_faces)
+    begin = np.zeros(triangles.n_faces, dtype=np.int64) if begin is None else begin
+    return FaceCutter(triangles, merged, faces, edges, begin).assemble()
+
+
+def affected_elements(
+    triangles: IntrinsicMesh, merged: MergedSources, unfit: Sequence[bool]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Faces to cut and edges to split: those of nonconforming sources, and those that these entail in turn.
+
+    Where a face is cut, the edges on which a segment in it ends are split; where an edge is split, its faces are cut.
+    """
+    nodes, inside, m = merged.nodes, merged.edges < 0, triangles.n_faces
+    last = m + triangles.n_edges
+    face, end = np.repeat(merged.faces[inside], 2), merged.ends[inside].ravel()
+    on_edge = nodes.kinds[end] == EDGE
+    with_points = np.zeros(triangles.n_edges, dtype=bool)
+    with_points[nodes.elements[nodes.kinds == EDGE]] = True
+    at, side = np.nonzero(with_points[triangles.edges.face_edges])
+    wanted = nodes[np.unique(np.concatenate([s for s, bad in zip(merged.samples, unfit, strict=True) if bad]))]
+    begin = [
+        merged.faces[inside & np.asarray(unfit)[merged.owners]],
+        wanted.elements[wanted.kinds == FACE],
+        m + wanted.elements[wanted.kinds == EDGE],
+    ]
+    heads = np.concatenate([m + nodes.elements[end[on_edge]], at, *begin])
+    given = np.concatenate([face[on_edge], m + triangles.edges.face_edges[at, side]])
+    tails = np.concatenate([given, np.full(len(heads) - len(given), last)])
+    graph = csr_matrix((np.ones(len(heads)), (tails, heads)), shape=(last + 1, last + 1))
+    reached = np.sort(breadth_first_order(graph, last, return_predecessors=False))[:-1]
+    return reached[reached < m], reached[reached >= m] - m
+
+
+class FaceCutter:
+    """An intrinsic mesh while some of its faces are being cut."""
+
+    def __init__(
+        self,
+        triangles: IntrinsicMesh,
+        merged: MergedSources,
+        faces: NDArray[np.int64],
+        edges: NDArray[np.int64],
+        begin: NDArray[np.int64],
+    ) -> None:
+        self.triangles, self.merged, self.begin = triangles, merged, begin
+        self.n_vertices, self.n_edges = triangles.n_vertices, triangles.n_edges
+        self.faces: list[NewFace] = []
+        self.pieces: list[NewSegment] = []
+        self.cut_faces = faces.tolist()
+        nodes = merged.nodes
+        self.vertex_of = np.where(nodes.kinds == VERTEX, nodes.elements, -1).tolist()
+        self.node_at = {v: i for i, v in enumerate(self.vertex_of) if v >= 0}
+        self.on_edge: dict[int, list[int]] = {e: [] for e in edges.tolist()}
+        self.in_face: dict[int, list[int]] = {f: [] for f in self.cut_faces}
+        for i, (kind, element) in enumerate(zip(nodes.kinds.tolist(), nodes.elements.tolist(), strict=True)):
+            home = self.on_edge if kind == EDGE else self.in_face if kind == FACE else {}
+            if element in home:
+                home[element].append(i)
+                self.vertex_of[i] = self.new_vertex()
+                self.node_at[self.vertex_of[i]] = i
+        for members in self.on_edge.values():
+            members.sort(key=lambda i: nodes.along[i])
+        self.sub_edges = {e: [self.new_edge() for _ in range(len(m) + 1)] for e, m in self.on_edge.items()}
+
+        self.chains: dict[int, tuple[list[int], list[float], dict[int, int]]] = {}
+        inside = defaultdict(list)
+        rows = zip(merged.ends.tolist(), merged.faces.tolist(), merged.edges.tolist(), strict=True)
+        for p, ((tail, head), face, edge) in enumerate(rows):
+            if edge in self.on_edge:
+                self.cut_along(p, edge)
+            elif edge < 0 and face in self.in_face:
+                inside[face].append(p)
+            else:
+                self.pieces.append(NewSegment(tail, head, face, edge, merged.vectors[p], merged.owners[p]))
+        for face in self.cut_faces:
+            self.cut_face(face, inside[face])
+
+    def new_vertex(self) -> int:
+        self.n_vertices += 1
+        return self.n_vertices - 1
+
+    def new_edge(self) -> int:
+        self.n_edges += 1
+        return self.n_edges - 1
+
+    def node(self, vertex: int) -> int:
+        """The node at a vertex, a new one if it had none."""
+        if vertex not in self.node_at:
+            self.node_at[vertex] = len(self.vertex_of)
+            self.vertex_of.append(vertex)
+        return self.node_at[vertex]
+
+    def cut_along(self, p: int, edge: int) -> None:
+        """Replace segment p, which lies on an edge that was split, by one between each two of its new vertices."""
+        merged, (vertices, at, place) = self.merged, self.along_edge(edge)
+        a, b = (place[self.vertex_of[i]] for i in merged.ends[p].tolist())
+        step = 1 if a < b else -1
+        for k in range(a, b, step):
+            vector = merged.vectors[p] * (abs(at[k + step] - at[k]) / abs(at[b] - at[a]))
+            ends = self.node(vertices[k]), self.node(vertices[k + step])
+            sub = self.sub_edges[edge][min(k, k + step)]
+            self.pieces.append(NewSegment(*ends, -1, sub, vector, merged.owners[p]))
+
+    def along_edge(self, edge: int) -> tuple[list[int], list[float], dict[int, int]]:
+        """Vertices along a split edge, where each is from tail to head, and which place in the list each has."""
+        if edge not in self.chains:
+            chain = self.on_edge[edge]
+            tail, head = self.triangles.edges.vertices[edge].tolist()
+            vertices = [tail, *(self.vertex_of[i] for i in chain), head]
+            at = [0.0, *self.merged.nodes.along[chain].tolist(), 1.0]
+            self.chains[edge] = vertices, at, {v: k for k, v in reversed(list(enumerate(vertices)))}
+        return self.chains[edge]
+
+    def cut_face(self, face: int, inside: list[int]) -> None:
+        """Cut one face along the segments inside it."""
+        triangles, merged = self.triangles, self.merged
+        around = ((self.begin[face] + np.arange(3)) % 3).tolist()
+        points, vertices = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], triangles.corner_vertices[face, around].tolist()
+        sides: list[list[int]] = []
+        edge_of: dict[tuple[int, int], tuple[int, bool]] = {}
+        frames: dict[int, tuple[int, int, bool]] = {}
+        for k, side in enumerate(around):
+            edge, forward = int(triangles.edges.face_edges[face, side]), bool(triangles.edges.forward[face, side])
+            members = self.on_edge.get(edge, [])[:: 1 if forward else -1]
+            subs = self.sub_edges.get(edge, [edge])[:: 1 if forward else -1]
+            (x, y), (u, v) = points[k], points[(k + 1) % 3]
+            chain = [k]
+            for i in members:
+                t = merged.nodes.along[i] if forward else 1 - merged.nodes.along[i]
+                chain.append(len(points))
+                points.append((float(x + t * (u - x)), float(y + t * (v - y))))
+                vertices.append(self.vertex_of[i])
+            sides.append(chain[1:])
+            chain.append((k + 1) % 3)
+            for j, sub in enumerate(subs):
+                edge_of[chain[j], chain[j + 1]] = sub, forward
+                along = (chain[j], chain[j + 1]) if forward else (chain[j + 1], chain[j])
+                frames[sub] = (*along, bool(triangles.reflected[face, side]))
+        cut = Triangulation.of(points, sides)
+        for i in self.in_face[face]:
+            cut.insert((float(merged.nodes.barycentric[i, around[1]]), float(merged.nodes.barycentric[i, around[2]])))
+            vertices.append(self.vertex_of[i])
+
+        local = {v: k for k, v in reversed(list(enumerate(vertices)))}
+        ends = [[local[self.vertex_of[i]] for i in merged.ends[p].tolist()] for p in inside]
+        ways = [cut.connect(*pair) for pair in ends]
+        if any(way[-1] != end for way, (_, end) in zip(ways, ends, strict=True)):
+            raise SourceError(
+                f"the curves cross face {face}, which is as thin as rounding",
+                remedy="merge the vertices that nearly coincide",
+                element=f"face {face}",
+            )
+        vertices += [self.new_vertex() for _ in range(len(cut.points) - len(vertices))]
+        flat = np.array(cut.points)
+        q = triangles.corner_positions[face, around]
+        positions = q[0] + flat[:, 0] * (q[1] - q[0]) + flat[:, 1] * (q[2] - q[0])
+
+        for corner in cut.triangles:
+            edges, ahead = [], []
+            for u, v in edges_of(corner):
+                if (u, v) not in edge_of:
+                    edge = self.new_edge()
+                    edge_of[u, v], edge_of[v, u], frames[edge] = (edge, True), (edge, False), (u, v, False)
+                edges.append(edge_of[u, v][0])
+                ahead.append(edge_of[u, v][1])
+            self.faces.append(NewFace(face, [vertices[i] for i in corner], edges, ahead, positions[list(corner)]))
+
+        for p, chain in zip(inside, map(cut.along, ways), strict=True):
+            whole = abs(positions[chain[-1]] - positions[chain[0]])
+            for u, v in pairwise(chain):
+                edge = (edge_of.get((u, v)) or edge_of[v, u])[0]
+                tail, head, over = frames[edge]
+                step = np.conj(positions[head] - positions[tail])
+                vector = merged.vectors[p] * step / whole if whole > 0 else 0j  # its ends are nearer than rounding
+                ends_here = self.node(vertices[u]), self.node(vertices[v])
+                self.pieces.append(
+                    NewSegment(*ends_here, -1, edge, np.conj(vector) if over else vector, merged.owners[p])
+                )
+
+    def assemble(self) -> tuple[IntrinsicMesh, MergedSources, NDArray[np.bool_], NDArray[np.int64]]:
+        """What `cut_along` returns."""
+        triangles, merged = self.triangles, self.merged
+        kept = np.setdiff1d(np.arange(triangles.n_faces), self.cut_faces)
+        parents = np.concatenate([kept, [f.parent for f in self.faces]]).astype(np.int64)
+        order = np.argsort(parents, kind="stable")  # the first face of an edge, or a part of it, stays the first
+
+        def with_new(old: NDArray[Any], name: str) -> NDArray[Any]:
+            return np.concatenate([old[kept], [getattr(f, name) for f in self.faces]])[order]
+
+        face_edges = with_new(triangles.edges.face_edges, "edges")
+        forward = with_new(triangles.edges.forward, "ahead")
+        corners = with_new(triangles.corner_vertices, "corners")
+        used, first, flat = np.unique(face_edges, return_index=True, return_inverse=True)
+        vertices = np.stack([corners.ravel()[first], np.roll(corners, -1, axis=1).ravel()[first]], axis=1)
+        table = EdgeTable(vertices, flat.reshape(-1, 3), forward)
+        finer = IntrinsicMesh(corners, with_new(triangles.corner_positions, "positions"), table, self.n_vertices)
+
+        new_face = np.full(triangles.n_faces, -1)
+        is_new = order >= len(kept)
+        new_face[parents[order][~is_new]] = np.flatnonzero(~is_new)
+        new_edge = np.full(self.n_edges, -1)
+        new_edge[used] = np.arange(len(used))
+
+        at_vertex = np.array(self.vertex_of)
+        fill = np.zeros(len(at_vertex) - len(merged.nodes))
+        kinds = np.where(at_vertex >= 0, VERTEX, np.concatenate([merged.nodes.kinds, fill]).astype(np.int64))
+        elements = np.concatenate([merged.nodes.elements, fill]).astype(np.int64)
+        elements[kinds == VERTEX] = at_vertex[kinds == VERTEX]
+        elements[kinds == EDGE] = new_edge[elements[kinds == EDGE]]
+        elements[kinds == FACE] = new_face[elements[kinds == FACE]]
+        weights = np.concatenate([merged.nodes.barycentric, np.zeros((len(fill), 3))])
+        nodes = points_on_elements(finer, kinds, elements, np.concatenate([merged.nodes.along, fill]), weights)
+
+        ends = np.array([(p.start, p.end) for p in self.pieces], dtype=np.int64).reshape(-1, 2)
+        edges = np.array([p.edge for p in self.pieces], dtype=np.int64)
+        faces = np.array([p.face for p in self.pieces], dtype=np.int64)
+        on_edge = edges >= 0
+        edges[on_edge] = new_edge[edges[on_edge]]
+        faces[~on_edge] = new_face[faces[~on_edge]]
+        faces[on_edge] = finer.first_halfedges[edges[on_edge]] // 3
+        vectors = np.array([p.vector for p in self.pieces], dtype=np.complex128)
+        owners = np.array([p.owner for p in self.pieces], dtype=np.int64)
+        moved = MergedSources(nodes, ends, faces, edges, vectors, owners, merged.samples)
+        return finer, moved, is_new, parents[order]
+
+
+class NewFace(NamedTuple):
+    """Part of a face that was cut."""
+
+    parent: int
+    corners: list[int]
+    edges: list[int]
+    ahead: list[bool]
+    positions: NDArray[np.complex128]
+
+
+class NewSegment(NamedTuple):
+    """A segment, or part of one; `face` has no meaning where it runs along an edge."""
+
+    start: int
+    end: int
+    face: int
+    edge: int
+    vector: complex
+    owner: int
+
+
+def points_on_elements(
+    triangles: IntrinsicMesh,
+    kinds: NDArray[np.int64],
+    elements: NDArray[np.int64],
+    along: NDArray[np.float64],
+    barycentric: NDArray[np.float64],
+) -> LocatedPoints:
+    """Points given by their elements: by the fraction `along` an edge, or by `barycentric` coordinates in a face."""
+    faces, weights = elements.copy(), barycentric.copy()
+    at_vertex, on_edge = kinds == VERTEX, np.flatnonzero(kinds == EDGE)
+    vertices = points_at_vertices(triangles, elements[at_vertex])
+    faces[at_vertex], weights[at_vertex] = vertices.faces, vertices.barycentric
+    faces[on_edge], side = np.divmod(triangles.first_halfedges[elements[on_edge]], 3)
+    weights[on_edge] = barycentric_on_edges(triangles.edges, faces[on_edge], side, along[on_edge])
+    return LocatedPoints(faces, weights, kinds, elements, np.where(kinds == EDGE, along, 0.0))
+
+
+def flip_new_faces(
+    triangles: IntrinsicMesh, merged: MergedSources, is_new: NDArray[np.bool_]
+) -> tuple[IntrinsicMesh, MergedSources]:
+    """Flip edges of new faces to Delaunay, except those that a segment uses and those of faces with one inside.
+
+    Where neighbouring faces do not agree on the length of their edge, no edge is flipped.
+    """
+    if not triangles.agree_on_lengths:
+        return triangles, merged
+    on_edge, nodes = merged.edges >= 0, merged.nodes
+    fixed = np.ones(triangles.n_edges, dtype=bool)
+    fixed[triangles.edges.face_edges[is_new]] = False
+    fixed[merged.edges[on_edge]] = True
+    fixed[triangles.edges.face_edges[merged.faces[~on_edge]]] = True
+    fixed[triangles.edges.face_edges[nodes.elements[nodes.kinds == FACE]]] = True
+    fixed[nodes.elements[nodes.kinds == EDGE]] = True
+    better = lay_out(flip_all(glue(triangles, fixed)))
+    same = (better.edges.face_edges == triangles.edges.face_edges).all(axis=1)
+    positions = np.where(same[:, None], triangles.corner_positions, better.corner_positions)
+    better = replace(better, corner_positions=positions)  # faces of which no edge was flipped keep their layout
+    faces = merged.faces.copy()
+    faces[on_edge] = better.first_halfedges[merged.edges[on_edge]] // 3
+    located = points_on_elements(better, nodes.kinds, nodes.elements, nodes.along, nodes.barycentric)
+    return better, replace(merged, nodes=located, faces=faces)

@@ -1,0 +1,343 @@
+"""Curves and points on an intrinsic mesh: straight segments inside faces and along edges, and their end points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from ..errors import SourceError
+from .components import connected_components
+from .face_pairs import face_pairs
+from .intrinsic_mesh import IntrinsicMesh
+from .segment_chains import assemble_polylines
+from .signed_graph import Links, signs_of
+from .surface_points import (
+    EDGE,
+    SNAP,
+    VERTEX,
+    LocatedPoints,
+    barycentric_in,
+    concatenated,
+    incident_faces,
+    unique_points,
+)
+from .unit_vectors import unit
+
+STRAIGHT = 1e-6
+"""Change of the unit normal from one segment to the next, up to which a line may go straight on: ends of short ones are
+rounded. How far all of them are off the line between the outer ones decides then (`SNAP`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class CurveSegments:
+    """One source as straight segments, each of which lies in one face or along one edge.
+
+    Attributes
+    ----------
+    nodes : LocatedPoints
+        (s,) distinct points of the source, in order of first appearance.
+    ends : (k, 2) int
+        The nodes that each segment joins; no segments for isolated points.
+    faces : (k,) int
+        A face that contains the segment.
+    edges : (k,) int
+        The edge that the segment runs along, or −1 for a segment inside its face.
+    vectors : (k,) complex
+        Normal times length: the direction in which φ grows, in the layout of the face, or in the frame of the edge.
+    oriented : bool
+        Whether the curve has a positive and a negative side.
+    """
+
+    nodes: LocatedPoints
+    ends: NDArray[np.int64]
+    faces: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    vectors: NDArray[np.complex128]
+    oriented: bool
+
+    @classmethod
+    def of_points(cls, nodes: LocatedPoints) -> CurveSegments:
+        """Isolated points as a source without segments."""
+        none = np.empty(0, dtype=np.int64)
+        return cls(nodes, np.empty((0, 2), dtype=np.int64), none, none, np.empty(0, dtype=np.complex128), False)
+
+    @cached_property
+    def lengths(self) -> NDArray[np.float64]:
+        """(k,) length of each segment."""
+        return np.abs(self.vectors)
+
+    @property
+    def is_conforming(self) -> bool:
+        """Whether the triangles can represent it as they are: all but unoriented curves that cross faces."""
+        return self.oriented or bool((self.nodes.kinds[self.ends] == VERTEX).all() and (self.edges >= 0).all())
+
+
+@dataclass(frozen=True, eq=False)
+class MergedSources:
+    """The segments of several sources in one list, with points that coincide counted once."""
+
+    nodes: LocatedPoints
+    ends: NDArray[np.int64]
+    faces: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    vectors: NDArray[np.complex128]
+    owners: NDArray[np.int64]
+    samples: list[NDArray[np.int64]]
+
+    @classmethod
+    def of(cls, parts: Sequence[CurveSegments]) -> MergedSources:
+        """Merge sources; `samples` has the nodes of each."""
+        located = concatenated([p.nodes for p in parts])
+        first, who = unique_points(located)
+        offsets = np.cumsum([0] + [len(p.nodes) for p in parts])
+        return cls(
+            located[first],
+            np.concatenate([who[p.ends + o] for p, o in zip(parts, offsets, strict=False)]),
+            np.concatenate([p.faces for p in parts]),
+            np.concatenate([p.edges for p in parts]),
+            np.concatenate([p.vectors for p in parts]),
+            np.repeat(np.arange(len(parts)), [len(p.ends) for p in parts]),
+            [who[a:b] for a, b in pairwise(offsets)],
+        )
+
+    def parts(self, oriented: Sequence[bool]) -> list[CurveSegments]:
+        """The sources, each by itself again."""
+        order = np.argsort(self.owners, kind="stable")
+        bounds = np.searchsorted(self.owners[order], np.arange(len(oriented) + 1))
+        each = zip(pairwise(bounds), self.samples, oriented, strict=True)
+        return [self._part(order[begin:end], old, has_sides) for (begin, end), old, has_sides in each]
+
+    def _part(self, mine: NDArray[np.int64], old: NDArray[np.int64], oriented: bool) -> CurveSegments:
+        """The source that has some of the pieces; its old nodes come first."""
+        nodes = np.concatenate([old, np.setdiff1d(self.ends[mine], old)]).astype(np.int64)
+        distinct, first = np.unique(nodes, return_index=True)
+        ends = first[np.searchsorted(distinct, self.ends[mine])]
+        return CurveSegments(self.nodes[nodes], ends, self.faces[mine], self.edges[mine], self.vectors[mine], oriented)
+
+
+def joined_end_to_end(
+    parts: Sequence[CurveSegments], may_go_on: NDArray[np.bool_]
+) -> tuple[list[CurveSegments], NDArray[np.int64]]:
+    """Lines in which one curve goes on in the next where they touch, and no third one ends there.
+
+    A curve that runs back along the one before it is a copy of that, and does not continue it.
+
+    Shapes: `may_go_on` (k,); returned: lines, which (k,).
+    """
+    merged = MergedSources.of(parts)
+    bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
+    (tails, second), (last, heads) = merged.ends[bounds[:-1]].T, merged.ends[bounds[1:] - 1].T
+    arriving = np.zeros(len(merged.nodes), dtype=np.int64)
+    arriving[heads] = np.arange(len(parts))
+    turns_back = np.isin(tails, heads) & (last[arriving[tails]] == second)
+    apart = len(merged.nodes) * (1 + np.arange(len(parts)))  # nodes of its own for each
+    tails = tails + np.where(may_go_on & ~turns_back, 0, apart)
+    lines = assemble_polylines(tails, heads + np.where(may_go_on, 0, apart))
+    members = sorted((line for line, _, _ in lines), key=min)
+    which = np.empty(len(parts), dtype=np.int64)
+    joined = []
+    for number, line in enumerate(members):
+        which[line] = number
+        if len(line) == 1:
+            joined.append(parts[line[0]])
+            continue
+        own = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in line])
+        nodes = np.unique(np.concatenate([merged.samples[k] for k in line]))
+        joined.append(
+            CurveSegments(
+                merged.nodes[nodes],
+                np.searchsorted(nodes, merged.ends[own]),
+                merged.faces[own],
+                merged.edges[own],
+                merged.vectors[own],
+                parts[line[0]].oriented,
+            )
+        )
+    return joined, which
+
+
+def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> list[CurveSegments]:
+    """The same lines with as few points as they need: those where a line goes straight on within a face are left out.
+
+    Points at which another line ends or bends stay, and those where the normals of a line change.
+    """
+    merged = MergedSources.of(parts)
+    faces, vectors = merged.faces, merged.vectors
+    node, before, after = _nodes_between(merged)
+    run, first, last = _runs(len(faces), before, after)
+    places = np.stack([barycentric_in(triangles, faces, merged.nodes[end]) for end in merged.ends.T], axis=1)
+    places = (places * triangles.corner_positions[faces, None]).sum(axis=2)
+    begin, end = places[first[run[before]], 0], places[last[run[before]], 1]
+    off = np.abs((np.conj(end - begin) * (places[before, 1] - begin)).imag)
+    bent = off > SNAP * triangles.edge_lengths[faces[before]].max(axis=1) * np.abs(end - begin)
+    bent &= merged.edges[before] < 0
+    straight = np.bincount(run[before], bent, len(first))[run[before]] == 0
+    ends_at = np.bincount(np.concatenate([merged.ends.ravel(), *merged.samples]), minlength=len(merged.nodes))
+    passes = np.bincount(node[straight], minlength=len(merged.nodes))  # of each, two segments and one sample
+    straight &= (3 * passes == ends_at)[node]
+    node, before, after = node[straight], before[straight], after[straight]
+
+    run, first, last = _runs(len(faces), before, after)
+    sums = np.bincount(run, vectors.real, len(first)) + 1j * np.bincount(run, vectors.imag, len(first))
+    ends = np.stack([merged.ends[first, 0], merged.ends[last, 1]], axis=1)
+    samples = [sample[~np.isin(sample, node)] for sample in merged.samples]
+    fewer = MergedSources(merged.nodes, ends, faces[first], merged.edges[first], sums, merged.owners[first], samples)
+    return fewer.parts([part.oriented for part in parts])
+
+
+def _nodes_between(merged: MergedSources) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Where one segment goes on in another, in a face or along an edge in the same direction: the node, and these two.
+
+    A node is there once for each source that goes on there.
+    """
+    k = len(merged.ends)
+    of_source = merged.owners[:, None] * len(merged.nodes) + merged.ends
+    places, index = np.unique(of_source, return_inverse=True)
+    tails, heads = index.reshape(-1, 2).T
+    into, out = np.full(len(places), -1), np.full(len(places), -1)
+    into[heads], out[tails] = np.arange(k), np.arange(k)
+    at = np.flatnonzero((np.bincount(index.ravel()) == 2) & (into >= 0) & (out >= 0))
+    before, after = into[at], out[at]
+    normals = merged.vectors / np.abs(merged.vectors)
+    alike = np.abs(normals[before] - normals[after]) <= STRAIGHT
+    for each in (merged.edges, np.where(merged.edges < 0, merged.faces, -1)):
+        alike &= each[before] == each[after]
+    at, before, after = at[alike], before[alike], after[alike]
+    run = connected_components(k, before, after)  # loops that go straight on, as such without area do, begin somewhere
+    of_runs, link = np.unique(run[before], return_index=True)
+    begins = link[np.bincount(run[before], minlength=k)[of_runs] == np.bincount(run)[of_runs]]
+    at, before, after = (np.delete(each, begins) for each in (at, before, after))
+    return places[at] % max(len(merged.nodes), 1), before, after
+
+
+def _runs(
+    k: int, before: NDArray[np.int64], after: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """The run of each of k segments, in order of their first ones; the first and the last segment of each run."""
+    is_first, is_last = np.ones(k, dtype=bool), np.ones(k, dtype=bool)
+    is_first[after] = False
+    is_last[before] = False
+    run = connected_components(k, before, after)
+    first = np.flatnonzero(is_first)
+    order = np.empty(len(first), dtype=np.int64)
+    order[run[first]] = np.arange(len(first))
+    last = np.empty(len(first), dtype=np.int64)
+    last[order[run[is_last]]] = np.flatnonzero(is_last)
+    return order[run], first, last
+
+
+def given_directions(
+    triangles: IntrinsicMesh,
+    positions: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    edges: NDArray[np.int64],
+    normals: NDArray[np.float64],
+    name: str,
+) -> NDArray[np.complex128]:
+    """(k,) unit vectors along given normals: in the layout of the face, or in the frame of the edge.
+
+    On an edge the normal is projected into the plane of each of the edge's faces; the mean of these projections,
+    expressed in the frame of the edge, is used.
+    """
+    largest = np.abs(normals).max(axis=1, initial=0.0)
+    extreme = (largest > 1e100) | ((largest > 0) & (largest < 1e-100))  # whose squares cannot be computed
+    normals = normals / np.where(extreme, largest, 1.0)[:, None]
+    inside = np.flatnonzero(edges < 0)
+    directions = np.zeros(len(faces), dtype=np.complex128)
+    directions[inside] = in_layout(triangles, positions, faces[inside], normals[inside])
+
+    along = np.flatnonzero(edges >= 0)
+    on_edges = LocatedPoints(
+        faces[along], np.zeros((len(along), 3)), np.full(len(along), EDGE), edges[along], np.zeros(len(along))
+    )
+    if len(along):
+        which, around = incident_faces(triangles, on_edges)
+        side = (triangles.edges.face_edges[around] == edges[along][which, None]).argmax(axis=1)
+        seen = in_layout(triangles, positions, around, normals[along[which]])
+        np.add.at(directions, along[which], triangles.in_edge_frames(seen, around, side))
+    length = np.abs(directions)
+    scale = np.linalg.norm(normals, axis=1)
+    flat = np.flatnonzero(length <= 1e-6 * scale)
+    if len(flat):
+        raise SourceError(
+            f"{name}: the normal {normals[flat[0]].tolist()} at face {faces[flat[0]]} does not lie along the surface",
+            remedy="give the direction, tangent to the surface, in which the distance grows",
+            element=f"face {faces[flat[0]]}",
+        )
+    return directions / length
+
+
+def carried_left(
+    triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDArray[np.int64], lengths: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(k,) −1 where the face that decides a segment's left is turned against those of most of the curve, else 1.
+
+    Faces are compared across the edges around the curve, so left stays on one side of it however faces are turned. On a
+    curve along which orientation is lost, left changes sides somewhere. On a segment along an edge (`edges`; else −1)
+    the first face at the edge decides.
+    """
+    telling, links, number = _agreement_around(triangles, faces, edges)
+    signs = signs_of(links, int(number.max(initial=-1)) + 1)[number[telling]]
+    most = float(np.sign(signs @ lengths)) or signs[0]
+    return signs * most
+
+
+def loses_orientation(triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDArray[np.int64]) -> bool:
+    """Whether the faces around a curve cannot all be turned to agree, as those around the middle of a Möbius strip."""
+    _, links, number = _agreement_around(triangles, faces, edges)
+    of_two = np.abs(links.weights) == 1  # of three faces around an edge two cannot agree
+    links = Links(links.tails[of_two], links.heads[of_two], links.weights[of_two])
+    signs = signs_of(links, int(number.max(initial=-1)) + 1)
+    return bool((signs[links.tails] * signs[links.heads] * links.weights < 0).any())
+
+
+def _agreement_around(
+    triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], Links, NDArray[np.int64]]:
+    """The face that decides the left of each segment; which faces around a curve agree; and their numbers there."""
+    first = triangles.first_halfedges
+    first_faces = np.zeros(triangles.n_edges, dtype=np.int64)
+    first_faces[triangles.edges.face_edges.ravel()[first]] = first // 3
+    telling = np.where(edges < 0, faces, first_faces[edges])
+    corners = triangles.corner_vertices
+    touched = np.zeros(triangles.n_vertices, dtype=bool)
+    touched[corners[faces]] = True
+    touched[corners[telling]] = True
+    around = np.asarray(touched[corners].any(axis=1))
+    number = np.cumsum(around) - 1
+    pairs = face_pairs(triangles)
+    (one, other), sides = pairs.faces.T, pairs.sides
+    forward = triangles.edges.forward
+    agree = np.where(forward[one, sides[:, 0]] != forward[other, sides[:, 1]], 1.0, -1.0)
+    near = around[one] & around[other]
+    links = Links(number[one[near]], number[other[near]], agree[near] * pairs.shares[near])
+    return telling, links, number
+
+
+def in_layout(
+    triangles: IntrinsicMesh, positions: NDArray[np.float64], faces: NDArray[np.int64], vectors: NDArray[np.float64]
+) -> NDArray[np.complex128]:
+    """(k,) vectors in space projected into the planes of their faces, in layout coordinates."""
+    of_faces = positions[faces] if positions.ndim == 3 else positions[triangles.corner_vertices[faces]]
+    a, b, c = of_faces.transpose(1, 0, 2)
+    first = unit(b - a)
+    normal = unit(np.cross(first, c - a))
+    second = np.cross(normal, first)
+    seen = np.einsum("ij,ij->i", vectors, first) + 1j * np.einsum("ij,ij->i", vectors, second)
+    edge = triangles.edge_vectors[faces, 0]
+    return seen * edge / np.abs(edge)
+
+
+def interpolation_at(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:
+    """(n, n_vertices) sparse: from values at vertices to values at points. The rows of A in Eq. 14."""
+    weights = located.barycentric
+    index = np.repeat(np.arange(len(located)), 3).reshape(-1, 3)
+    used = weights > 0
+    columns = triangles.corner_vertices[located.faces]
+    return csr_matrix((weights[used], (index[used], columns[used])), shape=(len(located), triangles.n_vertices))

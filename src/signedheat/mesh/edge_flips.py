@@ -1,0 +1,126 @@
+"""Edges of a triangulated level set flipped so that they run along its creases.
+
+Marching from cell to cell cuts across the creases of a level set, and leaves teeth there although every vertex lies on
+the level. Of the two triangulations of a quadrilateral the one that bends less, ``Σ length · angle`` over its five
+edges, has its diagonal along the crease.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .edges import EdgeTable, edge_keys, edge_table
+from .triangles import area_vectors
+from .unit_vectors import unit
+
+SHARP = np.deg2rad(25.0)
+"""Angle between two faces from which on the edge between them is looked at."""
+GAIN = 1e-9
+"""What a flip must save, over the length of the edges around times a radian: less is rounding."""
+ROUNDS = 12
+"""Times that edges are flipped at most; what one flip makes better for another is nearly done after four."""
+MOST = 4_000_000
+"""Faces beyond which creases stay as they are, lest looking for them takes more memory than the surface itself."""
+
+
+def flipped_along_creases(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], held: NDArray[np.bool_] | None = None
+) -> NDArray[np.int64]:
+    """(m, 3) faces on the same vertices, with edges flipped wherever that makes the surface bend less.
+
+    No edge has more than two faces, which agree; it stays so. Around vertices that are held, (n,), nothing is flipped.
+
+    Examples
+    --------
+    A roof whose ridge the edge between its triangles crosses; the faces around hold its eaves:
+
+    >>> roof, corners = [[0, -1, 0], [1, 0, 1], [0, 1, 0], [-1, 0, 1]], [[2, -2, 0], [2, 2, 0], [-2, 2, 0], [-2, -2, 0]]
+    >>> vertices = np.array(roof + corners, dtype=float)
+    >>> around = [[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]]
+    >>> flipped_along_creases(vertices, np.array([[0, 1, 2], [0, 2, 3], *around]))[:2].tolist()
+    [[2, 3, 1], [3, 0, 1]]
+    """
+    if not 0 < len(faces) <= MOST:
+        return faces
+    _, _, sharp = _creases(vertices, faces)
+    if not len(sharp):
+        return faces
+    near = np.zeros(len(vertices), dtype=bool)
+    near[faces[sharp // 3]] = True
+    some = np.flatnonzero(near[faces].any(axis=1))
+    result: NDArray[np.int64] = faces.copy()
+    for _ in range(ROUNDS):
+        first, second, one, other = _flips(vertices, result[some], near, held)
+        if not len(first):
+            break
+        result[some[first]], result[some[second]] = one, other
+    return result
+
+
+def _creases(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[EdgeTable, NDArray[np.float64], NDArray[np.int64]]:
+    """Edges and unit normals of faces, and both halfedges of the edges at which two make an angle of over `SHARP`."""
+    table, normals = edge_table(faces), unit(area_vectors(vertices[faces]))
+    one, other = normals[table.pairs // 3].swapaxes(0, 1)
+    return table, normals, table.pairs[np.einsum("ij,ij->i", one, other) < np.cos(SHARP)]
+
+
+def _flips(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], whole: NDArray[np.bool_], held: NDArray[np.bool_] | None
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of faces to replace, (k,) each, no two of them neighbors, and what replaces them, (k, 3) each.
+
+    The edge from a to b has c and d across; the edge from c to d takes its place, unless there is one already: of the
+    vertices that are `whole`, one of which it needs, all faces are here.
+    """
+    table, normals, creases = _creases(vertices, faces)
+    (first, second), (i, j) = (creases // 3).T, (creases % 3).T
+    a, b = faces[first, i], faces[first, (i + 1) % 3]
+    c, d = faces[first, (i + 2) % 3], faces[second, (j + 2) % 3]
+    rim = (  # from, to, the side, the face it belongs to, and which of the new ones it will
+        (b, c, (i + 1) % 3, first, 1),
+        (c, a, (i + 2) % 3, first, 0),
+        (a, d, (j + 1) % 3, second, 0),
+        (d, b, (j + 2) % 3, second, 1),
+    )
+    new = np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)
+    made = [unit(area_vectors(vertices[each])) for each in new]
+    gain = _bend(vertices, a, b, normals[first], normals[second]) - _bend(vertices, c, d, *made)
+    reach = np.linalg.norm(vertices[c] - vertices[d], axis=1)
+    faces_around = [first, second]
+    for tail, head, side, owner, which in rim:
+        beyond = table.mates[3 * owner + side]
+        there = beyond >= 0
+        other = np.where(there, beyond // 3, owner)
+        faces_around.append(other)
+        before = _bend(vertices, tail, head, normals[owner], normals[other])
+        gain += np.where(there, before - _bend(vertices, tail, head, made[which], normals[other]), 0.0)
+    keys = edge_keys(c, d)
+    present = np.isin(keys, edge_keys(*table.vertices.T))
+    gain[present | ~(whole[c] | whole[d]) | (c == d)] = 0.0
+    if held is not None:
+        gain[held[a] | held[b] | held[c] | held[d]] = 0.0
+    order = np.argsort(gain, kind="stable")
+    rank = np.empty(len(gain), dtype=np.int64)
+    rank[order] = np.arange(1, len(gain) + 1)
+    rank[gain <= GAIN * reach] = 0
+    best = np.zeros(len(faces), dtype=np.int64)
+    for face in faces_around:
+        np.maximum.at(best, face, rank)
+    won = np.flatnonzero((rank > 0) & np.all([best[face] == rank for face in faces_around], axis=0))
+    won = won[np.unique(keys[won], return_index=True)[1]]  # two of them may want the same edge
+    return first[won], second[won], new[0][won], new[1][won]
+
+
+def _bend(
+    vertices: NDArray[np.float64],
+    tails: NDArray[np.int64],
+    heads: NDArray[np.int64],
+    one: NDArray[np.float64],
+    other: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(k,) length times the angle between the unit normals on both sides of edges."""
+    lengths = np.linalg.norm(vertices[heads] - vertices[tails], axis=1)
+    return lengths * np.arccos(np.clip(np.einsum("ij,ij->i", one, other), -1.0, 1.0))

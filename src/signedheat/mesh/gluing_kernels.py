@@ -1,0 +1,370 @@
+"""Kernels on intrinsic triangulations: triangles given by their gluing and their edge lengths alone.
+
+Halfedge ``3 f + k`` runs from corner k to corner k + 1 of face f. Two halfedges of one edge may lie in one face, and
+two edges may join the same two vertices, so nothing here is looked up by vertex ids.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+
+kernel = compiled(error_model="numpy")  # without exceptions, compilation takes half the time
+
+FLIP, TURN, SPLIT_FACE, SPLIT_EDGE = 0, 1, 2, 3
+"""Kinds of steps in a history."""
+MOST_FLIPS = 1000
+"""An edge that has been flipped as often flips back and forth because of rounding, and is left as it is."""
+
+
+class Gluing(NamedTuple):
+    """An intrinsic triangulation under construction; arrays are longer than the part that is in use.
+
+    Attributes
+    ----------
+    tail, edge : (3 m,) int
+        Tail vertex and edge of every halfedge.
+    forward : (3 m,) bool
+        Whether the halfedge runs in the direction of its edge.
+    front : (3 m,) bool
+        Which of the two sides of its edge the halfedge is on: it stays through all steps, so that the two sides of a
+        source do, until the edge is flipped.
+    sibling : (3 m,) int
+        Next halfedge of the same edge, cyclically; the halfedge itself at a boundary.
+    start : (e,) int
+        One halfedge of every edge.
+    length : (e,) float
+        Length of every edge, in multiples of `unit`.
+    fixed : (e,) bool
+        Edges that must not be flipped.
+    flips : (e,) int
+        How often each edge has been flipped.
+    counts : (5,) int
+        Numbers of faces, edges, vertices, steps of the history, and edges on the stack.
+    steps, weights : (s, 4) int, (s, 4) float
+        The history: kind of the step, two halfedges or faces, the new vertex; and the affine dependency of its points.
+    scratch : int array
+        Work array.
+    unit : float
+        Unit of length.
+    """
+
+    tail: NDArray[np.int64]
+    edge: NDArray[np.int64]
+    forward: NDArray[np.bool_]
+    front: NDArray[np.bool_]
+    sibling: NDArray[np.int64]
+    start: NDArray[np.int64]
+    length: NDArray[np.float64]
+    fixed: NDArray[np.bool_]
+    flips: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    steps: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    scratch: NDArray[np.int64]
+    unit: float
+
+
+@kernel
+def following(h: int) -> int:
+    """The next halfedge around the face."""
+    return h + 1 if h % 3 < 2 else h - 2
+
+
+@kernel
+def preceding(h: int) -> int:
+    """The previous halfedge around the face."""
+    return h - 1 if h % 3 else h + 2
+
+
+@kernel
+def half_tangent(a: float, b: float, c: float) -> tuple[float, float]:
+    """Numerator and denominator of tan²(α/2), α the angle opposite to side a, without cancellation (Kahan).
+
+    Their product is 16 times the squared area; lengths that violate the triangle inequality count as a flat triangle.
+    """
+    if b < c:
+        b, c = c, b
+    difference = a - b
+    numerator = (a + (b - c)) * max(c + difference, 0.0)
+    denominator = (a + (b + c)) * max(c - difference, 0.0)
+    return numerator, denominator
+
+
+@kernel
+def tangent_at(g: Gluing, h: int) -> tuple[float, float]:
+    """`half_tangent` of the corner at the tail of a halfedge."""
+    n = following(h)
+    return half_tangent(g.length[g.edge[n]], g.length[g.edge[h]], g.length[g.edge[preceding(h)]])
+
+
+@kernel
+def is_interior(g: Gluing, h: int) -> bool:
+    """Whether exactly two different faces meet at the halfedge's edge."""
+    other: int = g.sibling[h]
+    back: int = g.sibling[other]
+    return other != h and back == h and other // 3 != h // 3
+
+
+@kernel
+def violates_delaunay(g: Gluing, h: int) -> bool:
+    """Whether the two angles opposite to an interior edge sum to more than π (by more than rounding)."""
+    n, d = tangent_at(g, preceding(h))
+    m, e = tangent_at(g, preceding(g.sibling[h]))
+    return n * m > d * e * (1.0 + 1e-10)
+
+
+@kernel
+def move(g: Gluing, old: tuple[int, ...], new: tuple[int, ...]) -> None:
+    """Renumber halfedges old[k] to new[k], a permutation of them, all at once; tails stay where they are."""
+    successors, predecessors, edges, flags = g.scratch[0], g.scratch[1], g.scratch[2], g.scratch[3]
+    for k in range(len(old)):
+        after = g.sibling[old[k]]
+        before = after
+        while g.sibling[before] != old[k]:
+            before = g.sibling[before]
+        for l in range(len(old)):
+            if before == old[l]:
+                before = -1
+        for l in range(len(old)):
+            if after == old[l]:
+                after = new[l]
+                break
+        successors[k], predecessors[k], edges[k] = after, before, g.edge[old[k]]
+        flags[k] = 2 * g.forward[old[k]] + g.front[old[k]]
+    for k in range(len(old)):
+        h = new[k]
+        g.sibling[h], g.edge[h], g.forward[h], g.front[h] = successors[k], edges[k], flags[k] >= 2, flags[k] % 2 == 1
+        g.start[edges[k]] = h
+        if predecessors[k] >= 0:
+            g.sibling[predecessors[k]] = h
+
+
+@kernel
+def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float, b: float, c: float, d: float) -> None:
+    """Write one step into the history."""
+    n = g.counts[3]
+    g.steps[n, 0], g.steps[n, 1], g.steps[n, 2], g.steps[n, 3] = kind, first, second, vertex
+    g.weights[n, 0], g.weights[n, 1], g.weights[n, 2], g.weights[n, 3] = a, b, c, d
+    g.counts[3] = n + 1
+
+
+@kernel
+def faces_around(steps: NDArray[np.int64], n: int, around: NDArray[np.int64], start: NDArray[np.int64]) -> None:
+    """The faces that step n of a history has or makes, and the corner of each that its first point is at."""
+    kind = steps[n, 0]
+    around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
+    start[0] = start[1] = start[2] = 0
+    if kind == TURN:
+        around[1] = around[2] = -1
+    elif kind != SPLIT_FACE:
+        around[0], start[0], around[2] = steps[n, 1] // 3, steps[n, 1] % 3, -1
+    if kind == FLIP:
+        around[1], start[1] = steps[n, 2] // 3, steps[n, 2] % 3
+
+
+@kernel
+def turn_over(g: Gluing, face: int) -> None:
+    """Reverse a face: corners (0, 1, 2) become (0, 2, 1)."""
+    h = 3 * face
+    move(g, (h, h + 2), (h + 2, h))
+    g.tail[h + 1], g.tail[h + 2] = g.tail[h + 2], g.tail[h + 1]
+    for k in range(3):
+        g.forward[h + k] = not g.forward[h + k]
+    record(g, TURN, face, -1, -1, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
+    """The two faces at an edge unfolded into one plane: ``h: i → j`` with apex a, its twin with apex b.
+
+    Returns the signed areas of jab and iab, the areas of the twin's face and of h's face, and the length of ab. The
+    areas are the affine dependency of the four corners: area_jab·i + area_iab·j = area_twin·a + area_h·b.
+    """
+    t = g.sibling[h]
+    mirrored = g.forward[h] == g.forward[t]
+    at_i, at_j = (t, following(t)) if mirrored else (following(t), t)
+    ai, ja = g.length[g.edge[preceding(h)]], g.length[g.edge[following(h)]]
+    ib, bj = g.length[g.edge[preceding(t)]], g.length[g.edge[following(t)]]
+    if not mirrored:
+        ib, bj = bj, ib
+    n1, d1 = tangent_at(g, h)
+    n2, d2 = tangent_at(g, at_i)
+    m1, e1 = tangent_at(g, following(h))
+    m2, e2 = tangent_at(g, at_j)
+    norm, norm_j = (n1 + d1) * (n2 + d2), (m1 + e1) * (m2 + e2)
+    if not (norm > 0.0 and norm_j > 0.0):
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    sine, cosine = np.sqrt(n1 * d2) + np.sqrt(n2 * d1), np.sqrt(d1 * d2) - np.sqrt(n1 * n2)
+    sine_j, cosine_j = np.sqrt(m1 * e2) + np.sqrt(m2 * e1), np.sqrt(e1 * e2) - np.sqrt(m1 * m2)
+    length = np.sqrt((ai - ib) ** 2 + 4.0 * ai * ib * sine * sine / norm)
+    area_iab, area_jab = ai * ib * sine * cosine / norm, ja * bj * sine_j * cosine_j / norm_j
+    return area_jab, area_iab, 0.25 * np.sqrt(n2 * d2), 0.25 * np.sqrt(n1 * d1), length
+
+
+@kernel
+def flip(g: Gluing, h: int) -> bool:
+    """Flip an interior edge, if the two faces form a strictly convex quadrilateral; returns whether it did.
+
+    ``h: i → j`` with apex a and its twin ``t: j → i`` with apex b become ``h: b → a`` with apex i, ``t: a → b`` with
+    apex j. Faces and halfedges keep their ids, so that a history can be run backwards.
+    """
+    t = g.sibling[h]
+    if g.forward[h] == g.forward[t]:
+        turn_over(g, t // 3)
+        t = g.sibling[h]
+    h1, h2, t1, t2 = following(h), preceding(h), following(t), preceding(t)
+    area_jab, area_iab, area_g, area_f, length = diamond(g, h)
+    if not (length > 0.0 and area_iab > 0.0 and area_jab > 0.0):
+        return False
+    record(g, FLIP, h, t, -1, area_jab, area_iab, area_g, area_f)
+    i, j, a, b = g.tail[h], g.tail[t], g.tail[h2], g.tail[t2]
+    move(g, (h1, h2, t1, t2), (t2, h1, h2, t1))
+    g.tail[h], g.tail[h1], g.tail[h2] = b, a, i
+    g.tail[t], g.tail[t1], g.tail[t2] = a, b, j
+    g.length[g.edge[h]] = length
+    g.forward[h], g.forward[t] = True, False
+    g.front[h], g.front[t] = True, False  # it is another edge now
+    return True
+
+
+@kernel
+def flip_until_delaunay(g: Gluing, stack: NDArray[np.int64], stacked: NDArray[np.bool_]) -> bool:
+    """Flip until every edge that is not fixed is Delaunay; returns False if the history is full before that.
+
+    `stack` holds the edges still to be checked, `counts[4]` of them; `stacked` marks them.
+    """
+    while g.counts[4] > 0:
+        if g.counts[3] + 2 > len(g.steps):
+            return False
+        g.counts[4] -= 1
+        e = stack[g.counts[4]]
+        stacked[e] = False
+        h = g.start[e]
+        if g.fixed[e] or g.flips[e] >= MOST_FLIPS or not is_interior(g, h) or not violates_delaunay(g, h):
+            continue
+        if not flip(g, h):
+            continue
+        g.flips[e] += 1
+        t = g.sibling[h]
+        for side in (following(h), preceding(h), following(t), preceding(t)):
+            look_at(g, stack, stacked, g.edge[side])
+    return True
+
+
+@kernel
+def look_at(g: Gluing, stack: NDArray[np.int64], stacked: NDArray[np.bool_], e: int) -> None:
+    """Push an edge on the stack of edges to be checked."""
+    if not stacked[e]:
+        stack[g.counts[4]] = e
+        stacked[e] = True
+        g.counts[4] += 1
+
+
+@kernel
+def new_edge(g: Gluing, length: float, fixed: bool) -> int:
+    """Add an edge."""
+    e: int = g.counts[1]
+    g.counts[1] = e + 1
+    g.length[e], g.fixed[e], g.flips[e] = length, fixed, 0
+    return e
+
+
+@kernel
+def apex_position(g: Gluing, h: int) -> tuple[float, float]:
+    """(x, y) of the face's third corner, with the halfedge along the positive x axis from the origin; y ≥ 0."""
+    base, right, left = g.length[g.edge[h]], g.length[g.edge[following(h)]], g.length[g.edge[preceding(h)]]
+    n, d = half_tangent(right, base, left)
+    return 0.5 * (base + (left - right) * (left + right) / base), 0.5 * np.sqrt(n * d) / base
+
+
+@kernel
+def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
+    """Insert a vertex into a face at barycentric coordinates (u, v, w); returns the vertex.
+
+    Face (a, b, c) becomes (a, b, x) and two new faces (b, c, x) and (c, a, x).
+    """
+    h = 3 * f
+    n: int = g.counts[0]
+    x: int = g.counts[2]
+    a, b, c = g.tail[h], g.tail[h + 1], g.tail[h + 2]
+    base = g.length[g.edge[h]]
+    apex_x, apex_y = apex_position(g, h)
+    px, py = v * base + w * apex_x, w * apex_y
+    record(g, SPLIT_FACE, f, n, x, u, v, w, 1.0)
+    to_a, to_b = new_edge(g, np.hypot(px, py), False), new_edge(g, np.hypot(px - base, py), False)
+    to_c = new_edge(g, np.hypot(px - apex_x, py - apex_y), False)
+    g.counts[2], g.counts[0] = x + 1, n + 2
+    k, l = 3 * n, 3 * n + 3
+    move(g, (h + 1, h + 2), (k, l))
+    g.tail[k], g.tail[l] = b, c
+    pair(g, h + 2, x, l + 1, a, to_a)
+    pair(g, k + 2, x, h + 1, b, to_b)
+    pair(g, l + 2, x, k + 1, c, to_c)
+    return x
+
+
+@kernel
+def split_edge(g: Gluing, h: int, fraction: float) -> int:
+    """Insert a vertex on an edge, `fraction` of the way along halfedge h, splitting all its faces; returns the vertex.
+
+    Face (tail, head, apex) becomes (tail, x, apex) and a new face (x, head, apex). No face may have the edge twice.
+    The half at the edge's own tail keeps its id.
+    """
+    count = sibling_count(g, h)
+    around, seconds = np.empty(count, np.int64), np.empty(count, np.int64)
+    y = h
+    for k in range(count):
+        around[k] = y
+        y = g.sibling[y]
+    e: int = g.edge[h]
+    x: int = g.counts[2]
+    g.counts[2] = x + 1
+    along = fraction if g.forward[h] else 1.0 - fraction
+    whole = g.length[e]
+    other = new_edge(g, (1.0 - along) * whole, g.fixed[e])
+    for k in range(count):
+        y, n = around[k], g.counts[0]
+        g.counts[0] = n + 1
+        here = along if g.forward[y] else 1.0 - along
+        apex_x, apex_y = apex_position(g, y)
+        record(g, SPLIT_EDGE, y, n, x, 1.0 - here, here, 0.0, 1.0)
+        cut = new_edge(g, np.hypot(apex_x - here * whole, apex_y), False)
+        second, first, last = 3 * n, following(y), preceding(y)
+        head, apex = g.tail[first], g.tail[last]
+        move(g, (first,), (second + 1,))
+        g.tail[second], g.tail[second + 1] = x, head
+        g.forward[second], g.front[second] = g.forward[y], g.front[y]
+        pair(g, first, x, second + 2, apex, cut)
+        seconds[k] = second
+    g.length[e] = along * whole
+    for k in range(count):
+        l = (k + 1) % count
+        near, far = (around[k], seconds[k]) if g.forward[around[k]] else (seconds[k], around[k])
+        next_near, next_far = (around[l], seconds[l]) if g.forward[around[l]] else (seconds[l], around[l])
+        g.edge[near], g.edge[far] = e, other
+        g.start[e], g.start[other] = near, far
+        g.sibling[near], g.sibling[far] = next_near, next_far
+    return x
+
+
+@kernel
+def sibling_count(g: Gluing, h: int) -> int:
+    """Number of halfedges of an edge."""
+    count, y = 1, g.sibling[h]
+    while y != h:
+        count += 1
+        y = g.sibling[y]
+    return count
+
+
+@kernel
+def pair(g: Gluing, h: int, tail: int, t: int, head: int, e: int) -> None:
+    """Glue two halfedges into a new edge."""
+    g.tail[h], g.edge[h], g.forward[h], g.front[h], g.sibling[h] = tail, e, True, True, t
+    g.tail[t], g.edge[t], g.forward[t], g.front[t], g.sibling[t] = head, e, False, False, h
+    g.start[e] = h

@@ -1,0 +1,259 @@
+"""Intrinsic mesh: all that the surface method needs to know of a surface.
+
+Per face three vertex ids, three edge ids, and the three corners laid out in the plane as complex numbers. Triangle
+meshes, polygon meshes after virtual refinement, digital surfaces with corrected normals, intrinsic triangulations and
+the local triangulations of point clouds are all represented in this way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..errors import GeometryError
+from ..frozen import Frozen
+from .components import element_components
+from .edges import EdgeTable, edge_table
+from .triangles import Triangles
+
+Index = NDArray[np.int64] | slice
+FLATTEST = 1e-18
+"""Area relative to the square of the longest edge, below which a face is taken to be as thick as that."""
+
+
+@dataclass(frozen=True, eq=False)
+class IntrinsicMesh(Frozen):
+    """Triangles given by their vertices, their edges and their shapes alone, without positions in space.
+
+    Attributes
+    ----------
+    corner_vertices : (m, 3) int
+        Vertex ids.
+    corner_positions : (m, 3) complex
+        Corners in the plane of the face, counter-clockwise.
+    edges : EdgeTable
+        Edge k of a face runs from corner k to corner k + 1. Two edges may join the same two vertices.
+    n_vertices : int
+        Number of vertices, used or not.
+    leading_sides : (e,) int, optional
+        Halfedge 3 f + k of each edge whose face f counts as the first face of the edge; by default the lowest face.
+    """
+
+    corner_vertices: NDArray[np.int64]
+    corner_positions: NDArray[np.complex128]
+    edges: EdgeTable
+    n_vertices: int
+    leading_sides: NDArray[np.int64] | None = None
+
+    @classmethod
+    def from_lengths(
+        cls,
+        corner_vertices: NDArray[np.int64],
+        lengths: NDArray[np.float64],
+        n_vertices: int,
+        edges: EdgeTable | None = None,
+    ) -> IntrinsicMesh:
+        """Lay out triangles of given edge lengths; ``lengths[:, k]`` runs from corner k to corner k + 1.
+
+        Corner 0 is at the origin, corner 1 on the positive real axis, corner 2 above it. The height comes from
+        Kahan's stable form of Heron's formula, so that needles keep their shape.
+
+        Examples
+        --------
+        >>> IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.array([[4.0, 5.0, 3.0]]), 3).corner_positions
+        array([[0.+0.j, 4.+0.j, 0.+3.j]])
+        """
+        base, right, left = lengths.T
+        a, b, c = np.sort(lengths, axis=1)[:, ::-1].T
+        product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))
+        twice_area = 0.5 * np.sqrt(np.maximum(product, 0.0))
+        divisor = np.where(base > 0, base, 1.0)  # rounding leaves some edges no length
+        apex_x = 0.5 * (base + (left - right) * (left + right) / divisor)
+        positions = np.zeros((len(lengths), 3), dtype=np.complex128)
+        positions[:, 1] = base
+        positions[:, 2] = apex_x + 1j * np.where(base > 0, twice_area / divisor, left)
+        return cls(corner_vertices, positions, edge_table(corner_vertices) if edges is None else edges, n_vertices)
+
+    @property
+    def n_faces(self) -> int:
+        """Number of faces."""
+        return len(self.corner_vertices)
+
+    @property
+    def n_edges(self) -> int:
+        """Number of edges."""
+        return len(self.edges.vertices)
+
+    @cached_property
+    def edge_vectors(self) -> NDArray[np.complex128]:
+        """(m, 3) from corner k to corner k + 1, in the face's layout."""
+        return np.roll(self.corner_positions, -1, axis=1) - self.corner_positions
+
+    @cached_property
+    def edge_lengths(self) -> NDArray[np.float64]:
+        """(m, 3) lengths of `edge_vectors`."""
+        return np.abs(self.edge_vectors)
+
+    @cached_property
+    def lengths_of_edges(self) -> NDArray[np.float64]:
+        """(e,) lengths, each as one of the edge's faces has it."""
+        lengths = np.zeros(self.n_edges)
+        lengths[self.edges.face_edges] = self.edge_lengths
+        return lengths
+
+    @property
+    def agree_on_lengths(self) -> bool:
+        """Whether all faces of every edge give it the same length; flattened voxel faces do not."""
+        of_edges = self.lengths_of_edges[self.edges.face_edges]
+        return bool(np.allclose(of_edges, self.edge_lengths, rtol=1e-6, atol=0))
+
+    @cached_property
+    def face_areas(self) -> NDArray[np.float64]:
+        """(m,) areas, where rounding does not make them negative."""
+        first, _, last = self.edge_vectors.T
+        return np.maximum(-0.5 * (np.conj(first) * last).imag, 0.0)
+
+    @property
+    def areas_as_divisors(self) -> NDArray[np.float64]:
+        """(m,) areas, those of flat faces as if they were `FLATTEST`."""
+        squares: NDArray[np.float64] = (np.abs(self.edge_vectors) ** 2).max(axis=1)
+        return np.maximum(self.face_areas, FLATTEST * squares)
+
+    @cached_property
+    def vertex_areas(self) -> NDArray[np.float64]:
+        """(n_vertices,) a third of the area of the faces at each vertex."""
+        thirds = np.repeat(self.face_areas / 3, 3)
+        return np.bincount(self.corner_vertices.ravel(), thirds, self.n_vertices).astype(np.float64)
+
+    @cached_property
+    def corner_cotangents(self) -> NDArray[np.float64]:
+        """(m, 3) cotangent of the angle at each corner."""
+        leaving = self.edge_vectors
+        arriving = -np.roll(leaving, 1, axis=1)
+        return (np.conj(leaving) * arriving).real / (2.0 * self.areas_as_divisors)[:, None]
+
+    @cached_property
+    def edge_directions(self) -> NDArray[np.complex128]:
+        """(m, 3) z_fe: unit vector of edge k, tail to head, in the face's layout.
+
+        Two edges e, g of a face differ by the rotation ``conj(z_fe) z_fg``, which is r of Eq. 8.
+        """
+        lengths = np.where(self.edge_lengths > 0, self.edge_lengths, 1.0)  # what has no length has no direction
+        return np.where(self.edges.forward, 1.0, -1.0) * self.edge_vectors / lengths
+
+    @cached_property
+    def reflected(self) -> NDArray[np.bool_]:
+        """(m, 3) where the frame of edge k is a reflection, not a rotation, of the layout of the face.
+
+        The second axis of an edge's frame points into the first face of the edge and out of all others. The direction
+        of the edge, turned by 90° in a face, points into the faces that run along the edge in its direction and out of
+        the others. Where the two disagree, vectors are conjugated between frame and layout. On a consistently oriented
+        manifold mesh they never do.
+        """
+        is_first = np.zeros(3 * self.n_faces, dtype=bool)
+        is_first[self.first_halfedges] = True
+        return self.edges.forward != is_first.reshape(-1, 3)
+
+    @cached_property
+    def first_halfedges(self) -> NDArray[np.int64]:
+        """(k,) halfedge 3 f + j in the first face of every edge that has a face."""
+        if self.leading_sides is not None:
+            return self.leading_sides
+        starts, halfedges = self.edges.halfedges
+        return halfedges[starts[:-1][np.diff(starts) > 0]]
+
+    @cached_property
+    def is_consistently_oriented(self) -> bool:
+        """Whether no frame is reflected: then the connection Laplacian is complex Hermitian."""
+        return not self.reflected.any()
+
+    @cached_property
+    def face_components(self) -> NDArray[np.int64]:
+        """(m,) part of the surface that each face lies in, joined across edges; parts may share vertices."""
+        return element_components(self.edges.face_edges)
+
+    def in_edge_frames(
+        self, vectors: NDArray[np.complex128], faces: Index = slice(None), sides: Index = slice(None)
+    ) -> NDArray[np.complex128]:
+        """Vectors in the layouts of some faces, as the frames of some of their edges see them.
+
+        Without `sides` there is a vector for each side of the faces, (k, 3), or one for all three, (k, 1); with them
+        one for that side of each.
+        """
+        turned = np.conj(self.edge_directions[faces, sides]) * vectors
+        return np.where(self.reflected[faces, sides], np.conj(turned), turned)
+
+    def in_face_frames(self, vectors: NDArray[np.complex128], faces: Index = slice(None)) -> NDArray[np.complex128]:
+        """(k, 3) the vectors of an (e,) edge array as seen in the layouts of some faces."""
+        of_face = vectors[self.edges.face_edges[faces]]
+        return self.edge_directions[faces] * np.where(self.reflected[faces], np.conj(of_face), of_face)
+
+    def sums_in_faces(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """(m, c) sums over the edges of each face, in its layout, of the columns of an (e, c) edge array.
+
+        Three times the means of Sec. 6.
+        """
+        straight, mirrored = self._face_sums
+        sums: NDArray[np.complex128] = straight @ vectors
+        return sums + mirrored @ np.conj(vectors) if mirrored.nnz else sums
+
+    @cached_property
+    def _face_sums(self) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """(m, e) the matrices of `sums_in_faces`, for vectors and for their mirror images."""
+        shape = self.n_faces, self.n_edges
+        starts, edges, directions = np.arange(0, 3 * self.n_faces + 1, 3), self.edges.face_edges, self.edge_directions
+        if self.is_consistently_oriented:
+            return sparse.csr_array((directions.ravel(), edges.ravel(), starts), shape), sparse.csr_array(shape)
+        parts = np.where(self.reflected, 0, directions), np.where(self.reflected, directions, 0)
+        straight, mirrored = (sparse.csr_array((part.ravel(), edges.ravel(), starts), shape) for part in parts)
+        return straight, mirrored
+
+
+MARGIN = 1e-14
+"""Margin of the triangle inequalities, relative to the mean length, to which flat triangles are mollified at least."""
+
+
+def mollify(lengths: NDArray[np.float64], margin: float) -> tuple[NDArray[np.float64], float]:
+    """Add one length δ to all edges, (m, 3), the smallest for which every triangle inequality holds with a margin.
+
+    The margin is the least ``a + b − c`` in every triangle, as a fraction of the mean length. Returns the new lengths,
+    the given array itself if δ is zero, and δ.
+
+    Examples
+    --------
+    >>> mollify(np.array([[1.0, 1.0, 2.0]]), 0.09375)
+    (array([[1.125, 1.125, 2.125]]), 0.125)
+    """
+    longest = lengths.max(axis=1)
+    slack = float((lengths.sum(axis=1) - 2.0 * longest).min())
+    added = margin * float(lengths.mean()) - slack
+    return (lengths + added, added) if added > 0 else (lengths, 0.0)
+
+
+def laid_out(mesh: Triangles, margin: float) -> tuple[IntrinsicMesh, float]:
+    """The intrinsic mesh of a mesh, mollified, and the length that mollification has added to all edges.
+
+    Examples
+    --------
+    >>> from signedheat import TriangleMesh
+    >>> flat = TriangleMesh([[0, 0, 0], [4, 0, 0], [1, 1, 0], [0, 0, 0]], [[0, 1, 2], [0, 1, 3]])
+    >>> triangles, added = laid_out(flat, 1e-6)
+    >>> bool(0 < added < 1e-5 and triangles.face_areas.min() > 0)
+    True
+    """
+    corners = mesh.vertices[mesh.faces]
+    sides = np.roll(corners, -1, axis=1) - corners
+    lengths = np.linalg.norm(sides, axis=2)
+    area = 0.5 * float(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum())
+    if not area > 2 * np.finfo(np.float64).eps * float(np.abs(mesh.bounds).max()) * float(lengths.sum()):
+        raise GeometryError(
+            f"all {mesh.n_faces} faces have no area, or none beyond rounding: there is nothing to measure distance on",
+            remedy="check the coordinates; move shapes that are far away to the origin",
+            element="faces",
+        )
+    lengths, added = mollify(lengths, margin)
+    return IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges), added

@@ -1,0 +1,160 @@
+"""Triangles of a mesh that pass through each other."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+from ..parallel import CHUNK, n_threads
+from .box_tree import BoxTree
+from .unit_vectors import unit
+from .welding import same_positions
+
+TOUCHING = 1e-10
+"""Depth, over the size of the mesh, up to which triangles only touch."""
+FOLDED = 1e-10
+"""One less the cosine between two neighbours as seen along their edge, up to which one covers the other."""
+UPRIGHT = 1e-13
+"""One less the cosine between two directions up to which they are one."""
+
+
+def self_intersections(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(k, 2) pairs of faces that pass through each other, or cover each other in one plane.
+
+    Those that have no vertex in common must not touch, either; vertices at one place are one.
+
+    Examples
+    --------
+    >>> points = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0.5, 0.5, -1], [0.6, 0.5, 1], [0.5, 0.6, 1]])
+    >>> self_intersections(points, np.array([[0, 1, 2], [3, 4, 5]])).tolist()
+    [[0, 1]]
+    """
+    slack = TOUCHING * float(np.ptp(vertices, axis=0).max(initial=0.0))
+    return overlapping_faces(vertices, same_positions(vertices)[faces], slack, -slack)
+
+
+def overlapping_faces(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], slack: float, depth: float
+) -> NDArray[np.int64]:
+    """(k, 2) pairs of faces that overlap to a depth, or by `slack` if they have a vertex in common.
+
+    Along their normals they may be apart by `slack`. Those that have an edge in common overlap if they are folded.
+    """
+    if not len(faces):
+        return np.zeros((0, 2), dtype=np.int64)
+    centred = np.ascontiguousarray(vertices - vertices.mean(axis=0), dtype=np.float64)
+    ids = np.ascontiguousarray(faces, dtype=np.int64)
+    corners = centred[ids]
+    tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
+    flat = corners.reshape(-1, 9)
+
+    def part(start: int) -> NDArray[np.int64]:
+        starts, near = tree.meeting(corners[start : start + CHUNK], slack)
+        owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+        one, other = owners[near > owners], near[near > owners]
+        shared = sum((i == j).astype(np.int8) for i, j in product(ids[one].T.copy(), ids[other].T.copy()))
+        meet, few, many = np.empty(len(one), dtype=bool), np.flatnonzero(shared < 2), np.flatnonzero(shared > 1)
+        meet[many] = _folded(corners, ids, one[many], other[many])
+        meet[few] = _overlapping(flat, one[few], other[few], slack, np.where(shared[few] > 0, slack, depth))
+        return np.stack([one, other], axis=1)[meet]
+
+    with ThreadPoolExecutor(n_threads()) as pool:
+        pairs = np.concatenate(list(pool.map(part, range(0, len(ids), CHUNK))))
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+
+def _folded(
+    corners: NDArray[np.float64], ids: NDArray[np.int64], one: NDArray[np.int64], other: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """(k,) whether faces with an edge in common lie on the same side of it, or have all corners in common."""
+    same = ids[one][:, :, None] == ids[other][:, None, :]
+    apex = np.argmin(same.any(axis=2), axis=1)
+    beyond = np.argmin(same.any(axis=1), axis=1)
+    start, end = corners[one, (apex + 1) % 3], corners[one, (apex + 2) % 3]
+    along = unit(end - start)
+    away = [place - start for place in (corners[one, apex], corners[other, beyond])]
+    first, second = (unit(each - (each * along).sum(axis=1)[:, None] * along) for each in away)
+    folded: NDArray[np.bool_] = ((first * second).sum(axis=1) > 1.0 - FOLDED) | same.any(axis=2).all(axis=1)
+    return folded
+
+
+@compiled
+def _overlapping(
+    corners: NDArray[np.float64],
+    one: NDArray[np.int64],
+    other: NDArray[np.int64],
+    slack: float,
+    depths: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """(k,) whether triangles overlap, each pair deeper than its depth."""
+    result, axis = np.empty(len(one), dtype=np.bool_), np.empty(3)
+    for k in range(len(one)):
+        result[k] = overlap(corners[one[k]], corners[other[k]], slack, depths[k], axis)
+    return result
+
+
+@compiled
+def overlap(
+    p: NDArray[np.float64], q: NDArray[np.float64], slack: float, depth: float, axis: NDArray[np.float64]
+) -> bool:
+    """Whether two triangles, (9,) each, overlap deeper than a depth along every axis that may separate them.
+
+    Along their normals they may be apart by a slack.
+    """
+    for d in range(3):
+        if min(p[d], p[3 + d], p[6 + d]) > max(q[d], q[3 + d], q[6 + d]) + slack:
+            return False
+        if min(q[d], q[3 + d], q[6 + d]) > max(p[d], p[3 + d], p[6 + d]) + slack:
+            return False
+    normals = np.zeros((2, 3))
+    for a in range(17):
+        # normals of both; sides turned in their planes, which part most of those that touch; products of their sides
+        if a < 2:
+            t = p if a == 0 else q
+            ux, uy, uz = t[3] - t[0], t[4] - t[1], t[5] - t[2]
+            vx, vy, vz = t[6] - t[0], t[7] - t[1], t[8] - t[2]
+        elif a < 8:
+            t = p if a < 5 else q
+            i = 3 * ((a - 2) % 3)
+            k = (i + 3) % 9
+            ux, uy, uz = t[k] - t[i], t[k + 1] - t[i + 1], t[k + 2] - t[i + 2]
+            sx, sy, sz = t[3] - t[0], t[4] - t[1], t[5] - t[2]
+            rx, ry, rz = t[6] - t[0], t[7] - t[1], t[8] - t[2]
+            vx, vy, vz = sy * rz - sz * ry, sz * rx - sx * rz, sx * ry - sy * rx
+        else:
+            i, j = 3 * ((a - 8) // 3), 3 * ((a - 8) % 3)
+            k, m = (i + 3) % 9, (j + 3) % 9
+            ux, uy, uz = p[k] - p[i], p[k + 1] - p[i + 1], p[k + 2] - p[i + 2]
+            vx, vy, vz = q[m] - q[j], q[m + 1] - q[j + 1], q[m + 2] - q[j + 2]
+        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        length = np.sqrt(x * x + y * y + z * z)
+        scale = np.sqrt((ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz))
+        if not length > 1e-9 * scale:
+            continue
+        axis[0], axis[1], axis[2] = x / length, y / length, z / length
+        if a < 2:
+            normals[a, 0], normals[a, 1], normals[a, 2] = axis[0], axis[1], axis[2]
+        elif a >= 8:  # along a normal both are flat, and touch
+            upright = False
+            for n in range(2):
+                cosine = normals[n, 0] * axis[0] + normals[n, 1] * axis[1] + normals[n, 2] * axis[2]
+                upright |= abs(cosine) > 1.0 - UPRIGHT
+            if upright:
+                continue
+        p0 = q0 = np.inf
+        p1 = q1 = -np.inf
+        for c in range(0, 9, 3):
+            s = p[c] * axis[0] + p[c + 1] * axis[1] + p[c + 2] * axis[2]
+            p0, p1 = min(p0, s), max(p1, s)
+            s = q[c] * axis[0] + q[c + 1] * axis[1] + q[c + 2] * axis[2]
+            q0, q1 = min(q0, s), max(q1, s)
+        if a < 2:
+            if p0 > q1 + slack or q0 > p1 + slack:
+                return False
+        elif p0 >= q1 - depth or q0 >= p1 - depth:
+            return False
+    return True

@@ -1,0 +1,158 @@
+"""What lies around each feature of triangles: normals of edges and vertices, and faces on their other side."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..mesh.box_tree import morton_codes
+from ..mesh.components import by_first_use, connected_components, grouped, sums_of
+from ..mesh.edges import EdgeTable, edge_table
+from ..mesh.unit_vectors import unit
+from ..mesh.welding import coincident_faces, same_positions, same_rows
+from .nearest_triangles import triangle_rows
+
+FOLD = 0.02
+"""Where unit normals of two faces add up to less than this, the edge between them is a fold and decides no side."""
+
+
+class FaceFeatures(NamedTuple):
+    """Triangles with the normals of their features (Bærentzen & Aanæs 2005).
+
+    An edge is regular if exactly two faces share it, run along it in opposite directions and do not lie on each other;
+    a vertex is, if all edges around it are and its faces make one fan. There the sign of ``(x − y) · normal`` is the
+    side of a point x whose nearest place is y.
+
+    Attributes
+    ----------
+    corners : (m, 9) float
+        Corners of the faces, each face once, in the order of a space-filling curve.
+    rows : (m, 16) float
+        The same as `foot_on_triangle` wants it.
+    vertices : (n, 3) float
+        Their positions.
+    faces, edges : (m, 3) int
+        Vertices, which are different where positions are; and edges, corner k to corner k + 1.
+    face_normals, edge_normals, vertex_normals : (·, 3) float
+        Unit normals of the faces, their sums at edges, and angle-weighted at vertices.
+    edge_regular, vertex_regular : (·,) bool
+        Whether the surface is closed and consistent there.
+    across, apexes : (m, 3) int
+        The face on the other side of each edge, and its vertex that is not on it; −1 where the edge is not regular.
+    vertex_starts, vertex_corners : (n + 1,), (3 m,) int
+        Corners around each vertex, in compressed rows: three times the face, plus 0, 1 or 2.
+    trusted : (m,) float
+        Confidence in each face: 1 where it was there, less where it was put back.
+    ids : (m,) int
+        Which of the triangles given each is.
+    """
+
+    corners: NDArray[np.float64]
+    rows: NDArray[np.float64]
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    edges: NDArray[np.int32]
+    face_normals: NDArray[np.float64]
+    edge_normals: NDArray[np.float64]
+    vertex_normals: NDArray[np.float64]
+    edge_regular: NDArray[np.bool_]
+    vertex_regular: NDArray[np.bool_]
+    across: NDArray[np.int32]
+    apexes: NDArray[np.int32]
+    vertex_starts: NDArray[np.int64]
+    vertex_corners: NDArray[np.int32]
+    trusted: NDArray[np.float32]
+    ids: NDArray[np.int64]
+
+    @classmethod
+    def of(
+        cls, vertices: NDArray[np.float64], faces: NDArray[np.int64], trusted: NDArray[np.float32] | None = None
+    ) -> FaceFeatures:
+        """Features of (m, 3) faces. Vertices at one position are one; faces without extent and copies are left out.
+
+        Examples
+        --------
+        >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]])
+        >>> features = FaceFeatures.of(np.eye(4)[:, :3], faces)
+        >>> len(features.corners), bool(features.edge_regular.all())
+        (4, True)
+        """
+        faces = same_positions(vertices)[faces]
+        trusted = np.ones(len(faces), dtype=np.float32) if trusted is None else trusted
+        ids = np.arange(len(faces))
+        a, b, c = faces.T
+        proper = (a != b) & (b != c) & (c != a)
+        if not proper.all():
+            faces, trusted, ids = faces[proper], trusted[proper], ids[proper]
+        if len(faces):  # what is near in space had better be near in memory
+            order = np.argsort(morton_codes(vertices[faces].mean(axis=1)), kind="stable")
+            trusted, ids = trusted[order], ids[order]
+            numbers, used = by_first_use(faces[order].ravel(), len(vertices))
+            faces, vertices = numbers.reshape(-1, 3), vertices[used]
+        table = edge_table(faces)
+        copies = _copies(faces, table)
+        if copies.any():
+            faces, trusted, ids = faces[~copies], trusted[~copies], ids[~copies]
+            table = edge_table(faces)
+        places = vertices[faces]
+        corners = np.ascontiguousarray(places.reshape(-1, 9))
+        starts, around = grouped(faces.ravel(), len(vertices))
+        sides = np.roll(places, -1, axis=1) - places
+        face_normals = unit(np.cross(sides[:, 0], sides[:, 1]))
+        lengths = np.sqrt(np.einsum("mki,mki->mk", sides, sides))
+        products = np.maximum(lengths * np.roll(lengths, 1, axis=1), 1e-300)
+        cosines = np.einsum("mki,mki->mk", sides, np.roll(sides, 1, axis=1)) / -products
+        angles = np.arccos(np.clip(cosines, -1.0, 1.0)).ravel()
+        thrice = np.repeat(face_normals, 3, axis=0)
+        edge_normals = sums_of(thrice, table.face_edges.ravel(), len(table.vertices))
+        vertex_normals = sums_of(angles[:, None] * thrice, faces.ravel(), len(vertices))
+
+        edge_regular, vertex_regular, mates = _regular(faces, table, edge_normals, len(vertices))
+        across = np.where(mates < 0, -1, mates // 3).reshape(-1, 3).astype(np.int32)
+        return cls(
+            corners,
+            triangle_rows(corners),
+            vertices,
+            faces.astype(np.int32),
+            table.face_edges.astype(np.int32),
+            face_normals,
+            edge_normals,
+            vertex_normals,
+            edge_regular,
+            vertex_regular,
+            across,
+            np.where(across < 0, -1, faces[across].sum(axis=2) - faces - np.roll(faces, -1, axis=1)).astype(np.int32),
+            starts,
+            around.astype(np.int32),
+            trusted,
+            ids,
+        )
+
+
+def _regular(
+    faces: NDArray[np.int64], table: EdgeTable, edge_normals: NDArray[np.float64], n_vertices: int
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.int64]]:
+    """Which edges and vertices are regular; and (3 m,) the other halfedge of each at a regular edge, else −1."""
+    edges = (table.face_counts == 2) & (table.balance == 0) & ((edge_normals**2).sum(axis=1) > FOLD**2)
+    mates = np.where(edges[table.face_edges].ravel(), table.mates, -1)
+    one = np.flatnonzero(mates >= 0)
+    following = np.roll(np.arange(len(mates)).reshape(-1, 3), -1, axis=1).ravel()
+    fans = connected_components(len(mates), one, following[mates[one]])  # both leave the same vertex
+    corners, fan = faces.ravel(), np.empty(n_vertices, dtype=np.int64)
+    fan[corners] = fans
+    vertices = np.ones(n_vertices, dtype=bool)
+    vertices[corners[fans != fan[corners]]] = False  # cones that touch are several
+    vertices[table.vertices[~edges]] = False
+    return edges, vertices, mates
+
+
+def _copies(faces: NDArray[np.int64], table: EdgeTable) -> NDArray[np.bool_]:
+    """Which faces are there before, with the same corners in the same order of rotation."""
+    copies = np.zeros(len(faces), dtype=bool)
+    crowded = np.flatnonzero((table.face_counts > 2)[table.face_edges].all(axis=1))
+    if len(crowded):
+        first, reverse = coincident_faces(faces[crowded].ravel(), np.arange(0, 3 * len(crowded) + 1, 3))
+        copies[crowded] = same_rows(np.column_stack([first, reverse])) != np.arange(len(crowded))
+    return copies

@@ -1,0 +1,236 @@
+"""Kernels: generalized winding numbers of points, through a tree of boxes (Barill et al. 2018).
+
+Faces near a point count by the solid angles that they are seen under, what is far by its moments.
+
+Around a centre p, with offsets e and area vectors a, 4π times the winding number at ``p − d`` is, by Taylor's theorem,
+``a·d / r³ + (tr M − 3 M(d) / r²) / r³ + (15 S(d) / r² − 3 tr S(d)) / 2 r⁵``, where ``M(d) = Σ (a·d) (e·d)`` and
+``S(d) = Σ (a·d) (e·d)²`` are polynomials, of which the symmetric part is all that counts (Barill et al. 2018).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+from ..mesh.box_tree import LEAF, BoxTree
+from ..parallel import in_chunks
+
+DEPTH = 1e-5
+"""Size of a face by which what is behind it lies behind it."""
+IN_PLANE = 1e-9
+"""Volume of the cone to a triangle, over the product of its sides there, up to which a point lies in its plane."""
+OPENING = 1.25
+"""Distance over radius from which on moments replace what is below a node."""
+
+
+@dataclass(frozen=True, eq=False)
+class WindingTree:
+    """Triangles in a tree, of which each node can replace its triangles for points far away.
+
+    Attributes
+    ----------
+    triangles : (m, 3, 3) float
+        Their corners, counterclockwise from outside.
+    tree : BoxTree
+        Over their boxes.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> faces = corners[np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])]
+    >>> tree = WindingTree.of(faces)
+    >>> tree.numbers(np.array([[0.2, 0.2, 0.2], [1, 1, 1]])).round(2).tolist()
+    [1.0, 0.0]
+    >>> tree.behind(np.arange(4), faces.mean(axis=1)).round(2).tolist()
+    [1.0, 1.0, 1.0, 1.0]
+    """
+
+    triangles: NDArray[np.float64]
+    tree: BoxTree
+
+    @classmethod
+    def of(cls, triangles: NDArray[np.float64]) -> WindingTree:
+        """A tree of its own over (m, 3, 3) triangles."""
+        return cls(triangles, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)))
+
+    def numbers(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) winding numbers around (n, 3) points, to some hundredths, in time O(n log m).
+
+        On a face it is that of one of its sides: take `behind`.
+        """
+        corners = np.ascontiguousarray(self.triangles).reshape(-1, 9)
+        points = np.ascontiguousarray(points)  # one kind of array, for which the kernel is compiled
+        (numbers,) = in_chunks(lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk),), points)
+        return numbers
+
+    def behind(self, faces: NDArray[np.integer], places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) winding numbers just behind places (n, 3) in faces (n,): 1 more than in front, where no other face lies.
+
+        They must not be on the rims of these, where other faces meet them.
+        """
+        corners = self.triangles[faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        areas = np.linalg.norm(normals, axis=1)
+        depth = DEPTH * np.sqrt(areas) / np.where(areas > 0, areas, 1.0)
+        return self.numbers(places - depth[:, None] * normals)
+
+    @cached_property
+    def _moments(self) -> NDArray[np.float64]:
+        return moments_of(self.triangles, self.tree, OPENING)
+
+
+@compiled
+def _winding(
+    corners: NDArray[np.float64], items: NDArray[np.int64], moments: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n,) winding numbers around points, down the tree (Barill et al. 2018).
+
+    Far from a node, the first three terms of the expansion about its centre replace its triangles: area vector, first
+    and second moments (see `moments_of` for the columns of `moments`). In leaves, solid angles are summed.
+    """
+    leaves = len(moments) // 2
+    stack = np.empty(64, dtype=np.int64)
+    result = np.zeros(len(points))
+    for p in range(len(points)):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        total, depth = 0.0, 1
+        stack[0] = 1
+        while depth > 0:
+            depth -= 1
+            node = stack[depth]
+            dx, dy, dz = moments[node, 3] - x, moments[node, 4] - y, moments[node, 5] - z
+            square = dx * dx + dy * dy + dz * dz
+            if square > moments[node, 6]:
+                m = moments[node]
+                xx, yy, zz = dx * dx, dy * dy, dz * dz
+                lean = xx * m[7] + yy * m[8] + zz * m[9] + dx * dy * m[10] + dx * dz * m[11] + dy * dz * m[12]
+                bend = dx * (xx * m[13] + yy * m[18] + zz * m[20]) + dy * (yy * m[14] + xx * m[16] + zz * m[21])
+                bend += dz * (zz * m[15] + xx * m[17] + yy * m[19]) + dx * dy * dz * m[22]
+                trace = dx * (3.0 * m[13] + m[18] + m[20]) + dy * (3.0 * m[14] + m[16] + m[21])
+                trace += dz * (3.0 * m[15] + m[17] + m[19])
+                flux = dx * m[0] + dy * m[1] + dz * m[2] + m[7] + m[8] + m[9]
+                flux += (7.5 * bend / square - 3.0 * lean - 1.5 * trace) / square
+                total += flux / (square * np.sqrt(square))
+            elif node < leaves:
+                stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
+                depth += 2
+            else:
+                real, imaginary = 1.0, 0.0
+                for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
+                    if items[k] >= 0:
+                        rest, volume = solid_angle(corners, items[k], x, y, z)
+                        if rest > abs(volume):  # less than an eighth of a turn each: their product has their sum
+                            share = volume / rest
+                            real, imaginary = real - imaginary * share, imaginary + real * share
+                        elif volume != 0.0:
+                            total += 2.0 * np.arctan2(volume, rest)
+                if imaginary != 0.0:
+                    total += 2.0 * np.arctan2(imaginary, real)
+        result[p] = total / (4.0 * np.pi)
+    return result
+
+
+@compiled
+def solid_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z: float) -> tuple[float, float]:
+    """Parts of a complex number whose argument is half the signed solid angle of a triangle from a point.
+
+    Positive from behind it (van Oosterom & Strackee 1983).
+    """
+    ax, ay, az = corners[face, 0] - x, corners[face, 1] - y, corners[face, 2] - z
+    bx, by, bz = corners[face, 3] - x, corners[face, 4] - y, corners[face, 5] - z
+    cx, cy, cz = corners[face, 6] - x, corners[face, 7] - y, corners[face, 8] - z
+    a = np.sqrt(ax * ax + ay * ay + az * az)
+    b = np.sqrt(bx * bx + by * by + bz * bz)
+    c = np.sqrt(cx * cx + cy * cy + cz * cz)
+    volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    rest = a * b * c + (ax * bx + ay * by + az * bz) * c
+    rest += (bx * cx + by * cy + bz * cz) * a + (cx * ax + cy * ay + cz * az) * b
+    return rest, volume
+
+
+@compiled
+def mean_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z: float) -> float:
+    """Signed solid angle of a triangle from a point; from a point in its plane the mean of both sides, 0."""
+    rest, volume = solid_angle(corners, face, x, y, z)
+    scale = 1.0
+    for c in range(0, 9, 3):
+        dx, dy, dz = corners[face, c] - x, corners[face, c + 1] - y, corners[face, c + 2] - z
+        scale *= np.sqrt(dx * dx + dy * dy + dz * dz)
+    return 0.0 if abs(volume) <= IN_PLANE * scale else 2.0 * np.arctan2(volume, rest)
+
+
+SQUARES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Terms of M: xx, yy, zz, xy, xz, yz."""
+CUBES = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 0, 1), (0, 0, 2), (0, 1, 1), (1, 1, 2), (0, 2, 2), (1, 2, 2), (0, 1, 2))
+"""Terms of S: xxx, yyy, zzz, xxy, xxz, xyy, yyz, xzz, yzz, xyz."""
+WIDTH = 7 + len(SQUARES) + len(CUBES)
+
+
+def moments_of(triangles: NDArray[np.float64], tree: BoxTree, opening: float) -> NDArray[np.float64]:
+    """(2 · leaves, 23) of what is below each node of a tree.
+
+    Area vector, centre, the square of `opening` times the radius around it, then the coefficients of M and S.
+    """
+    leaves = len(tree.bounds) // 2
+    grouped = tree.items.reshape(leaves, LEAF)
+    there = grouped >= 0
+    corners = np.where(there[..., None, None], triangles[grouped], 0.0)
+    corners = np.ascontiguousarray(corners.transpose(2, 3, 0, 1))  # corner, axis, leaf, place in it
+    middles = corners.mean(axis=0)
+    own = 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0], axis=0)
+    areas = np.linalg.norm(own, axis=0)
+    vectors, weights, firsts = own.sum(axis=2), areas.sum(axis=1), (areas * middles).sum(axis=2)
+    centres = _over(firsts, weights)
+    offsets = np.where(there, middles - centres[..., None], 0.0)
+    linear = _product(own, offsets)
+    quadratic = _product(linear, offsets)
+    for corner in corners:  # the second moment of a triangle about its own centre
+        arm = corner - middles
+        quadratic += _product(_product(own, arm), arm) / 12
+    first, second = linear.sum(axis=2), quadratic.sum(axis=2)
+    reaches = np.where(there, np.linalg.norm(corners - centres[..., None], axis=1), 0.0)
+    radii = reaches.max(axis=(0, 2))
+    moments = np.zeros((2 * leaves, WIDTH))
+    level = leaves
+    while True:
+        rows = slice(level, 2 * level)
+        low, high = tree.bounds[rows, :3].T, tree.bounds[rows, 3:].T
+        with np.errstate(invalid="ignore"):  # of nothing
+            box = np.linalg.norm(np.maximum(centres - low, high - centres), axis=0)
+        radii = np.where(weights > 0, np.minimum(radii, box), 0.0)
+        moments[rows, :3], moments[rows, 3:6], moments[rows, 6] = vectors.T, centres.T, (opening * radii) ** 2
+        moments[rows, 7:13], moments[rows, 13:] = first.T, second.T
+        if level == 1:
+            return moments
+        level //= 2
+        firsts, total = _of_pairs(firsts), _of_pairs(weights)
+        middle = _over(firsts, total)
+        moved = np.where(weights > 0, centres - np.repeat(middle, 2, axis=1), 0.0)
+        second = second + 2 * _product(first, moved) + _product(_product(vectors, moved), moved)
+        first = first + _product(vectors, moved)
+        radii = (radii + np.linalg.norm(moved, axis=0)).reshape(-1, 2).max(axis=1)
+        vectors, first, second = (_of_pairs(each) for each in (vectors, first, second))
+        centres, weights = middle, total
+
+
+def _product(form: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coefficients of a linear or quadratic form, (3, …) or (6, …), times a linear one."""
+    given, wanted = (((0,), (1,), (2,)), SQUARES) if len(form) == 3 else (SQUARES, CUBES)
+    result = np.zeros((len(wanted), *form.shape[1:]))
+    for term, axes in enumerate(given):
+        for axis in range(3):
+            result[wanted.index(tuple(sorted((*axes, axis))))] += form[term] * line[axis]
+    return result
+
+
+def _over(firsts: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    return firsts / np.where(weights > 0, weights, 1.0)
+
+
+def _of_pairs(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(…, n / 2) sums of the two nodes below each."""
+    return values[..., ::2] + values[..., 1::2]

@@ -1,0 +1,272 @@
+"""Complete a broken shape, once: what bounds it, and what closes it where it is open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..constraints import Constraint
+from ..diagnostics import Diagnostics, FacesRestored, Note, OrientedPoints
+from ..errors import SignedHeatError, SourceError
+from ..foreign import SurfaceShape
+from ..joining import joined_shape
+from ..kinds import ShapeLike
+from ..memory import refuse_beyond_memory
+from ..mesh.triangles import face_areas
+from ..mesh.unit_vectors import axes_across
+from ..progress import Progress, Stopwatch
+from ..search.face_tree import FaceTree
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import flag
+from .bounding import Bounding, Nesting, bounding
+from .chain import Chain
+from .closing import closed_by, small_lids
+from .fitted_points import mean_gap
+from .heat_surfaces import Heat, heat_surface
+from .mesh_orientation import oriented_as, owners_of
+from .point_orientation import orient_points
+from .rims import open_edges
+from .seams import seams, small_gaps
+from .solid import Solid
+from .union import Surface, united
+
+STEPS = 2
+"""Steps that are timed."""
+BYTES_PER_FACE = 1300
+"""Measured peak for each face of meshes of 330,000, closed or open; points take less."""
+BYTES_IF_LOOSE, BYTES_OF_HEAT = 3400, 150_000_000
+"""The same for loose triangles; and of the grid that they and points are completed on."""
+CELLS = 2.0
+"""Cells between neighbouring points of a cloud."""
+MATCH = (1e-6, 0.75)
+"""Distance of corners over the size of pieces between which they were one corner, before noise moved them."""
+SEAM = 0.75
+"""Cells from faces within which the zero set of φ is taken for those faces."""
+
+
+def complete(
+    shape: ShapeLike | Sequence[ShapeLike],
+    *,
+    completion: Literal["lids", "heat"] = "lids",
+    lids: Literal["bent", "flat"] = "bent",
+    as_oriented: bool = False,
+    keep_overlaps: bool = False,
+    nested: Nesting = "given",
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    progress: Progress | None = None,
+) -> Solid:
+    """The solid that a shape is, or is a broken picture of.
+
+    Faces are turned to agree and to face outwards. Parts that bound something are closed by lids: thin plates that go
+    on over their rims where the surface bends towards them, and are flat elsewhere. Points, and loose triangles that
+    scatter around a surface, are completed by the signed heat method. Bodies that overlap are united. Sheets bound
+    nothing: distance to them is positive on both sides. None of this depends on where distance is wanted, nor on
+    rotation, position and scale.
+
+    Parameters
+    ----------
+    shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh; or several meshes
+        Broken or not; points with normals or without. Objects of trimesh, PyVista, meshio and Open3D and pairs
+        (vertices, faces) are taken wherever a shape is. A `Solid` is returned as it is.
+    completion : {"lids", "heat"}
+        What closes meshes: lids, or the zero set of φ where no face is, as in the paper (Feng & Crane 2024).
+    lids : {"bent", "flat"}
+        Whether lids go on as the surface bends towards them, or are flat: for half models, ducts and hulls.
+    as_oriented : bool
+        Take faces and normals as they are, whichever way they face.
+    keep_overlaps : bool
+        Count what lies inside other bodies as surface.
+    nested : {"given", "cavities", "bodies"}
+        What closed pieces within others are: as they were given, to what they lie in; cavities, and bodies in these, as
+        slicers take them; or bodies all.
+    constraint, diffusion : Constraint, float
+        Of the signed heat method, where that completes.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``, ten times a second; what it raises cancels.
+
+    Returns
+    -------
+    Solid
+        Its ``diagnostics.notes`` say what was turned, left out and completed.
+
+    Raises
+    ------
+    SourceError
+        If no face has an area, or points have no normals and none are to be fitted.
+    MemoryLimitError
+        If it cannot fit in memory; nothing has been allocated then.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> ball = samples.without_patches(samples.sphere(3), 3, 0.4)
+    >>> solid = complete(ball)
+    >>> solid.distance([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]).round(1).tolist()
+    [-1.0, 1.0]
+    """
+    if isinstance(shape, Solid):
+        return shape
+    if completion not in ("lids", "heat"):
+        raise SignedHeatError(f'completion must be "lids" or "heat", not {completion!r}', element="completion")
+    if lids not in ("bent", "flat"):
+        raise SignedHeatError(f'lids must be "bent" or "flat", not {lids!r}', element="lids")
+    if nested not in ("given", "cavities", "bodies"):
+        raise SignedHeatError(f'nested must be "given", "cavities" or "bodies", not {nested!r}', element="nested")
+    as_oriented, keep_overlaps = flag(as_oriented, "as_oriented"), flag(keep_overlaps, "keep_overlaps")
+    joined = joined_shape(shape)
+    count = joined.n_points if isinstance(joined, PointCloud) else joined.triangulation.n_faces
+    refuse_beyond_memory(
+        f"completing a shape of {count} faces",
+        count,
+        lambda n: bytes_to_complete(joined, n),
+        lambda n: f"simplify it to {n} faces, or free memory",
+    )
+    method = Heat(constraint, diffusion)
+    stopwatch = Stopwatch(progress, STEPS)
+    if isinstance(joined, PointCloud):
+        with stopwatch("orient") as run:
+            cloud, notes = (joined, ()) if as_oriented else run(partial(oriented_points, joined))
+        with stopwatch("complete") as run:
+            solid = run(partial(_from_points, cloud, method))
+    else:
+        with stopwatch("orient") as run:
+            chain = run(lambda: Chain.of(joined.triangulation))
+            decided = bounding(chain, nested, as_oriented)
+            notes = () if as_oriented else (oriented_as(joined, chain, decided).note,)
+        with stopwatch("complete") as run:
+            solid = run(
+                partial(completed, joined.triangulation, chain, decided, completion, lids, keep_overlaps, method)
+            )
+            owners = owners_of(joined)
+            solid = replace(solid, origins=np.where(solid.origins >= 0, owners[solid.origins], -1))
+    source = joined if isinstance(joined, TriangleMesh) else None
+    diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
+    return replace(solid, source=source, diagnostics=diagnostics)
+
+
+def bytes_to_complete(shape: SurfaceShape, count: int) -> float:
+    """Peak memory of completing a shape that is like this one but has so many faces."""
+    if isinstance(shape, PointCloud):
+        return BYTES_OF_HEAT + BYTES_PER_FACE * count
+    mesh = shape.triangulation
+    if mesh.n_vertices == 3 * mesh.n_faces and mesh.n_faces > 1:
+        return BYTES_OF_HEAT + BYTES_IF_LOOSE * count
+    return BYTES_PER_FACE * count
+
+
+def oriented_points(cloud: PointCloud) -> tuple[PointCloud, tuple[Note, ...]]:
+    """Points whose normals point outwards, and what was done for it."""
+    points = orient_points(cloud)
+    return points.cloud, (OrientedPoints(points.n_fitted, points.n_turned),)
+
+
+def completed(
+    mesh: TriangleMesh,
+    chain: Chain,
+    decided: Bounding,
+    completion: Literal["lids", "heat"],
+    lids: Literal["bent", "flat"],
+    keep_overlaps: bool,
+    method: Heat,
+) -> Solid:
+    """The solid of a mesh of which it is decided what bounds; its origins are the triangles of the mesh."""
+    if not chain.areas.any():
+        raise SourceError("no face of the shape has an area", element="shape")
+    vertices = mesh.vertices
+    counts = np.abs(decided.counts)
+    faces = np.where((decided.counts < 0)[:, None], chain.faces[:, ::-1], chain.faces)
+    torn = np.where(counts > 0, 0, -1) if completion == "heat" else decided.torn
+    surfaces, notes = [], []
+    for group in np.unique(torn[torn >= 0]):
+        chosen = np.flatnonzero((torn == group) & (counts > 0))
+        surfaces += _torn(vertices, faces[chosen], chain.firsts[chosen], decided.pieces[chosen], method, completion)
+    bounds = np.repeat(np.arange(len(faces)), np.where(torn < 0, counts, 0))
+    if len(bounds):
+        lost = small_lids(vertices, faces[bounds])
+        whole = np.concatenate([faces[bounds], lost])
+        places, added = closed_by(vertices, whole, bent=lids == "bent")
+        surfaces.append(_made_from(places, whole, added, chain.firsts[bounds]))
+        if len(lost):
+            restored = float(face_areas(vertices[lost]).sum() / face_areas(vertices[faces[bounds]]).sum())
+            notes.append(FacesRestored(len(lost), restored / (1 + restored)))
+    idle = np.flatnonzero(counts == 0)
+    surfaces.append(Surface(vertices[chain.faces[idle]], chain.faces[idle], chain.firsts[idle], False))
+    return united(surfaces, keep_overlaps, notes)
+
+
+def _made_from(
+    places: NDArray[np.float64], faces: NDArray[np.int64], added: NDArray[np.int64], origins: NDArray[np.int64]
+) -> Surface:
+    """The cycle of faces, the first of which were given, and of what is added to them."""
+    whole = np.concatenate([faces, added])
+    return Surface(places[whole], whole, np.append(origins, np.full(len(whole) - len(origins), -1)), True)
+
+
+def _torn(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    origins: NDArray[np.int64],
+    pieces: NDArray[np.int64],
+    method: Heat,
+    completion: str,
+) -> list[Surface]:
+    """What is left of a body, and the zero set of φ where it is not; that alone where faces are noise around it."""
+    triangles = vertices[faces]
+    given = Surface(triangles, faces, origins, False)
+    scatter = scatter_of(triangles, pieces) if completion == "lids" else 0.0
+    names, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    made = heat_surface(TriangleMesh(names, corners.reshape(-1, 3)), method, scatter)
+    if made is None:
+        return [given]
+    if scatter:
+        return [Surface.made(made[0][made[1]])]
+    tree = FaceTree.of_triangles(triangles)
+    patches = made[0][made[1]]
+    cell = float(np.median(np.linalg.norm(patches[:, 1] - patches[:, 0], axis=1)))
+    away = tree.distances(patches.mean(axis=1)) > SEAM * cell
+    if not len(open_edges(faces, np.zeros(len(faces), dtype=np.int64))[0]):
+        return [replace(given, closing=True)]
+    places = np.concatenate([vertices, made[0]])
+    others = made[1][away] + len(vertices)
+    points, joins = seams(places, faces, others, cell)
+    places, whole = np.concatenate([places, points]), np.concatenate([faces, others, joins])
+    whole = np.concatenate([whole, small_gaps(places, whole)])
+    places, added = closed_by(places, whole)
+    return [_made_from(places, whole, added, origins)]
+
+
+def scatter_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> float:
+    """How far corners that were one have come apart, if pieces are noise around a surface; else 0.
+
+    They are if most of their corners lie near corners of others, but not on them.
+    """
+    points = triangles.reshape(-1, 3)
+    owners = np.repeat(labels, 3)
+    near, which = scipy.spatial.cKDTree(points).query(points, min(8, len(points)), workers=-1)
+    others = owners[which] != owners[:, None]
+    nearest = np.where(others, near, np.inf).min(axis=1)
+    sizes = np.repeat(np.sqrt(face_areas(triangles)), 3)
+    moved = (nearest > MATCH[0] * sizes) & (nearest < MATCH[1] * sizes)
+    return float(np.median(nearest[moved])) if moved.mean() > 0.5 else 0.0
+
+
+def _from_points(cloud: PointCloud, method: Heat) -> Solid:
+    """The solid that oriented points are samples of; where they bound nothing, each is a small triangle."""
+    if cloud.normals is None:
+        raise SourceError("the point cloud has no normals, which say what is inside", remedy="give it normals")
+    gap = mean_gap(np.asarray(cloud.points))
+    made = heat_surface(cloud, method, gap / CELLS)
+    if made is not None:
+        return united([Surface.made(made[0][made[1]])], True, points=cloud.points)
+    first, second = axes_across(cloud.normals)
+    turns = np.stack([np.cos(2 * np.pi * np.arange(3) / 3), np.sin(2 * np.pi * np.arange(3) / 3)], axis=1)
+    ways = turns[:, :1] * first[:, None] + turns[:, 1:] * second[:, None]
+    return united([Surface.made(cloud.points[:, None] + 0.25 * gap * ways, False)], True, points=cloud.points)

@@ -1,0 +1,214 @@
+"""Vertices of dual contouring: places in cells where the planes that touch a surface meet."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..grids.grid import Grid
+from ..grids.marching import CLEARANCE
+from ..mesh.components import sums_of
+from ..mesh.dual_cells import DualCells
+from ..mesh.edge_flips import MOST
+from ..mesh.edges import edge_table
+from ..mesh.self_intersections import self_intersections
+from ..mesh.triangles import area_vectors, divided_at
+from ..mesh.unit_vectors import unit
+from .offsets import Offset
+from .quadrics import Quadrics, minimizers
+
+MANY = 1 << 17
+"""Pieces of the level whose vertices are found together."""
+ASIDE = 0.05
+"""Cells off a crease at which its ends are looked for."""
+ON = 1e-3
+"""Cells off the level from which on a vertex is moved onto it."""
+BEYOND = 0.6
+"""Cells beyond its own up to which a vertex may go."""
+APART = 0.2
+"""Cells between vertices that have left their own."""
+BENT = np.deg2rad(5.0)
+"""Angle between two faces from which on the edge between them is looked at; where a corner is missing it is small."""
+CHORD = 0.02
+"""Cells off the level from which on an edge along a crease is divided."""
+DIVISIONS = 6
+"""Times that edges are divided; with three the largest distance of a bracket is .08 cells, with six .05."""
+NEAR = 4.0
+"""Cells between a new vertex and others of what its triangles may meet: vertices leave their cells by less than one."""
+BETWEEN = 0.1, 0.3, 0.6
+"""Shares of the way from the middle of an edge to the corner across at which planes are looked for."""
+AHEAD = 0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5
+"""Cells along a crease at which its ends are looked for."""
+
+
+def placed(offset: Offset, grid: Grid, cells: DualCells, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, v, 3) where the vertex of each piece of a level may be, in cells: at best; within its cell; at its middle.
+
+    At best it is on a crease or corner, even where the level goes beyond the cell without crossing its edges. The (e,
+    3) points are where the level crosses edges of the grid.
+    """
+    count = len(cells.owners)
+    vertices, middles, wider = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    rows, sides = np.nonzero(cells.edges >= 0)
+    pieces = cells.pieces[rows, sides]
+    order = np.argsort(pieces, kind="stable")
+    pieces, edges = pieces[order], cells.edges[rows, sides][order]
+    alone = np.bincount(cells.owners)[cells.owners] == 1
+    for begin in range(0, count, MANY):
+        stop = min(begin + MANY, count)
+        here = slice(*np.searchsorted(pieces, [begin, stop]))
+        parts = _vertices(
+            offset,
+            grid,
+            cells.places[cells.owners[begin:stop]],
+            alone[begin:stop],
+            pieces[here] - begin,
+            points[edges[here]],
+        )
+        for whole, part in zip((vertices, middles, wider), parts, strict=True):
+            whole[begin:stop] = (part - grid.origin) / grid.spacing
+    taken = _apart(cells, vertices, wider)
+    return np.stack([np.where(taken[:, None], wider, vertices), vertices, middles])
+
+
+def _apart(cells: DualCells, vertices: NDArray[np.float64], wider: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(v,) which vertices are taken from another list: of those near each other the one that moves the least."""
+    away = np.where(np.isnan(wider[:, 0]), np.inf, np.linalg.norm(wider - vertices, axis=1))
+    taken: NDArray[np.bool_] = (np.floor(wider) == cells.places[cells.owners]).all(axis=1)
+    rows = np.flatnonzero(np.isfinite(away) & ~taken)
+    if len(rows):
+        rows = rows[np.argsort(away[rows], kind="stable")]
+        settled = np.where(taken[:, None], wider, vertices)
+        near = scipy.spatial.cKDTree(settled).query_ball_point(wider[rows], APART, workers=-1)
+        rows = rows[[set(others) <= {row} for row, others in zip(rows, near, strict=True)]]
+        first, second = scipy.spatial.cKDTree(wider[rows]).query_pairs(APART, output_type="ndarray").T
+        taken[np.delete(rows, np.maximum(first, second))] = True
+    return taken
+
+
+def _vertices(
+    offset: Offset,
+    grid: Grid,
+    places: NDArray[np.int64],
+    alone: NDArray[np.bool_],
+    owners: NDArray[np.int64],
+    points: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Those of some pieces, of which each point where an edge is crossed has one; their middles; and others.
+
+    The others are corners and creases that lie up to `BEYOND` outside of the cell, or were not found within it; NaN
+    where there are none.
+    """
+    count = len(places)
+    step = float(grid.spacing.max())
+    corners = grid.origin + places * grid.spacing
+    room = CLEARANCE * grid.spacing
+    lower, upper = corners + room, corners + grid.spacing - room
+    middles = np.clip(sums_of(points, owners, count) / np.bincount(owners, minlength=count)[:, None], lower, upper)
+    lower, upper = lower - middles, upper - middles
+    on, normals = offset.planes(points)
+    quadrics = Quadrics.of(owners, on - middles[owners], normals, count)
+    found, ranks, along = minimizers(quadrics, lower, upper)
+    off = offset.distance(middles + found)
+    wider = np.full((count, 3), np.nan)
+    creased = np.flatnonzero((ranks > 1) & alone)
+    if len(creased):
+        # planes that pass through a cell with a crease without crossing its edges there
+        low, high = lower[creased] - BEYOND * grid.spacing, upper[creased] + BEYOND * grid.spacing
+        probes = found[creased][:, None] + _probes(along[creased], quadrics.sides[creased], grid.spacing)
+        on, normals = offset.planes((middles[creased][:, None] + probes).reshape(-1, 3))
+        which = np.repeat(np.arange(len(creased)), probes.shape[1])
+        on -= middles[creased][which]
+        within = ((on > low[which]) & (on < high[which])).all(axis=1)
+        more = Quadrics.of(which[within], on[within], normals[within], len(creased))
+        farther, higher, _ = minimizers(quadrics[creased] + more, low, high)
+        error = np.abs(offset.distance(middles[creased] + farther))
+        wanted = (error < ON * step) & ((higher > ranks[creased]) | (higher == 3) | (np.abs(off[creased]) > ON * step))
+        wider[creased[wanted]] = middles[creased[wanted]] + farther[wanted]
+    for _ in range(2):
+        off, gradients = offset.slopes(middles + found)
+        onto = np.clip(found - off[:, None] * gradients, lower, upper)
+        found = np.where((np.abs(off) > ON * step)[:, None], onto, found)
+    return middles + found, middles, wider
+
+
+def _probes(
+    along: NDArray[np.float64], across: NDArray[np.float64], spacing: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n, p, 3) moves from vertices on creases to places near which there may be other planes.
+
+    These are all around, and ahead and back along the crease, somewhat to both of its sides: beyond the end of a crease
+    the nearest place on the surface is on what ends it.
+    """
+    around = np.broadcast_to(0.5 * spacing * (2 * np.array(list(np.ndindex(2, 2, 2))) - 1), (len(along), 8, 3))
+    length = np.linalg.norm(across, axis=1)[:, None]
+    aside = ASIDE * spacing * across / np.where(length > 0, length, 1.0)
+    ahead = [way * share * spacing * along + sign * aside for share in AHEAD for way in (-1, 1) for sign in (-1, 1)]
+    return np.concatenate([around, np.stack(ahead, axis=1)], axis=1)
+
+
+def divided_along_creases(
+    offset: Offset, spacing: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """A surface whose edges are divided where it bends and they are off the level, with vertices on the level.
+
+    A crease may pass through a cell none of whose edges the level crosses: there is no vertex in it. No edge is divided
+    where that makes triangles pass through each other.
+    """
+    for _ in range(DIVISIONS if len(faces) <= MOST else 0):
+        edges, points = _creases_off(offset, spacing, vertices, faces)
+        while len(edges):
+            found, made = _divided(vertices, faces, edges, points)
+            away, _ = scipy.spatial.cKDTree(points).query(found, distance_upper_bound=NEAR * float(spacing.max()))
+            near = made[np.isfinite(away)[made].any(axis=1)]  # all else is as it was
+            meeting = near[self_intersections(found, near)]
+            if not len(meeting):
+                break
+            wrong = np.unique(meeting[meeting >= len(vertices)]) - len(vertices)
+            kept = np.delete(np.arange(len(edges)), wrong if len(wrong) else slice(None))
+            edges, points = edges[kept], points[kept]
+        if not len(edges):
+            break
+        vertices, faces = found, made
+    return vertices, faces
+
+
+def _creases_off(
+    offset: Offset, spacing: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """(k, 2) halfedges of bent edges off the level, no two of a face, and (k, 3) places on it for their middles.
+
+    The places are on creases, or else the nearest ones.
+    """
+    step = float(spacing.max())
+    normals, edges = unit(area_vectors(vertices[faces])), edge_table(faces).pairs
+    edges = edges[normals[edges // 3].prod(axis=1).sum(axis=1) < np.cos(BENT)]
+    tails, heads = faces.ravel()[edges[:, 0]], faces.ravel()[edges[:, 1]]
+    middles = 0.5 * (vertices[tails] + vertices[heads])
+    off = np.abs(offset.distance(middles))
+    rows = np.flatnonzero(off > CHORD * step)
+    rows = rows[np.argsort(-off[rows], kind="stable")]
+    edges, middles = edges[rows], middles[rows]
+    across = vertices[faces[edges // 3, (edges + 2) % 3]]
+    probes = [middles + share * (across[:, side] - middles) for share in BETWEEN for side in range(2)]
+    on, directions = offset.planes(np.concatenate(probes))
+    owners = np.tile(np.arange(len(edges)), len(probes))
+    room = np.broadcast_to(BEYOND * spacing, middles.shape)
+    moves, _, _ = minimizers(Quadrics.of(owners, on - middles[owners], directions, len(edges)), -room, room)
+    off, gradients = offset.slopes(middles)
+    points, nearest = middles + moves, middles - off[:, None] * gradients
+    points = np.where((np.abs(offset.distance(points)) < ON * step)[:, None], points, nearest)
+    first = np.full(len(faces), len(edges))
+    np.minimum.at(first, edges // 3, np.arange(len(edges))[:, None])
+    alone = (first[edges // 3] == np.arange(len(edges))[:, None]).all(axis=1)
+    return edges[alone], points[alone]
+
+
+def _divided(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: NDArray[np.int64], points: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """With a point on each of some edges, (k, 2) halfedges, and the faces on both of their sides divided."""
+    rows, corners = edges.ravel() // 3, edges.ravel() % 3
+    new = np.repeat(len(vertices) + np.arange(len(edges)), 2)
+    return np.concatenate([vertices, points]), divided_at(faces, rows, corners, new)

@@ -1,0 +1,257 @@
+"""The boundary of a solid as one closed mesh of the faces that were given and of what completes them.
+
+Where they do not join, the surface is contoured: within boxes around these places it is a contour, elsewhere the faces,
+and between them walls of the boxes where only one of them has the inside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import GeometryError
+from ..mesh.arrangement import arranged, meeting_faces
+from ..mesh.components import element_components, sums_of
+from ..mesh.edges import edge_table
+from ..mesh.manifold import split_at_pinches
+from ..mesh.self_intersections import self_intersections
+from ..mesh.triangles import part_volumes
+from ..mesh.welding import coincident_faces, indexed
+from ..search.face_tree import FaceTree
+from ..surfaces.triangle_mesh import TriangleMesh
+from .regions import Regions, widest
+from .tiles import Evaluated
+from .winding import Windings
+
+OFF = 0.5
+"""Cells between contour and faces from which on faces are missing; edges of contours are cut off by less."""
+SHIFT = np.array([0.37, 0.41, 0.43])
+"""Of the walls of boxes, in cells, so that they lie in no face along the axes."""
+ATTEMPTS = 6
+"""Times that boxes are put around what does not join, and around triangles that pass through each other; each time with
+other walls."""
+SQUARES = np.array([[[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [1, 1, 1], [1, 0, 1]]])
+"""Corners of the sides of a cell across the first axis, counter-clockwise as seen from outside."""
+
+
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """Triangles that meet in whole edges, and where they do not close or pass through each other.
+
+    Attributes
+    ----------
+    points, faces : (n, 3) float, (m, 3) int
+        The triangles.
+    bad : (k, 2) int
+        Ends of edges that faces do not run along as often one way as the other, and of those of faces that meet.
+    open : bool
+        Whether there are any of the former.
+    """
+
+    points: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    bad: NDArray[np.int64]
+    open: bool
+
+    @classmethod
+    def of(cls, points: NDArray[np.float64], faces: NDArray[np.int64]) -> Joined:
+        """Look at triangles."""
+        table = edge_table(faces)
+        gaps = table.vertices[table.balance != 0]
+        meeting = faces[np.unique(self_intersections(points, faces))]
+        return cls(points, faces, np.concatenate([gaps, meeting[:, :2], meeting[:, 1:]]), bool(len(gaps)))
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """They alone; where bodies touch along an edge or at a vertex, each has its own."""
+        used, faces = np.unique(self.faces, return_inverse=True)
+        return TriangleMesh(*split_at_pinches(self.points[used], faces.reshape(-1, 3)))
+
+
+def given_surface(
+    solid: Evaluated, contour: Callable[[], TriangleMesh], cell: float
+) -> tuple[TriangleMesh, NDArray[np.float64]]:
+    """Triangles of a solid with the inside on one side, turned to have it behind them, joined into a closed mesh.
+
+    Those that join already stay as they are, in their order. Where triangles do not join, the surface of `contour`,
+    with cells of this size, takes their place; the middles of such places, (k, 3), are returned, too.
+
+    Raises
+    ------
+    GeometryError
+        If there are no such triangles, or they do not join with the contour either.
+    """
+    windings = solid.windings
+    turned, _ = outward(solid)
+    if not len(turned):
+        raise GeometryError(
+            "nothing of the shape bounds a solid", remedy="thicken it, or take the surface at a distance above zero"
+        )
+    whole = Joined.of(*indexed(turned))
+    if len(whole.bad):
+        whole = _conforming(whole, windings)
+    if not len(whole.bad):
+        return whole.mesh, np.zeros((0, 3))
+    best: tuple[Joined, Boxes | None] | None = None if whole.open else (whole, None)
+    surface = contour()
+    bad = [_far(surface, whole.points[whole.faces], OFF * cell)]
+    found: Joined = whole
+    for attempt in range(ATTEMPTS):
+        bad.append(_along(found.points[found.bad], 0.5 * cell))
+        boxes = Boxes.around(np.concatenate(bad), cell, (attempt + 1) * SHIFT % 1)
+        found = _exchanged(whole, windings, surface, boxes)
+        if not found.open and (best is None or len(found.bad) < len(best[0].bad)):
+            best = found, boxes
+        if not len(found.bad):
+            break
+    if best is None:
+        place = found.points[found.bad[0]].mean(axis=0)
+        raise GeometryError(
+            f"faces and completion do not join, first at ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g})",
+            remedy="leave out keep_faces: the sharp surface is closed",
+            element="surface",
+        )
+    found, places = best
+    return (found.mesh, np.zeros((0, 3))) if places is None else (_without_crumbs(found.mesh, places), places.middles)
+
+
+def _conforming(whole: Joined, windings: Windings) -> Joined:
+    """Triangles divided where they end on each other or cross, without those that are inside then or there twice."""
+    points, faces = whole.points, whole.faces
+    pieces = arranged(points, faces)
+    regions = Regions.of(pieces, windings)
+    faces = pieces.faces[regions.behind & ~regions.ahead & ~regions.doubled]
+    return Joined.of(pieces.points, _without_doubles(faces))
+
+
+def _without_doubles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Faces without pairs on the same vertices that face opposite ways."""
+    first, reverse = coincident_faces(faces.ravel(), np.arange(0, faces.size + 1, 3))
+    forth, back = (np.bincount(first[reverse == way], minlength=len(faces)) for way in (False, True))
+    return faces[~((forth == 1) & (back == 1))[first]]
+
+
+def outward(solid: Evaluated) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """(k, 3, 3) triangles with the inside on one side, turned to have it behind them, and which ones these are."""
+    behind, ahead = solid.windings.sides(solid.triangles)
+    chosen = np.flatnonzero(behind != ahead)
+    turned = np.where(ahead[chosen, None, None], solid.triangles[chosen, ::-1], solid.triangles[chosen])
+    return turned, chosen
+
+
+def unjoined(places: NDArray[np.float64]) -> str:
+    """Where a contour was taken, for messages."""
+    x, y, z = places[0]
+    around = "one place" if len(places) == 1 else f"{len(places)} places, the first"
+    return f"around {around} at ({x:.4g}, {y:.4g}, {z:.4g}), where they do not join: contoured there"
+
+
+def _along(edges: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """(n, 3) points on edges, (m, 2, 3), as far apart as that at most."""
+    pieces = np.maximum(np.ceil(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1) / step), 1).astype(np.int64)
+    row = np.repeat(np.arange(len(edges)), pieces + 1)
+    share = (np.arange(len(row)) - np.repeat(np.cumsum(pieces + 1) - pieces - 1, pieces + 1)) / pieces[row]
+    points: NDArray[np.float64] = edges[row, 0] + share[:, None] * (edges[row, 1] - edges[row, 0])
+    return points
+
+
+def _far(surface: TriangleMesh, triangles: NDArray[np.float64], distance: float) -> NDArray[np.float64]:
+    """(n, 3) vertices and centres of a surface that are that far from all triangles."""
+    points = np.concatenate([surface.vertices, surface.vertices[surface.faces].mean(axis=1)])
+    tree = FaceTree.of_triangles(triangles)
+    return points[tree.distances(points) > distance]
+
+
+def _exchanged(whole: Joined, windings: Windings, surface: TriangleMesh, boxes: Boxes) -> Joined:
+    """Triangles outside of boxes, those of a surface within, and walls of the boxes where one of them is inside."""
+    contour = surface.vertices[surface.faces]
+    points, faces = indexed(np.concatenate([whole.points[whole.faces], contour, boxes.walls]))
+    sets = np.repeat(np.arange(3), [len(whole.faces), len(contour), len(boxes.walls)])
+    pairs = meeting_faces(points, faces)
+    pieces = arranged(points, faces, pairs[sets[pairs[:, 0]] != sets[pairs[:, 1]]])
+    centres = widest(pieces)
+    within, kind = boxes.have(centres), sets[pieces.origins]
+    walls = np.flatnonzero(kind == 2)
+    here, there = Windings(contour).inside(centres[walls]), windings.inside(centres[walls])
+    chosen = [(kind == 0) & ~within, (kind == 1) & within, walls[here & ~there]]
+    backwards = pieces.faces[walls[there & ~here]][:, ::-1]
+    return Joined.of(
+        pieces.points, _without_doubles(np.concatenate([*(pieces.faces[each] for each in chosen), backwards]))
+    )
+
+
+def _without_crumbs(mesh: TriangleMesh, boxes: Boxes) -> TriangleMesh:
+    """A mesh without bodies and cavities smaller than a cell that lie in boxes or next to them."""
+    parts, volumes = part_volumes(mesh.vertices, mesh.faces)
+    small = np.abs(volumes) < boxes.cell**3
+    beyond = ~boxes.grown.have(mesh.vertices)[mesh.faces].all(axis=1)
+    crumbs = small & (np.bincount(parts, beyond) == 0)
+    used, faces = np.unique(mesh.faces[~crumbs[parts]], return_inverse=True)
+    return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """Cells of a grid.
+
+    Attributes
+    ----------
+    places : (n, 3) int
+        Which.
+    cell : float
+        Their size.
+    shift : (3,) float
+        In cells, of the grid against the origin.
+    """
+
+    places: NDArray[np.int64]
+    cell: float
+    shift: NDArray[np.float64]
+
+    @classmethod
+    def around(cls, points: NDArray[np.float64], cell: float, shift: NDArray[np.float64]) -> Boxes:
+        """The cells that points are in, and all that touch them."""
+        return cls(np.unique(np.floor(points / cell - shift).astype(np.int64), axis=0), cell, shift).grown
+
+    @cached_property
+    def grown(self) -> Boxes:
+        """With all that touch them."""
+        near = self.places[:, None] + np.array(list(np.ndindex(3, 3, 3))) - 1
+        return Boxes(np.unique(near.reshape(-1, 3), axis=0), self.cell, self.shift)
+
+    def have(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(m,) which of (m, 3) points are in them."""
+        return _among(np.floor(points / self.cell - self.shift).astype(np.int64), self.places)
+
+    @cached_property
+    def walls(self) -> NDArray[np.float64]:
+        """(k, 3, 3) triangles of their sides towards other cells, which face outwards."""
+        found = []
+        for axis in range(3):
+            for side in range(2):
+                step = np.zeros(3, dtype=np.int64)
+                step[axis] = 2 * side - 1
+                outer = self.places[~_among(self.places + step, self.places)]
+                found.append(outer[:, None] + np.roll(SQUARES[side], axis, axis=1))
+        quads = np.concatenate(found)
+        return self.cell * (np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) + self.shift)
+
+    @property
+    def middles(self) -> NDArray[np.float64]:
+        """(k, 3) of their connected parts."""
+        corners = (self.places[:, None] + np.array(list(np.ndindex(2, 2, 2)))).reshape(-1, 3)
+        _, ids = np.unique(corners, axis=0, return_inverse=True)
+        parts = element_components(ids.reshape(-1, 8))
+        counts = np.bincount(parts)
+        return self.cell * (sums_of(self.places + 0.5, parts, len(counts)) / counts[:, None] + self.shift)
+
+
+def _among(places: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(n,) which of (n, 3) cells are among others."""
+    both = np.concatenate([others, places])
+    keys = np.ravel_multi_index(tuple((both - both.min(axis=0)).T), tuple(np.ptp(both, axis=0) + 1))
+    return np.isin(keys[len(others) :], keys[: len(others)])

@@ -1,0 +1,220 @@
+"""Orientation of meshes: faces agree with their neighbours, and what bounds faces outwards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..diagnostics import ShapeOriented
+from ..errors import GeometryError
+from ..foreign import ForeignShape, converted
+from ..frozen import Frozen
+from ..reprs import ShortRepr
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.triangle_mesh import TriangleMesh
+from .bounding import Bounding, Nesting, bounding
+from .chain import Chain
+
+Mesh = TriangleMesh | PolygonMesh
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Orientation(Frozen, ShortRepr):
+    """How a mesh was oriented, and what was found on the way.
+
+    Attributes
+    ----------
+    shape : TriangleMesh or PolygonMesh
+        The oriented mesh, on the same vertices.
+    faces : (k,) int
+        Which faces of the mesh that was given are still there, in order.
+    turned : (k,) bool
+        Which of them were turned.
+    parts : (k,) int
+        Piece of each, that hangs together across edges of two faces or closes as it was given; −1 for faces on fewer
+        than three places, and inner walls.
+    undecided : (k,) bool
+        Faces of sheets, which bound nothing: they agree with their neighbours.
+    inner : (k,) bool
+        Walls between closed cells (see `inner_walls`), which bound nothing: left as they are.
+    n_parts, closed_parts : int
+        Pieces, and those that close.
+    turned_parts, turned_faces, turned_area : int, int, float
+        Pieces given facing inwards; faces turned, and their share of the area.
+    inconsistent_edges : int
+        Edges across which two faces disagreed.
+    nonmanifold_edges : int
+        Edges of three or more faces, across which orientation is not carried on.
+    nonorientable_parts : int
+        Pieces whose faces cannot agree, such as Möbius bands: left as they are.
+    undecided_parts, undecided_area : int, float
+        Pieces that bound nothing, and their share of the area.
+    merged_faces : int
+        Duplicates left out.
+    nested_bodies, cavities : int
+        Pieces within others: those that are bodies as well, and those that are walls of cavities.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> found = orientation(samples.with_flipped_faces(samples.sphere(2), 0.1))
+    >>> found.turned_faces, found.inconsistent_edges, found.n_parts
+    (33, 89, 1)
+    """
+
+    shape: Mesh
+    faces: NDArray[np.int64]
+    turned: NDArray[np.bool_]
+    parts: NDArray[np.int64]
+    undecided: NDArray[np.bool_]
+    inner: NDArray[np.bool_]
+    n_parts: int
+    closed_parts: int
+    turned_parts: int
+    turned_faces: int
+    turned_area: float
+    inconsistent_edges: int
+    nonmanifold_edges: int
+    nonorientable_parts: int
+    undecided_parts: int
+    undecided_area: float
+    merged_faces: int
+    nested_bodies: int
+    cavities: int
+
+    @property
+    def summary(self) -> dict[str, int | float]:
+        """The counts and shares by name."""
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return {name: value for name, value in values.items() if isinstance(value, (int, float))}
+
+    @property
+    def note(self) -> ShapeOriented:
+        """The note about it in diagnostics."""
+        return ShapeOriented(**{entry.name: getattr(self, entry.name) for entry in fields(ShapeOriented)})
+
+
+def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Orientation:
+    """Orient a mesh, and say what was turned, merged and left.
+
+    Vertices at one place, to roundoff, count as one, and so do faces on the same corners. What closes as it was given
+    stays as it is, or turns as a whole to face outwards. Elsewhere faces are made to agree across edges of two, walls
+    between closed cells are left out (`inner_walls`), and Gauss's formula decides which way the pieces so found face
+    and which of them bound nothing (`signedheat.solids.bounding`).
+
+    Takes O(n log n) time.
+
+    Parameters
+    ----------
+    shape : TriangleMesh or PolygonMesh
+        Any mesh, however broken.
+    nested : {"given", "cavities", "bodies"}
+        What closed pieces within others are: as they were given, to what they lie in; cavities, and bodies in these; or
+        bodies all.
+
+    Raises
+    ------
+    GeometryError
+        If the shape is no mesh.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> outer, cavity = samples.sphere(3), samples.sphere(3, radius=0.5)
+    >>> inside_out = TriangleMesh(cavity.vertices, cavity.faces[:, ::-1])
+    >>> found = orientation(samples.union(outer, inside_out))
+    >>> found.turned_parts, found.cavities, found.nested_bodies
+    (0, 1, 0)
+    >>> orientation(samples.union(outer, cavity)).nested_bodies
+    1
+    """
+    shape = converted(shape)
+    if not isinstance(shape, TriangleMesh | PolygonMesh):
+        kind = type(shape).__name__
+        raise GeometryError(
+            f"faces are oriented here, and a {kind} has none",
+            remedy="pass a TriangleMesh or PolygonMesh",
+        )
+    chain = Chain.of(shape.triangulation)
+    return oriented_as(shape, chain, bounding(chain, nested))
+
+
+def oriented_as(shape: Mesh, chain: Chain, decided: Bounding) -> Orientation:
+    """What a decision about the chain of a mesh makes of the mesh."""
+    owners = owners_of(shape)
+    n = int(owners.max()) + 1
+    there = chain.numbers >= 0
+
+    def given(values: NDArray[Any], without: float) -> NDArray[Any]:
+        """(m,) values of the chain at the triangles that were given."""
+        return np.append(values, np.array(without, dtype=values.dtype))[chain.numbers]
+
+    areas, as_given, inside = given(chain.areas, 0), given(decided.as_given, 0), given(decided.inner, 0)
+
+    def most(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(n,) faces of which most of the area is in a mask of triangles."""
+        return np.bincount(owners, np.where(mask, areas, -areas), n) > 0
+
+    first = np.full(n, -1)
+    first[owners[::-1]] = np.arange(len(owners))[::-1]
+    turned, whole = most(decided.to_turn(chain)), most(as_given)
+    # of copies one that need not turn stays; all do of what is whole as it was given
+    group = np.where(there[first] & ~whole, chain.numbers[first], len(chain.faces) + np.arange(n))
+    order = np.lexsort((turned, group))
+    kept = np.sort(order[np.append(True, np.diff(group[order]) != 0)])
+    pieces = np.where(inside, -1, given(decided.pieces, -1))[first][kept]
+    sheet = most(there & (given(decided.counts, 0) == 0) & ~as_given)[kept]
+    turned, inner = turned[kept], most(inside)[kept]
+    sheet &= ~inner & (pieces >= 0)
+    weights = np.bincount(owners, areas, n)[kept]
+    total = max(float(weights.sum()), np.finfo(float).tiny)
+    names, labels = np.unique(pieces[pieces >= 0], return_inverse=True)
+    own, mass = pieces >= 0, weights[pieces >= 0]
+    inwards = np.bincount(labels, np.where(turned[own], mass, -mass), len(names)) > 0
+    closing = np.zeros(len(decided.orientable), dtype=bool)
+    closing[decided.pieces] = decided.closed
+    idle = np.bincount(labels, sheet[own], len(names)) > 0
+    return Orientation(
+        shape=_turned_mesh(shape, kept, turned),
+        faces=kept,
+        turned=turned,
+        parts=pieces,
+        undecided=sheet,
+        inner=inner,
+        n_parts=len(names),
+        closed_parts=int(closing[names].sum()),
+        turned_parts=int((inwards & ~idle).sum()),
+        turned_faces=int(turned.sum()),
+        turned_area=float(weights[turned].sum()) / total,
+        inconsistent_edges=decided.disagreeing,
+        nonmanifold_edges=int((chain.edges.face_counts > 2).sum()),
+        nonorientable_parts=int((~decided.orientable[names]).sum()),
+        undecided_parts=int(idle.sum()),
+        undecided_area=float(weights[sheet].sum()) / total,
+        merged_faces=n - len(kept),
+        nested_bodies=decided.bodies,
+        cavities=decided.cavities,
+    )
+
+
+def owners_of(shape: Mesh) -> NDArray[np.int64]:
+    """(m,) face that each triangle of a mesh is part of."""
+    return shape.refinement.face_polygons if isinstance(shape, PolygonMesh) else np.arange(shape.n_faces)
+
+
+def _turned_mesh(shape: Mesh, kept: NDArray[np.int64], flipped: NDArray[np.bool_]) -> Mesh:
+    """Some faces of a mesh, some of them turned; the mesh itself where nothing changes."""
+    if not flipped.any() and len(kept) == (shape.n_faces if isinstance(shape, TriangleMesh) else shape.n_polygons):
+        return shape
+    if isinstance(shape, TriangleMesh):
+        faces = shape.faces[kept] if len(kept) < shape.n_faces else shape.faces.copy()
+        faces[flipped] = faces[flipped][:, ::-1]
+        return TriangleMesh(shape.vertices, faces)
+    polygons = shape.polygons
+    return PolygonMesh(
+        shape.vertices,
+        [polygons[k][::-1] if turn else polygons[k] for k, turn in zip(kept.tolist(), flipped.tolist(), strict=True)],
+    )

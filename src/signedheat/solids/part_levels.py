@@ -1,0 +1,76 @@
+"""Levels of triangles: means over both sides of the winding number of all triangles of their group.
+
+The winding number jumps by one across a face. The mean of both sides is ½ on a closed surface that faces outwards, −½
+on one that faces inwards, and 0 on a flat sheet; between, it says how much of a body a group is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+from ..search.winding_tree import WindingTree, mean_angle
+
+FEW = 256
+"""Triangles up to which those of a group are summed one by one."""
+
+
+def levels_within(
+    triangles: NDArray[np.float64], groups: NDArray[np.int64], counts: NDArray[np.int64], faces: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """(n,) levels at the centres of some triangles, each in its own group.
+
+    Triangles, (m, 3, 3), are there as often as `counts` says, (m,), reversed if that is negative.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> tet = corners[np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])]
+    >>> levels_within(tet, np.zeros(4, dtype=int), np.ones(4, dtype=int), np.arange(2)).round(6).tolist()
+    [0.5, 0.5]
+    """
+    _, labels = np.unique(groups, return_inverse=True)
+    order = np.argsort(labels, kind="stable")
+    sizes = np.bincount(labels)
+    starts = np.concatenate([[0], np.cumsum(sizes)])
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    corners = np.ascontiguousarray(triangles[order]).reshape(-1, 9)
+    levels = _among_few(corners, starts, counts[order], rank[faces], labels[faces])
+    for group in np.unique(labels[faces][sizes[labels[faces]] > FEW]):
+        chosen = np.flatnonzero(labels[faces] == group)
+        members = order[starts[group] : starts[group + 1]]
+        there = np.repeat(members, np.abs(counts[members]))
+        directed = np.where((counts[there] < 0)[:, None, None], triangles[there, ::-1], triangles[there])
+        tree, some = WindingTree.of(directed), triangles[faces[chosen]]
+        normals = np.cross(some[:, 1] - some[:, 0], some[:, 2] - some[:, 0])
+        lengths = np.linalg.norm(normals, axis=1)
+        step = 1e-5 * normals / np.sqrt(np.where(lengths > 0, lengths, 1.0))[:, None]
+        centres = some.mean(axis=1)
+        levels[chosen] = 0.5 * (tree.numbers(centres - step) + tree.numbers(centres + step))
+    return levels
+
+
+@compiled
+def _among_few(
+    corners: NDArray[np.float64],
+    starts: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    faces: NDArray[np.int64],
+    groups: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    levels = np.zeros(len(faces))
+    for row in range(len(faces)):
+        i, group = faces[row], groups[row]
+        if starts[group + 1] - starts[group] > FEW:
+            continue
+        x = (corners[i, 0] + corners[i, 3] + corners[i, 6]) / 3
+        y = (corners[i, 1] + corners[i, 4] + corners[i, 7]) / 3
+        z = (corners[i, 2] + corners[i, 5] + corners[i, 8]) / 3
+        total = 0.0
+        for j in range(starts[group], starts[group + 1]):
+            if j != i:
+                total += counts[j] * mean_angle(corners, j, x, y, z)
+        levels[row] = total / (4.0 * np.pi)
+    return levels

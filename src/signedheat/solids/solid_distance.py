@@ -1,0 +1,81 @@
+"""Signed distance to shapes in space: complete them, and measure to what was given and to its completion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from numpy.typing import ArrayLike
+
+from ..area_elements import bounds_around
+from ..constraints import Constraint
+from ..errors import UnsupportedTypeError
+from ..grids.grid import Grid
+from ..grids.grid_field import GridField
+from ..joining import joined_shape
+from ..kinds import Shapes
+from ..progress import Progress, within
+from ..sharpening import sharpen
+from ..solver import SignedHeatSolver, checked
+from ..surfaces.point_cloud import PointCloud
+from ..tets.tet_field import TetField
+from ..tets.tet_mesh import TetMesh
+from ..validation import positive_number
+from .bounding import Nesting
+from .completion import complete
+
+
+def distance_to_shapes(
+    shape: Shapes,
+    domain: Grid | TetMesh | None = None,
+    *,
+    resolution: int = 128,
+    spacing: ArrayLike | None = None,
+    padding: float | None = None,
+    band: float | None = None,
+    completion: Literal["lids", "heat"] = "lids",
+    lids: Literal["bent", "flat"] = "bent",
+    nested: Nesting = "given",
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    as_oriented: bool = False,
+    keep_overlaps: bool = False,
+    progress: Progress | None = None,
+) -> GridField | TetField:
+    """Signed distance to shapes in space: see `signed_distance`, which calls this.
+
+    On tets, distance is along paths around walls, with the signs of φ.
+    """
+    joined = joined_shape(shape)
+    if domain is None:
+        domain = Grid.around(bounds_around([joined]), resolution, padding, spacing)
+    if not isinstance(domain, Grid | TetMesh):
+        kind = type(domain).__name__
+        raise UnsupportedTypeError(
+            f"distance to a shape in space is measured on a Grid or a TetMesh, not on a {kind}", element="domain"
+        )
+    in_space = isinstance(domain, Grid) and domain.dimension == 3
+    if band is not None and not in_space:
+        raise UnsupportedTypeError(
+            "a band is computed around solids, on a grid in space without walls", remedy="leave out the band"
+        )
+    diffusion, constraint = positive_number(diffusion, "diffusion"), checked(constraint)
+    solid = complete(
+        joined,
+        completion=completion,
+        lids=lids,
+        nested=nested,
+        as_oriented=as_oriented,
+        keep_overlaps=keep_overlaps,
+        constraint=constraint,
+        diffusion=diffusion,
+        progress=within(progress, 0.0, 0.5),
+    )
+    then = within(progress, 0.5, 1.0)
+    if isinstance(domain, Grid) and in_space:
+        return solid.field(grid=domain, band=band, progress=then)
+    source = joined if isinstance(joined, PointCloud) else solid.boundary
+    phi: GridField | TetField = SignedHeatSolver(domain, diffusion, then).distance(source, constraint)  # type: ignore[assignment]
+    if isinstance(phi, TetField):
+        phi = sharpen(phi, solid.boundary)
+    return replace(phi, diagnostics=phi.diagnostics.noting(*solid.diagnostics.notes))

@@ -1,0 +1,238 @@
+"""Distance to solids at the nodes of grids: tile by tile, each of which is computed alone."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal, Protocol, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..diagnostics import Diagnostics
+from ..errors import MemoryLimitError, OutsideError, UnsupportedTypeError
+from ..grids.blocks import NODES, SIDE, Blocks
+from ..grids.grid import Grid
+from ..grids.grid_discretization import refuse_large_grid
+from ..grids.grid_field import GridField
+from ..grids.solid_queries import SolidQueries
+from ..memory import available_memory, libraries
+from ..parallel import n_threads
+from ..progress import Progress
+from ..search.face_tree import FaceTree
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import positive_number
+from .node_distances import distances_in, solved
+from .stores import Scheduler, blocks_held, in_store
+from .winding import Windings
+
+EDGE = 8
+"""Blocks along each edge of the tiles of dense grids: small, lest threads wait for the last."""
+BYTES_PER_NODE = 12.0
+"""Of a value and a confidence."""
+BYTES_AT_WORK = 40e6
+"""Of the tiles that are computed at a time, measured; and of what is compiled."""
+BYTES_IN_BAND = 6.5
+"""Of a node of a band: a value, a confidence, and its share of the tables of blocks."""
+COARSE = 65
+"""Nodes along the longest side of the coarse grid of a band at most."""
+Result = TypeVar("Result")
+
+
+class Evaluated(SolidQueries, Protocol):
+    """A `Solid`, as those see it that it calls."""
+
+    @property
+    def origins(self) -> NDArray[np.int64]:
+        """(m,) face of the source that each triangle is part of; −1 for the completion."""
+
+    @property
+    def bounding(self) -> NDArray[np.bool_]:
+        """(m,) triangles that have the inside behind them only."""
+
+    @property
+    def source(self) -> TriangleMesh | None:
+        """The shape that was given."""
+
+    @property
+    def tree(self) -> FaceTree:
+        """Of its triangles."""
+
+    @property
+    def windings(self) -> Windings:
+        """Decides what is inside."""
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        """Notes."""
+
+
+def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> GridField[Literal[3]]:
+    """Signed distance to a solid at all nodes of a grid.
+
+    Raises
+    ------
+    MemoryLimitError
+        If it cannot fit in memory; nothing has been allocated then.
+    """
+    refuse_walls(grid)
+    refuse_large_grid(grid, BYTES_PER_NODE, BYTES_AT_WORK)
+    values, confidence = np.empty(grid.shape), np.empty(grid.shape, dtype=np.float32)
+    n_blocks = -(-np.array(grid.shape) // SIDE)
+    firsts = np.stack(np.meshgrid(*(np.arange(0, n, EDGE) for n in n_blocks), indexing="ij"), axis=-1).reshape(-1, 3)
+    tree, windings = prepared(solid)
+
+    def tile(first: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+        stop = np.minimum(first + EDGE, n_blocks)
+        axes = (np.arange(*ends) for ends in zip(first, stop, strict=True))
+        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        return distances_in(tree, windings, grid, SIDE * first, places)
+
+    for done, (first, (distances, trusted)) in enumerate(zip(firsts, in_threads(tile, firsts), strict=True)):
+        here = tuple(slice(f, f + n) for f, n in zip(SIDE * first, distances.shape, strict=True))
+        values[here], confidence[here] = distances, trusted
+        if progress is not None:
+            progress((done + 1) / len(firsts), "distance")
+    return cast("GridField[Literal[3]]", GridField(grid, values, solid.diagnostics, confidence, solid=solid))
+
+
+def band_field(
+    solid: Evaluated,
+    grid: Grid,
+    width: float,
+    store: str | PathLike[str] | None,
+    scheduler: Scheduler,
+    progress: Progress | None,
+) -> GridField[Literal[3]]:
+    """Signed distance to a solid at the nodes in blocks near its surface; and on a coarse grid everywhere.
+
+    Raises
+    ------
+    MemoryLimitError
+        If it cannot fit in memory, or into the store; nothing has been allocated then.
+    """
+    refuse_walls(grid)
+    width = positive_number(width, "band")
+    tree, windings = prepared(solid)
+    coarse = dense_field(solid, coarser(grid, 1 << max(0, math.ceil(math.log2(max(grid.shape) / COARSE)))), None)
+    reach = width + float(np.linalg.norm(grid.spacing))  # so that cells around the ends of the band are whole
+    limit = blocks_that_fit(store)
+    places = blocks_near(tree, grid, reach, limit)
+    if places is None:
+        factor = 2
+        while blocks_near(tree, coarser(grid, factor), reach, limit) is None:
+            factor *= 2
+        raise MemoryLimitError(
+            f"the band has more than {limit:,} blocks of {NODES} nodes, {limit * NODES * BYTES_IN_BAND / 1e9:.2g} GB, "
+            "for which there is room",
+            remedy=f"use a spacing of {factor * float(grid.spacing.min()):.3g} or more, or a narrower band"
+            + ("" if store is not None else ", or keep it on disk (store)"),
+        )
+    blocks = Blocks.of(places, grid.shape)
+    if not len(blocks):
+        raise OutsideError("no node of the grid is as near to the surface as the band is wide", element="grid")
+    tiles, diagnostics = tiles_of(blocks), solid.diagnostics
+    if store is None:
+        values: NDArray[Any] = np.empty((len(blocks), SIDE, SIDE, SIDE), dtype=np.float32)
+        confidence: NDArray[Any] = np.empty(values.shape, dtype=np.float16)
+
+        def solve(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+            values[rows], confidence[rows] = solved(tree, windings, grid, blocks.places[rows].astype(np.int64))
+            return rows
+
+        for done, _ in enumerate(in_threads(solve, tiles)):
+            if progress is not None:
+                progress((done + 1) / len(tiles), "band")
+    else:
+        values, confidence, note = in_store(Path(store), tree, windings, grid, blocks, tiles, scheduler, progress)
+        diagnostics = diagnostics.noting(note)
+    field = GridField(grid, values, diagnostics, confidence, solid=solid, blocks=blocks, coarse=coarse, width=width)
+    return cast("GridField[Literal[3]]", field)
+
+
+def tiles_of(blocks: Blocks) -> list[NDArray[np.int64]]:
+    """Rows of the blocks of each tile."""
+    tiles = blocks.places.astype(np.int64) // EDGE
+    _, owners = np.unique(tiles, axis=0, return_inverse=True)
+    order = np.argsort(owners.ravel(), kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(owners.ravel()[order])) + 1)
+
+
+def coarser(grid: Grid, factor: int) -> Grid:
+    """A grid with fewer nodes, that many times as far apart."""
+    return Grid(grid.origin, factor * grid.spacing, [max(2, 1 - (-(n - 1) // factor)) for n in grid.shape])
+
+
+def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> NDArray[np.int64] | None:
+    """(n, 3) places of the blocks that may have a node within reach of a face; None if there are more than a limit."""
+    diagonal = float(np.linalg.norm(grid.spacing))
+    found = blocks_where(grid, lambda centres, half: tree.distances(centres) <= reach + half * diagonal, limit)
+    return found if len(found) <= limit else None
+
+
+def blocks_where(
+    grid: Grid, near: Callable[[NDArray[np.float64], float], NDArray[np.bool_]], limit: float = math.inf
+) -> NDArray[np.int64]:
+    """(n, 3) places of blocks, found from coarse to fine; no further once there are more than a limit.
+
+    `near` says of cubes of nodes, by their centres and half the nodes along their edges, which may be wanted.
+    """
+    n_blocks = -(-np.array(grid.shape) // SIDE)
+    side = 1 << max(0, int(np.ceil(np.log2(n_blocks.max()))))
+    places, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))
+    while True:
+        half = 0.5 * (side * SIDE - 1)
+        places = places[near(grid.origin + (places * side * SIDE + half) * grid.spacing, half)]
+        if side == 1 or not 0 < len(places) <= limit:
+            return places
+        side //= 2
+        places = (2 * places[:, None] + halves).reshape(-1, 3)
+        places = places[(places * side < n_blocks).all(axis=1)]
+
+
+def blocks_that_fit(store: str | PathLike[str] | None) -> int:
+    """How many blocks fit in memory, or on the disk of a store with those that it holds already."""
+    if store is not None:
+        folder = Path(store).absolute()
+        there = next(place for place in (folder, *folder.parents) if place.exists())
+        return max(blocks_held(folder), int(shutil.disk_usage(there).free / (NODES * BYTES_IN_BAND)))
+    available = available_memory()
+    left = math.inf if available is None else available - libraries() - BYTES_AT_WORK
+    return int(min(max(left, 0) / (NODES * BYTES_IN_BAND), 2**40))
+
+
+def refuse_walls(grid: Grid) -> None:
+    """Raise if a grid is not one in space."""
+    if grid.dimension != 3:
+        raise UnsupportedTypeError(
+            "distance to a solid is measured on grids in space", remedy="give it three axes", element="grid"
+        )
+
+
+def prepared(solid: Evaluated) -> tuple[FaceTree, Windings]:
+    """What tiles need of a solid, made before threads would make it twice."""
+    tree, windings = solid.tree, solid.windings
+    _ = tree.discs
+    windings.inside(np.zeros((1, 3)))
+    return tree, windings
+
+
+def in_threads(solve: Callable[[NDArray[np.int64]], Result], places: Iterable[NDArray[np.int64]]) -> Iterator[Result]:
+    """Results, in order, few of which are held at a time."""
+    with ThreadPoolExecutor(n_threads()) as pool:
+        jobs: deque[Future[Result]] = deque()
+        try:
+            for place in places:
+                jobs.append(pool.submit(solve, place))
+                if len(jobs) > 2 * n_threads():
+                    yield jobs.popleft().result()
+            while jobs:
+                yield jobs.popleft().result()
+        finally:
+            for job in jobs:
+                job.cancel()

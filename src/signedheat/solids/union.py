@@ -1,0 +1,185 @@
+"""Unite what closes a solid: faces cut where they cross, and those left out that lie inside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..diagnostics import BoundsNothing, CompletedArea, Diagnostics, LeftOut, Note
+from ..mesh.arrangement import Arrangement, arranged, meeting_faces
+from ..mesh.triangles import face_areas
+from ..mesh.welding import same_positions
+from .regions import Regions
+from .solid import Solid
+from .winding import Windings
+
+TRUST = 0.05
+"""Distance from what was given, over its diagonal, at which confidence in the completion has fallen to a half."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles of one kind.
+
+    Attributes
+    ----------
+    triangles : (m, 3, 3) float
+        Corners.
+    ids : (m, 3) int
+        Vertices, one number for each position.
+    origins : (m,) int
+        Face that was given, or −1.
+    closing : bool
+        Whether they count in the winding number.
+    """
+
+    triangles: NDArray[np.float64]
+    ids: NDArray[np.int64]
+    origins: NDArray[np.int64]
+    closing: bool
+
+    @classmethod
+    def made(cls, triangles: NDArray[np.float64], closing: bool = True) -> Surface:
+        """Triangles that were not given; their vertices have negative numbers."""
+        ids = -1 - same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)
+        return cls(triangles, ids, np.full(len(triangles), -1), closing)
+
+    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64], closing: bool) -> Surface:
+        """Some of its triangles."""
+        return Surface(self.triangles[chosen], self.ids[chosen], self.origins[chosen], closing)
+
+
+def united(
+    surfaces: list[Surface],
+    keep_overlaps: bool,
+    notes: Sequence[Note] = (),
+    points: NDArray[np.float64] | None = None,
+    copies: int = 0,
+) -> Solid:
+    """The solid that surfaces close: without what lies inside, where bodies overlap, and without idle completion."""
+    whole = joined_surfaces(surfaces)
+    closing = np.concatenate([np.full(len(each.triangles), each.closing) for each in surfaces])
+    windings = Windings(whole.triangles[closing])
+    pieces = _cut(whole, closing)
+    regions = Regions.of(pieces, windings)
+    triangles, behind, ahead = pieces.points[pieces.faces], regions.behind, regions.ahead
+    origins = whole.origins[pieces.origins]
+    given = origins >= 0
+    buried = behind & ahead
+    bounds = (behind != ahead) & ~regions.doubled
+    kept = np.where(given, (~buried & ~regions.doubled) | keep_overlaps, bounds | ~closing[pieces.origins])
+    if not kept.any():
+        kept[:] = True
+    confidence = _confidence(triangles[kept], given[kept], whole, points)
+    diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds, copies)))
+    bounding = (behind & ~ahead)[kept]
+    return Solid(triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics)
+
+
+def _cut(whole: Surface, closing: NDArray[np.bool_]) -> Arrangement:
+    """Faces divided where they meet: those that close by each other, all others by these."""
+    ids = whole.ids
+    first = np.full(int(ids.max()) + 1, -1)
+    first[ids.ravel()[::-1]] = np.arange(ids.size)[::-1]
+    points = whole.triangles.reshape(-1, 3)[first]
+    faces = same_positions(points)[ids]
+    pairs = meeting_faces(points, faces)
+    both = closing[pairs].all(axis=1)
+    closed = np.flatnonzero(closing)
+    number = np.cumsum(closing) - 1
+    pieces = _arranged(points, faces, closed, number[pairs[both]])
+    if closing.all():
+        return pieces
+    across = pairs[closing[pairs].any(axis=1) & ~both]
+    asked = ~closing
+    asked[across] = True
+    used = np.flatnonzero(asked)
+    number = np.full(len(faces), -1)
+    number[used] = np.arange(len(used))
+    others = _arranged(points, faces, used, number[across])
+    sheets = ~closing[others.origins]
+    return Arrangement(
+        np.concatenate([pieces.points, others.points]),
+        np.concatenate([pieces.faces, others.faces[sheets] + len(pieces.points)]),
+        np.concatenate([pieces.origins, others.origins[sheets]]),
+        np.concatenate([pieces.cells, others.cells[sheets] + 1 + int(pieces.cells.max(initial=-1))]),
+    )
+
+
+def _arranged(
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    chosen: NDArray[np.int64],
+    pairs: NDArray[np.int64],
+) -> Arrangement:
+    """Some faces, divided where pairs of them meet."""
+    if not len(pairs):
+        return Arrangement(points, faces[chosen], chosen, np.arange(len(chosen)))
+    pieces = arranged(points, faces[chosen], pairs)
+    return pieces._replace(origins=chosen[pieces.origins])
+
+
+def _notes(
+    triangles: NDArray[np.float64],
+    origins: NDArray[np.int64],
+    kept: NDArray[np.bool_],
+    buried: NDArray[np.bool_],
+    bounds: NDArray[np.bool_],
+    copies: int,
+) -> list[Note]:
+    notes: list[Note] = []
+    areas, given = face_areas(triangles), origins >= 0
+    total = max(float(areas[given].sum()), np.finfo(float).tiny)
+    covered = buried & given
+    if covered.any() or copies:
+        faces, others = np.unique(origins[covered]), np.unique(origins[given & kept])
+        cut = int(np.isin(faces, others).sum())
+        notes.append(LeftOut(len(faces), float(areas[covered].sum()) / total, cut, copies))
+    made = kept & ~given
+    if made.any():
+        area, corners = float(areas[made].sum()), triangles[made].reshape(-1, 3)
+        box = np.stack([corners.min(axis=0), corners.max(axis=0)])
+        notes.append(CompletedArea(area, area / float(areas[kept].sum()), [box.tolist()]))
+    idle = given & kept & ~bounds
+    if float(areas[idle].sum()) > 1e-6 * total:
+        notes.append(BoundsNothing(float(areas[idle].sum()) / total))
+    return notes
+
+
+def _confidence(
+    triangles: NDArray[np.float64], given: NDArray[np.bool_], whole: Surface, points: NDArray[np.float64] | None
+) -> NDArray[np.float32]:
+    """(m,) 1 where surface was given; where it was completed less, the farther from what was given."""
+    confidence = np.ones(len(triangles), dtype=np.float32)
+    if points is None:
+        points = whole.triangles[whole.origins >= 0].reshape(-1, 3)
+    if given.all():
+        return confidence
+    if not len(points):
+        confidence[~given] = 0.5
+        return confidence
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    away = scipy.spatial.cKDTree(points).query(triangles[~given].mean(axis=1), workers=-1)[0]
+    trust = TRUST * diagonal / np.maximum(TRUST * diagonal + away, np.finfo(float).tiny)
+    confidence[~given] = np.minimum(trust, np.nextafter(np.float32(1), np.float32(0)))
+    return confidence
+
+
+def joined_surfaces(surfaces: list[Surface]) -> Surface:
+    """Several surfaces as one; numbers of vertices that are new, which are negative, stay apart."""
+    ids, lowest = [], 0
+    for each in surfaces:
+        own = np.where(each.ids < 0, each.ids + lowest, each.ids)
+        lowest = min(lowest, int(own.min(initial=0)))
+        ids.append(own)
+    joined = np.concatenate(ids)
+    return Surface(
+        np.concatenate([each.triangles for each in surfaces]),
+        np.unique(joined, return_inverse=True)[1].reshape(joined.shape),
+        np.concatenate([each.origins for each in surfaces]),
+        True,
+    )

@@ -1,0 +1,305 @@
+"""Transfer of sources from a mesh to an intrinsic triangulation of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SourceError
+from ..frozen import Frozen
+from ..geodesics.exact_distance import cleared
+from ..geodesics.geodesic_sources import zero_line
+from ..mesh.components import grouped, members_of
+from ..mesh.conforming_refinement import cut_along
+from ..mesh.curve_segments import CurveSegments
+from ..mesh.edges import EdgeTable
+from ..mesh.intrinsic_mesh import FLATTEST, IntrinsicMesh
+from ..mesh.segment_chains import assemble_polylines
+from ..mesh.surface_points import (
+    SNAP,
+    LocatedPoints,
+    barycentric_in,
+    concatenated,
+    contain,
+    edges_between,
+    locate_points,
+    unique_points,
+)
+from .intrinsic_history import History, misplaced_lines, straight_lines
+
+
+@dataclass(frozen=True, eq=False)
+class ConformingRefinement(Frozen):
+    """Triangles cut so that some curves run along edges.
+
+    Attributes
+    ----------
+    triangles : IntrinsicMesh
+        After the cuts; old vertices first.
+    marked : (e,) bool
+        Edges along which the curves run.
+    parents : (m,) int
+        The face, before the cuts, that each face is part of.
+    corners : (m, 3, 3) float
+        Barycentric coordinates of the corners of each face in its parent.
+    """
+
+    triangles: IntrinsicMesh
+    marked: NDArray[np.bool_]
+    parents: NDArray[np.int64]
+    corners: NDArray[np.float64]
+
+    @classmethod
+    def of(
+        cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments], heights: NDArray[np.float64]
+    ) -> ConformingRefinement:
+        """Cut faces along all segments inside them, and put vertices at all points of the sources.
+
+        Faces are put in the order of the heights (n,) of the vertices, so that no later choice hangs on the order that
+        they were given in.
+        """
+        finer, parents, corners = triangles, np.arange(triangles.n_faces), np.eye(3)[None]
+        marked = np.zeros(finer.n_edges, dtype=bool)
+        if parts:
+            begin = heights[triangles.corner_vertices].argmin(axis=1)
+            finer, merged, is_new, parents = cut_along(triangles, parts, begin=begin)
+            corners, new = np.where(is_new[:, None, None], 0.0, np.eye(3)), np.flatnonzero(is_new)
+            corners[new] = barycentric_of(triangles, parents[new], finer.corner_positions[new])
+            marked = np.zeros(finer.n_edges, dtype=bool)
+            marked[merged.edges[merged.edges >= 0]] = True
+        at_corners = np.einsum("mkl,ml->mk", corners, heights[triangles.corner_vertices[parents]])
+        finer, edges, faces, turns = in_order(finer, at_corners)
+        corners = np.take_along_axis(np.broadcast_to(corners, (len(faces), 3, 3))[faces], turns[:, :, None], axis=1)
+        return cls(finer, marked[edges], parents[faces], corners)
+
+    def push_forward(
+        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Points, and vectors (p, k, 3) at them, of the faces before the cuts, in the faces after."""
+        which, child = members_of(*grouped(self.parents, int(self.parents.max()) + 1), faces)
+        to_child = np.linalg.inv(self.corners[child])
+        weights = np.einsum("pk,pkl->pl", barycentric[which], to_child)
+        best = np.lexsort([-weights.min(axis=1), which])[np.searchsorted(which, np.arange(len(faces)))]
+        return child[best], weights[best], np.einsum("pvk,pkl->pvl", vectors, to_child[best])
+
+    def pull_back(
+        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Points of the faces after the cuts, in the faces before."""
+        return self.parents[faces], np.einsum("pk,pkl->pl", barycentric, self.corners[faces])
+
+
+def in_order(
+    triangles: IntrinsicMesh, heights: NDArray[np.float64]
+) -> tuple[IntrinsicMesh, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles with faces, their corners and edges in the order of the heights (m, 3) of the corners.
+
+    Returns
+    -------
+    triangles : IntrinsicMesh
+        With the same vertices; each face begins at its lowest corner.
+    edges, faces : (e,) int, (m,) int
+        The number that each had.
+    turns : (m, 3) int
+        The corner that each was.
+    """
+    faces = np.argsort(heights.sum(axis=1), kind="stable")
+    turns = (heights[faces].argmin(axis=1)[:, None] + np.arange(3)) % 3
+    old = triangles.edges
+    rows = faces[:, None]
+    sides, forward = old.face_edges[rows, turns], old.forward[rows, turns]
+    first = np.unique(sides, return_index=True)[1]
+    first.sort()
+    edges, ahead = sides.ravel()[first], forward.ravel()[first]
+    number = np.empty(triangles.n_edges, dtype=np.int64)
+    number[edges] = np.arange(len(edges))
+    vertices = np.where(ahead[:, None], old.vertices[edges], old.vertices[edges][:, ::-1])
+    table = EdgeTable(vertices, number[sides], forward == ahead[number[sides]])
+    corners, positions = triangles.corner_vertices[rows, turns], triangles.corner_positions[rows, turns]
+    return IntrinsicMesh(corners, positions, table, triangles.n_vertices), edges, faces, turns
+
+
+def barycentric_of(
+    triangles: IntrinsicMesh, faces: NDArray[np.int64], points: NDArray[np.complex128]
+) -> NDArray[np.float64]:
+    """(n, k, 3) barycentric coordinates of points in face layouts, k to each face."""
+    return np.stack([np.ones_like(points.real), *(np.zeros_like(points.real),) * 2], axis=-1) + differences_of(
+        triangles, faces, points - triangles.corner_positions[faces, :1]
+    )
+
+
+def differences_of(
+    triangles: IntrinsicMesh, faces: NDArray[np.int64], vectors: NDArray[np.complex128]
+) -> NDArray[np.float64]:
+    """(n, k, 3) vectors in face layouts as differences of barycentric coordinates, k to each face."""
+    q = triangles.corner_positions[faces]
+    u, v = (q[:, 1] - q[:, 0])[:, None], (q[:, 2] - q[:, 0])[:, None]
+    area = (np.conj(u) * v).imag
+    flat = np.flatnonzero(area[:, 0] <= FLATTEST * (np.abs(u) ** 2 + np.abs(v) ** 2)[:, 0])
+    area[flat] = 1.0
+    second, third = (np.conj(vectors) * v).imag / area, (np.conj(u) * vectors).imag / area
+    if len(flat):  # the shortest of the solutions that come nearest
+        sides = np.stack([u[flat], v[flat]], axis=-1)
+        sides = np.stack([sides.real, sides.imag], axis=-2)
+        parts = np.stack([vectors[flat].real, vectors[flat].imag], axis=-1)
+        second[flat], third[flat] = np.moveaxis(np.einsum("fkij,fkj->fki", np.linalg.pinv(sides, 1e-7), parts), -1, 0)
+    return np.stack([-second - third, second, third], axis=-1)
+
+
+def transfer_segments(
+    source: CurveSegments, refinement: ConformingRefinement, history: History, before: IntrinsicMesh
+) -> CurveSegments:
+    """Transfer a source from the triangles `before` the refinement to the triangles at the end of the history."""
+    after = history.after
+    none = np.zeros((len(source.nodes), 0, 3))
+    spots = history.forward(*_snapped(*refinement.push_forward(source.nodes.faces, source.nodes.barycentric, none)))
+    nodes = locate_points(after, spots[0], spots[1])
+    if len(source.ends) == 0:
+        return CurveSegments(nodes, source.ends, source.faces, source.edges, source.vectors, source.oriented)
+
+    faces, at_start, at_end, directions = in_faces(before, source)
+    along = at_end - at_start
+    growth = differences_of(before, faces, directions[:, None])[:, 0]
+    at_piece = (along * before.corner_positions[faces]).sum(axis=1)
+    vectors = np.stack([along, growth], axis=1)
+    middle = history.forward(*_snapped(*refinement.push_forward(faces, 0.5 * (at_start + at_end), vectors)))
+    lines = straight_lines(history.gluing_after, *middle)
+    lost = misplaced_lines(after, lines, np.abs(at_piece))
+    if len(lost):
+        raise SourceError(
+            f"segment {lost[0]} of the curves crosses triangles as thin as rounding, which turn it",
+            remedy="merge the vertices that nearly coincide, or compute with intrinsic=False",
+            element=f"segment {lost[0]}",
+        )
+    owners, faces, carried = lines.owners, lines.faces, lines.vectors
+    starts, ends = locate_points(after, faces, lines.starts), locate_points(after, faces, lines.ends)
+    located = concatenated([nodes, ends, starts])
+    joined = _joined(after, located, faces, owners, source.ends)
+    who = unique_points(located)[1]
+    keep = who[joined[:, 0]] != who[joined[:, 1]]
+    owners, faces, carried, joined = owners[keep], faces[keep], carried[keep], joined[keep]
+    starts, ends = starts[keep], ends[keep]
+
+    # the angle between segment and normal is known; the transferred normal only gives the side, however thin the faces
+    corners = after.corner_positions[faces]
+    steps = ((ends.barycentric - starts.barycentric) * corners).sum(axis=1)
+    carried = np.conj(steps) * (carried[:, 1] * corners).sum(axis=1)
+    turn = (directions / (at_piece * np.abs(directions / at_piece)))[owners]
+    grown = steps * np.where(carried.imag * turn.imag < 0, np.conj(turn), turn)
+    begin, finish = (barycentric_in(after, faces, located[end]) for end in joined.T)
+    edges, side = edges_between(after, faces, begin, finish)
+    used = np.union1d(np.arange(len(nodes)), joined)
+    place = np.searchsorted(used, joined)
+    chosen, who = unique_points(located[used])
+    return CurveSegments(
+        located[used][chosen],
+        who[place],
+        faces,
+        edges,
+        np.where(edges >= 0, after.in_edge_frames(grown, faces, side), grown),
+        source.oriented,
+    )
+
+
+def _joined(
+    triangles: IntrinsicMesh,
+    points: LocatedPoints,
+    faces: NDArray[np.int64],
+    owners: NDArray[np.int64],
+    nodes: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """(r, 2) the points that pieces of segments run between: each from where the last one ended, or from a node.
+
+    Shapes: `faces`, `owners` (r,), `nodes` (s, 2).
+    """
+    n = len(points) - 2 * len(faces)
+    last = np.append(np.diff(owners) > 0, True)
+    first = np.append(True, last[:-1])
+    ends = np.where(last, nodes[owners, 1], n + np.arange(len(owners)))
+    starts = np.where(first, nodes[owners, 0], np.roll(ends, 1))
+    joined = np.stack([starts, ends], axis=1)
+    for k, own in enumerate((n + len(faces), n)):  # where rounding has put a node beyond the face: their own ends
+        beyond = np.flatnonzero(~contain(triangles, faces, points[joined[:, k]]))
+        joined[beyond, k] = own + beyond
+    return joined
+
+
+def in_faces(
+    triangles: IntrinsicMesh, source: CurveSegments
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128]]:
+    """Face, start, end (barycentric) and normal in the layout of the face of every segment, along edges or not.
+
+    For a segment along an edge it is the face of the edge with the largest area.
+    """
+    faces = source.faces.copy()
+    on_edge = np.flatnonzero(source.edges >= 0)
+    flat, used = triangles.edges.face_edges.ravel(), np.zeros(triangles.n_edges, dtype=bool)
+    used[source.edges[on_edge]] = True
+    chosen = np.flatnonzero(used[flat])
+    order = chosen[np.lexsort([triangles.face_areas[chosen // 3], flat[chosen]])]
+    fattest = np.empty(triangles.n_edges, dtype=np.int64)
+    fattest[flat[order]] = order
+    halfedge = fattest[source.edges[on_edge]]
+    faces[on_edge] = halfedge // 3
+    directions = source.vectors.copy()
+    seen = directions[on_edge]
+    reflected = triangles.reflected.ravel()[halfedge]
+    directions[on_edge] = triangles.edge_directions.ravel()[halfedge] * np.where(reflected, np.conj(seen), seen)
+    starts = barycentric_in(triangles, faces, source.nodes[source.ends[:, 0]])
+    return faces, starts, barycentric_in(triangles, faces, source.nodes[source.ends[:, 1]]), directions
+
+
+def _snapped(
+    faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Points within rounding error of an edge moved onto it, and vectors within rounding error of its direction too."""
+    near = barycentric < SNAP
+    weights = np.where(near, 0.0, barycentric)
+    weights /= weights.sum(axis=1, keepdims=True)
+    size = np.abs(vectors[:, :1]).max(axis=2, keepdims=True) if vectors.shape[1] else 0.0
+    flat = np.zeros(vectors.shape, dtype=bool)
+    flat[:, :1] = near[:, None] & (np.abs(vectors[:, :1]) < SNAP * size)
+    return faces, weights, np.where(flat, 0.0, vectors)
+
+
+LEAST = 1e-12
+"""Values that are smaller, relative to the largest, count as zero."""
+
+
+def level_lines(
+    history: History, refinement: ConformingRefinement, values: NDArray[np.float64]
+) -> list[tuple[NDArray[np.int64], NDArray[np.float64], bool]]:
+    """The zero set of a function that is linear on the triangles after a history, on those before the refinement.
+
+    Every segment is straight on an intrinsic triangle, and is traced across the faces of the mesh below. The triangles
+    must be consistently oriented.
+
+    Returns
+    -------
+    list of (faces, barycentric, closed)
+        Points of one polyline each, in order, with larger values to its left.
+    """
+    least = LEAST * max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-300)
+    line = zero_line(history.after, cleared(history.after, values, least))
+    if not len(line.faces):
+        return []
+    spots = barycentric_of(history.after, line.faces, line.positions)
+    lines = straight_lines(
+        history.gluing_before, *history.backward(line.faces, spots.mean(axis=1), np.diff(spots, axis=1))
+    )
+    faces, starts = refinement.pull_back(lines.faces, lines.starts)
+    ends = refinement.pull_back(lines.faces, lines.ends)[1]
+    first = np.searchsorted(lines.owners, np.arange(len(line.faces) + 1))
+    found = []
+    for order, _, closed in assemble_polylines(*line.ends.T):
+        rows = np.concatenate([np.arange(first[k], first[k + 1]) for k in order])
+        if closed:
+            found.append((faces[rows], starts[rows], True))
+        elif len(rows):
+            found.append(
+                (np.append(faces[rows], faces[rows[-1]]), np.concatenate([starts[rows], ends[rows[-1:]]]), False)
+            )
+    return found

@@ -1,0 +1,551 @@
+"""Intrinsic triangulations of a mesh: the same surface with better triangles (Sec. 9.4, Fig. 22).
+
+Edges are geodesics along the surface instead of segments in space, so that triangles can be chosen for their angles
+alone, without changing the surface. Edge flips give the intrinsic Delaunay triangulation (Bobenko & Springborn 2007),
+whose Laplacian has a maximum principle; inserted vertices give a minimum angle (Sharp, Soliman & Crane 2019).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
+from numbers import Real
+from typing import TYPE_CHECKING, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import GeometryError, SourceError
+from ..exchange import Displayed
+from ..foreign import ForeignShape, converted
+from ..frozen import Frozen
+from ..mesh.curve_segments import CurveSegments, without_straight_nodes
+from ..mesh.delaunay import flip_all, glue, lay_out
+from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.triangles import gradients_along
+from ..progress import Progress, Stopwatch
+from ..validation import finite_rows, flag, frozen
+from .intrinsic_history import History
+from .intrinsic_refinement import refine_all
+from .intrinsic_transfer import ConformingRefinement, level_lines, transfer_segments
+from .level_sets import is_consistent, level_set, without_repeats
+from .source_segments import segments_of, segments_of_each
+from .surface_curves import Curve, CurveOrPoints, CurvesAndPoints
+from .triangle_mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    import pyvista
+
+AREA_ERROR = 1e-4
+"""Largest relative change of the area of a mesh. It is 1e-7 at most where some faces are degenerate."""
+LARGEST_ANGLE = 30.0
+"""Degrees; for larger minimum angles refinement need not terminate."""
+UPWARD = (np.pi / 4) ** np.arange(3)
+"""Direction in which no two different points with coordinates that are algebraic numbers are equally high."""
+
+
+@dataclass(frozen=True, eq=False)
+class IntrinsicTriangulation(Displayed, Frozen):
+    """An intrinsic triangulation of a mesh, made by `intrinsic_delaunay`; a domain like the mesh itself.
+
+    The first vertices are those of the mesh, with the same ids. Sources are given on the mesh; fields have values at
+    all vertices, and `VertexField.restrict` returns those at the vertices of the mesh.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    triangles : IntrinsicMesh
+        The triangles. Two edges may join the same two vertices, or an edge may join a vertex with itself.
+    marked : (e,) bool
+        Edges along which the kept curves run.
+    goal : float
+        The minimum angle of refinement, in degrees; 0 for flips only.
+    complete : bool
+        Whether refinement ended before the limit on the number of vertices.
+    close : (m,) bool
+        Faces at vertices that nearly coincide, which refinement leaves thin.
+
+    Examples
+    --------
+    >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> better = intrinsic_delaunay(strip, refine=True)
+    >>> better.n_vertices > strip.n_vertices, bool(np.isclose(better.triangles.face_areas.sum(), 9.0))
+    (True, True)
+    """
+
+    mesh: TriangleMesh
+    triangles: IntrinsicMesh
+    marked: NDArray[np.bool_]
+    goal: float
+    complete: bool
+    close: NDArray[np.bool_] = field(repr=False)
+    base: IntrinsicMesh = field(repr=False)
+    refinement: ConformingRefinement = field(repr=False)
+    history: History = field(repr=False)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices; those of the mesh come first."""
+        return self.triangles.n_vertices
+
+    @property
+    def n_faces(self) -> int:
+        """Number of faces."""
+        return self.triangles.n_faces
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """(m, 3) vertex ids. These do not determine the edges of a face: see `triangles`."""
+        return self.triangles.corner_vertices
+
+    @cached_property
+    def vertices(self) -> NDArray[np.float64]:
+        """(n, 3) positions in space of the vertices, all of which lie on the mesh."""
+        faces, weights = self.vertex_places
+        return frozen(self.in_space(faces, weights))
+
+    @cached_property
+    def vertex_places(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """(n,) face of the mesh, and (n, 3) barycentric coordinates in it, of every vertex; face −1 where unused."""
+        old = self.mesh.faces
+        faces, weights = np.full(self.mesh.n_vertices, -1), np.zeros((self.mesh.n_vertices, 3))
+        for k in range(3):
+            faces[old[:, k]], weights[old[:, k]] = np.arange(len(old)), np.eye(3)[k]
+        cut = self.refinement.triangles
+        extra, corner = np.unique(cut.corner_vertices.ravel(), return_index=True)
+        corner = corner[extra >= self.mesh.n_vertices]
+        put = self.refinement.pull_back(corner // 3, np.eye(3)[corner % 3])
+        new = self.refinement.pull_back(*self.history.new_vertices)
+        return np.concatenate([faces, put[0], new[0]]), np.concatenate([weights, put[1], new[1]])
+
+    @cached_property
+    def corner_angles(self) -> NDArray[np.float64]:
+        """(m, 3) angles at the corners, in radians."""
+        leaving = self.triangles.edge_vectors
+        return np.angle(-np.conj(leaving) * np.roll(leaving, 1, axis=1))
+
+    @cached_property
+    def thin_faces(self) -> NDArray[np.int64]:
+        """(k,) faces with an angle below the goal."""
+        return np.flatnonzero(self.corner_angles.min(axis=1) < np.radians(self.goal) - 1e-9)
+
+    @property
+    def summary(self) -> str:
+        """The smallest angle reached, and the reasons for smaller ones than the goal, in words."""
+        if not self.goal:
+            return f"Delaunay; the smallest angle is {np.degrees(self.corner_angles.min()):.3g}°"
+        if not len(self.thin_faces):
+            return f"no angle below {self.goal:g}°"
+        n_close = int(self.close[self.thin_faces].sum())
+        rest = len(self.thin_faces) - n_close
+        reasons = [f"{n_close} where vertices all but coincide"] if n_close else []
+        if rest and self.complete:
+            reasons.append(f"{rest} where the surface, its boundary or the kept curves close in at less than 60°")
+        elif rest:
+            reasons.append(f"{rest} because the limit of {self.n_vertices} vertices was reached: raise max_vertices")
+        return (
+            f"no angle below {self.goal:g}° but in {len(self.thin_faces)} of {self.n_faces} faces: {', '.join(reasons)}"
+        )
+
+    def in_space(self, faces: NDArray[np.int64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Positions of points that are given on the mesh.
+
+        Parameters
+        ----------
+        faces : (p,) int
+            Faces of the mesh.
+        barycentric : (p, 3) float
+            Barycentric coordinates of the points in these faces.
+
+        Returns
+        -------
+        (p, 3) float
+            Positions, in the units of the mesh.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> better.in_space(np.array([0]), np.array([[0.0, 0.5, 0.5]])).tolist()
+        [[9.0, 0.5, 0.0]]
+        """
+        positions = np.einsum("pk,pkd->pd", barycentric, self.mesh.vertices[self.mesh.faces[faces]])
+        lost = np.flatnonzero(np.asarray(faces) < 0)
+        positions[lost] = self.mesh.vertices[lost]
+        return positions
+
+    def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Faces and barycentric coordinates, on the triangulation, of points given by those on the mesh.
+
+        Parameters
+        ----------
+        faces : (p,) int
+            Faces of the mesh.
+        barycentric : (p, 3) float
+            Barycentric coordinates of the points in these faces.
+
+        Returns
+        -------
+        faces : (p,) int
+            Faces of the triangulation.
+        barycentric : (p, 3) float
+            Barycentric coordinates in them.
+
+        Raises
+        ------
+        GeometryError
+            If a face does not exist, or a coordinate is NaN or infinite.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> faces, barycentric = better.locate([0], [[0.5, 0.25, 0.25]])
+        >>> faces.shape, float(barycentric.sum().round(9))
+        ((1,), 1.0)
+        """
+        barycentric = finite_rows(barycentric, "barycentric coordinates", 3)
+        faces = np.asarray(faces, dtype=np.int64)
+        wrong = np.flatnonzero((faces < 0) | (faces >= self.mesh.n_faces))
+        if len(wrong):
+            raise GeometryError(
+                f"point {wrong[0]} is in face {faces[wrong[0]]}, of {self.mesh.n_faces} faces",
+                element=f"point {wrong[0]}",
+            )
+        return self._forward(faces, barycentric, np.zeros((len(faces), 0, 3)))[:2]
+
+    def gradient(
+        self, values: NDArray[np.float64], faces: NDArray[np.int64], barycentric: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Gradients in space of a function that is linear on these triangles.
+
+        Parameters
+        ----------
+        values : (n_vertices,) float
+            The function at the vertices of the triangulation.
+        faces : (p,) int
+            Faces of the mesh.
+        barycentric : (p, 3) float
+            Barycentric coordinates of the points in these faces.
+
+        Returns
+        -------
+        (p, 3) float
+            Gradients at the points, in units of the values over a length.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> better.gradient(better.vertices[:, 0], np.array([0]), np.array([[0.2, 0.3, 0.5]])).round(9)[:, :2].tolist()
+        [[1.0, 0.0]]
+        """
+        return self.gradient_of_corners(values[self.faces], faces, barycentric)
+
+    def gradient_of_corners(
+        self, corners: NDArray[np.float64], faces: NDArray[np.int64], barycentric: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Gradients in space of a function that may jump between these triangles.
+
+        Parameters
+        ----------
+        corners : (n_faces, 3) float
+            The function at the corners of each triangle.
+        faces : (p,) int
+            Faces of the mesh.
+        barycentric : (p, 3) float
+            Barycentric coordinates of the points in these faces.
+
+        Returns
+        -------
+        (p, 3) float
+            Gradients at the points.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> corners = better.vertices[better.faces, 0]
+        >>> better.gradient_of_corners(corners, np.array([0]), np.array([[0.2, 0.3, 0.5]])).round(9)[:, :2].tolist()
+        [[1.0, 0.0]]
+        """
+        sides = np.broadcast_to([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]], (len(faces), 2, 3))
+        found, _, moves = self._forward(faces, barycentric, sides)
+        rises = np.einsum("psk,pk->ps", moves, corners[found])
+        return gradients_along(np.einsum("psk,pkd->psd", sides, self.mesh.vertices[self.mesh.faces[faces]]), rises)
+
+    def _forward(
+        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Points of the mesh, and vectors (p, k, 3) at them, on the triangulation."""
+        below = self.refinement.push_forward(faces, barycentric, vectors)
+        found, weights, moved = self.history.forward(below[0], np.maximum(below[1], 0.0), below[2])
+        return found, weights / weights.sum(axis=1, keepdims=True), moved
+
+    def level_set(self, values: NDArray[np.float64], level: float = 0.0) -> list[Curve]:
+        """Level set of a function that is linear on these triangles, as curves on the mesh.
+
+        Larger values are to its left; values equal to the level count as larger. On inconsistently oriented meshes
+        it is that of the values at the vertices of the mesh.
+
+        Parameters
+        ----------
+        values : (n_vertices,) float
+            The function at the vertices of the triangulation.
+        level : float
+            Its value on the curves.
+
+        Returns
+        -------
+        list of Curve
+            On the mesh.
+
+        Raises
+        ------
+        SourceError
+            If there is not one value per vertex.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> [line] = better.level_set(better.vertices[:, 0], 4.5)
+        >>> strip.positions(line)[:, 0].round(9).min().item()
+        4.5
+        """
+        if values.shape != (self.n_vertices,):
+            raise SourceError(
+                f"a level set needs one value per vertex: {self.n_vertices}, not an array {values.shape}",
+                element="values",
+            )
+        if not is_consistent(self.mesh):
+            return level_set(self.mesh, values[: self.mesh.n_vertices], level)
+        lines = level_lines(self.history, self.refinement, values - level)
+        curves = [Curve(faces, np.maximum(weights, 0.0), closed=closed) for faces, weights, closed in lines]
+        return without_repeats(self.mesh, curves)
+
+    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the vertices of `triangulation`, from values at the vertices of the triangles.
+
+        Parameters
+        ----------
+        values : (n,) float
+            One for each vertex.
+
+        Returns
+        -------
+        (m,) float
+            One for each vertex of the triangulation: the same.
+
+        Examples
+        --------
+        >>> from signedheat import samples
+        >>> better = intrinsic_delaunay(samples.sphere(1))
+        >>> better.on_triangulation(np.ones(better.n_vertices)).shape == (better.n_vertices,)
+        True
+        """
+        return values
+
+    def edge_lines(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Edges as polylines on the mesh.
+
+        Returns
+        -------
+        edges : (s,) int
+            The edge that each straight part belongs to.
+        starts, ends : (s, 3) float
+            Where the part starts and ends in space.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> edges, starts, ends = better.edge_lines()
+        >>> starts.shape == ends.shape == (len(edges), 3)
+        True
+        """
+        lines = self.history.edges_before()
+        starts = self.in_space(*self.refinement.pull_back(lines.faces, lines.starts))
+        return lines.owners, starts, self.in_space(*self.refinement.pull_back(lines.faces, lines.ends))
+
+    @overload
+    def transfer(self, source: CurveOrPoints | CurveSegments) -> CurveSegments: ...
+    @overload
+    def transfer(self, source: Sequence[CurveOrPoints | CurveSegments]) -> list[CurveSegments]: ...
+    def transfer(
+        self, source: CurveOrPoints | CurveSegments | Sequence[CurveOrPoints | CurveSegments]
+    ) -> CurveSegments | list[CurveSegments]:
+        """Transfer a source that is given on the mesh to these triangles.
+
+        Parameters
+        ----------
+        source : Curve, SurfacePoints, CurveSegments, or sequence of them
+            On the mesh.
+
+        Returns
+        -------
+        CurveSegments or list of CurveSegments
+            Segments, each within one triangle of the triangulation.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = intrinsic_delaunay(strip, refine=True)
+        >>> line = strip.polyline([[4.0, 0.0, 0.0], [4.0, 1.0, 0.0]])
+        >>> len(better.transfer([line]))
+        1
+        """
+        if isinstance(source, Sequence):
+            return [self.transfer(part) for part in source]
+        seen = segments_of(source, self.base, self.mesh.vertices)
+        if isinstance(source, CurveSegments):
+            return seen
+        return transfer_segments(seen, self.refinement, self.history, self.base)
+
+    def to_pyvista(self) -> pyvista.PolyData:
+        """Convert the mesh to PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            The triangles of the mesh, not those of the triangulation.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> from signedheat import samples
+        >>> intrinsic_delaunay(samples.sphere(1)).to_pyvista().n_points
+        42
+        """
+        return self.mesh.to_pyvista()
+
+    def __repr__(self) -> str:
+        return f"IntrinsicTriangulation({self.n_vertices} vertices, {self.n_faces} faces: {self.summary})"
+
+
+def intrinsic_delaunay(
+    mesh: TriangleMesh | ForeignShape,
+    keep: CurvesAndPoints = (),
+    refine: bool = False,
+    angle: float = 28.0,
+    max_vertices: int | None = None,
+    coarsest: float = np.inf,
+    progress: Progress | None = None,
+) -> IntrinsicTriangulation:
+    """Intrinsic Delaunay triangulation or refinement of a mesh: better angles, the same surface.
+
+    Boundary and nonmanifold edges are not flipped, and neither are the edges of kept curves; refinement may split them.
+    The mesh may be nonmanifold, nonorientable, inconsistently oriented, and have nearly degenerate faces.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    keep : Curve, SurfacePoints or a sequence of them
+        Curves that are to run along edges, and points that are to be vertices; of the points of curves those are where
+        lines turn, end or meet. Other sources can be used as well.
+    refine : bool
+        Insert vertices until no angle is smaller than `angle`. Smaller ones remain where boundaries or kept curves meet
+        at less than 60°, at vertices with a total angle of less than 60°, and at groups of vertices that nearly
+        coincide (of a size less than a hundredth of the distance to any other vertex), since grading the triangles
+        towards them takes hundreds of vertices and gains no accuracy. `IntrinsicTriangulation.summary` reports them.
+    angle : float
+        Minimum angle in degrees, at most 30.
+    max_vertices : int, optional
+        Limit on the number of vertices; by default 20 for every vertex of the mesh and the kept curves, plus 10,000.
+    coarsest : float
+        Largest circumradius that refinement leaves, in multiples of that of an equilateral triangle of the mean area
+        that there would be otherwise; at least 1. Flat parts of CAD meshes, which no small angle makes it split,
+        are then about as fine as the rest.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``; an exception that it raises cancels.
+
+    Returns
+    -------
+    IntrinsicTriangulation
+        A domain. Time and memory are proportional to the numbers of flips and new vertices, which on all but contrived
+        meshes are proportional to the size of the mesh.
+
+    Raises
+    ------
+    GeometryError
+        If the domain is not a triangle mesh, has no area or faces so thin that lengths of edges do not determine it to
+        four digits, or `angle`, `max_vertices` or `coarsest` is out of range.
+    SourceError
+        If a curve to be kept does not lie on the mesh.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> vertices = [[0, 0, 0], [10, 0, 0], [10, 1, 0], [0, 1, 0]]
+    >>> strip = sh.TriangleMesh(vertices, [[0, 1, 2], [0, 2, 3]])
+    >>> better = sh.intrinsic_delaunay(strip, refine=True)
+    >>> better.summary
+    'no angle below 28°'
+    >>> bool(abs(better.triangles.face_areas.sum() - 10) < 1e-12)
+    True
+    """
+    mesh, refine = triangle_mesh(mesh), flag(refine, "refine")
+    if not isinstance(angle, Real) or not 0 < angle <= LARGEST_ANGLE:
+        raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle!r}", element="angle")
+    if max_vertices is not None and not (isinstance(max_vertices, Real) and 0 < max_vertices < np.inf):
+        raise GeometryError(f"max_vertices must be positive and finite, not {max_vertices!r}", element="max_vertices")
+    if not isinstance(coarsest, Real) or not coarsest >= 1:
+        raise GeometryError(f"coarsest must be at least 1, not {coarsest!r}", element="coarsest")
+    stopwatch = Stopwatch(progress, steps=3)
+    with stopwatch("embed curves"):
+        base = mesh.intrinsic
+        refuse_other_area(mesh, base)
+        listed = list(keep) if isinstance(keep, Sequence) else [keep]
+        parts = list(chain.from_iterable(segments_of_each(listed, base, mesh.vertices)))
+        parts = without_straight_nodes(base, parts) if parts else []
+        refinement = ConformingRefinement.of(base, parts, (mesh.vertices - mesh.bounds[0]) @ UPWARD)
+        marked, complete = refinement.marked, True
+    with stopwatch("flip"):
+        gluing = flip_all(glue(refinement.triangles, marked))
+        close = np.zeros(refinement.triangles.n_faces, dtype=bool)
+    with stopwatch("refine"):
+        if refine:
+            inner = None if progress is None else lambda share: progress((2 + share) / 3, "refine")
+            limit = 20 * refinement.triangles.n_vertices + 10_000 if max_vertices is None else int(max_vertices)
+            gluing, origin, close, complete = refine_all(gluing, np.radians(angle), float(coarsest), limit, inner)
+            marked = np.append(marked, False)[origin]
+    n = int(gluing.counts[3])
+    triangles = lay_out(gluing)
+    refuse_other_area(mesh, triangles)
+    history = History(refinement.triangles, triangles, gluing.steps[:n].copy(), gluing.weights[:n].copy())
+    goal = angle if refine else 0.0
+    return IntrinsicTriangulation(mesh, triangles, marked, goal, complete, close, base, refinement, history)
+
+
+def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
+    """Refuse faces whose edge lengths do not determine the area: thinner than about the square root of rounding."""
+    before, after = float(mesh.face_areas.sum()), float(triangles.face_areas.sum())
+    longest, most = float(triangles.lengths_of_edges.max(initial=0.0)), float(mesh.edge_lengths.sum())
+    lost = "" if abs(after - before) <= AREA_ERROR * before else f"area would be {after:.6g}, and it is {before:.6g}"
+    if not longest <= most:
+        lost = f"longest edge would be {longest:.6g}, and all edges together are {most:.6g}"
+    if lost:
+        raise GeometryError(
+            f"the faces are too thin to be triangulated anew: their {lost}",
+            remedy="remove faces that are all but flat, or scale the shape where it is squashed",
+            element="faces",
+        )
+
+
+def triangle_mesh(domain: object) -> TriangleMesh:
+    """The domain, if it is a triangle mesh; others have no intrinsic triangulation."""
+    domain = converted(domain)
+    if not isinstance(domain, TriangleMesh):
+        raise GeometryError(
+            f"an intrinsic triangulation is made from a TriangleMesh, not from a {type(domain).__name__}",
+            element="domain",
+        )
+    return domain

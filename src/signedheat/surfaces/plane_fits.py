@@ -1,0 +1,319 @@
+"""Planes fitted to points on an unknown surface, and how large the neighbourhoods must be for that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+from ..mesh.unit_vectors import axes_across
+from ..parallel import in_chunks
+
+CLEAN_NEIGHBORS = 12
+"""Neighbours that a plane is fitted to where there is no noise to average out."""
+NOISY_NEIGHBORS = (12, 24, 48, 96, 192)
+"""Sizes of neighbourhood that noise may call for."""
+CLEAN_DEVIATION = 0.07
+"""Deviation from robust planes, in reaches of neighbourhoods, above which points are noisy: curvature stays below .06,
+also on thin sheets and at edges where the points resolve them; noise as wide as the neighbourhood has .09 or more."""
+ANGLE_ERROR = 0.13
+"""Radians by which noise may turn planes, as estimated from their deviation, above which they are not used."""
+CLEAN_HEIGHTS = (0.25, 0.15, 0.1)
+"""Heights over the plane through a point, in reaches, beyond which a neighbour belongs to another sheet, one by one."""
+NOISY_HEIGHTS = (0.5, 0.5, 0.5)
+"""The same over planes that move from a noisy point to where its neighbours are densest."""
+TWO_SIDES = 0.9
+"""Mean distance of neighbours from a quadric through them, relative to the root of its mean square, above which they
+are those of two sides: where these are even, it is .88 to .99, where they are random .83 to .96, but of one noisy side
+.74 to .86."""
+MERGED = 0.03
+"""Share of points with neighbours on two sides from which a cloud is announced. Of scans, CAD and tori with up to .4
+spacings of noise at most .014 are such; of plates, bowls, lenses and tubes whose sides are merged .25 to 1."""
+ONE_SIDE = 0.02
+"""Root mean square distance from a quadric, in spacings, up to which neighbours are taken for those of one side."""
+ON_QUADRIC = 24
+"""Neighbours to which a quadric is fitted."""
+_TRIAL_HEIGHTS = (0.5, 0.5, 0.5)
+_TRIED = 2000
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneFits:
+    """Planes near points.
+
+    Attributes
+    ----------
+    axes : (n, 3) float
+        Unit normals, up to sign.
+    places : (n, 3) float
+        The points themselves; where they are noisy, the nearest points of the planes.
+    reaches : (n,) float
+        Distance to the last neighbour used.
+    n_neighbors : int
+        Size of the neighbourhoods.
+    noisy : bool
+        Whether the points lie around the surface rather than on it.
+    """
+
+    axes: NDArray[np.float64]
+    places: NDArray[np.float64]
+    reaches: NDArray[np.float64]
+    n_neighbors: int
+    noisy: bool
+
+
+def fit_planes(points: NDArray[np.float64], n_neighbors: int | None = None) -> PlaneFits:
+    """Fit a plane near each of (n, 3) distinct points.
+
+    Without noise the neighbourhoods are small, and sheets that lie close together, or meet in an edge, stay apart:
+    of several planes that explain the point, the one that explains most neighbours. `n_neighbors` says that there is
+    noise, and how large neighbourhoods must be to average it out.
+
+    Examples
+    --------
+    >>> xy = np.random.default_rng(0).random((400, 2))
+    >>> sheets = np.concatenate([np.c_[xy[:200], np.zeros(200)], np.c_[xy[200:], np.full(200, 0.1)]])
+    >>> bool(np.median(np.abs(fit_planes(sheets).axes[:, 2])) > 0.999)
+    True
+    """
+    tree = scipy.spatial.cKDTree(points)
+    noisy = n_neighbors is not None
+    size = n_neighbors or min(CLEAN_NEIGHBORS, len(points) - 1)
+    heights, starts = (NOISY_HEIGHTS, 1) if noisy else (CLEAN_HEIGHTS, 5)
+    axes, places, reaches, _ = planes_near(points, tree, np.arange(len(points)), size, heights, starts)
+    places = points - ((points - places) * axes).sum(axis=1, keepdims=True) * axes if noisy else points
+    return PlaneFits(axes, places, reaches, size, noisy)
+
+
+def noisy_sizes(points: NDArray[np.float64], normals: NDArray[np.float64] | None = None) -> list[int]:
+    """Sizes of neighbourhoods in which planes can be fitted in spite of noise, from the least; without noise none.
+
+    Estimated from at most 2,000 of the points. With normals, from neighbours on the same side: the other side of a thin
+    plate is no noise.
+
+    Examples
+    --------
+    >>> points = np.random.default_rng(0).random((2000, 3)) * (1, 1, 0.1)
+    >>> noisy_sizes(points)[-1], noisy_sizes(points * (1, 1, 0))
+    (192, [])
+    """
+    largest = (len(points) - 1) // 4
+    if largest < CLEAN_NEIGHBORS:
+        return []
+    tree = scipy.spatial.cKDTree(points)
+    tried = np.arange(0, len(points), -(-len(points) // _TRIED))
+    if normals is not None:
+        reach = float(np.median(tree.query(points[tried], k=CLEAN_NEIGHBORS + 1)[0][:, -1]))
+        tree = scipy.spatial.cKDTree(np.column_stack([points, reach * normals]))
+    deviations = planes_near(points, tree, tried, CLEAN_NEIGHBORS, _TRIAL_HEIGHTS)[3]
+    if np.median(deviations) < CLEAN_DEVIATION:
+        return []
+    sizes = [k for k in NOISY_NEIGHBORS if k <= largest]
+    errors = [2 * float(np.median(planes_near(points, tree, tried, k, (np.inf,), 1)[3])) / k**0.5 for k in sizes]
+    return [k for k, error in zip(sizes, errors, strict=True) if error < ANGLE_ERROR] or sizes[-1:]
+
+
+def noise_scale(points: NDArray[np.float64], normals: NDArray[np.float64] | None = None) -> int | None:
+    """Size of neighbourhoods that noise calls for where normals are given; without noise none."""
+    sizes = noisy_sizes(points, normals)
+    return sizes[min(2, len(sizes) - 1)] if sizes else None
+
+
+def point_spacing(distances: NDArray[np.float64], k: int) -> NDArray[np.float64]:
+    """Distance between points, from that to the k-th neighbour: in a plane, k lie in a circle of k squared spacings."""
+    return distances / np.sqrt(k / np.pi)
+
+
+def share_of_two_sides(points: NDArray[np.float64], normals: NDArray[np.float64]) -> float:
+    """Share of points whose neighbours with similar normals are rather those of both sides of a plate that is thinner
+    than they are apart: they lie at two heights over a quadric. Estimated from at most 2,000 points.
+
+    Examples
+    --------
+    >>> random = np.random.default_rng(0)
+    >>> points, up = random.random((2000, 3)) * (1, 1, 0), np.tile([0.0, 0, 1], (2000, 1))
+    >>> sides, noise = 0.005 * random.choice([-1, 1], 2000), 0.005 * random.normal(size=2000)
+    >>> [share_of_two_sides(points + up * heights[:, None], up) > MERGED for heights in (sides, noise)]
+    [True, False]
+    """
+    k = min(ON_QUADRIC, len(points) - 1)
+    tree = scipy.spatial.cKDTree(points)
+
+    def found(tried: NDArray[np.int64]) -> tuple[NDArray[np.bool_]]:
+        distances, near = tree.query(points[tried], k=k + 1)
+        offsets, normal = points[near] - points[tried, None], normals[tried]
+        weights = np.exp(-((distances / distances[:, -1:]) ** 2)) * (np.einsum("nkd,nd->nk", normals[near], normal) > 0)
+        frame = np.stack([*axes_across(normal), normal], axis=1)
+        spacing = point_spacing(distances[:, -1], k)
+        x, y, z = np.einsum("nkd,nad->ank", offsets, frame) / spacing[:, None]
+        terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2)
+        moments = np.einsum("nka,nk,nkb->nab", terms, weights, terms) + 1e-9 * np.eye(6)
+        factors = np.linalg.solve(moments, np.einsum("nka,nk,nk->na", terms, weights, z)[..., None])
+        apart, total = np.abs(z - (terms @ factors)[..., 0]), weights.sum(axis=1)
+        mean, root = (weights * apart).sum(axis=1) / total, np.sqrt((weights * apart**2).sum(axis=1) / total)
+        enough = (weights > 0).sum(axis=1) > k / 2
+        return ((mean > TWO_SIDES * root) & (root > ONE_SIDE) & enough,)
+
+    return float(in_chunks(found, np.arange(0, len(points), -(-len(points) // _TRIED)))[0].mean())
+
+
+def planes_near(
+    points: NDArray[np.float64],
+    tree: scipy.spatial.cKDTree,
+    chosen: NDArray[np.int64],
+    n_neighbors: int,
+    heights: tuple[float, ...],
+    n_starts: int = 5,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Axes, centres, reaches and deviations of planes near chosen points."""
+
+    def fit(some: NDArray[np.int64]) -> tuple[Floats, Floats, Floats, Floats]:
+        distances, neighbors = tree.query(tree.data[some], k=n_neighbors + 1)
+        neighbors[:, 0] = some
+        axes, centers, deviations = np.zeros((len(some), 3)), points[some], np.zeros(len(some))
+        fitted = axes, centers, deviations
+        robust_planes(points, neighbors, distances, np.array(heights), n_starts > 1, n_starts, *fitted)
+        return axes, centers, distances[:, -1], deviations
+
+    axes, centers, reaches, deviations = in_chunks(fit, chosen)
+    return axes, centers, reaches, deviations
+
+
+@compiled
+def least_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float, axis: Floats) -> float:
+    """Write the unit eigenvector of the least eigenvalue of a symmetric 3×3 matrix; return that eigenvalue.
+
+    Eigenvalues in closed form by the angle of their cubic (Smith 1961), the vector as a product of two rows.
+    """
+    mean = (xx + yy + zz) / 3.0
+    ax, ay, az = xx - mean, yy - mean, zz - mean
+    p = ((ax * ax + ay * ay + az * az + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0) ** 0.5
+    if not p > 1e-15 * abs(mean):
+        axis[0], axis[1], axis[2] = 0.0, 0.0, 1.0
+        return mean
+    half = (ax * (ay * az - yz * yz) - xy * (xy * az - yz * xz) + xz * (xy * yz - ay * xz)) / (2.0 * p * p * p)
+    least = mean + 2.0 * p * np.cos((np.arccos(min(max(half, -1.0), 1.0)) + 2.0 * np.pi) / 3.0)
+    ax, ay, az = xx - least, yy - least, zz - least
+    longest = -1.0
+    for pair in range(3):
+        if pair == 0:
+            u, v, w = xy * yz - xz * ay, xz * xy - ax * yz, ax * ay - xy * xy
+        elif pair == 1:
+            u, v, w = xy * az - xz * yz, xz * xz - ax * az, ax * yz - xy * xz
+        else:
+            u, v, w = ay * az - yz * yz, yz * xz - xy * az, xy * yz - ay * xz
+        square = u * u + v * v + w * w
+        if square > longest:
+            longest = square
+            axis[0], axis[1], axis[2] = u, v, w
+    if longest <= 1e-24 * p**4:  # points along a line, whose direction each row has: any axis across it will do
+        u, v, w = xx - least, xy, xz
+        if yy - least > u:
+            u, v, w = xy, yy - least, yz
+        if zz - least > max(xx, yy) - least:
+            u, v, w = xz, yz, zz - least
+        if abs(u) <= abs(v) and abs(u) <= abs(w):
+            axis[0], axis[1], axis[2] = 0.0, w, -v
+        elif abs(v) <= abs(w):
+            axis[0], axis[1], axis[2] = -w, 0.0, u
+        else:
+            axis[0], axis[1], axis[2] = v, -u, 0.0
+        longest = axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2
+    length = longest**0.5
+    axis[0], axis[1], axis[2] = axis[0] / length, axis[1] / length, axis[2] / length
+    return max(least, 0.0)
+
+
+@compiled
+def weighted_plane(offsets: Floats, weights: Floats, count: int, axis: Floats, center: Floats) -> float:
+    """Write normal and weighted mean of the first `count` points; return their mean squared height."""
+    total = x = y = z = 0.0
+    for j in range(count):
+        total += weights[j]
+        x += weights[j] * offsets[j, 0]
+        y += weights[j] * offsets[j, 1]
+        z += weights[j] * offsets[j, 2]
+    x, y, z = x / total, y / total, z / total
+    xx = xy = xz = yy = yz = zz = 0.0
+    for j in range(count):
+        a, b, c = offsets[j, 0] - x, offsets[j, 1] - y, offsets[j, 2] - z
+        wa, wb = weights[j] * a, weights[j] * b
+        xx, xy, xz = xx + wa * a, xy + wa * b, xz + wa * c
+        yy, yz, zz = yy + wb * b, yz + wb * c, zz + weights[j] * c * c
+    center[0], center[1], center[2] = x, y, z
+    return least_eigenvector(xx / total, xy / total, xz / total, yy / total, yz / total, zz / total, axis)
+
+
+@compiled
+def plane_through(a: Floats, b: Floats, axis: Floats) -> bool:
+    """Write the normal of the plane spanned by two vectors; return whether they span one."""
+    u, v, w = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    square = u * u + v * v + w * w
+    if square <= 1e-16 * (a[0] ** 2 + a[1] ** 2 + a[2] ** 2) * (b[0] ** 2 + b[1] ** 2 + b[2] ** 2):
+        return False
+    length = square**0.5
+    axis[0], axis[1], axis[2] = u / length, v / length, w / length
+    return True
+
+
+@compiled
+def weigh_by_height(offsets: Floats, near: Floats, axis: Floats, base: Floats, height: float, weights: Floats) -> float:
+    """Write Tukey's biweight of the heights over a plane through `base`, times `near`; return the sum."""
+    total = 0.0
+    level = axis[0] * base[0] + axis[1] * base[1] + axis[2] * base[2]
+    for j in range(len(near)):
+        part = (axis[0] * offsets[j, 0] + axis[1] * offsets[j, 1] + axis[2] * offsets[j, 2] - level) / height
+        weights[j] = near[j] * (1.0 - part * part) ** 2 if abs(part) < 1.0 else 0.0
+        total += weights[j]
+    return total
+
+
+@compiled
+def robust_planes(
+    points: Floats,
+    neighbors: NDArray[np.int64],
+    distances: Floats,
+    heights: Floats,
+    on_surface: bool,
+    n_starts: int,
+    axes: Floats,
+    centers: Floats,
+    deviations: Floats,
+) -> None:
+    """Fit a plane near each point to those of its neighbours that lie within a height of it, from several starts.
+
+    The first neighbour is the point itself. Heights are parts of the reach, one after the other: over the plane through
+    the point, if `on_surface`, else through the centre of those found before, the point itself at first. The plane with
+    most neighbours within the last height is kept.
+    """
+    n, k = neighbors.shape
+    offsets, near, weights = np.empty((k, 3)), np.empty(k), np.empty(k)
+    axis, center, origin = np.empty(3), np.empty(3), np.zeros(3)
+    base = origin if on_surface else center
+    for i in range(n):
+        reach, most = distances[i, k - 1], -1.0
+        axes[i, 2] = 1.0
+        if not reach > 0.0:
+            continue
+        for j in range(k):
+            for c in range(3):
+                offsets[j, c] = points[neighbors[i, j], c] - points[neighbors[i, 0], c]
+            near[j] = np.exp(-((distances[i, j] / reach) ** 2))
+        for start in range(n_starts):
+            if start < 2:
+                weighted_plane(offsets, near, k if start == 0 else min(k, 7), axis, center)
+            elif k < 4 or not plane_through(offsets[1 + start // 4], offsets[2 + (start > 2)], axis):
+                continue
+            square, center[0], center[1], center[2] = 0.0, 0.0, 0.0, 0.0
+            for height in heights:
+                weigh_by_height(offsets, near, axis, base, height * reach, weights)
+                square = weighted_plane(offsets, weights, k, axis, center)
+            explained = weigh_by_height(offsets, near, axis, base, heights[-1] * reach, weights)
+            if explained > most:
+                most, deviations[i] = explained, square**0.5 / reach
+                for c in range(3):
+                    axes[i, c], centers[i, c] = axis[c], points[neighbors[i, 0], c] + center[c]

@@ -1,0 +1,148 @@
+"""The common subdivision of a mesh and an intrinsic triangulation of it: flat polygons on which both are linear.
+
+The edges of both divide the surface into convex polygons. Each lies in one face of the mesh, so that it is flat in
+space, and in one intrinsic triangle, so that a field on the triangulation is linear on it.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from ..errors import GeometryError
+from ..mesh.surface_points import EDGE, VERTEX, LocatedPoints, locate_points
+from .intrinsic_history import misplaced_lines
+from .intrinsic_triangulation import IntrinsicTriangulation
+from .polygon_mesh import PolygonMesh
+
+
+def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMesh, csr_matrix]:
+    """Subdivide the triangles of an intrinsic triangulation along the edges of its mesh.
+
+    Parameters
+    ----------
+    triangulation : IntrinsicTriangulation
+        From `intrinsic_delaunay`.
+
+    Returns
+    -------
+    PolygonMesh
+        Flat polygons in space; the vertices of the triangulation come first.
+    (n_polygon_vertices, n_vertices) sparse
+        Interpolation: maps values at the vertices of the triangulation to values at those of the polygons.
+
+    Raises
+    ------
+    GeometryError
+        If the argument is not an intrinsic triangulation, or has triangles as thin as rounding.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> mesh = sh.TriangleMesh([[0, 0, 0], [10, 0, 0], [10, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> better = sh.intrinsic_delaunay(mesh, refine=True)
+    >>> polygons, interpolate = sh.common_subdivision(better)
+    >>> bool(abs(interpolate @ better.vertices - polygons.vertices).max() < 1e-12)
+    True
+    """
+    if not isinstance(triangulation, IntrinsicTriangulation):
+        raise GeometryError(
+            f"a {type(triangulation).__name__} is no IntrinsicTriangulation",
+            remedy="see intrinsic_delaunay",
+        )
+    triangles, n = triangulation.triangles, triangulation.n_vertices
+    polygons, _, where = subdivided(triangulation)
+    used = triangles.corner_vertices.ravel()
+    corner_of = np.full(n, -1)
+    corner_of[used] = np.arange(len(used))
+    own = corner_of >= 0
+    weights = np.concatenate([np.eye(3)[corner_of % 3] * own[:, None], where.barycentric])
+    faces = np.concatenate([corner_of // 3, where.faces])
+    matrix = csr_matrix(
+        (weights.ravel(), triangles.corner_vertices[faces].ravel(), 3 * np.arange(len(faces) + 1)), (len(faces), n)
+    )
+    matrix.eliminate_zeros()
+    return PolygonMesh(np.concatenate([triangulation.vertices, positions(triangulation, where)]), polygons), matrix
+
+
+def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], NDArray[np.int64], LocatedPoints]:
+    """The polygons, the triangle that each lies in, and the points at which edges of the mesh cross intrinsic edges.
+
+    Corners of polygons are vertices of the triangulation, or, from n_vertices on, crossings in order.
+    """
+    triangles, n = triangulation.triangles, triangulation.n_vertices
+    lines = triangulation.history.edges_after()
+    lost = misplaced_lines(triangles, lines, triangulation.history.before.lengths_of_edges)
+    if len(lost):
+        raise GeometryError(
+            f"edge {lost[0]} of the mesh crosses triangles as thin as rounding, which turn it",
+            remedy="merge the vertices that nearly coincide",
+            element=f"edge {lost[0]}",
+        )
+    starts = locate_points(triangles, lines.faces, lines.starts)
+    ends = locate_points(triangles, lines.faces, lines.ends)
+    last = np.append(np.diff(lines.owners) > 0, True)
+    crossing = (ends.kinds == EDGE) & ~last
+    node = np.where(ends.kinds == VERTEX, ends.elements, n + np.cumsum(crossing) - 1)
+    begin = np.where(starts.kinds == VERTEX, starts.elements, np.roll(node, 1))
+
+    on_edge = defaultdict(list)
+    where = ends[np.flatnonzero(crossing)]
+    for k in np.lexsort([where.along, where.elements]).tolist():
+        on_edge[int(where.elements[k])].append(n + k)
+    chords = defaultdict(list)
+    inside = ~((lines.starts < 1e-9) & (lines.ends < 1e-9)).any(axis=1)
+    for k in np.flatnonzero(inside & (begin != node)).tolist():
+        chords[int(lines.faces[k])].append((int(begin[k]), int(node[k])))
+
+    polygons, owners = [], []
+    table = triangles.edges
+    rows = (a.tolist() for a in (triangles.corner_vertices, table.face_edges, table.forward))
+    for face, (corners, edges, forward) in enumerate(zip(*rows, strict=True)):
+        outline = []
+        for corner, edge, ahead in zip(corners, edges, forward, strict=True):
+            outline += [corner, *on_edge.get(edge, [])[:: 1 if ahead else -1]]
+        parts = cut(outline, chords.get(face, []))
+        polygons += parts
+        owners += [face] * len(parts)
+    return polygons, np.array(owners), where
+
+
+def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
+    """Cut a convex polygon along chords between its corners; of chords that cross each other, along the shorter.
+
+    Short chords come first, so that each cuts off what others have left between its ends: in linear time.
+    """
+    if not chords:
+        return [outline]
+    places = defaultdict(list)
+    for k, corner in enumerate(outline):
+        places[corner].append(k)
+    found = [(a, b) for a, b in chords if a in places and b in places]
+    found.sort(key=lambda ends: abs(places[ends[0]][0] - places[ends[1]][0]))
+    following = [*range(1, len(outline)), 0]
+    alive = [True] * len(outline)
+    parts, left = [], len(outline)
+    for chord in found:
+        ends = [next((k for k in places[corner] if alive[k]), -1) for corner in chord]
+        first, last = min(ends), max(ends)
+        if first < 0 or following[first] == last:
+            continue
+        part = [first]
+        while part[-1] != last:
+            part.append(following[part[-1]])
+        if len(part) < left:  # else it is a side of what is left
+            parts.append([outline[k] for k in part])
+            for k in part[1:-1]:
+                alive[k] = False
+            following[first], left = last, left - len(part) + 2
+    return [*parts, [corner for corner, is_left in zip(outline, alive, strict=True) if is_left]]
+
+
+def positions(triangulation: IntrinsicTriangulation, places: LocatedPoints) -> NDArray[np.float64]:
+    """(p, 3) positions in space of points of the triangulation."""
+    found = triangulation.history.backward(places.faces, places.barycentric)
+    return triangulation.in_space(*triangulation.refinement.pull_back(*found[:2]))

@@ -1,0 +1,264 @@
+"""Base class of surface domains: how curves and points are placed on them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SourceError
+from ..frozen import Frozen
+from ..mesh.surface_points import corners_at
+from ..validation import array_of, finite_number, flag, numbers
+from .level_sets import boundary_curves, level_set, region_boundary
+from .projection import PlaceableTriangles, projected_curve
+from .surface_curves import Curve, SurfacePoints
+
+
+class Surface(Frozen):
+    """A domain on which curves and points can be placed.
+
+    Face ids of curves and points refer to `triangulation`, vertex ids to the domain.
+    """
+
+    @property
+    def triangulation(self) -> PlaceableTriangles:
+        """The triangles that curves refer to."""
+        raise NotImplementedError
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of values that a field on the surface has."""
+        return self.triangulation.n_vertices
+
+    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the vertices of `triangulation`, from values at the vertices of the domain."""
+        raise NotImplementedError
+
+    def path(self, vertices: ArrayLike, closed: bool = False, oriented: bool = True) -> Curve:
+        """Curve through vertices, in order, with φ > 0 to its left.
+
+        Parameters
+        ----------
+        vertices : (n,) int
+            Vertex ids. Consecutive vertices that share no face are joined by a geodesic path.
+        closed : bool
+            Whether the last vertex is joined to the first.
+        oriented : bool
+            Whether the curve has a positive and a negative side.
+
+        Returns
+        -------
+        Curve
+            On this surface.
+
+        Raises
+        ------
+        SourceError
+            If there are fewer than two vertices, or one does not exist or has no face.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).path([0, 1])
+        Curve(2 points, open, oriented)
+        """
+        faces, weights = self._at_vertices(vertices, "point of the path")
+        return Curve(faces, weights, closed=closed, oriented=oriented)
+
+    def points_at(self, vertices: ArrayLike) -> SurfacePoints:
+        """Vertices as isolated point sources, from which φ grows in all directions.
+
+        Parameters
+        ----------
+        vertices : int or (n,) int
+            Vertex ids.
+
+        Returns
+        -------
+        SurfacePoints
+            On this surface.
+
+        Raises
+        ------
+        SourceError
+            If there is no vertex, or one does not exist or has no face.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).points_at(2)
+        SurfacePoints(1 points)
+        """
+        return SurfacePoints(*self._at_vertices(vertices, "point"))
+
+    def positions(self, points: Curve | SurfacePoints) -> NDArray[np.float64]:
+        """Positions in space of the points of a curve, or of isolated points.
+
+        Parameters
+        ----------
+        points : Curve or SurfacePoints
+            On this surface.
+
+        Returns
+        -------
+        (n, 3) float
+            Positions, in the units of the surface.
+
+        Raises
+        ------
+        SourceError
+            If one lies in a face that does not exist.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> mesh.positions(mesh.level_set([0.0, 1.0, 1.0], 0.5)[0]).tolist()
+        [[0.0, 0.5, 0.0], [0.5, 0.0, 0.0]]
+        """
+        triangles = self.triangulation
+        wrong = np.flatnonzero((points.faces < 0) | (points.faces >= triangles.n_faces))
+        if len(wrong):
+            raise SourceError(
+                f"point {wrong[0]} lies in face {points.faces[wrong[0]]}, and there are {triangles.n_faces}",
+                element=f"point {wrong[0]}",
+            )
+        corners = triangles.vertices[triangles.faces[points.faces]]
+        return np.einsum("nk,nkd->nd", points.barycentric, corners)
+
+    def polyline(
+        self, points: ArrayLike, closed: bool = False, oriented: bool = True, max_distance: float | None = None
+    ) -> Curve:
+        """Polyline in space, projected on the surface: the closest points, joined by geodesic paths.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            Points in order.
+        closed : bool
+            Whether the last point is joined to the first.
+        oriented : bool
+            Whether the curve has a positive and a negative side.
+        max_distance : float, optional
+            Largest distance of a point from the surface; 5 % of the diagonal of its bounding box by default.
+
+        Returns
+        -------
+        Curve
+            One segment per face crossed.
+
+        Raises
+        ------
+        SourceError
+            If a point is too far away, or two consecutive points are not connected on the surface.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> mesh.polyline([[0.8, 0.2, 0.01], [0.2, 0.8, 0.01]]).barycentric.round(3).tolist()
+        [[0.2, 0.6, 0.2], [0.5, 0.0, 0.5], [0.2, 0.2, 0.6]]
+        """
+        closed, oriented = flag(closed, "closed"), flag(oriented, "oriented")
+        return projected_curve(self.triangulation, points, closed, oriented, max_distance)
+
+    def level_set(self, values: ArrayLike, level: float = 0.0) -> list[Curve]:
+        """Level set of a function that is linear between vertices, oriented so that φ grows with the function.
+
+        Parameters
+        ----------
+        values : (n_vertices,) float
+            The function; faces with a NaN corner are skipped.
+        level : float
+            The level.
+
+        Returns
+        -------
+        list of Curve
+            One for each connected component, open or closed; larger values are to its left.
+
+        Raises
+        ------
+        SourceError
+            If there is not one value per vertex.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).level_set([0.0, 1.0, 1.0], 0.5)
+        [Curve(2 points, open, oriented)]
+        """
+        at_vertices, height = numbers(values, "values", SourceError), finite_number(level, "level")
+        if at_vertices.shape != (self.n_vertices,):
+            raise SourceError(
+                f"a level set needs one value per vertex: {self.n_vertices}, not an array {at_vertices.shape}",
+                element="values",
+            )
+        return level_set(self.triangulation, self.on_triangulation(at_vertices), height)
+
+    def region_boundary(self, face_mask: ArrayLike) -> list[Curve]:
+        """Boundary of a region of faces, with the region to the left, so that φ > 0 in it.
+
+        Parameters
+        ----------
+        face_mask : (n_faces,) bool
+            True for the faces of the region.
+
+        Returns
+        -------
+        list of Curve
+            Curves along edges between the region and other faces; the boundary of the surface does not count.
+
+        Raises
+        ------
+        SourceError
+            If there is not one boolean per face.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> mesh.region_boundary([True, False])
+        [Curve(2 points, open, oriented)]
+        """
+        return region_boundary(self.triangulation, self._triangle_mask(array_of(face_mask, "face_mask", SourceError)))
+
+    def boundary_curves(self) -> list[Curve]:
+        """The boundary of the surface, with the surface to its left.
+
+        Returns
+        -------
+        list of Curve
+            Closed loops, split at vertices where they touch each other.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).boundary_curves()
+        [Curve(3 points, closed, oriented)]
+        """
+        return boundary_curves(self.triangulation)
+
+    def _at_vertices(self, vertices: ArrayLike, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        ids = self._triangulation_vertices(np.atleast_1d(array_of(vertices, f"vertex ids of a {name}", SourceError)))
+        mesh = self.triangulation
+        corners = corners_at(mesh.faces, ids, mesh.n_vertices, name)
+        return corners // 3, np.eye(3)[corners % 3]
+
+    def _triangulation_vertices(self, vertices: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Vertices of `triangulation` that are vertices of the domain."""
+        return vertices
+
+    def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Faces of `triangulation` that belong to faces of the domain."""
+        check_mask(face_mask, self.triangulation.n_faces)
+        return face_mask
+
+
+def check_mask(face_mask: NDArray[np.bool_], n_faces: int) -> None:
+    """Raise `SourceError` unless there is one boolean per face."""
+    if face_mask.shape != (n_faces,) or face_mask.dtype != bool:
+        raise SourceError(
+            f"a region needs one boolean per face, {n_faces} in all, not {face_mask.dtype} of shape {face_mask.shape}",
+            element="face_mask",
+        )

@@ -1,0 +1,357 @@
+"""Surfaces of every kind as a discretisation: one vector per edge, one value per vertex of an intrinsic mesh."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..cache import LastUsed, fingerprint
+from ..diagnostics import EdgesLengthened, LargeAngles, Note, PointsLeftOut, VerticesAdded
+from ..direct_integration import DirectIntegration, refuse_contradictions
+from ..discretization import Levels, SourceTerm, discretize
+from ..errors import GeometryError
+from ..linear import Factor, chosen_backend, elimination_order, factorize
+from ..memory import refuse_beyond_memory
+from ..mesh.conforming_refinement import refine_to_conform
+from ..mesh.curve_segments import CurveSegments
+from ..mesh.intrinsic_mesh import IntrinsicMesh, laid_out, mollify
+from ..spring_integration import SpringIntegration
+from .cotan import cotan_matrix, divergence
+from .digital_surface import DigitalSurface
+from .intrinsic_triangulation import IntrinsicTriangulation
+from .nonmanifold_frames import nonmanifold_frames
+from .point_cloud import PointCloud
+from .polygon_mesh import PolygonMesh
+from .source_segments import segments_of_each
+from .surface_source import SurfaceSource, ends_among, surface_source
+from .surfels import count_surfels, separated_edges
+from .triangle_mesh import TriangleMesh
+from .vector_heat import VectorHeat, extrapolated
+
+TIMES = 2
+"""Diffusion times whose factors are kept: where curves end another one is used."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceDiscretization:
+    """The discretisation of a surface.
+
+    Parameters
+    ----------
+    domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
+        The domain of the fields returned.
+    triangles : IntrinsicMesh
+        The triangles that the method runs on.
+    restriction : (n,) int, optional
+        Vertex of the triangles for each vertex of the domain, if they are not the same.
+    transfer : callable, optional
+        Maps a source on the domain to the same source on the triangles, if their faces are not those of the domain.
+    positions : (n_vertices, 3) or (m, 3, 3) float, optional
+        Positions in space of the vertices, or of the corners of each face (up to translation) if every face lies in a
+        plane of its own; needed for curves with given normals. By default those of the domain's triangulation.
+    triangulation : IntrinsicTriangulation, optional
+        That of the domain whose vertices are the first of the triangles; φ on it is kept as well.
+    spacing : float, optional
+        h. By default half the mean edge length, the mean distance between neighbouring edge midpoints.
+    notes : tuple of Note
+        Repairs made in building the triangles; they are added to the diagnostics of every field.
+    """
+
+    domain: Any
+    triangles: IntrinsicMesh
+    restriction: NDArray[np.int64] | None = None
+    transfer: Callable[[Any], Any] | None = None
+    positions: NDArray[np.float64] | None = None
+    triangulation: IntrinsicTriangulation | None = None
+    spacing: float = math.nan
+    notes: tuple[Note, ...] = ()
+    _heats: LastUsed[float, VectorHeat] = field(default_factory=lambda: LastUsed(TIMES), init=False, repr=False)
+    _turned: LastUsed[bytes, SurfaceDiscretization] = field(default_factory=LastUsed, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if math.isnan(self.spacing):
+            object.__setattr__(self, "spacing", 0.5 * float(self.triangles.lengths_of_edges.mean()))
+
+    @cached_property
+    def extent(self) -> float:
+        """Square root of the area of the largest connected part, in multiples of h."""
+        areas = np.bincount(self.triangles.face_components, self.triangles.face_areas)
+        return float(np.sqrt(areas.max(initial=0.0))) / self.spacing
+
+    @cached_property
+    def integration(self) -> SurfaceIntegration:
+        """Step 3."""
+        ordered = partial(factorize, order=self.vertex_order)
+        return SurfaceIntegration(self.stiffness, factorize=ordered, strength=STRENGTH / self.spacing)
+
+    @cached_property
+    def stiffness(self) -> sparse.csr_matrix:
+        """Upper triangle of C (Eq. 10), on the vertices of the triangles."""
+        return cotan_matrix(self.triangles)
+
+    @cached_property
+    def vertex_order(self) -> NDArray[np.int64]:
+        """Fill-reducing order of the vertices, from which that of the edges follows."""
+        return elimination_order(self.stiffness)
+
+    def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
+        """Refine the triangles to conform to unoriented curves; choose frames at nonmanifold edges."""
+        triangles, segments = refine_to_conform(self.triangles, self.segments(sources))
+        surface = self if triangles is self.triangles else self._cut_into(triangles)
+        triangles, groups = nonmanifold_frames(triangles, segments)
+        return surface._turned_to(triangles), groups
+
+    def segments(self, sources: Sequence[Any]) -> list[list[CurveSegments]]:
+        """The sources, given on the domain, as segments on the triangles."""
+        if self.transfer is not None:
+            sources = [self.transfer(source) for source in sources]
+        positions = self.positions
+        if positions is None and self.transfer is None:
+            positions = self.domain.triangulation.vertices
+        return segments_of_each(sources, self.triangles, positions)
+
+    def _turned_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
+        """The same surface with other first faces at nonmanifold edges; shares all of step 3, which ignores them."""
+        if triangles is self.triangles:
+            return self
+
+        def turned() -> SurfaceDiscretization:
+            other = replace(self, triangles=triangles)
+            vars(other).update({name: getattr(self, name) for name in ("stiffness", "integration", "vertex_order")})
+            return other
+
+        return self._turned(fingerprint(triangles.first_halfedges), turned)
+
+    def _cut_into(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
+        """The same surface with refined triangles, whose first vertices are the present ones."""
+        added = triangles.n_vertices - self.triangles.n_vertices
+        return replace(
+            self,
+            triangles=triangles,
+            restriction=np.arange(self.triangles.n_vertices) if self.restriction is None else self.restriction,
+            transfer=None,
+            notes=(*self.notes, VerticesAdded(added)),
+        )
+
+    def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
+        """X₀ (Eq. 11, Eq. 19) and the rows that interpolate φ along the sources (Eq. 14)."""
+        return surface_source(self.triangles, sources, diffusion, self.spacing)
+
+    def diffuse(self, source: Any) -> list[NDArray[np.complex128]]:
+        """Solve ``(M + tL) X = X₀`` (Eq. 12): one vector per edge, in stages (see `VectorHeat`)."""
+        return self.diffuse_many([source])[0]
+
+    def diffuse_many(self, sources: Sequence[Any]) -> list[list[NDArray[np.complex128]]]:
+        """Solve Eq. 12 for several sources at once, of the same t, and all of them to be extrapolated or none."""
+        time, order = sources[0].time, self.triangles.edges.elimination_order
+        heat = self._heats(time, lambda: VectorHeat(self.triangles, time, order(self.vertex_order)))
+        return heat.solve([source.vectors for source in sources], changes=2 if sources[0].extrapolated else 0)
+
+    def to_cells(self, stages: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
+        """(m,) three times the mean of X over the edges of each face (Sec. 6), in its layout; extrapolated if wanted.
+
+        Each face takes it from the last stage in which all of its edges are known.
+        """
+        sums = self.triangles.sums_in_faces(stages[0])
+        for stage in stages[1:]:
+            later = self.triangles.sums_in_faces(stage)
+            sums = np.where(np.isnan(later), sums, later)
+        return extrapolated(sums) if sums.shape[1] > 1 else sums[:, 0]
+
+    def divergence(self, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
+        return divergence(self.triangles, directions)
+
+    def reached_by(self, vectors: sparse.csr_array) -> NDArray[np.bool_]:
+        """(n_vertices,) which vertices have a face in a component with a source: vectors diffuse across edges only."""
+        parts = self.triangles.face_components
+        if not parts.any():
+            return np.ones(self.triangles.n_vertices, dtype=bool)
+        is_source = np.zeros(self.triangles.n_edges, dtype=bool)
+        is_source[vectors.indices[vectors.data != 0]] = True
+        with_source = np.unique(parts[is_source[self.triangles.edges.face_edges].any(axis=1)])
+        reached = np.zeros(self.triangles.n_vertices, dtype=bool)
+        reached[self.triangles.corner_vertices[np.isin(parts, with_source)]] = True
+        return reached
+
+
+@discretize.register
+def _(domain: TriangleMesh) -> SurfaceDiscretization:
+    refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
+    return lowered_mesh(domain)
+
+
+def lowered_mesh(domain: TriangleMesh) -> SurfaceDiscretization:
+    """The discretisation of a mesh, of whose memory the caller has made sure."""
+    triangles, added = laid_out(domain, 1e-6)
+    share = large_angles(triangles)
+    notes = (*([EdgesLengthened(added)] if added else []), *([LargeAngles(share)] if share else []))
+    return SurfaceDiscretization(domain, triangles, notes=notes)
+
+
+def large_angles(triangles: IntrinsicMesh) -> float:
+    """Fraction of angles above 120°, or 0 if below 1 %. Many of them make directions far from the source inaccurate."""
+    share = float((triangles.corner_cotangents < -(3**-0.5)).mean())
+    return share if share >= 0.01 else 0.0
+
+
+BYTES = {"pardiso": (1200, 40), "cholmod": (1150, 150), "superlu": (800, 200)}
+"""Peak for each triangle, and what every doubling of their number adds, since the fill of factors grows; by back end.
+Measured on 20,000 to 310,000 triangles with one diffusion time; CHOLMOD with three."""
+
+
+def memory_estimate(n_triangles: int) -> float:
+    """Bytes that a first distance on so many triangles takes at the most.
+
+    Examples
+    --------
+    >>> memory_estimate(640_000) > 2 * memory_estimate(320_000)
+    True
+    """
+    each, per_doubling = BYTES[chosen_backend()]
+    return n_triangles * (each + per_doubling * math.log2(max(n_triangles, 2)))
+
+
+def refuse_too_many(triangles: int, count: int, elements: str, more: float = 0.0) -> None:
+    """Raise `MemoryLimitError` if distance on so many triangles, and `more` bytes, do not fit into memory.
+
+    They stand for a `count` of elements of the domain: triangles, polygons, points, faces of voxels.
+    """
+    each = triangles / max(count, 1)
+    refuse_beyond_memory(
+        f"distance on {count:,} {elements}",
+        count,
+        lambda number: memory_estimate(math.ceil(each * number)) + more * number / count,
+        lambda number: f"use at most {number:,} {elements}, coarsened or in parts",
+    )
+
+
+STRENGTH = 100.0
+"""Strength of the springs along curves that cross faces, in 1/h: measured on twenty meshes, good and bad."""
+SOFT = 10.0
+"""λ of `Soft` where none is given, in 1/h."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceIntegration(SpringIntegration):
+    """Step 3 on the vertices of a surface: `fit` is exact for sources at vertices only, and uses springs for others."""
+
+    @property
+    def soft_weight(self) -> float:
+        """λ of `Soft` where none is given, in 1/length."""
+        return SOFT / STRENGTH * self.strength
+
+    def anchored(self, source: SourceTerm) -> Factor:
+        """Factor of C with φ held at zero along the source, as stiffly at every sample."""
+        return self._pulled_factor(source.interpolation, DirectIntegration.springs(self, source))
+
+    def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, NDArray[np.float64]]:
+        """Springs all along segments, so that more points on them change nothing; at vertices, and isolated points.
+
+        What is linear along a segment has the same square there as at its two Gauss points.
+        """
+        assert isinstance(source, SurfaceSource)
+        n, springs = len(source.weights), self.springs(source)
+        ends, lengths = ends_among(source.parts, np.arange(n)), np.concatenate([p.lengths for p in source.parts])
+        shares = 0.5 + np.array([[1.0, -1.0], [-1.0, 1.0]]) / 12**0.5
+        along = np.repeat(ends, 2, axis=0), np.tile(shares, (len(ends), 1))
+        alone = np.bincount(ends.ravel(), minlength=n) == 0
+        points = np.flatnonzero(alone | (np.diff(source.interpolation.indptr) == 1))
+        starts = np.concatenate([np.arange(0, 4 * len(ends), 2), 4 * len(ends) + np.arange(len(points) + 1)])
+        entries = np.concatenate([along[1].ravel(), np.ones(len(points))]), np.concatenate([along[0].ravel(), points])
+        places = sparse.csr_matrix((*entries, starts), shape=(len(starts) - 1, n))
+        return places, np.concatenate([np.repeat(0.5 * self.strength * lengths, 2), springs[points]])
+
+    def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+        """Impose levels: exactly along edges, to some hundredths of h across faces (Eq. 14)."""
+        if (np.diff(source.interpolation.indptr) == 1).all():
+            return self.fit_exactly(divergence, source, levels)
+        fitted = super().fit(divergence, source, levels)
+        if levels.groups is None:
+            between = np.diff(np.unique(levels.values)).min(initial=np.inf)
+            refuse_contradictions(source.interpolation, levels.values, fitted, 0.25 * float(between))
+        return fitted
+
+
+LIGHTER = 0.87
+"""Memory of a triangle of a polygon, over that of others: few edges meet in virtual vertices. Measured on quads."""
+
+
+@discretize.register
+def _(domain: PolygonMesh) -> SurfaceDiscretization:
+    refuse_too_many(round(LIGHTER * len(domain.corners)), domain.n_polygons, "polygons")
+    return lowered_polygons(domain)
+
+
+def lowered_polygons(domain: PolygonMesh) -> SurfaceDiscretization:
+    """The discretisation of polygons, of whose memory the caller has made sure.
+
+    φ is solved for on all vertices of the triangles, virtual ones included, and reported at those of the polygons.
+
+    With virtual vertices eliminated in step 3 (``PᵀCP``), a curve across polygons could not be a level set of φ: it
+    crosses more edges of triangles than its polygons have corners, and φ would be constant on whole polygons. h is half
+    the mean length of the polygons' own edges, so that virtual vertices do not change t.
+    """
+    lowered = lowered_mesh(domain.triangulation)
+    own = (domain.triangulation.edges.vertices < domain.n_vertices).all(axis=1)
+    spacing = 0.5 * float(domain.triangulation.edge_lengths[own].mean())
+    return replace(lowered, domain=domain, restriction=np.arange(domain.n_vertices), spacing=spacing)
+
+
+NEIGHBORS, BYTES_PER_POINT = 40_000_000, 1300
+"""Bytes of the libraries that find neighbours, and of neighbours, in addition to those of triangles. Measured."""
+
+
+@discretize.register
+def _(domain: PointCloud) -> SurfaceDiscretization:
+    """The values of φ are at the points; points that coincide share one unknown.
+
+    h is the mean distance between neighbouring points, the scale below which the samples do not determine the surface.
+    """
+    refuse_too_many(2 * domain.n_points, domain.n_points, "points", more=NEIGHBORS + BYTES_PER_POINT * domain.n_points)
+    mesh = domain.triangulation
+    used = np.zeros(domain.n_points, dtype=bool)
+    used[mesh.faces] = True
+    duplicates = int((domain.representatives != np.arange(domain.n_points)).sum())
+    notes = (PointsLeftOut(duplicates, np.flatnonzero(~used[domain.representatives]).tolist()),)
+    spacing = float(mesh.edge_lengths.mean())
+    return replace(lowered_mesh(mesh), domain=domain, restriction=domain.representatives, spacing=spacing, notes=notes)
+
+
+BYTES_PER_VOXEL = 20
+"""Blurred copies of the volume, from which normals are estimated."""
+
+
+@discretize.register
+def _(domain: DigitalSurface) -> SurfaceDiscretization:
+    """Each square becomes four triangles between its corners, moved, and their mean.
+
+    h is the standard deviation of the Gaussian with which normals are estimated, and at least the voxel size. At a
+    smaller scale the shape of the surface is unknown, and diffusion would follow the directions of the lattice.
+    """
+    faces = count_surfels(domain.volume)
+    refuse_too_many(4 * faces, faces, "faces of voxels", more=BYTES_PER_VOXEL * domain.volume.size)
+    mesh, corners = domain.triangulation, domain.smooth_vertices
+    positions = np.concatenate([corners, corners[domain.surfels.corners].mean(axis=1)])
+    placed = positions[mesh.faces]
+    sides = np.linalg.norm(np.roll(placed, -1, axis=1) - placed, axis=2)
+    if not sides.any():
+        raise GeometryError(
+            "the faces of the voxels are so small that their corners fall together",
+            remedy="scale spacing, or move origin to zero",
+            element="spacing",
+        )
+    lengths, _ = mollify(sides, 1e-6)
+    edges = separated_edges(mesh.edges, domain.surfels)
+    triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, edges)
+    extent = float((domain.bounds[1] - domain.bounds[0]).max())
+    spacing = max(min(0.5 * domain.radius, extent), float(domain.spacing.mean()))
+    own = np.arange(domain.n_vertices)
+    return SurfaceDiscretization(domain, triangles, restriction=own, positions=positions, spacing=spacing)

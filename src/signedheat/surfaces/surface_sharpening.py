@@ -1,0 +1,286 @@
+"""Sharpening on surfaces: exact geodesic distance to curves and points, and to the zero set of φ where curves end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..diagnostics import GeodesicWindows, SharpenedToCurves
+from ..discretization import SourceTerm, discretize
+from ..errors import GeometryError, InexactWarning, SourceError, UnsupportedTypeError, warn_user
+from ..foreign import as_list
+from ..geodesics.exact_distance import Report, cleared, distance_to_segments, distance_to_zero_line, window_limit
+from ..geodesics.geodesic_sources import PlacedSegments, zero_line
+from ..linear_elements import LinearElements
+from ..mesh.components import connected_components
+from ..mesh.curve_segments import CurveSegments, interpolation_at
+from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.surface_points import incident_faces
+from ..progress import Progress
+from ..sharpening_methods import Method, Nearest, nearest, sharpen_field, sharpened
+from .curve_sides import CurveSides, curve_sides
+from .intrinsic_triangulation import IntrinsicTriangulation
+from .surface_curves import CurvesAndPoints
+from .surface_discretization import SurfaceDiscretization
+from .surface_source import SurfaceSource
+from .vertex_field import VertexField
+
+FAR = 1.0
+"""Triangle sizes: what the zero set has farther from any curve completes the curves."""
+
+ROUGHLY = 1e-4
+"""Tolerance of distances that are compared only, of which differences below a thousandth do not count."""
+
+INVENTED = 0.05
+"""Share of the zero set, apart from curves without an end, from which there is a warning that these bound nothing."""
+
+UNDECIDED = 0.1
+"""Share of the vertices whose sides curves without an end decide, up to which they bound nothing: where they bound a
+region of meshes, they decide all but those next to them. At that, no level set of 96 on eight meshes is announced."""
+
+NEGLIGIBLE = 1e-3
+"""Share of the zero set, apart from curves that bound nothing, up to which they are not announced: a loop round a hole
+through a plate has that share of the hole's circumference in its own."""
+
+FALSE_ZERO_WIDTH = 4.0
+"""Distance from an unoriented source, relative to h, within which zeros of φ may be due to that source alone."""
+
+
+@sharpen_field.register
+def _(
+    field: VertexField, source: CurvesAndPoints | None, method: Method | None, progress: Progress | None
+) -> VertexField:
+    if field.finest is not field:
+        same = replace(field.finest, diagnostics=field.diagnostics)
+        fine = sharpen_field(same, source, method, progress)
+        assert isinstance(fine, VertexField)
+        values = fine.values[: len(field.values)]
+        return replace(field, values=values, diagnostics=fine.diagnostics, finer=cast("VertexField[Any]", fine))
+    surface = discretize(field.domain)
+    if not isinstance(surface, SurfaceDiscretization):
+        raise UnsupportedTypeError(
+            f"a field on a {type(field.domain).__name__} cannot be sharpened: its domain is no surface", element="field"
+        )
+    elements = LinearElements.on_triangles(surface.triangles)
+    new, diagnostics = sharpened(field, surface, elements, at_triangles(surface, field), source, method, progress)
+    values = new if surface.restriction is None else new[surface.restriction]
+    return replace(field, values=values, diagnostics=diagnostics)
+
+
+def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[np.float64]:
+    """Values at the vertices of the surface's triangles; averages of neighbours at those that the domain lacks."""
+    n = surface.triangles.n_vertices
+    values = np.asarray(field.values)
+    wanted = n if surface.restriction is None else len(surface.restriction)
+    if values.shape != (wanted,) or not np.issubdtype(values.dtype, np.number):
+        raise GeometryError(
+            f"the field has {values.dtype} values of shape {values.shape}, and its domain {wanted} vertices",
+            remedy="give one number for each",
+        )
+    if surface.restriction is None:
+        return values.astype(np.float64)
+    assert not isinstance(field.domain, IntrinsicTriangulation)  # it has the vertices of its triangles
+    values = field.domain.on_triangulation(field.values)
+    if len(values) != n:
+        values = np.full(n, np.nan)
+        values[surface.restriction] = field.values
+    return values
+
+
+@nearest.register
+def _(
+    surface: SurfaceDiscretization,
+    values: NDArray[np.float64],
+    source: SourceTerm | None,
+    given: CurvesAndPoints | None,
+    tolerance: float,
+    report: Callable[[], None] | None,
+) -> Nearest:
+    """Polyhedral distance."""
+    if given is None:
+        return nearest_zero(surface, values, source, tolerance, report)
+    parts = list(chain.from_iterable(surface.segments(as_list(given))))
+    if not parts:
+        raise SourceError("there are no curves to sharpen to", remedy="leave them out", element="curves")
+    return nearest_curve(surface.triangles, values, parts, surface.spacing, tolerance, report)
+
+
+def nearest_zero(
+    surface: SurfaceDiscretization,
+    values: NDArray[np.float64],
+    source: SourceTerm | None,
+    tolerance: float,
+    report: Report | None,
+) -> Nearest:
+    """The nearest of the zero set of φ, and of the unoriented curves and points that φ was computed from."""
+    unsided = [part for part in source.parts if not part.oriented] if isinstance(source, SurfaceSource) else []
+    sides = np.zeros(len(values), dtype=np.int64)
+    if not isinstance(source, SurfaceSource) or not unsided:
+        distance, windows = distance_to_zero_line(surface.triangles, values, tolerance, report)
+        return Nearest(distance, sides, (note_on_searches(surface.triangles, windows),))
+    # Unoriented curves run along edges of refined triangles, whose first vertices are those of the surface.
+    near, windows = distance_to_segments(
+        source.triangles, [PlacedSegments.of(source.triangles, unsided)], tolerance, report
+    )
+    note = note_on_searches(source.triangles, windows)
+    near = near[: len(values)]
+    if not source.oriented:
+        return Nearest(near, np.ones_like(sides), (note,))
+    sided = np.concatenate(
+        [interpolation_at(source.triangles, part.nodes).indices for part in source.parts if part.oriented]
+    )
+    lines = without_false_zeros(
+        surface.triangles, values, near < FALSE_ZERO_WIDTH * surface.spacing, sided[sided < len(values)]
+    )
+    distance, more = distance_to_zero_line(surface.triangles, lines, tolerance, report)
+    also = note_on_searches(surface.triangles, more)
+    both = GeodesicWindows(windows + more, note.cut_short or also.cut_short)
+    return Nearest(np.minimum(near, distance), sides, (both,))
+
+
+@dataclass(frozen=True, eq=False)
+class CurvesThere:
+    """The curves on the triangles of a surface, and exact distance to them.
+
+    Attributes
+    ----------
+    placed : PlacedSegments
+        All of them.
+    distance : (n,) float
+        Of every vertex to them.
+    sides : CurveSides
+        Those of the oriented ones.
+    windows : int
+        A measure of the work.
+    """
+
+    placed: PlacedSegments
+    distance: NDArray[np.float64]
+    sides: CurveSides
+    windows: int
+
+    @classmethod
+    def on(
+        cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments], tolerance: float, report: Report | None
+    ) -> CurvesThere:
+        """Measure to curves and points."""
+        placed = PlacedSegments.of(triangles, parts)
+        distance, windows = distance_to_segments(triangles, [placed], tolerance, report)
+        return cls(placed, distance, curve_sides(triangles, placed), windows)
+
+
+def nearest_curve(
+    triangles: IntrinsicMesh,
+    values: NDArray[np.float64],
+    parts: Sequence[CurveSegments],
+    spacing: float,
+    tolerance: float,
+    report: Report | None,
+) -> Nearest:
+    """The nearest of curves and points, and of the zero set of φ where oriented ones are missing.
+
+    1. Exact distance to the curves themselves.
+    2. Sides: in regions that curves bound, and at vertices next to a curve, the curve decides; elsewhere φ does.
+    3. The zero set of φ, in regions that no curve bounds, where it is farther from any curve than the triangles there
+       are large, or beyond the free end of one: it completes the curves.
+    4. The smaller of both distances, with the sides of 2.
+    """
+    there = CurvesThere.on(triangles, parts, tolerance, report)
+    distance, counts = there.distance, [there.windows]
+    if not any(part.oriented for part in parts):
+        return Nearest(distance, np.ones(len(values), dtype=np.int64), (note_on_searches(triangles, *counts),))
+    sides, bounded = there.sides, there.sides.regions != 0
+    is_near = sides.reach <= distance * (1 + 1e-9)
+    side = np.where(bounded, sides.regions, np.where(is_near, sides.nearby, 0))
+    turned = (side != 0) & (np.sign(values) != side) & ~np.isnan(values)
+    values = np.where(turned, np.copysign(distance, side), values)
+    missing, more = missing_parts(triangles, values, parts, there, spacing, tolerance, report)
+    counts += more
+    completed = float(missing.lengths.sum())
+    if completed > 0:
+        to_missing, windows = distance_to_segments(triangles, [missing], tolerance, report)
+        distance = np.where(bounded, distance, np.minimum(distance, to_missing))
+        counts.append(windows)
+    there_length = sum(float(part.lengths.sum()) for part in parts)
+    share = completed / (completed + there_length or 1.0)
+    note = SharpenedToCurves(share, len(sides.free_ends), float(bounded.mean()))
+    reached = ~np.isnan(values)
+    decided = (bounded & reached).sum() / max(reached.sum(), 1)
+    if share > (INVENTED if decided > UNDECIDED else NEGLIGIBLE) and not note.free_ends:
+        warn_user(
+            f"curves without free ends bound no region: {100 * share:.2g} % of what distance is measured to is "
+            "where its sign must change elsewhere. piecewise_distance lets it jump there",
+            InexactWarning,
+        )
+    return Nearest(distance, side, (note, note_on_searches(triangles, *counts)))
+
+
+def missing_parts(
+    triangles: IntrinsicMesh,
+    values: NDArray[np.float64],
+    parts: Sequence[CurveSegments],
+    there: CurvesThere,
+    spacing: float,
+    tolerance: float,
+    report: Report | None,
+) -> tuple[PlacedSegments, list[int]]:
+    """The parts of the zero set of φ that complete the curves; and the number of windows of each search."""
+    size = np.sqrt(2 * triangles.face_areas)
+    corners = triangles.corner_vertices
+    apart = there.distance[corners].mean(axis=1) > FAR * size
+    counts = []
+    if len(there.sides.free_ends):
+        ends = CurveSegments.of_points(there.placed.nodes[there.sides.free_ends])
+        to_ends, windows = distance_to_segments(triangles, [PlacedSegments.of(triangles, [ends])], ROUGHLY, report)
+        counts.append(windows)
+        beyond = to_ends <= there.distance * (1 + 1e-3)
+        apart |= beyond[corners].all(axis=1)
+    apart[there.placed.faces] = False
+    apart &= (there.sides.regions[corners] == 0).any(axis=1)
+    values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
+    unsided = [part for part in parts if not part.oriented]
+    if unsided:
+        near, windows = distance_to_segments(triangles, [PlacedSegments.of(triangles, unsided)], ROUGHLY, report)
+        sided = [incident_faces(triangles, part.nodes)[1] for part in parts if part.oriented]
+        values = without_false_zeros(
+            triangles, values, near < FALSE_ZERO_WIDTH * spacing, corners[np.concatenate(sided)].ravel()
+        )
+        counts.append(windows)
+    return zero_line(triangles, values, apart), counts
+
+
+def without_false_zeros(
+    triangles: IntrinsicMesh, values: NDArray[np.float64], near: NDArray[np.bool_], sided: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Values with NaN along those parts of the zero set that are due to unoriented sources.
+
+    φ is zero at such a source only on average, so it may change sign around it. A connected part of the zero set that
+    lies entirely near the source, and at no vertex of an oriented curve, is due to the source alone.
+    """
+    signs = np.sign(values)[triangles.corner_vertices]
+    crossed = np.flatnonzero((signs.min(axis=1) < 0) & (signs.max(axis=1) > 0))
+    m, e = len(crossed), triangles.n_edges
+    through = np.roll(signs, -1, axis=1)[crossed] * signs[crossed] < 0
+    face, side = np.nonzero(through)
+    line = connected_components(m + e, face, m + triangles.edges.face_edges[crossed[face], side])[:m]
+    corners = triangles.corner_vertices[crossed]
+    is_sided = np.zeros(len(values), dtype=bool)
+    is_sided[sided] = True
+    own = np.ones(line.max(initial=-1) + 1, dtype=bool)
+    own[line[(~near[corners] | is_sided[corners]).any(axis=1)]] = False
+    result = values.copy()
+    result[corners[own[line]]] = np.nan
+    return result
+
+
+def note_on_searches(triangles: IntrinsicMesh, *counts: int) -> GeodesicWindows:
+    """The note on searches with so many windows, and a warning if one was cut short."""
+    note = GeodesicWindows(sum(counts), cut_short=max(counts) >= window_limit(triangles))
+    if note.cut_short:
+        warn_user(f"exact distance was cut short: {note}", InexactWarning)
+    return note

@@ -1,0 +1,346 @@
+"""Sources on surfaces, lowered to X₀ of Eq. 12 (Eq. 11, Eq. 19) and to the rows A of Eq. 14 that interpolate φ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, csr_matrix, vstack
+
+from ..errors import CancellingNormalsError, SourceError
+from ..frozen import Frozen
+from ..mesh.components import connected_components
+from ..mesh.curve_segments import CurveSegments, interpolation_at
+from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.surface_points import (
+    EDGE,
+    VERTEX,
+    LocatedPoints,
+    concatenated,
+    incident_faces,
+    points_at_vertices,
+    unique_points,
+)
+from .source_segments import segments_of_each
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceSource(Frozen):
+    """Curves and points, lowered to an intrinsic mesh.
+
+    Attributes
+    ----------
+    vectors : (1, e) complex sparse
+        X₀, in the frames of the edges.
+    time : float
+        t of Eq. 12.
+    interpolation : (s, n_vertices) sparse
+        Row i interpolates φ at sample i; samples are the distinct points of every source.
+    weights : (s,) float
+        Length of curve that belongs to each sample; h for isolated points.
+    components : (s,) int
+        Connected component of the union of all sources, numbered by first appearance.
+    source_ids : (s,) int
+        Source that each sample belongs to.
+    oriented : bool
+        Whether any source is oriented; if none is, φ is an unsigned distance.
+    triangles : IntrinsicMesh
+        The triangles that the sources are lowered to; the first vertices are those of the domain's own triangles.
+    parts : list of CurveSegments
+        The sources on these triangles.
+    extrapolated : bool
+        Whether directions are to be extrapolated in t.
+    """
+
+    vectors: csr_array
+    time: float
+    interpolation: csr_matrix
+    weights: NDArray[np.float64]
+    components: NDArray[np.int64]
+    source_ids: NDArray[np.int64]
+    oriented: bool
+    triangles: IntrinsicMesh
+    parts: Sequence[CurveSegments]
+    extrapolated: bool = False
+
+    @cached_property
+    def ending(self) -> NDArray[np.bool_]:
+        """(m,) faces of those connected parts of the surface in which an oriented curve ends.
+
+        Ends at the boundary and at nonmanifold edges, where three curves may meet, do not count.
+        """
+        triangles = self.triangles
+        oriented = [part for part in self.parts if part.oriented]
+        if not oriented:
+            return np.zeros(triangles.n_faces, dtype=bool)
+        nodes, ends = joined(oriented)
+        free = nodes[np.flatnonzero(np.bincount(ends.ravel(), minlength=len(nodes)) % 2)]
+        rim = triangles.edges.face_counts != 2
+        at_rim = np.zeros(triangles.n_vertices, dtype=bool)
+        at_rim[triangles.edges.vertices[rim]] = True
+        outer = ((free.kinds == VERTEX) & at_rim[free.elements % triangles.n_vertices]) | (
+            (free.kinds == EDGE) & rim[free.elements % triangles.n_edges]
+        )
+        parts = triangles.face_components
+        return np.isin(parts, parts[incident_faces(triangles, free[~outer])[1]])
+
+    @property
+    def ends_everywhere(self) -> bool:
+        """Whether there is no connected part of the surface in which all curves are closed."""
+        return all(self.ending[part.nodes.faces].all() for part in self.parts)
+
+
+def surface_source(
+    triangles: IntrinsicMesh,
+    sources: Sequence[Any],
+    diffusion: float,
+    spacing: float,
+    positions: NDArray[np.float64] | None = None,
+) -> SurfaceSource:
+    """Lower sources to an intrinsic mesh.
+
+    Parameters
+    ----------
+    triangles : IntrinsicMesh
+        The surface; face ids of the sources refer to it.
+    sources : sequence of Curve, SurfacePoints, CurveSegments or sequences of them
+        What distance is measured to; a sequence in it counts as one source. Unoriented curves must run along edges: see
+        `refine_to_conform`.
+    diffusion : float
+        τ in ``t = τ h²``.
+    spacing : float
+        h: mean distance between unknowns. An isolated point has the weight of a curve of this length.
+    positions : (n_vertices, 3) float, optional
+        Vertices in space, for curves whose normals are given.
+
+    Examples
+    --------
+    >>> from signedheat import Curve
+    >>> triangles = IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.ones((1, 3)), 3)
+    >>> across = Curve([0, 0], [[0.5, 0.5, 0.0], [0.5, 0.0, 0.5]])
+    >>> surface_source(triangles, [across], 1.0, 0.5).weights
+    array([0.25, 0.25])
+    """
+    groups = segments_of_each(sources, triangles, positions)
+    parts = [part for group in groups for part in group]
+    if not parts or not all(groups):
+        raise SourceError(
+            "there is no source",
+            remedy="pass at least one curve or point, and no empty lists",
+        )
+    if not all(part.is_conforming for part in parts):
+        raise SourceError("unoriented curves inside faces must be embedded in the triangles first", element="curves")
+    vectors = oriented_vectors(triangles, [p for p in parts if p.oriented])
+    vectors = vectors + unoriented_vectors(triangles, parts, spacing)
+    points = [p.nodes for p in parts if len(p.ends) == 0]
+    if points:
+        nodes = concatenated(points)
+        at_vertex = nodes.kinds == VERTEX
+        vectors = vectors + spacing * vertex_point_vectors(triangles, nodes.elements[at_vertex])
+        vectors = vectors + np.sqrt(3) * spacing**2 * inner_point_vectors(triangles, nodes[~at_vertex])
+    elif np.abs(vectors.data).max(initial=0.0) <= 1e-12 * max(part.lengths.max() for part in parts):
+        raise CancellingNormalsError(
+            "the curves cancel: all of them run both ways, or close inside single faces, so that no side is positive",
+            remedy="make them unoriented (oriented=False), or the faces smaller, as intrinsic=True does",
+            element="curves",
+        )
+
+    components = connected(parts)
+    sizes = [sum(len(p.nodes) for p in group) for group in groups]
+    return SurfaceSource(
+        vectors=vectors,
+        time=diffusion * spacing**2,
+        interpolation=vstack([interpolation_at(triangles, p.nodes) for p in parts], format="csr"),
+        weights=np.concatenate([line_elements(p, spacing) for p in parts]),
+        components=components,
+        source_ids=np.repeat(np.arange(len(groups)), sizes),
+        oriented=any(p.oriented for p in parts),
+        triangles=triangles,
+        parts=parts,
+    )
+
+
+def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> csr_array:
+    """Eq. 11 without its factor ψ_e(m): i(b − a) for a segment ab, to its edge or in thirds to the edges of its face.
+
+    One third is the mean of ψ_e over a face; it gives segments along edges and segments inside faces of one curve the
+    same weight. (The published code adds the whole vector to each of the three edges.)
+    """
+    sums = csr_array((1, triangles.n_edges), dtype=np.complex128)
+    for part in parts:
+        along, inside = part.edges >= 0, part.edges < 0
+        sums = sums + scatter(triangles.n_edges, part.edges[along], part.vectors[along])
+        sums = sums + from_faces(triangles, part.faces[inside], part.vectors[inside] / 3)
+    return sums
+
+
+def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments], spacing: float) -> csr_array:
+    """App. A.2, from Eq. 11 and Eq. 19: vectors away from curves along edges, on both sides and at free ends.
+
+    A face at edge ij, i before j in its own order, contributes i(p_j − p_i) to its other two edges. On ij itself the
+    contributions of the two sides cancel.
+    """
+    curves = [p for p in parts if len(p.ends) and not p.oriented]
+    if not curves:
+        return csr_array((1, triangles.n_edges), dtype=np.complex128)
+    edges = np.unique(np.concatenate([p.edges for p in curves]))
+    marked = np.zeros(triangles.n_edges, dtype=bool)
+    marked[edges] = True
+    faces, sides = np.nonzero(marked[triangles.edges.face_edges])
+    inward = 1j * triangles.edge_vectors[faces, sides]
+    on_edges = triangles.in_edge_frames(inward[:, None], faces)
+    on_edges[np.arange(len(faces)), sides] = 0
+    sums = scatter(triangles.n_edges, triangles.edges.face_edges[faces], on_edges)
+
+    touched = np.bincount(triangles.edges.vertices[edges].ravel(), minlength=triangles.n_vertices)
+    for part in parts:  # an end at a vertex of another source is not free
+        if len(part.ends) and part.oriented:
+            at_vertex = part.nodes.kinds == VERTEX
+            touched[part.nodes.elements[at_vertex]] += 2
+    ends_free = touched[triangles.edges.vertices[edges]] == 1
+    which, end = np.nonzero(ends_free)
+    faces, arcs = free_end_arcs(triangles, edges[which], triangles.edges.vertices[edges[which], end], spacing)
+    return sums + from_faces(triangles, faces, arcs)
+
+
+def vertex_point_vectors(triangles: IntrinsicMesh, vertices: NDArray[np.int64]) -> csr_array:
+    """App. A.1, Eq. 19: the corner of angle α at a vertex contributes i d (1 − e^{iα}) / Θ to the edges of its face.
+
+    d is the direction of the first edge of the corner, counter-clockwise, and Θ the total angle at the vertex.
+    """
+    marked = np.zeros(triangles.n_vertices, dtype=bool)
+    marked[vertices] = True
+    faces, corners = np.nonzero(marked[triangles.corner_vertices])
+    leaving = triangles.edge_vectors[faces, corners]
+    arriving = -triangles.edge_vectors[faces, (corners + 2) % 3]
+    angles = np.angle(arriving * np.conj(leaving))
+    owners = triangles.corner_vertices[faces, corners]
+    total = np.bincount(owners, weights=angles, minlength=triangles.n_vertices)[owners]
+    round_corner = 1j * (leaving / np.abs(leaving)) * (1 - np.exp(1j * angles)) / total
+    return from_faces(triangles, faces, round_corner)
+
+
+def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_array:
+    """Points on edges and inside faces: −∇δ_p against the Crouzeix–Raviart functions, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
+
+    Its diffusion is minus the gradient of the heat kernel, which points away from p with equal strength in all
+    directions, whatever the shape of the faces: on each, ``Σ_e ∇ψ_e = 0`` and ``Σ_e ∇ψ_e x_eᵀ`` is the identity. ∇ψ_e,
+    constant on faces, is averaged over the faces around each vertex and interpolated at p. At a vertex of equilateral
+    triangles it is Eq. 19 divided by √3 h, which the caller makes up for.
+    """
+    corner = np.argwhere(located.barycentric > 0)
+    vertices = triangles.corner_vertices[located.faces[corner[:, 0]], corner[:, 1]]
+    which, faces = incident_faces(triangles, points_at_vertices(triangles, vertices))
+    area = np.bincount(which, triangles.face_areas[faces], len(vertices))
+    share = located.barycentric[corner[:, 0], corner[:, 1]] / np.where(area > 0, area, np.inf)
+    outward = -1j * triangles.edge_vectors[faces] * share[which][:, None]
+    in_frames = triangles.in_edge_frames(outward, faces)
+    return scatter(triangles.n_edges, triangles.edges.face_edges[faces], in_frames)
+
+
+def from_faces(triangles: IntrinsicMesh, faces: NDArray[np.int64], vectors: NDArray[np.complex128]) -> csr_array:
+    """(1, e) sums of face vectors over the three edges of each face."""
+    in_frames = triangles.in_edge_frames(vectors[:, None], faces)
+    return scatter(triangles.n_edges, triangles.edges.face_edges[faces], in_frames)
+
+
+def scatter(n: int, index: NDArray[np.int64], values: NDArray[np.complex128]) -> csr_array:
+    """(1, n) sparse sums of values with the same index."""
+    flat = index.ravel()
+    return csr_array((values.ravel(), (np.zeros(len(flat), dtype=np.int64), flat)), shape=(1, n), dtype=np.complex128)
+
+
+def line_elements(part: CurveSegments, spacing: float) -> NDArray[np.float64]:
+    """(s,) half the length of the segments that meet at each node; `spacing` at isolated points."""
+    if len(part.ends) == 0:
+        return np.full(len(part.nodes), spacing)
+    return np.bincount(part.ends.ravel(), np.repeat(0.5 * part.lengths, 2), len(part.nodes)).astype(np.float64)
+
+
+def joined(parts: Sequence[CurveSegments]) -> tuple[LocatedPoints, NDArray[np.int64]]:
+    """The distinct points of all sources, and the two at the ends of every segment."""
+    nodes = concatenated([p.nodes for p in parts])
+    first, who = unique_points(nodes)
+    return nodes[first], ends_among(parts, who)
+
+
+def ends_among(parts: Sequence[CurveSegments], who: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(k, 2) points at the ends of every segment, from the number of each node's point."""
+    offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
+    ends: NDArray[np.int64] = np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])
+    return who[ends]
+
+
+def connected(parts: Sequence[CurveSegments]) -> NDArray[np.int64]:
+    """(s,) connected component of every node, over all sources, in order of first appearance."""
+    first, who = unique_points(concatenated([p.nodes for p in parts]))
+    return connected_components(len(first), *ends_among(parts, who).T)[who]
+
+
+def free_end_arcs(
+    triangles: IntrinsicMesh, edges: NDArray[np.int64], vertices: NDArray[np.int64], least: float
+) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
+    """Vectors that point away from the free ends of curves, integrated over the half disk of directions behind each.
+
+    Directions are given by their angle from the curve, measured the shortest way around the vertex. Behind the end are
+    those at a quarter of the total angle or more; at boundary and nonmanifold vertices, at a right angle or more.
+
+    Curves end with an edge at a vertex. The weight of an end is the length of that edge, but at least `least`:
+    subdividing a curve into short edges must not make its ends vanish. (The published code has no least weight.)
+
+    Returned: faces (j,), vectors (j,).
+    """
+    faces, vectors = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.complex128)]
+    marked = np.zeros(triangles.n_vertices, dtype=bool)
+    marked[vertices] = True
+    all_faces, all_corners = np.nonzero(marked[triangles.corner_vertices])
+    owner = triangles.corner_vertices[all_faces, all_corners]
+    order = np.argsort(owner, kind="stable")
+    all_faces, all_corners, owner = all_faces[order], all_corners[order], owner[order]
+    begin, stop = np.searchsorted(owner, vertices), np.searchsorted(owner, vertices, side="right")
+    for edge, lo, hi in zip(edges, begin, stop, strict=True):
+        face, corner = all_faces[lo:hi], all_corners[lo:hi]
+        leaving = triangles.edge_vectors[face, corner]
+        arriving = -triangles.edge_vectors[face, (corner + 2) % 3]
+        angle = np.angle(arriving * np.conj(leaving))
+        spokes, ends = np.unique(
+            np.stack([triangles.edges.face_edges[face, corner], triangles.edges.face_edges[face, (corner + 2) % 3]]),
+            return_inverse=True,
+        )
+        right, left = ends.reshape(2, -1)
+        last = np.searchsorted(spokes, edge)
+        away = angles_from(last, right, left, angle, len(spokes))
+
+        ring = np.isfinite(away[right])
+        closed = bool((np.bincount(np.concatenate([right[ring], left[ring]]))[np.unique(right[ring])] == 2).all())
+        quarter = angle[ring].sum() / 4 if closed else np.pi / 2
+        start = np.clip(quarter - away[right], 0, angle)
+        end = np.clip(angle + away[left] - quarter, 0, angle)
+        behind = end > start
+        arc = -1j * (leaving / np.abs(leaving)) * (np.exp(1j * end) - np.exp(1j * start))
+        length = np.abs(np.concatenate([leaving[right == last], arriving[left == last]]))[0]
+        faces.append(face[behind])
+        vectors.append(arc[behind] * max(length, least) / (end - start)[behind].sum())
+    return np.concatenate(faces), np.concatenate(vectors)
+
+
+def angles_from(
+    spoke: int, right: NDArray[np.int64], left: NDArray[np.int64], angle: NDArray[np.float64], n_spokes: int
+) -> NDArray[np.float64]:
+    """(n_spokes,) angle from one spoke (edge at a vertex) to all others, the shortest way around; inf if not connected.
+
+    Corner k lies between spokes ``right[k]`` and ``left[k]``, and has the angle ``angle[k]``.
+    """
+    away = np.full(n_spokes, np.inf)
+    away[spoke] = 0.0
+    for _ in range(n_spokes):
+        before = away.copy()
+        np.minimum.at(away, left, away[right] + angle)
+        np.minimum.at(away, right, away[left] + angle)
+        if (away == before).all():
+            break
+    return away

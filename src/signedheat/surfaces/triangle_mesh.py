@@ -1,0 +1,142 @@
+"""Triangle meshes, as domains on which distance is measured, and as sources in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..exchange import Elements, Exchangeable
+from ..mesh.edges import EdgeTable, edge_table
+from ..mesh.intrinsic_mesh import MARGIN, IntrinsicMesh, laid_out
+from ..mesh.triangles import area_vectors
+from ..mesh.welding import joined_rims
+from ..search.nearest_triangles import TriangleTree
+from ..validation import coordinates, element_ids, used_bounds
+from .surface import Surface
+
+if TYPE_CHECKING:
+    import trimesh  # noqa: F401  named in the base class
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
+    """Triangles in space: manifold or not, orientable or not, closed or not.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        Positions; vertices that no face uses are allowed.
+    faces : (m, 3) int
+        Vertex ids. The normal of a face points to the side from which its corners run counter-clockwise.
+
+    Raises
+    ------
+    GeometryError
+        If there is no face, a coordinate is NaN or infinite, or a face names a vertex that does not exist.
+
+    Examples
+    --------
+    >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> mesh.face_areas
+    array([0.5])
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        positions = coordinates(vertices, "vertices", 3)
+        vars(self).update(vertices=positions, faces=element_ids(faces, "faces", 3, len(positions)))
+
+    @classmethod
+    def _of(cls, elements: Elements) -> TriangleMesh:
+        return cls(elements.points, elements.triangles)
+
+    @property
+    def _elements(self) -> Elements:
+        return Elements.of_triangles(self.vertices, self.faces)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, used by a face or not."""
+        return len(self.vertices)
+
+    @property
+    def n_faces(self) -> int:
+        """Number of faces."""
+        return len(self.faces)
+
+    @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) lower and upper corner of the bounding box of the faces, without unreferenced vertices."""
+        return used_bounds(self.vertices, self.faces)
+
+    @cached_property
+    def edges(self) -> EdgeTable:
+        """The edges, numbered by first appearance in the faces (corner 0–1, 1–2, 2–0, face after face)."""
+        return edge_table(self.faces)
+
+    @cached_property
+    def face_area_vectors(self) -> NDArray[np.float64]:
+        """(m, 3) area times unit normal."""
+        return area_vectors(self.vertices[self.faces])
+
+    @cached_property
+    def face_areas(self) -> NDArray[np.float64]:
+        """(m,) areas."""
+        return np.linalg.norm(self.face_area_vectors, axis=1)
+
+    @cached_property
+    def edge_lengths(self) -> NDArray[np.float64]:
+        """(e,) lengths, in the order of `edges`."""
+        tail, head = self.edges.vertices.T
+        return np.linalg.norm(self.vertices[head] - self.vertices[tail], axis=1)
+
+    @cached_property
+    def intrinsic(self) -> IntrinsicMesh:
+        """The triangles in the plane, edges lengthened by no more than rounding so that every one has an area."""
+        return laid_out(self, MARGIN)[0]
+
+    @cached_property
+    def joined(self) -> TriangleMesh:
+        """The same faces, with one vertex for those of rims at one place, as along seams."""
+        places = joined_rims(self.vertices, self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel())
+        whole = (places == np.arange(len(places))).all()
+        return self if whole else TriangleMesh(self.vertices, places[self.faces])
+
+    @cached_property
+    def search_tree(self) -> TriangleTree:
+        """Tree of the faces, in which those nearest to points are found."""
+        return TriangleTree.of(self.vertices[self.faces])
+
+    @property
+    def triangulation(self) -> TriangleMesh:
+        """The triangles that curves refer to: the mesh itself."""
+        return self
+
+    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the vertices of `triangulation`, from values at the vertices of the mesh.
+
+        Parameters
+        ----------
+        values : (n,) float
+            One for each vertex.
+
+        Returns
+        -------
+        (m,) float
+            One for each vertex of the triangulation: the same.
+
+        Examples
+        --------
+        >>> TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).on_triangulation(np.arange(3.0)).tolist()
+        [0.0, 1.0, 2.0]
+        """
+        return values
+
+    def __repr__(self) -> str:
+        return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"

@@ -1,0 +1,401 @@
+"""Distance at the vertices of a surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Generic, cast, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..diagnostics import Diagnostics
+from ..discretization import SourceTerm
+from ..errors import OutsideError
+from ..exchange import Displayed, with_values
+from ..field_arithmetic import Combinable, Rule
+from ..foreign import SurfaceShape
+from ..frozen import Frozen
+from ..kinds import EmbeddedSurface, SurfaceDomain
+from ..mesh.triangles import gradients_along
+from ..packages import lazy_module
+from ..validation import array_of, finite_number, query_points, shaped
+from .intrinsic_triangulation import IntrinsicTriangulation
+from .point_cloud import PointCloud
+from .polygon_mesh import PolygonMesh
+from .projection import closest_points
+from .subdivision import common_subdivision
+from .surface_curves import Curve, SurfacePoints
+from .triangle_mesh import TriangleMesh
+
+files: Any = lazy_module("signedheat.io.field_files", "files")
+
+if TYPE_CHECKING:
+    import pyvista
+    from typing_extensions import TypeVar
+
+    Surface = TypeVar("Surface", bound=SurfaceDomain, default=SurfaceDomain, covariant=True)
+else:
+    from typing import TypeVar
+
+    Surface = TypeVar("Surface", bound=SurfaceDomain, covariant=True)
+
+Embedded = TypeVar("Embedded", bound=EmbeddedSurface)
+
+
+@dataclass(frozen=True, eq=False)
+class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
+    """Signed distance at the vertices of a surface, linear on its triangles.
+
+    Attributes
+    ----------
+    domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
+        The surface.
+    values : (n_vertices,) float
+        φ, in the units of the vertices; NaN where no source is connected.
+    diagnostics : Diagnostics
+        Timings, diffusion time, and notes on the computation.
+    source : SourceTerm, optional
+        The lowered source, which `sharpen` needs.
+    finer : VertexField, optional
+        The same on an intrinsic triangulation of the mesh, on whose vertices φ was computed: contours, values at points
+        and sharpening use these too.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> phi = VertexField(mesh, np.array([-0.5, 0.5, 0.5, -0.5]))
+    >>> phi([[0.75, 0.5, 0.0]]).round(3)
+    array([0.25])
+    >>> phi.face_gradients.tolist()
+    [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+    >>> phi.contour(0.0)
+    [Curve(3 points, open, oriented)]
+    """
+
+    domain: Surface
+    values: NDArray[np.float64]
+    diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
+    source: SourceTerm | None = field(default=None, repr=False)
+    finer: VertexField[IntrinsicTriangulation] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        array_of(self.values, "values")
+
+    def __call__(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
+        """φ at points of the surface, linear between vertices.
+
+        Parameters
+        ----------
+        points : SurfacePoints, Curve or (..., 3) float
+            Points on the surface, or positions in space, for which the closest points of the surface are taken.
+
+        Returns
+        -------
+        (...) float
+            Signed distances, in the shape of the points.
+        """
+        finest = self.finest
+        faces, weights, shape = self._at(points)
+        if isinstance(finest.domain, IntrinsicTriangulation):
+            faces, weights = finest.domain.locate(faces, weights)
+            corners = finest.domain.faces[faces]
+        else:
+            corners = finest.domain.triangulation.faces[faces]
+        values = finest.domain.on_triangulation(finest.values)
+        return shaped(np.einsum("ik,ik->i", weights, values[corners]), shape)
+
+    @property
+    def finest(self) -> VertexField[SurfaceDomain]:
+        """The field where φ was computed: `finer`, if its values are still the same, or the field itself."""
+        finer = self.finer
+        if finer is None or not np.array_equal(finer.values[: len(self.values)], self.values, equal_nan=True):
+            return cast("VertexField[SurfaceDomain]", self)
+        return cast("VertexField[SurfaceDomain]", finer)
+
+    def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
+        """∇φ in space at points, in the triangles on which φ is linear.
+
+        Parameters
+        ----------
+        points : Curve, SurfacePoints, or (..., 3) float
+            As for calling the field: on the surface, or positions that are projected onto it.
+
+        Returns
+        -------
+        (..., 3) float
+            Gradients; of length about 1, since φ is a distance.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> phi = VertexField(mesh, np.array([-0.5, 0.5, 0.5, -0.5]))
+        >>> phi.gradient([[0.75, 0.5, 0.0]]).tolist()
+        [[1.0, 0.0, 0.0]]
+        """
+        finest = self.finest
+        faces, weights, shape = self._at(points)
+        if isinstance(finest.domain, IntrinsicTriangulation):
+            return shaped(finest.domain.gradient(finest.values, faces, weights), shape)
+        return shaped(self.face_gradients[faces], shape)
+
+    @cached_property
+    def face_gradients(self) -> NDArray[np.float64]:
+        """(m, 3) ∇φ on the faces of the domain's triangulation, in space; of length about 1, since φ is a distance.
+
+        Of φ between the vertices of the domain: where it was computed on finer triangles, `gradient` is more accurate.
+        Zero on degenerate faces.
+        """
+        field = self._embedded
+        mesh = field.domain.triangulation
+        values, corners = field.domain.on_triangulation(field.values)[mesh.faces], mesh.vertices[mesh.faces]
+        return gradients_along(corners[:, 1:] - corners[:, :1], values[:, 1:] - values[:, :1])
+
+    def contour(self, level: float = 0.0) -> list[Curve]:
+        """The level set φ = level, as curves on the surface.
+
+        Parameters
+        ----------
+        level : float
+            The level, in the units of the vertices.
+
+        Returns
+        -------
+        list of Curve
+            One for each connected component, open or closed; greater φ is to its left.
+
+        Raises
+        ------
+        OutsideError
+            If φ does not take the level.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> phi = VertexField(mesh, np.array([-0.5, 0.5, 0.5, -0.5]))
+        >>> [line] = phi.contour(0.25)
+        >>> mesh.positions(line)[:, 0].tolist()
+        [0.75, 0.75, 0.75]
+        """
+        field, level = self.finest, finite_number(level, "level")
+        finite = field.values[np.isfinite(field.values)]
+        low, high = (float(finite.min()), float(finite.max())) if len(finite) else (np.nan, np.nan)
+        least = 1e-12 * max(high - low, 0.0)
+        if not low - least <= level <= high + least:
+            raise OutsideError(
+                f"level {level:g} is taken nowhere: φ goes from {low:g} to {high:g}",
+                remedy="choose a level between",
+                element=f"level {level:g}",
+            )
+        return field.domain.level_set(field.values, level)
+
+    def with_values(self, values: NDArray[np.float64]) -> VertexField[Surface]:
+        """Other values on the same surface, without what belongs to these.
+
+        Parameters
+        ----------
+        values : (n,) float
+            Of the shape of `values`.
+
+        Returns
+        -------
+        VertexField
+            Without diagnostics and source.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> phi = VertexField(mesh, np.array([0.0, 1.0, 2.0]))
+        >>> phi.with_values(2 * phi.values).values.tolist()
+        [0.0, 2.0, 4.0]
+        """
+        return VertexField(self.domain, values)
+
+    def combined_with(self, other: VertexField[Surface], rule: Rule) -> VertexField[Surface]:
+        """The field whose values a rule makes of those of two, also on the finer triangles of one of them.
+
+        Parameters
+        ----------
+        other : VertexField
+            On the same domain.
+        rule : callable
+            Takes two arrays of values and returns one, such as `np.minimum`.
+
+        Returns
+        -------
+        VertexField
+            With the values of the rule.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> phi = VertexField(mesh, np.array([0.0, 1.0, 2.0]))
+        >>> phi.combined_with(2.0 - phi, np.minimum).values.tolist()
+        [0.0, 1.0, 0.0]
+        """
+        result = self.with_values(rule(self.values, other.values))
+        finer = [field.finer for field in (self, other) if field.finest is field.finer]
+        if not finer:
+            return result
+        domain = max((field.domain for field in finer if field), key=lambda triangulation: triangulation.n_vertices)
+        values = rule(self._at_vertices_of(domain), other._at_vertices_of(domain))
+        values[: len(result.values)] = result.values
+        return replace(result, finer=VertexField(domain, values))
+
+    def _at_vertices_of(self, domain: IntrinsicTriangulation) -> NDArray[np.float64]:
+        """φ at the vertices of an intrinsic triangulation of the mesh; NaN at those that no face has."""
+        if self.finest.domain is domain:
+            return self.finest.values
+        faces, weights = domain.vertex_places
+        used = np.flatnonzero(faces >= 0)
+        values = np.full(len(faces), np.nan)
+        values[used] = self(SurfacePoints(faces[used], weights[used]))
+        return values
+
+    def to_pyvista(self) -> pyvista.PolyData:
+        """Convert to PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            Triangles, polygons or points with point data ``signed_distance``.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> phi = VertexField(mesh, np.array([0.0, 1.0, 2.0]))
+        >>> phi.to_pyvista().array_names
+        ['signed_distance']
+        """
+        simple = on_simple_surface(self)
+        return with_values(simple.domain.to_pyvista(), simple.values)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the surface with φ at its vertices, in the format given by the extension.
+
+        ``.ply`` and ``.vtp`` have a property ``signed_distance`` per vertex, ``.obj`` a texture coordinate,
+        ``.npz`` the arrays ``values``, ``vertices`` and ``faces``.
+
+        Parameters
+        ----------
+        path : str or path
+            The file. It is written under a temporary name and renamed, so that an existing file survives a failure.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is unknown or the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> phi = VertexField(mesh, np.array([0.0, 1.0, 0.0]))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     phi.save(f"{folder}/phi.ply")
+        ...     sh.load_field(f"{folder}/phi.ply").values.tolist()
+        [0.0, 1.0, 0.0]
+        """
+        files.write_field(self._embedded, path)
+
+    @overload
+    def restrict(self: VertexField[IntrinsicTriangulation]) -> VertexField[TriangleMesh]: ...
+    @overload
+    def restrict(self: VertexField[Embedded]) -> VertexField[Embedded]: ...
+    def restrict(self) -> VertexField[EmbeddedSurface]:
+        """On an intrinsic triangulation: φ at the vertices of its mesh. On any other domain: the field itself.
+
+        Returns
+        -------
+        VertexField
+            On the mesh.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> strip = sh.TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = sh.intrinsic_delaunay(strip, refine=True)
+        >>> phi = sh.SignedHeatSolver(better).distance(strip.points_at(0))
+        >>> len(phi.values) == better.n_vertices, len(phi.restrict().values)
+        (True, 4)
+        """
+        return self._embedded
+
+    def subdivided(self) -> VertexField[EmbeddedSurface]:
+        """φ on flat pieces of the surface, on each of which it is linear, to draw, save or measure in space.
+
+        Where φ was computed on an intrinsic triangulation of the mesh (`finer`), these are the polygons of their
+        `common_subdivision`, whose first vertices are those of the mesh; elsewhere the field is returned as it is.
+
+        Returns
+        -------
+        VertexField
+            On triangles or polygons in space.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> strip = sh.TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> phi = sh.SignedHeatSolver(strip, intrinsic=True).distance(strip.polyline([[4, 0, 0], [4, 1, 0]]))
+        >>> len(phi.subdivided().values) > len(phi.values)
+        True
+        """
+        fine = self.finest
+        if not isinstance(fine.domain, IntrinsicTriangulation):
+            return self._embedded
+        polygons, interpolate = common_subdivision(fine.domain)
+        unused = np.diff(interpolate.indptr) == 0
+        return VertexField(polygons, np.where(unused, np.nan, interpolate @ fine.values), self.diagnostics)
+
+    def __repr__(self) -> str:
+        low, high = (float(f.reduce(self.values)) for f in (np.fmin, np.fmax))
+        return f"VertexField({self.domain!r}, values from {low:.4g} to {high:.4g})"
+
+    @property
+    def _embedded(self) -> VertexField[EmbeddedSurface]:
+        if isinstance(self.domain, IntrinsicTriangulation):
+            mesh = self.domain.mesh
+            return VertexField(mesh, self.values[: mesh.n_vertices], self.diagnostics, self.source)
+        return cast("VertexField[EmbeddedSurface]", self)
+
+    def _at(
+        self, points: Curve | SurfacePoints | ArrayLike
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], tuple[int, ...]]:
+        """(n,) faces of points and (n, 3) barycentric coordinates in them, and the shape that the points have."""
+        mesh = self._embedded.domain.triangulation
+        if isinstance(points, (Curve, SurfacePoints)):
+            outside = np.flatnonzero((points.faces < 0) | (points.faces >= mesh.n_faces))
+            if len(outside):
+                raise OutsideError(
+                    f"point {outside[0]} lies in face {points.faces[outside[0]]}, but face ids go from 0 to "
+                    f"{mesh.n_faces - 1}",
+                    remedy="make it for this surface",
+                    element=f"point {outside[0]}",
+                )
+            return points.faces, points.barycentric, points.faces.shape
+        places, shape = query_points(points, 3)
+        faces, weights, _ = closest_points(mesh, places)
+        return faces, weights, shape
+
+
+def on_simple_surface(field: VertexField) -> VertexField[SurfaceShape]:
+    """The field on a surface that files support: voxel faces become triangles."""
+    domain = field.domain
+    if isinstance(domain, TriangleMesh | PolygonMesh | PointCloud):
+        return VertexField(domain, field.values)
+    if isinstance(domain, IntrinsicTriangulation):
+        return on_simple_surface(field.restrict())
+    return VertexField(domain.triangulation, domain.on_triangulation(field.values))

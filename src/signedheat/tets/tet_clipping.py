@@ -1,0 +1,299 @@
+"""Clipping of oriented triangles against the tets that they cross, and location of points in tets.
+
+A source in space need not conform to the mesh. Every triangle is clipped to one convex polygon in each tet that it
+crosses; the area vectors of the polygons add up to that of the triangle. A polygon that lies in a face of the mesh is
+shared equally by the tets at that face.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+from ..mesh.tet_shapes import TetShapes
+from ..parallel import CHUNK, in_chunks
+
+FLAT = 1e-10
+"""Tets whose volume, over the cube of the longest edge, is below this contain no part of a source."""
+TOUCHING = 1e-9
+"""Distance, relative to the size of a face, within which a point counts as lying in its plane."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClippedPolygons:
+    """Convex polygons, each the part of a source in one tet.
+
+    Attributes
+    ----------
+    tets : (p,) int
+        Tet that each polygon lies in.
+    parents : (p,) int
+        Triangle or point of the source that it is part of.
+    area_vectors : (p, 3) float
+        Area times normal.
+    areas : (p,) float
+        Areas.
+    barycentric : (p, 4) float
+        Barycentric coordinates of its centroid in the tet.
+    in_face : (p,) int
+        Corner opposite to the face that it lies in, −1 in the interior of the tet.
+    """
+
+    tets: NDArray[np.int64]
+    parents: NDArray[np.int64]
+    area_vectors: NDArray[np.float64]
+    areas: NDArray[np.float64]
+    barycentric: NDArray[np.float64]
+    in_face: NDArray[np.int64]
+
+
+class Planes(NamedTuple):
+    """The planes of the faces of a mesh, the same to the last bit for all tets that share a face.
+
+    Attributes
+    ----------
+    tet_faces : (m, 4) int
+        Face opposite each corner of each tet.
+    normals : (f, 3) float
+        Unit normals, out of the first tet; zero for faces without area.
+    offsets : (f,) float
+        Value of ``normal · x`` on the plane, with x relative to `center`.
+    tolerances : (f,) float
+        Distance within which a point counts as lying in the plane.
+    signs : (m, 4) float
+        +1 where the normal points out of the tet, −1 where into it.
+    shares : (f,) float
+        One over the number of tets at the face that are not flat.
+    solid : (m,) bool
+        Tets that are not flat, and can contain polygons.
+    center : (3,) float
+        Centre of the mesh; coordinates are taken relative to it to reduce rounding errors.
+    """
+
+    tet_faces: NDArray[np.int64]
+    normals: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+    tolerances: NDArray[np.float64]
+    signs: NDArray[np.float64]
+    shares: NDArray[np.float64]
+    solid: NDArray[np.bool_]
+    center: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, mesh: TetShapes) -> Planes:
+        """The planes of the faces of a tet mesh."""
+        faces = mesh.faces
+        center = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+        points = mesh.vertices - center
+        a, b, c = (points[faces.vertices[:, k]] for k in range(3))
+        normals = np.cross(b - a, c - a)
+        twice_area = np.linalg.norm(normals, axis=1)
+        normals /= np.where(twice_area > 0, twice_area, 1)[:, None]
+        signs = np.sign(np.einsum("mki,mki->mk", normals[faces.tet_faces], mesh.area_vectors))
+        solid = mesh.thickness > FLAT
+        counts = np.bincount(faces.tet_faces[solid].ravel(), minlength=len(normals))
+        return cls(
+            tet_faces=np.ascontiguousarray(faces.tet_faces),
+            normals=normals,
+            offsets=np.einsum("fi,fi->f", normals, (a + b + c) / 3),
+            tolerances=TOUCHING * np.sqrt(twice_area) + 1e-15 * np.abs(points).max(),
+            signs=signs,
+            shares=1 / np.maximum(counts, 1),
+            solid=solid,
+            center=center,
+        )
+
+
+def clip_triangles(mesh: TetShapes, planes: Planes, triangles: NDArray[np.float64]) -> ClippedPolygons:
+    """Clip (k, 3, 3) triangles against the tets that they cross; parts outside the mesh are dropped.
+
+    Examples
+    --------
+    >>> mesh = TetShapes(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]))
+    >>> across = np.array([[[0.0, 0.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]]])
+    >>> clip_triangles(mesh, Planes.of(mesh), across).area_vectors
+    array([[0.   , 0.   , 0.125]])
+    """
+    found = []
+    for begin in range(0, max(len(triangles), 1), CHUNK):  # most of what is near lies outside
+        some = triangles[begin : begin + CHUNK]
+        starts, tets = mesh.search_tree.meeting(some, _slack(mesh))
+        parents = np.repeat(np.arange(len(some)), np.diff(starts))
+        vectors, areas, centers, in_face = _clip(planes, some - planes.center, parents, tets)
+        kept = areas > 0
+        found.append([a[kept] for a in (tets, parents + begin, vectors, areas, centers, in_face)])
+    tets, parents, vectors, areas, centers, in_face = (np.concatenate(a) for a in zip(*found, strict=True))
+    return ClippedPolygons(tets, parents, vectors, areas, barycentric(mesh, tets, centers + planes.center), in_face)
+
+
+def containing_tets(mesh: TetShapes, planes: Planes, points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(k,) a tet that contains each point, −1 outside the mesh.
+
+    Examples
+    --------
+    >>> mesh = TetShapes(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]))
+    >>> containing_tets(mesh, Planes.of(mesh), np.array([[0.1, 0.1, 0.1], [1.0, 1.0, 1.0]]))
+    array([ 0, -1])
+    """
+
+    def found(some: NDArray[np.float64]) -> tuple[NDArray[np.int64]]:
+        near = mesh.search_tree.meeting(np.repeat(some[:, None], 3, axis=1), slack)
+        return (_locate(planes, some - planes.center, *near),)
+
+    slack = _slack(mesh)
+    return in_chunks(found, points)[0]
+
+
+def _slack(mesh: TetShapes) -> NDArray[np.float64]:
+    """(3,) how far beyond its box a tet is looked for: rounding may put a point there."""
+    lower, upper = mesh.search_tree.bounds[1].reshape(2, 3)
+    return 1e-9 * (upper - lower)
+
+
+def barycentric(mesh: TetShapes, tets: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k, 4) barycentric coordinates of points in given tets, clamped to be nonnegative, each row with sum one."""
+    from_corner = points[:, None] - mesh.vertices[mesh.tets[tets][:, [1, 0, 0, 0]]]  # on the face opposite each corner
+    inward = -np.einsum("pki,pki->pk", mesh.area_vectors[tets], from_corner)
+    inward = np.maximum(inward / np.maximum(np.abs(inward).max(axis=1, keepdims=True), np.finfo(float).tiny), 0)
+    total = inward.sum(axis=1, keepdims=True)
+    middle = np.full_like(inward, 0.25)  # of flat tets
+    return np.divide(inward, total, out=middle, where=total > 0)
+
+
+@compiled
+def beyond(planes: Planes, tet: int, k: int, x: float, y: float, z: float) -> float:
+    """Signed distance by which a point, relative to the centre, lies outside the face opposite corner k of a tet."""
+    f = planes.tet_faces[tet, k]
+    height = planes.normals[f, 0] * x + planes.normals[f, 1] * y + planes.normals[f, 2] * z - planes.offsets[f]
+    return planes.signs[tet, k] * height
+
+
+@compiled
+def _locate(
+    planes: Planes, points: NDArray[np.float64], starts: NDArray[np.int64], near: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    found = np.full(len(points), -1, dtype=np.int64)
+    for p in range(len(points)):
+        deepest = -np.inf
+        for t in near[starts[p] : starts[p + 1]]:
+            if not planes.solid[t]:
+                continue
+            inside = np.inf
+            for c in range(4):
+                out = beyond(planes, t, c, points[p, 0], points[p, 1], points[p, 2])
+                inside = min(inside, planes.tolerances[planes.tet_faces[t, c]] - out)
+            if inside >= 0.0 and (inside > deepest or (inside == deepest and t < found[p])):
+                deepest = inside
+                found[p] = t
+    return found
+
+
+@compiled
+def _clip(
+    planes: Planes, triangles: NDArray[np.float64], parents: NDArray[np.int64], tets: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Area vector, area and centroid of what of a triangle lies in a tet, and the face of the tet that it lies in."""
+    area_vectors, centers = np.zeros((len(tets), 3)), np.zeros((len(tets), 3))
+    areas, in_face = np.zeros(len(tets)), np.full(len(tets), -1)
+    polygon, other, heights, normal = np.empty((8, 3)), np.empty((8, 3)), np.empty(8), np.empty(3)
+    for k in range(len(tets)):
+        if not planes.solid[tets[k]]:
+            continue
+        a, b, c = triangles[parents[k], 0], triangles[parents[k], 1], triangles[parents[k], 2]
+        u0, u1, u2, v0, v1, v2 = b[0] - a[0], b[1] - a[1], b[2] - a[2], c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        normal[0], normal[1], normal[2] = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
+        if not (normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2 > 0.0):
+            continue
+        for i in range(3):
+            polygon[0, i], polygon[1, i], polygon[2, i] = a[i], b[i], c[i]
+        n = 3
+        for corner in range(4):
+            n, flat = _cut(planes, tets[k], corner, polygon, n, other, heights)
+            if flat:
+                in_face[k] = corner
+            if n < 3:
+                break
+        if n < 3:
+            continue
+        areas[k] = _measure(polygon, n, normal, area_vectors[k], centers[k])
+        if in_face[k] >= 0:
+            share = planes.shares[planes.tet_faces[tets[k], in_face[k]]]
+            areas[k] *= share
+            for axis in range(3):
+                area_vectors[k, axis] *= share
+    return area_vectors, areas, centers, in_face
+
+
+@compiled
+def _cut(
+    planes: Planes,
+    tet: int,
+    corner: int,
+    polygon: NDArray[np.float64],
+    n: int,
+    other: NDArray[np.float64],
+    heights: NDArray[np.float64],
+) -> tuple[int, bool]:
+    """Clip a polygon to the inner side of a face of a tet. Also whether the whole polygon lies in the face's plane.
+
+    Heights and crossings are the same, to the last bit, for the tets on both sides of the plane.
+    """
+    most, least = 0.0, 0.0
+    for i in range(n):
+        height = beyond(planes, tet, corner, polygon[i, 0], polygon[i, 1], polygon[i, 2])
+        heights[i] = 0.0 if abs(height) <= planes.tolerances[planes.tet_faces[tet, corner]] else height
+        most = max(most, heights[i])
+        least = min(least, heights[i])
+    if most <= 0.0:
+        return n, least == 0.0
+    kept = 0
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        if heights[i] <= 0.0:
+            for axis in range(3):
+                other[kept, axis] = polygon[i, axis]
+            kept += 1
+        if (heights[i] < 0.0 < heights[j]) or (heights[j] < 0.0 < heights[i]):
+            part = heights[i] / (heights[i] - heights[j])
+            for axis in range(3):
+                other[kept, axis] = polygon[i, axis] + part * (polygon[j, axis] - polygon[i, axis])
+            kept += 1
+    for i in range(kept):
+        for axis in range(3):
+            polygon[i, axis] = other[i, axis]
+    return kept, False
+
+
+@compiled
+def _measure(
+    polygon: NDArray[np.float64],
+    n: int,
+    normal: NDArray[np.float64],
+    area_vector: NDArray[np.float64],
+    center: NDArray[np.float64],
+) -> float:
+    """Area vector and centroid of a convex polygon; returns its area, negative if rounding has turned it over."""
+    area_vector[:] = 0.0
+    center[:] = 0.0
+    total = 0.0
+    size = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+    for i in range(1, n - 1):
+        u0, u1, u2 = polygon[i, 0] - polygon[0, 0], polygon[i, 1] - polygon[0, 1], polygon[i, 2] - polygon[0, 2]
+        j = i + 1
+        v0, v1, v2 = polygon[j, 0] - polygon[0, 0], polygon[j, 1] - polygon[0, 1], polygon[j, 2] - polygon[0, 2]
+        w0, w1, w2 = 0.5 * (u1 * v2 - u2 * v1), 0.5 * (u2 * v0 - u0 * v2), 0.5 * (u0 * v1 - u1 * v0)
+        part = (w0 * normal[0] + w1 * normal[1] + w2 * normal[2]) / size
+        area_vector[0] += w0
+        area_vector[1] += w1
+        area_vector[2] += w2
+        total += part
+        for axis in range(3):
+            center[axis] += part * (polygon[0, axis] + polygon[i, axis] + polygon[j, axis]) / 3.0
+    if total > 0.0:
+        for axis in range(3):
+            center[axis] /= total
+    return total

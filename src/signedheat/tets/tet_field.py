@@ -1,0 +1,304 @@
+"""Distance on a tet mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..diagnostics import Diagnostics
+from ..discretization import SourceTerm
+from ..errors import GeometryError, UnsupportedTypeError
+from ..exchange import Displayed, with_values
+from ..field_arithmetic import Combinable
+from ..field_levels import refuse_beyond_walls
+from ..frozen import Frozen
+from ..packages import lazy_module
+from ..search.nearest_triangles import TriangleTree
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import contiguous, finite_number, query_points, shaped
+from .marching_tets import closed_level_set
+from .tet_clipping import Planes, barycentric, containing_tets
+from .tet_mesh import TetMesh
+
+files: Any = lazy_module("signedheat.io.field_files", "files")
+
+if TYPE_CHECKING:
+    import pyvista
+
+
+@dataclass(frozen=True, eq=False)
+class TetField(Displayed, Combinable, Frozen):
+    """Signed distance at the vertices of a tet mesh, linear on every tet.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The domain.
+    values : (n_vertices,) float
+        φ at the vertices, in the units of the mesh. Positive on the side that the source normals point to, so negative
+        inside a shape with outward normals. NaN on parts of the mesh that are connected to no source.
+    diagnostics : Diagnostics
+        Timings, diffusion time, and notes on the computation.
+    source : SourceTerm, optional
+        The lowered source, which `sharpen` needs.
+
+    Raises
+    ------
+    GeometryError
+        If there is not one value per vertex.
+
+    Examples
+    --------
+    >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+    >>> phi = TetField(mesh, [-0.5, 0.5, -0.5, -0.5])
+    >>> phi([[0.25, 0.25, 0.25], [-1.0, 0.0, 0.0]])
+    array([-0.25, -1.5 ])
+    >>> phi.gradient([[0.25, 0.25, 0.25]])
+    array([[1., 0., 0.]])
+    >>> phi.contour().n_faces
+    8
+    """
+
+    mesh: TetMesh
+    values: NDArray[np.float64]
+    diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
+    source: SourceTerm | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.mesh, TetMesh):
+            raise UnsupportedTypeError(f"{self.mesh!r:.80} is not a TetMesh", element="mesh")
+        values = contiguous(self.values, "values")
+        if values.shape != (self.mesh.n_vertices,):
+            raise GeometryError(
+                f"values have shape {values.shape}, but the mesh has {self.mesh.n_vertices} vertices", element="values"
+            )
+        object.__setattr__(self, "values", values)
+
+    @property
+    def domain(self) -> TetMesh:
+        """The mesh."""
+        return self.mesh
+
+    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
+        """φ at points in space, to second order, from values and gradients at the corners of their tets.
+
+        Outside the mesh φ is extrapolated linearly from the nearest point of the boundary, along the gradient there.
+
+        Parameters
+        ----------
+        points : (..., 3) float
+            Positions, in the units of the mesh.
+
+        Returns
+        -------
+        (...) float
+            Signed distances, in the shape of the points; NaN where the nearest tet has a vertex without a value.
+        """
+        places, shape = query_points(points, 3)
+        corners, weights, away = self._place(places)
+        steps = (places - away)[:, None] - self.mesh.vertices[corners]
+        tangents = self.values[corners] + np.einsum("pki,pki->pk", self._vertex_gradients[corners], steps) / 2
+        values = np.einsum("pk,pk->p", weights, tangents)
+        outside = np.flatnonzero(away.any(axis=1))
+        if len(outside):
+            slopes = np.einsum("pk,pki->pi", weights[outside], self._vertex_gradients[corners[outside]])
+            values[outside] += np.einsum("pi,pi->p", slopes, away[outside])
+        return shaped(values, shape)
+
+    def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
+        """∇φ at points in space: volume-weighted means at the vertices, interpolated.
+
+        Outside the mesh it is the gradient at the nearest point of the boundary.
+
+        Parameters
+        ----------
+        points : (..., 3) float
+            Positions, in the units of the mesh.
+
+        Returns
+        -------
+        (..., 3) float
+            Gradients; of length about 1, since φ is a distance.
+
+        Examples
+        --------
+        >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+        >>> TetField(mesh, [0.0, 1.0, 2.0, 3.0]).gradient([0.2, 0.2, 0.2])
+        array([1., 2., 3.])
+        """
+        places, shape = query_points(points, 3)
+        corners, weights, _ = self._place(places)
+        return shaped(np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners]), shape)
+
+    @property
+    def tet_gradients(self) -> NDArray[np.float64]:
+        """(m, 3) ∇φ of the linear interpolant in every tet."""
+        return self.mesh.geometry.gradients(self.values[self.mesh.tets])
+
+    def contour(self, level: float = 0.0) -> TriangleMesh:
+        """The surface φ = level: closed, manifold, with normals pointing to greater φ.
+
+        Where the surface leaves the mesh, it is closed along the boundary of the mesh.
+
+        Parameters
+        ----------
+        level : float
+            The level, in the units of the mesh.
+
+        Returns
+        -------
+        TriangleMesh
+            The surface.
+
+        Raises
+        ------
+        OutsideError
+            If φ does not take the level anywhere in the mesh.
+
+        Examples
+        --------
+        >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+        >>> TetField(mesh, [0.0, 0.0, 0.0, 1.0]).contour(0.5).bounds[:, 2].tolist()
+        [0.0, 0.5]
+        """
+        level = finite_number(level, "level")
+        return TriangleMesh(*closed_level_set(self.mesh.geometry, self.values, self._vertex_gradients, level))
+
+    def offset(self, distance: float) -> TriangleMesh:
+        """The offset of the shape at a signed distance: `contour`, but refused if the mesh is too small for it.
+
+        Parameters
+        ----------
+        distance : float
+            Signed distance, positive outward, in the units of the mesh.
+
+        Returns
+        -------
+        TriangleMesh
+            As `contour`.
+
+        Raises
+        ------
+        OutsideError
+            If φ does not take the value in the mesh, or the offset leaves the mesh although the shape itself does not.
+
+        Examples
+        --------
+        >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+        >>> TetField(mesh, [-0.5, -0.5, -0.5, 0.5]).offset(0.25).bounds[:, 2].tolist()
+        [0.0, 0.75]
+        """
+        distance = finite_number(distance, "distance")
+        remedy = f"use a mesh that reaches more than {abs(distance):g} beyond the shape"
+        refuse_beyond_walls(self.values[np.unique(self.mesh.boundary.faces)], distance, "tet mesh", remedy)
+        return self.contour(distance)
+
+    def with_values(self, values: NDArray[np.float64]) -> TetField:
+        """Other values on the same mesh, without what belongs to these.
+
+        Parameters
+        ----------
+        values : (n,) float
+            Of the shape of `values`.
+
+        Returns
+        -------
+        TetField
+            Without diagnostics and source.
+
+        Examples
+        --------
+        >>> phi = TetField(TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]), [0.0, 1.0, 2.0, 3.0])
+        >>> phi.with_values(2 * phi.values).values.tolist()
+        [0.0, 2.0, 4.0, 6.0]
+        """
+        return TetField(self.mesh, values)
+
+    def to_pyvista(self) -> pyvista.UnstructuredGrid:
+        """Convert to PyVista.
+
+        Returns
+        -------
+        pyvista.UnstructuredGrid
+            With point data ``signed_distance``.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> phi = TetField(TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]), [0.0, 1.0, 2.0, 3.0])
+        >>> phi.to_pyvista().array_names
+        ['signed_distance']
+        """
+        return with_values(self.mesh.to_pyvista(), self.values)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write mesh and values to a file; `signedheat.load_field` reads it.
+
+        Parameters
+        ----------
+        path : str or path
+            ``.vtu``, ``.vtk`` or ``.msh``.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is another, or the file cannot be written.
+        MissingPackageError
+            If meshio is not installed.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from signedheat import load_field
+        >>> phi = TetField(TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]), [0.0, 1.0, 2.0, 3.0])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     phi.save(f"{folder}/phi.vtu")
+        ...     load_field(f"{folder}/phi.vtu").values.tolist()
+        [0.0, 1.0, 2.0, 3.0]
+        """
+        files.write_field(self, path)
+
+    @cached_property
+    def _vertex_gradients(self) -> NDArray[np.float64]:
+        return self.mesh.geometry.mean_gradients(self.values, self.mesh.tets, self.mesh.n_vertices)
+
+    @cached_property
+    def _planes(self) -> Planes:
+        return Planes.of(self.mesh.geometry)
+
+    @cached_property
+    def _wall_tree(self) -> TriangleTree:
+        return TriangleTree.of(self.mesh.vertices[self.mesh.boundary.faces])
+
+    def _place(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """(k, 4) vertices and weights that interpolate at each point, or at the closest point of the mesh, and offsets.
+
+        The offset is the vector (k, 3) from the closest point of the mesh to the point, zero inside the mesh.
+        """
+        tets = containing_tets(self.mesh.geometry, self._planes, points)
+        inside, outside = np.flatnonzero(tets >= 0), np.flatnonzero(tets < 0)
+        corners = np.zeros((len(points), 4), dtype=np.int64)
+        weights, away = np.zeros((len(points), 4)), np.zeros((len(points), 3))
+        corners[inside] = self.mesh.tets[tets[inside]]
+        weights[inside] = barycentric(self.mesh.geometry, tets[inside], points[inside])
+        if len(outside):
+            walls = self.mesh.boundary
+            faces, coordinates = self._wall_tree.nearest(points[outside])
+            corners[outside, :3], weights[outside, :3] = walls.faces[faces], coordinates
+            corners[outside, 3] = corners[outside, 0]
+            nearest = np.einsum("pk,pki->pi", coordinates, walls.vertices[walls.faces[faces]])
+            away[outside] = points[outside] - nearest
+        return corners, weights, away
+
+    def __repr__(self) -> str:
+        low, high = (float(f.reduce(self.values)) for f in (np.fmin, np.fmax))
+        return f"TetField({self.mesh!r}, values from {low:.4g} to {high:.4g})"

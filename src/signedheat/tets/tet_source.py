@@ -1,0 +1,229 @@
+"""Shapes in space, lowered to a tet mesh: X₀ of Eq. 12 (Sec. 8.1), and the rows A of Eq. 14 that average φ on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..area_elements import AreaElements, area_elements
+from ..diagnostics import Note, OutsideMesh
+from ..errors import SourceError
+from ..frozen import Frozen
+from ..mesh.components import sums_of
+from ..mesh.unit_vectors import unit
+from .tet_clipping import ClippedPolygons, Planes, barycentric, clip_triangles, containing_tets
+from .tet_mesh import TetMesh
+
+WHOLE = 1 - 1e-6
+"""Fraction of a face that a source must cover for the face to count as part of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class TetSource(Frozen):
+    """Sources lowered to a tet mesh.
+
+    Attributes
+    ----------
+    vectors : (f, 3) float
+        X₀ at the faces.
+    strengths : (f,) float
+        The scalar source: areas without their normals, as for an unsigned distance.
+    centers : (p, 3) float
+        Centroids of the clipped polygons of the source.
+    time : float
+        t of Eq. 12.
+    interpolation : (s, n) sparse
+        Row i averages φ over patch i of the source: the clipped polygons that are nearest to one vertex. Where the
+        source conforms to faces of the mesh, the patch is the vertex itself.
+    quadratic_correction : (s, 3n) sparse
+        What makes `interpolation` exact for quadratic φ: maps the gradients of φ at the unknowns (x, y, z of each in
+        turn) to its difference from the average of the linear interpolant.
+    weights : (s,) float
+        Area of each patch.
+    components, source_ids : (s,) int
+        Connected component, and source, that each patch belongs to.
+    notes : tuple of Note
+        The parts of the sources that lie outside the mesh.
+    """
+
+    vectors: NDArray[np.float64]
+    strengths: NDArray[np.float64]
+    centers: NDArray[np.float64]
+    time: float
+    interpolation: sparse.csr_matrix
+    quadratic_correction: sparse.csr_matrix
+    weights: NDArray[np.float64]
+    components: NDArray[np.int64]
+    source_ids: NDArray[np.int64]
+    notes: tuple[Note, ...]
+
+
+def tet_source(
+    mesh: TetMesh, planes: Planes, unknowns: NDArray[np.int64], sources: Sequence[Any], diffusion: float, spacing: float
+) -> TetSource:
+    """Lower sources to a tet mesh.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The domain.
+    planes : Planes
+        Of its faces.
+    unknowns : (m, 4) int
+        Unknown of φ at each corner of each tet.
+    sources : sequence of TriangleMesh, PolygonMesh or PointCloud
+        What distance is measured to, in any position. Parts outside the mesh are dropped, and noted.
+    diffusion, spacing : float
+        τ and h in ``t = τ max(h, h_source)²``.
+    """
+    cuts, components, outside, n_components, n_unknowns = [], [], np.zeros(len(sources)), 0, int(unknowns.max()) + 1
+    for number, source in enumerate(sources):
+        elements = area_elements(source)
+        if elements.corners.shape[2] != 3:
+            raise SourceError(
+                f"source {number} ({source!r}) does not lie in space of three dimensions, as tets do",
+                element=f"source {number}",
+            )
+        if not elements.vectors.any():
+            raise SourceError(
+                f"source {number} ({source!r}) has no area at all: its faces are degenerate",
+                element=f"source {number}",
+            )
+        polygons = _cut(mesh, planes, elements)
+        if len(polygons.tets) == 0:
+            raise SourceError(
+                f"source {number} ({source!r}) lies outside the tet mesh, which spans {_box(mesh)}",
+                remedy="move it into the mesh, or check that both have the same units",
+                element=f"source {number}",
+            )
+        outside[number] = 1 - polygons.areas.sum() / elements.weights.sum()
+        spacing = max(spacing, elements.spacing)
+        cuts.append(polygons)
+        components.append(elements.components[polygons.parents] + n_components)
+        n_components = int(components[-1].max()) + 1
+    time = diffusion * spacing**2
+    loads = np.sum([_loads(mesh, polygons, np.sqrt(time)) for polygons in cuts], axis=0)
+    if not np.abs(loads[:, :3]).max() > 1e-12 * np.abs(loads[:, 3]).max():
+        raise SourceError(
+            "the normals of the source cancel each other everywhere",
+            remedy="turn one of its coinciding sides",
+        )
+    leaving = np.flatnonzero(outside > 1e-9)
+    patches = [_patches(mesh, unknowns, n_unknowns, *part) for part in zip(cuts, components, strict=True)]
+    rows, corrections, weights, members = zip(*patches, strict=True)
+    return TetSource(
+        vectors=loads[:, :3],
+        strengths=loads[:, 3],
+        centers=np.concatenate([_centers(mesh, polygons) for polygons in cuts]),
+        time=time,
+        interpolation=sparse.vstack(rows, format="csr"),
+        quadratic_correction=sparse.vstack(corrections, format="csr"),
+        weights=np.concatenate(weights),
+        components=np.unique(np.concatenate(members), return_inverse=True)[1],
+        source_ids=np.repeat(np.arange(len(weights)), [len(found) for found in weights]),
+        notes=(OutsideMesh(leaving.tolist(), outside[leaving].tolist()),) if len(leaving) else (),
+    )
+
+
+def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygons:
+    if elements.corners.shape[1] == 3:
+        polygons = clip_triangles(mesh.geometry, planes, elements.corners)
+        sizes = np.linalg.norm(elements.vectors, axis=1)
+        counted = elements.weights / np.where(sizes > 0, sizes, 1)  # −1 for fan triangles outside their polygon
+        return replace(polygons, areas=polygons.areas * counted[polygons.parents])
+    tets = containing_tets(mesh.geometry, planes, elements.corners[:, 0])
+    k = np.flatnonzero(tets >= 0)
+    centers = barycentric(mesh.geometry, tets[k], elements.corners[k, 0])
+    return ClippedPolygons(tets[k], k, elements.vectors[k], elements.weights[k], centers, np.full(len(k), -1))
+
+
+def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> NDArray[np.float64]:
+    """(f, 4) X₀ at the faces (Sec. 8.1), and in the last column the scalar source, from areas without their normals.
+
+    A polygon is distributed to the four faces of its tet in proportion to ψ = 1 − 3λ of the Crouzeix–Raviart basis,
+    where that is positive: negative shares would emit waves of the wrong sign. For a polygon in a face of the mesh ψ is
+    one there and zero on the other faces, as in the paper. Otherwise the shares are reweighted: a plane wave along the
+    normal decays by e^(−r/√t), so a face δ √t in front of the polygon emits e^δ times the correct amplitude forward and
+    e^−δ times backward. Weights that are a mean of e^−δ and e^δ make both amplitudes correct, wherever such a mean
+    exists.
+    """
+    shares = np.maximum(1 - 3 * polygons.barycentric, 0)
+    corners = mesh.vertices[mesh.tets[polygons.tets]]
+    face_centers = (corners.sum(axis=1, keepdims=True) - corners) / 3
+    away = np.einsum("pki,pi->pk", face_centers - _centers(mesh, polygons)[:, None], unit(polygons.area_vectors))
+    ahead = np.exp(np.clip(away / width, -20, 20))
+    sent = [(shares * weight * (ahead - 1 / ahead)).sum(axis=1) for weight in (1 / ahead, ahead)]
+    mean = [np.maximum(sign * excess, 1e-300)[:, None] for sign, excess in zip((1, -1), sent[::-1], strict=True)]
+    shares *= mean[0] / ahead + mean[1] * ahead
+    shares /= (shares * (ahead + 1 / ahead)).sum(axis=1, keepdims=True) / 2
+    faces, n = mesh.faces.tet_faces[polygons.tets].ravel(), len(mesh.faces.vertices)
+    vectors = np.column_stack([polygons.area_vectors, polygons.areas])
+    return sums_of((shares[:, :, None] * vectors[:, None]).reshape(-1, 4), faces, n)
+
+
+def _patches(
+    mesh: TetMesh,
+    unknowns: NDArray[np.int64],
+    n_unknowns: int,
+    polygons: ClippedPolygons,
+    components: NDArray[np.int64],
+) -> tuple[sparse.csr_matrix, sparse.csr_matrix, NDArray[np.float64], NDArray[np.int64]]:
+    """Interpolation rows, quadratic corrections, areas and components of the patches.
+
+    One row per clipped polygon would be more constraints than a function that is linear on tets can meet without being
+    constant around the source. A quadratic φ, at the point x with barycentric coordinates λ between corners v, is
+    ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
+    """
+    corners = unknowns[polygons.tets]
+    conforming = _on_whole_faces(mesh, polygons, components)
+    k = np.flatnonzero(conforming)
+    of_face = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])[polygons.in_face[k]]
+    at_vertices = corners[k[:, None], of_face].ravel()
+    inside = np.flatnonzero(~conforming)
+    nearest = corners[inside, polygons.barycentric[inside].argmax(axis=1)]
+
+    keys = np.concatenate([np.repeat(components[k], 3), components[inside]]) * n_unknowns
+    keys += np.concatenate([at_vertices, nearest])
+    areas = np.concatenate([np.repeat(polygons.areas[k] / 3, 3), polygons.areas[inside]])
+    found, patch = np.unique(keys, return_inverse=True)
+    weights: NDArray[np.float64] = np.bincount(patch, weights=areas).astype(np.float64)
+    real = weights > 1e-9 * np.bincount(patch, weights=np.abs(areas))  # drop fan triangles that cancel
+    n_on = len(at_vertices)
+    columns = np.concatenate([at_vertices, corners[inside].ravel()])
+    entries = np.concatenate([areas[:n_on], (areas[n_on:, None] * polygons.barycentric[inside]).ravel()])
+    index = np.concatenate([patch[:n_on], np.repeat(patch[n_on:], 4)])
+    rows = sparse.csr_matrix(
+        (entries / np.where(real, weights, 1)[index], (index, columns)), shape=(len(found), n_unknowns)
+    )
+    rows.eliminate_zeros()
+    away = (_centers(mesh, polygons)[:, None] - mesh.vertices[mesh.tets[polygons.tets]])[inside].reshape(-1, 3)
+    steps = (entries / np.where(real, weights, 1)[index])[n_on:, None] * away / 2
+    places = np.repeat(index[n_on:], 3), (3 * columns[n_on:, None] + np.arange(3)).ravel()
+    corrections = sparse.csr_matrix((steps.ravel(), places), shape=(len(found), 3 * n_unknowns))
+    return rows[real], corrections[real], weights[real], found[real] // n_unknowns
+
+
+def _centers(mesh: TetMesh, polygons: ClippedPolygons) -> NDArray[np.float64]:
+    return np.einsum("pk,pki->pi", polygons.barycentric, mesh.vertices[mesh.tets[polygons.tets]])
+
+
+def _on_whole_faces(mesh: TetMesh, polygons: ClippedPolygons, components: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(p,) polygons that lie in a face of the mesh that their component covers entirely."""
+    on = polygons.in_face >= 0
+    covered = np.zeros(len(on), dtype=bool)
+    if on.any():
+        n_faces = len(mesh.faces.vertices)
+        face = mesh.faces.tet_faces[polygons.tets[on], polygons.in_face[on]]
+        _, which = np.unique(components[on] * n_faces + face, return_inverse=True)
+        area = np.linalg.norm(mesh.geometry.area_vectors[polygons.tets[on], polygons.in_face[on]], axis=1)
+        covered[on] = np.bincount(which, weights=polygons.areas[on])[which] >= WHOLE * area
+    return covered
+
+
+def _box(mesh: TetMesh) -> str:
+    return " × ".join(f"[{a:.4g}, {b:.4g}]" for a, b in mesh.bounds.T)

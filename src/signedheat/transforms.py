@@ -1,0 +1,106 @@
+"""Shapes moved, turned, scaled or sheared."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import GeometryError, UnsupportedTypeError
+from .foreign import ForeignShape, converted
+from .surfaces.digital_surface import DigitalSurface
+from .surfaces.point_cloud import PointCloud
+from .surfaces.polygon_mesh import PolygonMesh
+from .surfaces.triangle_mesh import TriangleMesh
+from .tets.tet_mesh import TetMesh
+from .validation import LARGEST, SMALLEST, numbers
+
+
+def transform(
+    shape: TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh | ForeignShape, matrix: ArrayLike
+) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh:
+    """A shape under an affine map. Insides stay insides: faces of what is mirrored are turned over.
+
+    Parameters
+    ----------
+    shape : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or TetMesh
+        The shape; the boundary of voxels becomes a polygon mesh.
+    matrix : (4, 4) or (3, 4) float
+        ``x → M[:3, :3] x + M[:3, 3]``; the last row, if it is there, is 0 0 0 1.
+
+    Returns
+    -------
+    TriangleMesh, PolygonMesh, PointCloud or TetMesh
+        Of the same kind.
+
+    Raises
+    ------
+    GeometryError
+        If the matrix has another form, or flattens the shape.
+
+    Examples
+    --------
+    >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> transform(mesh, np.diag([25.4, 25.4, 25.4, 1])).bounds[1].tolist()
+    [25.4, 25.4, 0.0]
+    >>> transform(mesh, np.diag([-1.0, 1, 1, 1])).faces.tolist()
+    [[2, 1, 0]]
+    """
+    whole = numbers(matrix, "matrix")
+    if whole.shape == (4, 4) and np.array_equal(whole[3], [0, 0, 0, 1]):
+        whole = whole[:3]
+    if whole.shape != (3, 4) or not (np.abs(whole) <= LARGEST).all():
+        raise GeometryError(
+            f"a transform is a matrix of 4 × 4 numbers up to {LARGEST:g} with the last row 0 0 0 1, or of 3 × 4",
+            element=f"matrix of shape {whole.shape}",
+        )
+    linear = whole[:, :3] / max(float(np.abs(whole[:, :3]).max()), SMALLEST)
+    if abs(np.linalg.det(linear)) <= 1e-12 * np.linalg.norm(linear) ** 3:
+        raise GeometryError("the transform flattens the shape", remedy="check the matrix", element="matrix")
+    return _transformed(converted(shape), whole[:, :3], whole[:, 3])
+
+
+@singledispatch
+def _transformed(
+    shape: object, linear: NDArray[np.float64], move: NDArray[np.float64]
+) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh:
+    raise UnsupportedTypeError(f"a {type(shape).__name__} cannot be transformed", remedy="transform what it is made of")
+
+
+@_transformed.register
+def _(shape: TriangleMesh, linear: NDArray[np.float64], move: NDArray[np.float64]) -> TriangleMesh:
+    faces = shape.faces if np.linalg.det(linear) > 0 else shape.faces[:, ::-1]
+    return TriangleMesh(shape.vertices @ linear.T + move, faces)
+
+
+@_transformed.register
+def _(shape: PolygonMesh, linear: NDArray[np.float64], move: NDArray[np.float64]) -> PolygonMesh:
+    polygons = [list(polygon) for polygon in shape.polygons]
+    if np.linalg.det(linear) < 0:
+        polygons = [polygon[::-1] for polygon in polygons]
+    return PolygonMesh(shape.vertices @ linear.T + move, polygons)
+
+
+@_transformed.register
+def _(shape: DigitalSurface, linear: NDArray[np.float64], move: NDArray[np.float64]) -> PolygonMesh:
+    return transform(shape.squares, np.column_stack([linear, move]))  # type: ignore[return-value]
+
+
+@_transformed.register
+def _(shape: PointCloud, linear: NDArray[np.float64], move: NDArray[np.float64]) -> PointCloud:
+    """Normals become those of the transformed planes, areas those of pieces of them."""
+    normals, areas = shape.normals, shape.areas
+    if normals is not None:
+        cofactors = normals @ (abs(np.linalg.det(linear)) * np.linalg.inv(linear))
+        lengths = np.linalg.norm(cofactors, axis=1)
+        normals, areas = cofactors / lengths[:, None], None if areas is None else areas * lengths
+    elif areas is not None:
+        areas = areas * abs(np.linalg.det(linear)) ** (2 / 3)
+    return PointCloud(shape.points @ linear.T + move, normals, areas, shape.n_neighbors)
+
+
+@_transformed.register
+def _(shape: TetMesh, linear: NDArray[np.float64], move: NDArray[np.float64]) -> TetMesh:
+    tets = shape.tets if np.linalg.det(linear) > 0 else shape.tets[:, [1, 0, 2, 3]]
+    return TetMesh(shape.vertices @ linear.T + move, tets)

@@ -1,0 +1,277 @@
+"""Checks of arguments that all domains share; arrays are returned read-only."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from numbers import Integral, Real
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import GeometryError, SignedHeatError
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+LARGEST = 1e40
+"""Of coordinates. Squared volumes, the largest powers of lengths that are computed, then stay finite."""
+SMALLEST = 1e-40
+"""Of the extent of a shape."""
+SINGLE = 1e-16, 1e17
+"""Least step and greatest extent of grids on which squares of lengths are computed with single precision."""
+LEAST_STEP = 1e-13
+"""Of spacings, relative to coordinates: less would leave nodes few digits apart."""
+_MOST = 2**63
+
+
+def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
+    """The array, contiguous and read-only, so that quantities derived from it stay valid."""
+    array = np.ascontiguousarray(array)
+    array.flags.writeable = False
+    return array
+
+
+def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.float64]:
+    """`values` as a new float64 array of any shape; whatever holds anything but real numbers is refused.
+
+    Examples
+    --------
+    >>> numbers([[1, 2]], "points")
+    array([[1., 2.]])
+    """
+    array = array_of(values, name, error)
+    try:
+        if array.dtype.kind not in "biufO":
+            raise TypeError
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # whatever is lost in converting
+            return np.array(array, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError, RuntimeWarning):
+        raise error(f"{name} must be real numbers, not {_described(array)}", element=name) from None
+
+
+def contiguous(values: object, name: str) -> NDArray[np.float64]:
+    """`values` as a float64 array of any shape, copied only if it is none yet."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float64 and not np.ma.isMaskedArray(values):
+        return np.ascontiguousarray(values)
+    return numbers(values, name)
+
+
+def whole_numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.int64]:
+    """`values` as a new int64 array of any shape; whatever holds anything but integers is refused."""
+    array = array_of(values, name, error)
+    if array.dtype.kind == "O" and array.size and all(isinstance(value, Integral) for value in array.ravel()):
+        array = array.astype(np.int64) if all(abs(int(value)) < _MOST for value in array.ravel()) else array
+    if array.dtype.kind not in "iu" or (array.size and array.dtype == np.uint64 and array.max() >= _MOST):
+        raise error(f"{name} must be integers of at most 63 bits, not {_described(array)}", element=name)
+    return array.astype(np.int64)
+
+
+def array_of(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[Any]:
+    """`values`, rows of numbers or an array of any library that NumPy can read or that speaks DLPack, as an array."""
+    if np.ma.isMaskedArray(values):
+        raise error(f"{name} are a masked array", remedy="drop what is masked, or fill it in", element=name)
+    try:
+        dlpack = hasattr(values, "__dlpack__") and not hasattr(values, "__array__")
+        return np.from_dlpack(values) if dlpack else np.asarray(values)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise error(f"{name} do not form an array: rows differ in length or kind", element=name) from None
+
+
+def _described(array: NDArray[Any]) -> str:
+    return f"an array of {array.dtype}" if array.ndim else " ".join(f"{array[()]!r:.50}".split())
+
+
+def finite_rows(
+    values: object, name: str, columns: int | None = None, error: type[SignedHeatError] = GeometryError
+) -> NDArray[np.float64]:
+    """`values` as a read-only float64 array of shape (n, columns), without NaN or infinity."""
+    array = numbers(values, name, error)
+    if array.ndim != 2 or (columns is not None and array.shape[1] != columns) or array.shape[1] == 0:
+        wanted = f"(n, {columns})" if columns is not None else "(n, d)"
+        raise error(f"{name} must have shape {wanted}, not {array.shape}", element=name)
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if len(bad):
+        raise error(
+            f"{len(bad)} of {len(array)} {name} hold NaN or infinity, first number {bad[0]}",
+            remedy="remove or repair them",
+            element=f"number {bad[0]}",
+        )
+    return frozen(array)
+
+
+def coordinates(
+    values: object, name: str, columns: int | None = None, error: type[SignedHeatError] = GeometryError
+) -> NDArray[np.float64]:
+    """The same, within what can be computed with: powers of lengths must not leave the range of numbers.
+
+    Examples
+    --------
+    >>> coordinates([[0, 0], [1, 1e-200]], "points")
+    array([[0.e+000, 0.e+000],
+           [1.e+000, 1.e-200]])
+    """
+    array = finite_rows(values, name, columns, error)
+    if len(array):
+        refuse_extreme(array.min(axis=0), array.max(axis=0), name, error)
+    return array
+
+
+def refuse_extreme(
+    lower: NDArray[np.float64], upper: NDArray[np.float64], name: str, error: type[SignedHeatError] = GeometryError
+) -> None:
+    """Refuse a box that reaches beyond `LARGEST`, or is smaller than `SMALLEST` but no point."""
+    with np.errstate(over="ignore"):  # from one end of what can be written to the other
+        farthest, extent = float(max(-lower.min(), upper.max())), float((upper - lower).max())
+    if farthest > LARGEST or 0 < extent < SMALLEST:
+        what = f"reach as far as {farthest:.3g}" if farthest > LARGEST else f"extend over {extent:.3g} only"
+        raise error(
+            f"{name} {what}, and lengths from {SMALLEST:g} to {LARGEST:g} can be computed with",
+            remedy="scale and move the shape, for instance to a size of 1 around the origin",
+            element=name,
+        )
+
+
+def query_points(values: object, columns: int) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+    """`values`, of shape (..., columns), as (n, columns) finite positions within `LARGEST`, and the leading shape."""
+    points = contiguous(values, "points")
+    if points.shape[-1:] != (columns,):
+        raise GeometryError(
+            f"points must have shape (..., {columns}), not {points.shape}",
+            remedy=f"give {columns} coordinates for each",
+            element="points",
+        )
+    if not np.isfinite(points).all():
+        raise GeometryError("points must be finite", remedy="leave out NaN and infinity", element="points")
+    farthest = float(np.abs(points).max(initial=0.0))
+    if farthest > LARGEST:
+        raise GeometryError(
+            f"points reach as far as {farthest:.3g}: the squares of such lengths cannot be computed with",
+            remedy=f"evaluate at points up to {LARGEST:g}",
+            element="points",
+        )
+    return points.reshape(-1, columns), points.shape[:-1]
+
+
+def shaped(values: NDArray[Scalar], shape: tuple[int, ...]) -> NDArray[Scalar]:
+    """(n, ...) values at points in the shape that these were given in; () is that of a single one.
+
+    Examples
+    --------
+    >>> shaped(np.zeros((6, 4)), (2, 3)).shape, shaped(np.ones((1, 4)), ()), float(shaped(np.ones(1), ()))
+    ((2, 3, 4), array([1., 1., 1., 1.]), 1.0)
+    """
+    return values.reshape((*shape, *values.shape[1:]))[()]
+
+
+def refuse_lost_spacing(steps: NDArray[np.float64], first: NDArray[np.float64], last: NDArray[np.float64]) -> None:
+    """Refuse a lattice whose nodes are few digits apart."""
+    if (steps < LEAST_STEP * np.maximum(np.abs(first), np.abs(last))).any():
+        raise GeometryError(
+            f"the spacing {steps.tolist()} is lost in the rounding of coordinates from {first.tolist()} on",
+            remedy="move the shape to the origin, or choose a larger spacing",
+            element="spacing",
+        )
+
+
+def finite_number(
+    value: object, name: str, least: float = -np.inf, error: type[SignedHeatError] = SignedHeatError
+) -> float:
+    """`value` as a finite float, at least `least`.
+
+    Examples
+    --------
+    >>> finite_number(2, "the distance", least=0)
+    2.0
+    """
+    if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:  # type: ignore[arg-type]
+        described = _described(value) if isinstance(value, np.ndarray) else " ".join(f"{value!r:.60}".split())
+        raise error(f"{name} must be a number, not {described}", element=name)
+    try:
+        number = float(value)
+    except (OverflowError, TypeError, ValueError):
+        number = math.nan
+    if not (np.isfinite(number) and number >= least):
+        wanted = "finite" if least == -np.inf else "finite and not negative" if least == 0 else f"at least {least:g}"
+        raise error(f"{name} must be {wanted}, not {number:g}", element=name)
+    return number
+
+
+def positive_number(value: object, name: str, error: type[SignedHeatError] = SignedHeatError) -> float:
+    """`value` as a finite positive float."""
+    number = finite_number(value, name, error=error)
+    if number <= 0:
+        raise error(f"{name} must be positive and finite, not {number:g}", element=name)
+    return number
+
+
+def whole_number(value: object, name: str, least: int, error: type[SignedHeatError] = GeometryError) -> int:
+    """`value` as an integer, at least `least`."""
+    number = finite_number(value, name, error=error)
+    if number % 1 or number < least:
+        raise error(f"{name} must be a whole number of at least {least}, not {number:g}", element=name)
+    return int(number)
+
+
+def boolean(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.bool_]:
+    """`values` as a boolean array of any shape, not copied; other types than booleans are refused."""
+    array = array_of(values, name, error)
+    if array.dtype != np.bool_:
+        raise error(
+            f"{name} must be boolean, not {_described(array)}", remedy="compare it with a threshold first", element=name
+        )
+    return array
+
+
+def flag(value: object, name: str) -> bool:
+    """`value` as True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise SignedHeatError(f"{name} must be True or False, not {value!r:.50}", element=name)
+    return bool(value)
+
+
+def positive_steps(values: object, count: int) -> NDArray[np.float64]:
+    """A spacing, one positive number for all axes or one for each, as one for each."""
+    steps = numbers(values, "spacing")
+    if steps.shape not in ((), (count,)) or not (np.isfinite(steps).all() and (steps > 0).all()):
+        raise GeometryError(
+            f"spacing must be positive and finite, one number or {count}, not {steps.tolist()}", element="spacing"
+        )
+    refuse_extreme(0 * steps, steps, "spacing")
+    return frozen(np.broadcast_to(steps, count).copy())
+
+
+def element_ids(values: object, name: str, corners: int, n_vertices: int) -> NDArray[np.int64]:
+    """`values` as a read-only int64 array of shape (m, corners), with all ids within 0 … n_vertices − 1."""
+    array = array_of(values, name, GeometryError)
+    if array.size == 0:
+        raise GeometryError(f"there are no {name}: the shape is empty", element=name)
+    if array.ndim != 2 or array.shape[1] != corners:
+        raise GeometryError(f"{name} must have shape (m, {corners}), not {array.shape}", element=name)
+    if array.dtype.kind not in "iuO":
+        raise GeometryError(f"{name} must hold integer vertex ids, not {array.dtype}", element=name)
+    ids = whole_numbers(array, name)
+    outside = np.flatnonzero(((ids < 0) | (ids >= n_vertices)).any(axis=1))
+    if len(outside):
+        first = outside[0]
+        raise GeometryError(
+            f"{len(outside)} {name} name a vertex that does not exist; number {first} is "
+            f"{ids[first].tolist()}, but vertex ids go from 0 to {n_vertices - 1}",
+            element=f"number {first}",
+        )
+    return frozen(ids)
+
+
+def used_bounds(points: NDArray[np.float64], ids: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(2, d) lower and upper corner of the box around the points that are named, column by column: that is fast.
+
+    Examples
+    --------
+    >>> used_bounds(np.array([[0.0, 1.0], [2.0, 0.0], [9.0, 9.0]]), np.array([0, 1, 0])).tolist()
+    [[0.0, 0.0], [2.0, 1.0]]
+    """
+    used = np.zeros(len(points), dtype=bool)
+    used[ids.ravel()] = True
+    columns = (points if used.all() else points[used]).T
+    return np.array([[column.min() for column in columns], [column.max() for column in columns]])

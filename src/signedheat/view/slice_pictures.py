@@ -1,0 +1,241 @@
+"""Pictures of fields on grids: slices with isolines and the cross-section of the shape."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..errors import GeometryError
+from ..grids.grid import Grid
+from ..grids.grid_field import GridField
+from ..grids.marching import level_lines
+from ..grids.polyline import Polyline
+from ..io.files import PathLike
+from ..kinds import SpaceSources
+from ..packages import lazy_module
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..tets.tet_field import TetField
+from .figures import add_color_bar, distance_colors, isolines_between, picture
+from .surface_pictures import outside_of, triangulated
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+
+mpl_collections: Any = lazy_module("matplotlib.collections", "pictures")
+
+AXES = "xyz"
+TET_NODES = 64
+"""Nodes along the longest side of the grid at which a field on tets is drawn."""
+
+
+def save_slices(
+    field: GridField | TetField, path: PathLike, shape: SpaceSources | None = None, levels: Sequence[float] = ()
+) -> None:
+    """Write three orthogonal slices through a field, each where it cuts most of the inside, with the shape.
+
+    Blue is inside, orange outside; the black line is φ = 0, dashed where surface was completed; the shape is red; solid
+    nodes are grey. A field in the plane is drawn whole.
+
+    Parameters
+    ----------
+    field : GridField or TetField
+        A field in two or three dimensions.
+    path : str or path
+        The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
+    shape : a shape, optional
+        The source of the field. In the plane, a `Polyline` or a sequence of them.
+    levels : sequence of float
+        Further levels to draw, with heavier lines than the isolines.
+
+    Raises
+    ------
+    FileFormatError
+        If the picture cannot be written.
+    GeometryError
+        If the field has one dimension, or more than three.
+    """
+    if isinstance(field, TetField):
+        grid = Grid.around(field.mesh.bounds, resolution=TET_NODES, padding=0.0)
+        field = GridField(grid, field(grid.points.reshape(-1, 3)).reshape(grid.shape))
+    if field.grid.dimension not in (2, 3):
+        raise GeometryError(
+            f"fields are drawn in 2 and 3 dimensions, and this one has {field.grid.dimension}", element="field"
+        )
+    if field.grid.dimension == 2:
+        sides = field.grid.upper - field.grid.origin
+        with picture(path, *(7.5 * sides / sides.max() + [1.6, 0.6])) as figure:
+            draw_plane(field, figure.add_subplot(), shape, levels)
+    else:
+        with picture(path, 13.2, 4.6) as figure:
+            draw_slices(field, figure.subplots(1, 3).tolist(), shape, levels)
+
+
+def draw_slices(
+    field: GridField,
+    axes: Sequence[Axes],
+    shape: SpaceSources | None = None,
+    levels: Sequence[float] = (),
+    across: Sequence[int] = (2, 1, 0),
+) -> None:
+    """Draw one slice into each of some axes of a figure; `across` has the coordinate that is constant on each."""
+    field = field.whole
+    colors, isolines, step = _look(field)
+    for panel, normal in zip(axes, across, strict=True):
+        horizontal, vertical = (axis for axis in range(3) if axis != normal)
+        layer = clearest_layer(field, normal)
+        position = float(field.grid.axes[normal][layer])
+        u, v = field.grid.axes[horizontal], field.grid.axes[vertical]
+        at = (slice(None),) * normal + (layer,)
+        trusted = None if field.confidence is None else field.confidence[at]
+        _draw_panel(panel, u, v, field.values[at], colors, isolines, levels, trusted)
+        _draw_section(panel, shape, normal, position, float(field.grid.spacing[normal]))
+        panel.set(xlabel=AXES[horizontal], ylabel=AXES[vertical])
+        panel.set_title(f"{AXES[normal]} = {rounded(position, field.grid.spacing[normal])}", fontsize=10)
+    add_color_bar(axes[0].figure, axes, colors, isolines, step)
+
+
+def clearest_layer(field: GridField, axis: int) -> int:
+    """The layer of nodes across an axis with most inside nodes; if there are none, with most nodes near the zero set.
+
+    Among equal layers, the one closest to the middle.
+    """
+    inside = field.values < 0
+    if not inside.any():
+        inside = np.abs(field.values) < 1.5 * field.grid.spacing.max()
+    others = tuple(other for other in range(3) if other != axis)
+    counts = inside.sum(axis=others)
+    most = np.flatnonzero(counts >= 0.98 * counts.max())
+    return int(most[np.abs(most - (len(counts) - 1) / 2).argmin()])
+
+
+def rounded(position: float, spacing: float) -> str:
+    """A position as text, rounded to the resolution of the grid.
+
+    Examples
+    --------
+    >>> rounded(-5e-7, 0.03), rounded(12.34567, 0.03), rounded(12345.6, 30.0)
+    ('0', '12.346', '12346')
+    """
+    digits = max(0, 1 - int(np.floor(np.log10(spacing))))
+    return f"{round(position, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{position:.0f}"
+
+
+def draw_plane(field: GridField, axes: Axes, shape: SpaceSources | None = None, levels: Sequence[float] = ()) -> None:
+    """Draw a field in the plane into axes, with polylines or points in red."""
+    colors, isolines, step = _look(field)
+    u, v = field.grid.axes
+    _draw_panel(axes, u, v, field.values, colors, isolines, levels)
+    for line in shape if isinstance(shape, Sequence) else [shape]:
+        if isinstance(line, PointCloud):
+            axes.scatter(line.points[:, 0], line.points[:, 1], s=6, c="#d4145a", linewidths=0, zorder=3)
+        elif isinstance(line, Polyline):
+            draw_line(line, axes)
+    axes.set(xlabel=AXES[0], ylabel=AXES[1])
+    add_color_bar(axes.figure, [axes], colors, isolines, step)
+
+
+def draw_line(line: Polyline, axes: Axes) -> None:
+    """Draw a polyline in red, above what there is."""
+    points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
+    axes.plot(*points.T, color="#d4145a", linewidth=2.0, zorder=3)
+
+
+def _look(field: GridField) -> tuple[ScalarMappable, NDArray[np.float64], float]:
+    """Colours, isolines and the step between them, shared by all panels of a picture."""
+    low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
+    return distance_colors(low, high), *isolines_between(low, high)
+
+
+def _draw_panel(
+    panel: Axes,
+    u: NDArray[np.float64],
+    v: NDArray[np.float64],
+    values: NDArray[np.float64],
+    colors: ScalarMappable,
+    isolines: NDArray[np.float64],
+    levels: Sequence[float],
+    trusted: NDArray[np.float32] | None = None,
+) -> None:
+    """Draw values on a plane, indexed [u, v], as colours and isolines; dashed levels where confidence is low."""
+    shown = np.ma.masked_invalid(values.T)
+    shading: Literal["nearest", "gouraud"] = "nearest" if shown.mask.any() else "gouraud"
+    panel.pcolormesh(u, v, shown, shading=shading, rasterized=True).set(cmap=colors.cmap, norm=colors.norm)
+    panel.set_facecolor("#b9b9b9")
+    low, high = float(shown.min()), float(shown.max())
+    isolines = isolines[(isolines > low) & (isolines < high)]
+    if len(isolines):
+        panel.contour(u, v, shown, isolines, colors="#20303c", linewidths=0.35, alpha=0.7)
+    for level, color in ((0.0, "black"), *((level, "#1b6e3c") for level in levels)):
+        if low < level < high:
+            for style, lines in level_pieces(u, v, values, level, trusted).items():
+                panel.add_collection(
+                    mpl_collections.LineCollection(lines, colors=color, linewidths=1.3, linestyles=style, zorder=2)
+                )
+    panel.set(aspect="equal", xlim=u[[0, -1]], ylim=v[[0, -1]])
+    panel.tick_params(labelsize=8)
+    for spine in panel.spines.values():
+        spine.set_visible(False)
+
+
+def level_pieces(
+    u: NDArray[np.float64],
+    v: NDArray[np.float64],
+    values: NDArray[np.float64],
+    level: float,
+    trusted: NDArray[np.float32] | None = None,
+) -> dict[str, list[NDArray[np.float64]]]:
+    """Lines of a level on a plane: solid where the surface was there, dashed where it was completed."""
+    spacing = np.array([u[1] - u[0], v[1] - v[0]])
+    pieces: dict[str, list[NDArray[np.float64]]] = {"solid": [], "dashed": []}
+    for line, _ in level_lines(values, np.zeros(2), np.ones(2), level):
+        places = line * spacing + [u[0], v[0]]
+        there = np.ones(len(line), dtype=bool)
+        if trusted is not None:
+            there = scipy.ndimage.map_coordinates(trusted, line.T, order=0, mode="nearest") >= 1.0
+        of_edge = there[1:] & there[:-1]
+        ends = np.flatnonzero(np.diff(of_edge)) + 1
+        for first, last in pairwise([0, *ends.tolist(), len(of_edge)]):
+            if last > first:
+                pieces["solid" if of_edge[first] else "dashed"].append(places[first : last + 1])
+    return pieces
+
+
+def cross_section(mesh: TriangleMesh, axis: int, position: float) -> NDArray[np.float64]:
+    """Intersection of a mesh with a plane across an axis.
+
+    Returns
+    -------
+    (s, 2, 2) float
+        Ends of the segments, in the other two coordinates.
+    """
+    corners = mesh.vertices[mesh.faces]
+    height = corners[:, :, axis] - position
+    above = height >= 0
+    cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
+    corners, height, above = corners[cut], height[cut], above[cut]
+    lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
+    row = np.arange(len(cut))
+    ends = []
+    for step in (1, 2):
+        other = (lone + step) % 3
+        share = height[row, lone] / (height[row, lone] - height[row, other])
+        ends.append(corners[row, lone] + share[:, None] * (corners[row, other] - corners[row, lone]))
+    return np.delete(np.stack(ends, axis=1), axis, axis=2)
+
+
+def _draw_section(panel: Axes, given: Any, axis: int, position: float, spacing: float) -> None:
+    shape = None if given is None else outside_of(given)
+    if isinstance(shape, PointCloud):
+        near = shape.points[np.abs(shape.points[:, axis] - position) < spacing]
+        x, y = np.delete(near, axis, axis=1).T
+        panel.scatter(x, y, s=3, c="#d4145a", linewidths=0, zorder=3)
+    elif shape is not None:
+        segments = cross_section(triangulated(shape), axis, position)
+        panel.add_collection(mpl_collections.LineCollection(list(segments), colors="#d4145a", linewidths=1.1, zorder=3))

@@ -1,0 +1,237 @@
+"""Pictures of shapes, with inner sides red, and of distance on surfaces, with isolines and sources; all shaded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..curves.piecewise_field import PiecewiseField
+from ..foreign import ForeignShape, as_shape
+from ..io.files import PathLike
+from ..kinds import Shape
+from ..surfaces.digital_surface import DigitalSurface
+from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.surface_curves import Curve, CurveOrPoints
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..surfaces.vertex_field import VertexField
+from ..tets.tet_mesh import TetMesh
+from .figures import add_color_bar, distance_colors, isolines_between, picture
+from .rasterizer import Camera, oblique, rasterize
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+
+OUTER_COLOR, INNER_COLOR = np.array([0.96, 0.86, 0.55]), np.array([0.80, 0.25, 0.20])
+MOST_POINTS = 200_000
+"""Of larger clouds an even subset is drawn."""
+
+
+def save_scene(shape: Shape | ForeignShape, path: PathLike, up: int = 2) -> None:
+    """Write a picture of a shape seen obliquely from above, with axis `up` pointing up.
+
+    Raises
+    ------
+    FileFormatError
+        If the picture cannot be written.
+    UnsupportedTypeError
+        If it is no shape.
+    """
+    with picture(path, 7, 6) as figure:
+        draw_shape(shape, figure.add_subplot(), up=up)
+
+
+def draw_shape(shape: Shape | ForeignShape, axes: Axes, view: tuple[float, float] = (18, -58), up: int = 2) -> None:
+    """Draw a shape into axes, seen from an elevation and an azimuth in degrees."""
+    shape = outside_of(shape)
+    direction = oblique(*view, up)
+    axes.set_axis_off()
+    if isinstance(shape, PointCloud):
+        draw_points(shape.points, axes, direction, up)
+        return
+    mesh = triangulated(shape)
+    camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
+    corners = camera.pixels(mesh.vertices)[mesh.faces]
+    _, face, _ = rasterize(corners, np.zeros((mesh.n_faces, 3)), camera.width, camera.height)
+    outwards = mesh.face_area_vectors @ camera.frame[2] > 0
+    colors = np.where(outwards[:, None], OUTER_COLOR, INNER_COLOR) * camera.shades(mesh.face_area_vectors)[:, None]
+    axes.imshow(np.where((face >= 0)[..., None], colors[face], 1.0), origin="lower", interpolation="antialiased")
+
+
+def draw_points(
+    points: NDArray[np.float64],
+    axes: Axes,
+    direction: NDArray[np.float64],
+    up: int = 2,
+    colors: NDArray[np.float64] | None = None,
+) -> None:
+    """Draw points into axes, from far to near; without (n, 4) colours, in darker blue the nearer they are."""
+    some = slice(None, None, max(1, len(points) // MOST_POINTS))
+    pixels = Camera.around(points[some], direction, up).pixels(points[some])
+    order = np.argsort(pixels[:, 2])
+    x, y, depth = pixels[order].T
+    if colors is None:
+        axes.scatter(x, y, s=4, c=depth, cmap="Blues", vmin=depth[0] - np.ptp(depth), linewidths=0)
+    else:
+        axes.scatter(x, y, s=4, c=colors[some][order], linewidths=0)
+    axes.set_axis_off()
+    axes.set_aspect("equal")
+
+
+def outside_of(shape: Shape | ForeignShape) -> TriangleMesh | PolygonMesh | PointCloud:
+    """What is seen of a shape of any kind: of voxels and tets, the boundary."""
+    own = as_shape(shape)
+    if isinstance(own, DigitalSurface):
+        return own.squares
+    return own.boundary if isinstance(own, TetMesh) else own
+
+
+def triangulated(mesh: Any) -> TriangleMesh:
+    """Polygons as fans around their centroids, for drawing."""
+    if isinstance(mesh, TriangleMesh):
+        return mesh
+    center = mesh.n_vertices + mesh.corner_polygons
+    faces = np.stack([mesh.corners, mesh.next_corners, center], axis=1)
+    return TriangleMesh(np.concatenate([mesh.vertices, mesh.polygon_centroids]), faces)
+
+
+def save_surface(
+    field: VertexField | PiecewiseField,
+    path: PathLike,
+    sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]] = (),
+    n_contours: int = 20,
+    up: int = 2,
+) -> None:
+    """Write a picture of a surface coloured by φ, with isolines, from a direction from which the sources are visible.
+
+    Blue is φ < 0, orange φ > 0; the heavy line is φ = 0; sources are yellow.
+
+    Parameters
+    ----------
+    field : VertexField or PiecewiseField
+        Distance on a surface.
+    path : str or path
+        The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
+    sources : sequence of Curve and SurfacePoints
+        The sources to draw.
+    n_contours : int
+        Approximate number of isolines.
+    up : int
+        Axis that points upwards: 0, 1 or 2.
+
+    Raises
+    ------
+    FileFormatError
+        If the picture cannot be written.
+    """
+    with picture(path, 8.0, 7.0) as figure:
+        axes = figure.add_subplot()
+        draw_surface(field, axes, sources, n_contours, up=up)
+        add_legend(axes, with_sources=bool(sources))
+
+
+def add_legend(axes: Axes, with_sources: bool) -> None:
+    """Say what the heavy lines are."""
+    axes.plot([], [], color="0.1", linewidth=1.6, label="φ = 0")
+    if with_sources:
+        axes.plot([], [], color="#ffd83b", linewidth=2.5, label="source")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=2, frameon=False, fontsize=8)
+
+
+def draw_surface(
+    field: VertexField | PiecewiseField,
+    axes: Axes,
+    sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]] = (),
+    n_contours: int = 20,
+    view: NDArray[np.float64] | None = None,
+    up: int = 2,
+    colors: ScalarMappable | None = None,
+) -> None:
+    """Draw into axes, with isolines and a colour bar; in given colours, without them.
+
+    `view` is a direction from the surface to the eye.
+    """
+    own, mesh, values = _own_and_painted(field)
+    flat = [item for source in sources for item in (source if isinstance(source, Sequence) else [source])]
+    direction = toward_sources(own, flat, up) if view is None else view
+    camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
+    corners = camera.pixels(mesh.vertices)[mesh.faces]
+    depth, face, phi = rasterize(corners, values[mesh.faces], camera.width, camera.height)
+
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    scale = distance_colors(low, high) if colors is None else colors
+    shade = scale.to_rgba(np.where(np.isfinite(phi), phi, 0.0))[..., :3]
+    shade[~np.isfinite(phi)] = 0.7
+    covered = face >= 0
+    image = np.where(covered[..., None], shade * camera.shades(mesh.face_area_vectors)[face][..., None], 1.0)
+    isolines, step = isolines_between(low, high, n_contours)
+    if n_contours > 0 and high > low and colors is None:
+        darken(image, phi, covered, step)
+    axes.imshow(image, origin="lower", interpolation="antialiased")
+    for item in flat:
+        draw_source(axes, item, own, camera, depth)
+    axes.set_axis_off()
+    if colors is None:
+        spanned = np.array([low, *isolines, high]) if high > low else isolines  # both signs, however little of one
+        add_color_bar(axes.figure, [axes], scale, spanned, step)
+
+
+def _own_and_painted(field: VertexField | PiecewiseField) -> tuple[TriangleMesh, Any, NDArray[np.float64]]:
+    """The triangles to which sources refer, and those on which φ is linear with the values at their vertices."""
+    domain = field.domain
+    own = domain.mesh if isinstance(domain, IntrinsicTriangulation) else domain.triangulation
+    painted = field.split() if isinstance(field, PiecewiseField) else field.subdivided()
+    surface: Any = painted.domain
+    return own, surface.triangulation, surface.on_triangulation(painted.values)
+
+
+def darken(image: NDArray[np.float64], phi: NDArray[np.float64], covered: NDArray[np.bool_], step: float) -> None:
+    """Darken the pixels of isolines at multiples of a step, one pixel wide, and of a heavier one at zero."""
+    for spacing, width, strength in ((step, 0.6, 0.55), (np.inf, 1.4, 0.9)):
+        level = phi / spacing if np.isfinite(spacing) else phi
+        rise = np.hypot(*np.gradient(level))
+        away = np.abs(level - np.round(level)) if np.isfinite(spacing) else np.abs(level)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            cover = np.clip(width + 0.5 - away / rise, 0, 1)
+        smooth = covered & np.isfinite(cover) & (rise < 0.5 if np.isfinite(spacing) else rise < 2 * step)
+        image[smooth] *= (1 - strength * cover[smooth])[:, None]
+
+
+def draw_source(axes: Axes, item: Any, mesh: Any, camera: Camera, depth: NDArray[np.float64]) -> None:
+    """Draw the visible parts of a source."""
+    points = np.einsum("ik,ikj->ij", item.barycentric, mesh.vertices[mesh.faces[item.faces]])
+    if isinstance(item, Curve) and item.closed:
+        points = np.concatenate([points, points[:1]])
+    pixels, near = np.split(camera.pixels(points), [2], axis=1)
+    column, row = np.clip(np.round(pixels).astype(int).T, 0, np.array(depth.shape[::-1])[:, None] - 1)
+    visible = near[:, 0] >= depth[row, column] - 6
+    if isinstance(item, Curve):
+        shown = np.where(visible[:, None], pixels, np.nan)
+        axes.plot(*shown.T, color="black", linewidth=3.2, solid_capstyle="round")
+        axes.plot(*shown.T, color="#ffd83b", linewidth=1.8, solid_capstyle="round")
+    else:
+        axes.plot(*pixels[visible].T, "o", color="#ffd83b", markeredgecolor="black", markersize=6)
+
+
+def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> NDArray[np.float64]:
+    """A direction from which most of the sources are visible; for flat surfaces, along their normals."""
+    normals = [mesh.face_area_vectors[s.faces] for s in sources]
+    mean = np.zeros(3)
+    if normals:
+        stacked = np.concatenate(normals)
+        lengths = np.linalg.norm(stacked, axis=1)
+        mean = (stacked[lengths > 0] / lengths[lengths > 0, None]).sum(axis=0) / len(stacked)
+    direction = oblique(22, -58, up)
+    if np.linalg.norm(mean) > 0.3:
+        return mean / np.linalg.norm(mean) + 0.2 * direction
+    extents = np.ptp(mesh.bounds, axis=0)
+    if not normals or extents.min() < 1e-3 * extents.max():
+        total: NDArray[np.float64] = mesh.face_area_vectors.sum(axis=0)
+        if np.linalg.norm(total) > 0.5 * mesh.face_areas.sum():
+            return total
+    return direction

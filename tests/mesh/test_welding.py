@@ -1,0 +1,64 @@
+"""What rounding tears is welded, and nothing else, however far from the origin."""
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat.mesh.welding import welded_vertices
+
+PLACES = ((0, 0, 0), (1e3, -1e3, 10), (431250, 5412300, 100), (1e6, 1e6, 1e6), (1e7, 0, 0), (1e7, 1e7, 1e7))
+SIDES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
+
+
+def box(low, high, sides=range(6)):
+    """Vertices, and two triangles for each of the sides; the first of which is at the bottom."""
+    corners = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)])
+    quads = SIDES[list(sides)]
+    return np.where(corners, high, low), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def house(unit, sides=range(6)):
+    """A house with thin walls and a chimney of one unit."""
+    outer, inner, chimney = (
+        box(*(unit * np.array(ends) for ends in both), sides)
+        for both in (([0, 0, 0], [20, 16, 12]), ([1, 1, 1], [19, 15, 11]), ([4, 4, 11], [5, 5, 17]))
+    )
+    vertices = np.concatenate([outer[0], inner[0], chimney[0]])
+    return vertices, np.concatenate([outer[1], inner[1][:, ::-1] + 8, chimney[1] + 16])
+
+
+def classes(vertices, faces):
+    return welded_vertices(vertices, faces.ravel(), np.roll(faces, -1, axis=1).ravel())
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("sides", [range(6), range(1, 6), [0, 2, 4]])
+@pytest.mark.parametrize("unit", [1.0, 0.5])
+def test_coordinates_on_lattices_are_kept_wherever_they_are(place, sides, unit):
+    vertices, faces = house(unit, sides)
+    corners = (vertices + place)[faces].reshape(-1, 3)
+    soup = classes(corners, np.arange(len(corners)).reshape(-1, 3))
+    assert len(np.unique(soup)) == len(np.unique(faces))
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("size", [1.0, 30.0])
+def test_single_precision_closes_facets_that_were_rounded_one_by_one(place, size):
+    ball = sh.samples.sphere(3)
+    last_place = np.spacing(np.float32(np.abs(place).max()))
+    corners = (max(size, 300 * size * last_place) * ball.vertices + place)[ball.faces].reshape(-1, 3)
+    noise = np.random.default_rng(0).normal(size=corners.shape)
+    torn = (corners * (1 + 2.0**-25 * noise)).astype(np.float32).astype(np.float64)
+    assert len(np.unique(torn, axis=0)) > 2 * ball.n_vertices
+    assert len(np.unique(classes(torn, np.arange(len(torn)).reshape(-1, 3)))) == ball.n_vertices
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("unit", [1.0, 0.5])
+def test_a_house_has_its_volume_wherever_it_is(place, unit):
+    vertices, faces = house(2 * unit)
+    kept = sh.complete((vertices + place, faces)).surface(keep_faces=True)
+    corners = (kept.vertices - place)[kept.faces]
+    volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    walls = 20 * 16 * 12 - 18 * 14 * 10 + 5  # and the chimney, from which the wall takes one cube
+    assert volume == pytest.approx(walls * (2 * unit) ** 3, rel=1e-9)

@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes.grid_cases import sphere
+from signedheat.samples import torus
+from signedheat.search.face_features import FaceFeatures
+from signedheat.search.face_tree import FaceTree
+from signedheat.search.nearest_triangles import foot_on_triangle
+
+
+def soup(n, seed=0):
+    """Triangles of every size and direction, needles and points among them."""
+    rng = np.random.default_rng(seed)
+    corners = rng.normal(size=(n, 1, 3)) + rng.normal(size=(n, 3, 3)) * 10 ** rng.uniform(-3, 0, (n, 1, 1))
+    corners[::17, 2] = corners[::17, 1]
+    corners[::29, 1:] = corners[::29, :1]
+    return sh.TriangleMesh(corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3))
+
+
+@pytest.mark.parametrize(
+    "mesh", [sphere(700), torus(n_around=40, n_across=20), soup(301), soup(3), sphere(80, 1e-3, (50.0, 0, 0))]
+)
+def test_the_nearest_face_is_that_of_all(mesh):
+    features = FaceFeatures.of(mesh.vertices, mesh.faces)
+    tree = FaceTree.of(features)
+    rng = np.random.default_rng(1)
+    middle, size = mesh.vertices.mean(axis=0), np.ptp(mesh.vertices, axis=0).max()
+    points = middle + size * np.concatenate([rng.uniform(-0.6, 0.6, (150, 3)), rng.uniform(-4, 4, (150, 3))])
+    squares = [[foot_on_triangle(features.rows, f, *p)[0] for f in range(len(features.rows))] for p in points]
+    nearest = np.sqrt(np.min(squares, axis=1))
+    np.testing.assert_allclose(tree.distances(points), nearest, rtol=1e-9, atol=1e-12 * size)
+    np.testing.assert_allclose(tree.search(points).distances, nearest, rtol=1e-9, atol=1e-12 * size)
+
+
+def test_discs_hold_the_corners_of_what_is_below_them():
+    mesh = torus(n_around=60, n_across=30)
+    features = FaceFeatures.of(mesh.vertices, mesh.faces)
+    tree = FaceTree.of(features)
+    leaves = len(tree.tree.bounds) // 2
+    corners = features.corners.reshape(-1, 3, 3)
+    for node in range(leaves // 8, 2 * leaves):
+        centre, normal, radius, thickness = np.split(tree.discs[node], [3, 6, 7])
+        if thickness >= 0:
+            low, high = node, node
+            while low < leaves:
+                low, high = 2 * low, 2 * high + 1
+            items = tree.tree.items.reshape(leaves, -1)[low - leaves : high - leaves + 1].ravel()
+            away = corners[items[items >= 0]].reshape(-1, 3) - centre
+            along = away @ normal
+            assert (np.abs(along) <= thickness + 1e-12).all()
+            assert (np.linalg.norm(away - along[:, None] * normal, axis=1) <= radius + 1e-12).all()
+    assert (tree.discs[leaves:, 7] >= 0).mean() > 0.5

@@ -1,0 +1,221 @@
+"""Points without normals, and loose triangles, face outwards."""
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from refusals import refused
+from signedheat import samples
+from signedheat.solids.gauss import Pieces, system_of
+from signedheat.solids.point_orientation import orient_points
+
+
+def box(size, center=(0.0, 0.0, 0.0)):
+    corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * np.array(size) / 2
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = [(a, b, c) for a, b, c, _ in quads] + [(a, c, d) for a, _, c, d in quads]
+    return sh.TriangleMesh(corners + np.array(center), faces)
+
+
+def turned(mesh):
+    return sh.TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+
+
+def contoured(values, extent, n=56):
+    grid = sh.Grid(-np.array(extent), 2 * max(extent) / n, np.ceil(np.array(extent) / max(extent) * n).astype(int) + 1)
+    return sh.GridField(grid, values(grid.points)).contour(0.0)
+
+
+def holed_plate():
+    """Genus two."""
+
+    def values(x):
+        walls = np.abs(x) - np.array([1.2, 0.7, 0.2])
+        rounded = np.linalg.norm(np.maximum(walls, 0), axis=-1) + np.minimum(walls.max(axis=-1), 0) - 0.1
+        holes = [0.35 - np.hypot(x[..., 0] - side, x[..., 1]) for side in (-0.6, 0.6)]
+        return np.maximum(rounded, np.maximum(*holes))
+
+    return contoured(values, (1.5, 1.0, 0.5))
+
+
+def shells():
+    """A ball in the cavity of a shell."""
+    return samples.union(samples.sphere(4), turned(samples.sphere(4, 0.8)), samples.sphere(3, 0.4))
+
+
+SHAPES = {
+    "sphere": samples.sphere,
+    "torus": samples.torus,
+    "genus two": holed_plate,
+    "box": lambda: box((2, 1, 0.7)),
+    "two bodies": lambda: samples.union(samples.sphere(), box((1, 1, 1), (1.8, 0, 0))),
+    "shells": shells,
+}
+
+
+def share_right(cloud, normals):
+    return float(((cloud.normals * normals).sum(axis=1) > 0).mean())
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_clean_points_face_outwards(name):
+    truth = samples.oriented_points(SHAPES[name](), 3000)
+    found = orient_points(sh.PointCloud(truth.points))
+    assert found.sided and not found.noisy
+    assert share_right(found.cloud, truth.normals) > 0.99
+    assert np.median(np.abs((found.cloud.normals * truth.normals).sum(axis=1))) > np.cos(np.radians(8))
+
+
+def test_points_of_a_plate_face_outwards_whatever_their_draw():
+    """Three times as thick as points are apart: of 24 draws 23 are right at .99 of the points, one at .976."""
+    plate, shares = box((1, 1, 0.104)), []
+    for seed in range(6):
+        truth = samples.oriented_points(plate, 2000, seed=seed)
+        shares.append(share_right(orient_points(sh.PointCloud(truth.points)).cloud, truth.normals))
+    assert min(shares) > 0.95 and np.median(shares) > 0.99
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_noisy_points_face_outwards(name):
+    truth = samples.oriented_points(SHAPES[name](), 5000)
+    diagonal = float(np.linalg.norm(np.ptp(truth.points, axis=0)))
+    noise = np.random.default_rng(1).normal(scale=0.005 * diagonal, size=truth.points.shape)
+    found = orient_points(sh.PointCloud(truth.points + noise))
+    assert found.noisy
+    assert share_right(found.cloud, truth.normals) > 0.99
+
+
+def test_holes_and_uneven_sampling_do_no_harm():
+    truth = samples.oriented_points(holed_plate(), 12_000)
+    rng = np.random.default_rng(0)
+    keep = rng.random(truth.n_points) < 0.1 + 0.9 * (truth.points[:, 0] + 1.3) / 2.6
+    for center in truth.points[rng.choice(truth.n_points, 5)]:
+        keep &= np.linalg.norm(truth.points - center, axis=1) > 0.25
+    found = orient_points(sh.PointCloud(truth.points[keep]))
+    assert share_right(found.cloud, truth.normals[keep]) > 0.99
+
+
+def test_half_a_torus_faces_outwards():
+    truth = samples.oriented_points(samples.torus(), 4000)
+    keep = truth.points[:, 0] > 0
+    found = orient_points(sh.PointCloud(truth.points[keep]))
+    assert share_right(found.cloud, truth.normals[keep]) > 0.99
+
+
+def test_signs_follow_a_rigid_motion_and_a_scale():
+    truth = samples.oriented_points(holed_plate(), 4000)
+    rotation = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    moved = sh.PointCloud(1e3 * truth.points @ rotation.T + 1e4)
+    here, there = orient_points(sh.PointCloud(truth.points)).cloud, orient_points(moved).cloud
+    agree = ((here.normals @ rotation.T) * there.normals).sum(axis=1)
+    assert (agree > 0.999).mean() > 0.995
+
+
+def test_the_same_points_give_the_same_bits():
+    points = samples.oriented_points(samples.torus(), 3000).points
+    first, second = (orient_points(sh.PointCloud(points)).cloud.normals for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_points_given_twice_share_a_normal():
+    points = samples.oriented_points(samples.sphere(), 1500).points
+    cloud = orient_points(sh.PointCloud(np.concatenate([points, points]))).cloud
+    np.testing.assert_array_equal(cloud.normals[:1500], cloud.normals[1500:])
+    assert ((cloud.normals * cloud.points).sum(axis=1) > 0).all()
+
+
+@pytest.mark.parametrize("wrong", [0.0, 0.5, 1.0])
+def test_normals_given_are_turned_where_they_are_wrong(wrong):
+    truth = samples.oriented_points(samples.torus(), 4000)
+    flip = np.random.default_rng(0).random(truth.n_points) < wrong
+    found = orient_points(sh.PointCloud(truth.points, np.where(flip[:, None], -truth.normals, truth.normals)))
+    assert share_right(found.cloud, truth.normals) > 0.995
+    assert abs(found.n_turned - flip.sum()) <= 0.005 * truth.n_points
+    assert found.n_fitted == 0
+
+
+def test_points_in_a_plane_face_one_way_and_say_so():
+    rng = np.random.default_rng(0)
+    found = orient_points(sh.PointCloud(np.c_[rng.random((500, 2)), np.zeros(500)]))
+    assert not found.sided
+    np.testing.assert_allclose(found.cloud.normals, np.tile(found.cloud.normals[0], (500, 1)), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        np.c_[np.arange(50.0), np.zeros((50, 2))],  # along a line
+        np.eye(4, 3),
+        np.random.default_rng(0).random((7, 3)),
+        np.stack(np.meshgrid(*[np.arange(4.0)] * 3), axis=-1).reshape(-1, 3),  # no surface at all
+        np.concatenate([np.zeros((1, 3)), np.random.default_rng(0).random((400, 3)) * 1e-6, np.ones((1, 3))]),
+    ],
+)
+def test_awkward_points_get_unit_normals(points):
+    normals = orient_points(sh.PointCloud(points)).cloud.normals
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1)
+
+
+def test_too_few_points_and_points_in_the_plane_are_refused():
+    with refused(sh.errors.GeometryError, "points"):
+        orient_points(sh.PointCloud([[0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0]]))
+    with refused(sh.errors.GeometryError, "points"):
+        orient_points(sh.PointCloud(np.random.default_rng(0).random((9, 2))))
+
+
+def orient_triangles(corners):
+    """Signs of loose triangles by Gauss's formula."""
+    return np.where(system_of(Pieces(corners, np.arange(len(corners)))).weights() >= 0, 1.0, -1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"), [("torus", 0.1), ("torus", 0.5), ("torus", 1.0), ("genus two", 0.5), ("shells", 0.5)]
+)
+def test_loose_triangles_face_outwards(name, wrong):
+    mesh = SHAPES[name]()
+    corners = samples.soup(mesh, 0.002).vertices.reshape(-1, 3, 3).copy()
+    flip = np.random.default_rng(0).random(len(corners)) < wrong
+    corners[flip] = corners[flip, ::-1]
+    right = (orient_triangles(corners) > 0) != flip
+    areas = mesh.face_areas
+    assert (areas * right).sum() > 0.995 * areas.sum()
+
+
+def test_large_triangles_are_sampled():
+    mesh = box((1, 2, 3))
+    corners = mesh.vertices[mesh.faces].copy()
+    corners[::2] = corners[::2, ::-1]
+    np.testing.assert_array_equal(orient_triangles(corners), np.where(np.arange(12) % 2, 1.0, -1.0))
+
+
+def test_triangles_without_area_keep_their_order():
+    corners = np.concatenate([samples.sphere(2).vertices[samples.sphere(2).faces], np.zeros((2, 3, 3))])
+    np.testing.assert_array_equal(orient_triangles(corners), np.ones(len(corners)))
+    np.testing.assert_array_equal(orient_triangles(np.zeros((5, 3, 3))), np.ones(5))
+
+
+def test_distance_to_points_without_normals_is_that_with_them():
+    truth = samples.oriented_points(samples.torus(), 5000)
+    grid = sh.Grid.around(truth.bounds, resolution=40)
+    x = grid.points
+    exact = np.hypot(np.hypot(x[..., 0], x[..., 1]) - 1, x[..., 2]) - 0.4
+    errors = [
+        float(np.sqrt(np.mean((sh.SignedHeatSolver(grid).distance(cloud).values - exact) ** 2)))
+        for cloud in (truth, orient_points(sh.PointCloud(truth.points)).cloud)
+    ]
+    assert errors[1] < 1.15 * errors[0]
+
+
+def test_few_points_keep_the_normals_that_they_are_given():
+    """Where a thin part's other side is as near as the next point, those that gave normals know better."""
+    assert orient_points(samples.oriented_points(samples.duck(40), 200)).n_turned == 0
+    assert orient_points(samples.oriented_points(samples.torus(1.0, 0.12), 300, seed=1)).n_turned == 0
+
+
+def test_far_between_points_nothing_is_missing():
+    """300 points on a ball, ten cells apart: its inside is solid, and it was taken for sheets."""
+    cloud = samples.oriented_points(samples.sphere(5), 300)
+    field = sh.signed_distance(cloud, resolution=96)
+    truth = np.linalg.norm(field.grid.points, axis=-1) - 1.0
+    assert np.sqrt(np.mean((field.values - truth) ** 2)) < 0.02
+    assert field.diagnostics.note(sh.diagnostics.BoundsNothing) is None

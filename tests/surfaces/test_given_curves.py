@@ -1,0 +1,117 @@
+"""Curves as lists of elements; curves without length; their positions; what is misplaced or masked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from refusals import refused
+from signedheat.diagnostics import WithoutLength
+from signedheat.samples import sphere
+from signedheat.surfaces.given_curves import curve_of_elements
+
+BALL = sphere(3)
+RING = BALL.level_set(BALL.vertices[:, 2], 0.1)[0]
+
+
+def edges(mesh):
+    seen = {}
+    for face in mesh.faces.tolist():
+        for k in range(3):
+            seen.setdefault(frozenset((face[k], face[(k + 1) % 3])), (face[k], face[(k + 1) % 3]))
+    return np.array(list(seen.values()))
+
+
+def as_elements(mesh, vertex, edge, face):
+    """A vertex, the middle of an edge's first quarter, a place in a face; and where these are."""
+    ends = mesh.vertices[edges(mesh)[edge]]
+    corners = mesh.vertices[mesh.faces[face]]
+    places = [mesh.vertices[vertex], 0.75 * ends[0] + 0.25 * ends[1], np.array([0.2, 0.3, 0.5]) @ corners]
+    return [(vertex, []), (edge, [0.25]), (face, [0.2, 0.3])], places
+
+
+@pytest.mark.filterwarnings("ignore::signedheat.errors.InexactWarning")  # its gap is wide
+def test_elements_are_numbered_as_potpourri3d_does():
+    pp3d = pytest.importorskip("potpourri3d")
+    np.testing.assert_array_equal(edges(BALL), pp3d.edges(BALL.vertices, BALL.faces))
+    curve = [(5, []), (17, [0.3]), (40, [0.2, 0.5, 0.3]), (9, [])]
+    solver = pp3d.MeshSignedHeatSolver(BALL.vertices, BALL.faces)
+    path = [(int(v), []) for v in pp3d_path(pp3d)]
+    theirs = solver.compute_distance([path], preserve_source_normals=False, level_set_constraint="ZeroSet")
+    ours = sh.SignedHeatSolver(BALL, 1.0, intrinsic=False).distance(path, sh.ZeroSet(hard=True)).values
+    np.testing.assert_allclose(ours, theirs, atol=1e-8)
+    assert sh.signed_distance([curve], BALL).values.shape == (BALL.n_vertices,)
+
+
+def pp3d_path(pp3d):
+    """Vertices along edges, around the ball."""
+    neighbours = {}
+    for a, b in edges(BALL):
+        neighbours.setdefault(a, set()).add(b)
+        neighbours.setdefault(b, set()).add(a)
+    at, path = 0, [0]
+    while len(path) < 12:
+        at = max(neighbours[at] - set(path), key=lambda v: BALL.vertices[v] @ [0.3, 1.0, 0.2])
+        path.append(at)
+        if BALL.vertices[at] @ [0.3, 1.0, 0.2] > 0.95:
+            break
+    return path
+
+
+def test_points_of_elements_lie_where_they_should():
+    elements, places = as_elements(BALL, 7, 33, 100)
+    np.testing.assert_allclose(BALL.positions(curve_of_elements(BALL, elements)), places, atol=1e-15)
+    one = sh.signed_distance(elements, BALL, as_oriented=True)
+    for same in ([elements], curve_of_elements(BALL, elements)):
+        np.testing.assert_array_equal(one.values, sh.signed_distance(same, BALL, as_oriented=True).values)
+    with refused(sh.errors.SourceError, "point 1"):
+        sh.signed_distance([(3, []), (10**6, [0.5])], BALL)
+
+
+def test_positions_of_curves():
+    np.testing.assert_allclose(BALL.positions(RING)[:, 2], 0.1, atol=1e-12)
+    np.testing.assert_array_equal(BALL.positions(BALL.points_at([4, 9])), BALL.vertices[[4, 9]])
+    cloud = sh.PointCloud(BALL.vertices)
+    np.testing.assert_array_equal(cloud.positions(cloud.path([4, 9])), BALL.vertices[[4, 9]])
+    with refused(sh.errors.SourceError, "point 0"):
+        BALL.positions(sh.SurfacePoints([10**6], [[1, 0, 0]]))
+
+
+@pytest.mark.parametrize("click", [
+    sh.Curve([3, 3], [[0.2, 0.3, 0.5]] * 2), BALL.path([5, 5]), BALL.polyline([[0, 0, 1], [0, 0, 1]]),
+])  # fmt: skip
+@pytest.mark.parametrize(
+    "measure",
+    [
+        lambda mesh, curves: sh.signed_distance(curves, mesh),
+        lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),
+    ],
+)
+def test_a_click_among_strokes_is_left_out_with_a_note(measure, click):
+    alone, with_click = measure(BALL, [RING]), measure(BALL, [RING, click])
+    np.testing.assert_array_equal(alone.values, with_click.values)
+    assert with_click.diagnostics.note(WithoutLength).without_length == [1]
+    assert alone.diagnostics.note(WithoutLength) is None
+    with refused(sh.errors.SourceError):
+        measure(BALL, click)
+
+
+def test_what_is_misplaced_is_named():
+    with refused(sh.errors.UnsupportedTypeError):
+        sh.signed_distance(BALL, RING)
+    with refused(sh.errors.UnsupportedTypeError, "band"):
+        sh.signed_distance(RING, BALL, band=0.1)
+    for intrinsic in ("yes", 3, None):
+        with refused(sh.errors.SignedHeatError, "intrinsic"):
+            sh.signed_distance(RING, BALL, intrinsic=intrinsic)
+
+
+def test_masks_are_not_ignored():
+    hidden = np.ma.masked_greater(BALL.vertices, 0.9)
+    with refused(sh.errors.GeometryError):
+        sh.as_shape((hidden, BALL.faces))
+    with refused(sh.errors.GeometryError):
+        sh.signed_distance((BALL.vertices, np.ma.masked_equal(BALL.faces, 3)), resolution=8)
+    with refused(sh.errors.GeometryError):
+        sh.VertexField(BALL, hidden[:, 0])
