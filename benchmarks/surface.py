@@ -163,7 +163,7 @@ def bare(data, clock) -> dict[str, object]:
     """Order, factorise and solve M + tL and C, assembled beforehand, as the solver library does it by itself."""
     import signedheat as sh
     from signedheat.linear import factorize
-    from signedheat.surfaces.crouzeix_raviart import vector_heat_matrix
+    from signedheat.surfaces.vector_heat import vector_heat_matrix
 
     surface = sh.SignedHeatSolver(sh.TriangleMesh(data["vertices"], data["faces"])).discretization
     heat, stiffness = vector_heat_matrix(surface.triangles, surface.spacing**2), surface.stiffness.copy()

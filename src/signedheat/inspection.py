@@ -11,7 +11,7 @@ from .foreign import Shape
 from .mesh.components import connected_components
 from .mesh.edges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
 from .mesh.tetrahedral import FLAT
-from .mesh.triangle_kernels import areas_of_polygons
+from .mesh.triangles import areas_of_polygons
 from .mesh.welding import coincident_faces, same_positions
 from .surfaces.digital_surface import DigitalSurface
 from .surfaces.point_cloud import PointCloud

@@ -9,9 +9,9 @@ from scipy.sparse.linalg import spsolve
 import signedheat as sh
 from shapes.grid_cases import box, rms, sphere
 from signedheat.discretization import discretize
+from signedheat.grids.multilevel import diffuse_by_sweeps
 from signedheat.grids.node_sources import NodeSources
 from signedheat.grids.stencil import divergence, laplacian, solve_poisson
-from signedheat.grids.sweeps import diffuse_by_sweeps
 from signedheat.mesh.unit_vectors import unit
 
 

@@ -15,7 +15,7 @@ from signedheat import linear
 from signedheat.discretization import discretize
 from signedheat.linear import available_backends, elimination_order, factorize, pardiso, upper_triangle, whole
 from signedheat.progress import Announcement
-from signedheat.surfaces.crouzeix_raviart import vector_heat_matrix
+from signedheat.surfaces.vector_heat import vector_heat_matrix
 
 backends = pytest.mark.parametrize("backend", available_backends())
 

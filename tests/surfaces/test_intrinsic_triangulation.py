@@ -357,7 +357,7 @@ def test_fixed_edges_keep_their_numbers():
 
 
 def test_vertices_that_all_but_coincide():
-    from signedheat.surfaces.coincidence_kernels import coinciding
+    from signedheat.surfaces.intrinsic_refinement import coinciding
 
     places = np.array(
         [0.0, 1e-3, 2e-3, 1.0, 1.5, 1.5 + 1e-3, 9.0, 9.0 + 1e-5, 9.001]

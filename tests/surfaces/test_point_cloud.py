@@ -12,8 +12,7 @@ from shapes import domain_cases as cases
 from signedheat.diagnostics import PointsLeftOut
 from signedheat.samples import sphere
 from signedheat.solids.point_orientation import orient_points
-from signedheat.surfaces.hole_filling import hole_fillings
-from signedheat.surfaces.local_triangulations import local_triangulations
+from signedheat.surfaces.local_triangulations import hole_fillings, local_triangulations
 from signedheat.surfaces.outward_signs import spread_out
 
 

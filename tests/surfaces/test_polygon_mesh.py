@@ -6,7 +6,7 @@ import pytest
 import signedheat as sh
 from shapes import domain_cases as cases
 from signedheat.mesh.ear_clipping import cut_into_ears
-from signedheat.surfaces.virtual_refinement import virtual_refinement, virtual_vertices
+from signedheat.surfaces.polygon_mesh import virtual_refinement, virtual_vertices
 
 
 def refined(vertices, polygons):

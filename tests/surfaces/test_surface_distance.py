@@ -14,8 +14,8 @@ from shapes.surfaces import FlatGluing
 from signedheat.diagnostics import EdgesLengthened
 from signedheat.linear import available_backends, whole
 from signedheat.method import diffuse, integrate, normalize
-from signedheat.surfaces.crouzeix_raviart import vector_heat_forces, vector_heat_matrix
 from signedheat.surfaces.surface_discretization import SurfaceDiscretization
+from signedheat.surfaces.vector_heat import vector_heat_forces, vector_heat_matrix
 
 CONSTRAINTS = [sh.Free(), sh.ZeroSet(), sh.EachComponent(), sh.LevelValues([0.3]), sh.Soft(2.0)]
 every_constraint = pytest.mark.parametrize("constraint", CONSTRAINTS, ids=repr)

@@ -1,12 +1,19 @@
-"""Geodesic paths: shortest paths across faces, between points that share no face."""
+"""Geodesic paths: shortest paths across faces, between points that share no face.
+
+A *sleeve* is a sequence of faces: each is left through a halfedge, and the next one entered through another halfedge of
+the same edge. Halfedge ``3 f + k`` of face f runs from corner k to corner k + 1.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from ..compiled import compiled
 from ..errors import SourceError
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import (
@@ -19,9 +26,8 @@ from ..mesh.surface_points import (
     points_at_vertices,
     shared_faces,
 )
-from .heap_kernels import Queue
+from .heap_kernels import Queue, pop, push
 from .initial_windows import Faces
-from .path_kernels import shortest_lines
 
 
 def join(
@@ -132,3 +138,345 @@ def path_through_vertices(
     step = np.arange(len(turning) - 1)
     located, _, ends, _ = join(triangles, chain[turning], step, step + 1, name)
     return located[ends[:-1]]
+
+
+TIE = 1e-9
+"""How much dearer ways are through one edge than through another of the same length: of ways around a symmetric peak,
+whose lengths differ by 1e-16, the same one is always found. Any number from 1e-12 to 1e-6 does."""
+
+
+@compiled
+def middle(faces: Faces, h: int) -> complex:
+    """Midpoint of a halfedge, in the layout of its face."""
+    return 0.5 * (faces.positions[h // 3, h % 3] + faces.positions[h // 3, (h % 3 + 1) % 3])
+
+
+@compiled
+def toll(e: int) -> float:
+    """What a way through an edge costs in addition to its length: evenly spread numbers, by the golden ratio."""
+    return 1.0 + TIE * ((e * 0.6180339887498949) % 1.0)
+
+
+@compiled
+def find_sleeve(
+    faces: Faces,
+    starts: NDArray[np.int64],
+    start_points: NDArray[np.complex128],
+    ends: NDArray[np.int64],
+    end_points: NDArray[np.complex128],
+    cost: NDArray[np.float64],
+    leave: NDArray[np.int64],
+    enter: NDArray[np.int64],
+    queue: Queue,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The faces between two sets of faces on the shortest path through midpoints of edges (Dijkstra).
+
+    Returns the halfedges through which all faces but the last are left, and those through which all but the first are
+    entered; empty if there is no path. `cost`, `leave`, `enter` and `queue` are work space, restored before returning.
+    """
+    edge_of, touched = faces.edges.ravel(), [0]
+    touched.pop()
+    for s in range(len(starts)):
+        for k in range(3):
+            h, e = 3 * starts[s] + k, edge_of[3 * starts[s] + k]
+            d = abs(middle(faces, h) - start_points[s]) * toll(e)
+            if d < cost[e]:
+                cost[e], leave[e], enter[e] = d, h, -1
+                touched.append(e)
+                push(queue, e, d)
+    best, last = np.inf, np.int64(-1)
+    while queue.size[0] > 0:
+        e = pop(queue)
+        d = cost[e]
+        if d >= best:
+            break
+        for k in range(faces.first_halfedge[e], faces.first_halfedge[e + 1]):
+            h = faces.halfedges[k]
+            if h == leave[e]:
+                continue
+            here = middle(faces, h)
+            for s in range(len(ends)):
+                if ends[s] == h // 3 and d + abs(here - end_points[s]) < best:
+                    best, last = d + abs(here - end_points[s]), h
+            for turn in range(1, 3):
+                out = h - h % 3 + (h + turn) % 3
+                to = edge_of[out]
+                there = d + abs(middle(faces, out) - here) * toll(to)
+                if there < cost[to]:
+                    cost[to], leave[to], enter[to] = there, out, h
+                    touched.append(to)
+                    push(queue, to, there)
+    n, h = 0, last
+    while h >= 0:
+        n, h = n + 1, enter[edge_of[h]]
+    left, entered = np.empty(n, np.int64), np.empty(n, np.int64)
+    while n > 0:
+        n -= 1
+        e = edge_of[last]
+        entered[n], left[n] = last, leave[e]
+        last = enter[e]
+    for e in touched:
+        cost[e], queue.places[e] = np.inf, -1
+    queue.size[0] = 0
+    return left, entered
+
+
+@compiled
+def unfold(
+    faces: Faces, left: NDArray[np.int64], entered: NDArray[np.int64]
+) -> tuple[NDArray[np.complex128], NDArray[np.int64], NDArray[np.complex128]]:
+    """Unfold a sleeve into the plane of its first face: tail and head of each halfedge left, and the last face.
+
+    Also whether each face, the last one included, is turned over in that plane.
+    """
+    portals, over = np.empty((len(left), 2), np.complex128), np.zeros(len(left) + 1, np.int64)
+    placed = faces.positions[left[0] // 3].copy()
+    for i in range(len(left)):
+        k, face, side = left[i] % 3, entered[i] // 3, entered[i] % 3
+        portals[i, 0], portals[i, 1] = placed[k], placed[(k + 1) % 3]
+        same = np.int64(faces.forward[left[i] // 3, k] == faces.forward[face, side])
+        over[i + 1] = over[i] ^ same
+        a, b = portals[i, 1 - same], portals[i, same]
+        placed[side], placed[(side + 1) % 3] = a, b
+        placed[(side + 2) % 3] = on_base(
+            faces.positions[face], side, over[i + 1], faces.positions[face, (side + 2) % 3], a, b
+        )
+    return portals, over, placed
+
+
+@compiled
+def on_base(corners: NDArray[np.complex128], side: int, over: int, point: complex, a: complex, b: complex) -> complex:
+    """Where a point of a face is if a side of the face is from a to b, and the face perhaps turned over."""
+    base = corners[(side + 1) % 3] - corners[side]
+    ratio = (point - corners[side]) / base if abs(base) > 0 else 0j
+    return a + (np.conj(ratio) if over else ratio) * (b - a)
+
+
+@compiled
+def turns(a: complex, b: complex) -> float:
+    """Cross product of plane vectors: positive where b is counter-clockwise of a."""
+    return a.real * b.imag - a.imag * b.real
+
+
+@compiled
+def funnel(
+    portals: NDArray[np.complex128], over: NDArray[np.int64], start: complex, end: complex
+) -> tuple[list[int], list[int], float]:
+    """Shortest path inside an unfolded sleeve, by the simple stupid funnel algorithm.
+
+    Returns the portals at which the path bends, whether it bends at their tail (0) or head (1), and its length.
+    """
+    bends, ends = [0], [0]
+    bends.pop()
+    ends.pop()
+    rims, at = np.full(2, start), np.full(2, -1)  # of the funnel, right and left, and the portals they come from
+    apex, total, i = start, 0.0, 0
+    while i <= len(portals):
+        for side in range(2):
+            other, sign = 1 - side, 1.0 - 2.0 * side
+            place = portals[i, side ^ over[i]] if i < len(portals) else end
+            if sign * turns(rims[side] - apex, place - apex) < 0:
+                continue
+            if apex == rims[side] or sign * turns(rims[other] - apex, place - apex) < 0:
+                if i < len(portals):
+                    rims[side], at[side] = place, i
+                continue
+            i = at[other]
+            bends.append(i)
+            ends.append(other ^ over[i])
+            total += abs(rims[other] - apex)
+            apex = rims[side] = rims[other]
+            at[side] = i
+            break
+        i += 1
+    return bends, ends, total + abs(end - apex)
+
+
+@compiled
+def other_way(
+    faces: Faces,
+    left: NDArray[np.int64],
+    entered: NDArray[np.int64],
+    portals: NDArray[np.complex128],
+    bend: int,
+    point: complex,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The sleeve that passes the vertex of a bend on its other side; empty where no faces connect there."""
+    first = last = bend
+    while first > 0 and (portals[first - 1, 0] == point or portals[first - 1, 1] == point):
+        first -= 1
+    while last + 1 < len(left) and (portals[last + 1, 0] == point or portals[last + 1, 1] == point):
+        last += 1
+    goal, at_tail = entered[last] // 3, portals[first, 0] == point
+    # walk around the vertex in all directions, breadth first: halfedges through which faces are left, and entered
+    out, into, before = [turned(left[first], at_tail)], [left[first]], [-1]
+    tail_there = [np.int64(not at_tail)]
+    k = 0
+    while k < len(out):
+        h = out[k]
+        e = faces.edges[h // 3, h % 3]
+        for across in faces.halfedges[faces.first_halfedge[e] : faces.first_halfedge[e + 1]]:
+            if across // 3 == h // 3 or is_among(into, across, 0, len(into)) or is_among(left, across, first, last + 1):
+                continue
+            if across // 3 == goal:
+                return spliced(left, entered, first, last, out, into, before, k, across)
+            same = faces.forward[h // 3, h % 3] == faces.forward[across // 3, across % 3]
+            at_tail = (tail_there[k] == 1) == same
+            out.append(turned(across, at_tail))
+            into.append(across)
+            before.append(k)
+            tail_there.append(np.int64(not at_tail))
+        k += 1
+    return left[:0], entered[:0]
+
+
+@compiled
+def is_among(values: Sequence[int] | NDArray[np.int64], value: int, begin: int, end: int) -> bool:
+    """Whether a value is among some of others."""
+    for k in range(begin, end):
+        if values[k] == value:
+            return True
+    return False
+
+
+@compiled
+def spliced(
+    left: NDArray[np.int64],
+    entered: NDArray[np.int64],
+    first: int,
+    last: int,
+    out: list[int],
+    into: list[int],
+    before: list[int],
+    k: int,
+    across: int,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """A sleeve whose crossings `first` to `last` are exchanged for those of a walk, which ends at its entry k."""
+    n, j = 1, k
+    while before[j] >= 0:
+        n, j = n + 1, before[j]
+    size = first + n + len(left) - 1 - last
+    new_left, new_entered = np.empty(size, np.int64), np.empty(size, np.int64)
+    for i in range(first):
+        new_left[i], new_entered[i] = left[i], entered[i]
+    for i in range(last + 1, len(left)):
+        new_left[first + n + i - last - 1], new_entered[first + n + i - last - 1] = left[i], entered[i]
+    for i in range(first + n - 1, first - 1, -1):
+        new_left[i], new_entered[i] = out[k], across
+        across, k = into[k], before[k]
+    return new_left, new_entered
+
+
+@compiled
+def turned(h: int, at_tail: bool) -> int:
+    """The other halfedge of the face at the tail of a halfedge, or at its head."""
+    return h - h % 3 + (h + 2) % 3 if at_tail else h - h % 3 + (h + 1) % 3
+
+
+@compiled
+def point_in(faces: NDArray[np.int64], points: NDArray[np.complex128], face: int) -> complex:
+    """The point listed for a face, in its layout."""
+    for s in range(len(faces)):
+        if faces[s] == face:
+            return points[s]
+    return points[0]
+
+
+@compiled
+def path_in(
+    faces: Faces,
+    left: NDArray[np.int64],
+    entered: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    start_points: NDArray[np.complex128],
+    ends: NDArray[np.int64],
+    end_points: NDArray[np.complex128],
+) -> tuple[NDArray[np.complex128], complex, complex, list[int], list[int], float]:
+    """The shortest path in a sleeve: its portals, its two ends, the bends as `funnel` returns them, and its length."""
+    portals, over, placed = unfold(faces, left, entered)
+    last = entered[-1] // 3
+    begin, end = point_in(starts, start_points, left[0] // 3), point_in(ends, end_points, last)
+    end = on_base(faces.positions[last], 0, over[-1], end, placed[0], placed[1])
+    bends, at, length = funnel(portals, over, begin, end)
+    return portals, begin, end, bends, at, length
+
+
+@compiled
+def straighten(
+    faces: Faces,
+    left: NDArray[np.int64],
+    entered: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    start_points: NDArray[np.complex128],
+    ends: NDArray[np.int64],
+    end_points: NDArray[np.complex128],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """The shortest path in a sleeve, improved as long as passing a vertex on its other side makes it shorter.
+
+    Returns the halfedges crossed and the fraction along each.
+    """
+    portals, begin, end, bends, at, length = path_in(faces, left, entered, starts, start_points, ends, end_points)
+    k = 0
+    while k < len(bends):
+        point = portals[bends[k], at[k]]
+        try_left, try_entered = other_way(faces, left, entered, portals, bends[k], point)
+        k += 1
+        if len(try_left) == 0:
+            continue
+        found = path_in(faces, try_left, try_entered, starts, start_points, ends, end_points)
+        if found[5] < length * (1 - 1e-12):
+            left, entered, k = try_left, try_entered, 0
+            portals, begin, end, bends, at, length = found
+    fractions = np.empty(len(left))
+    here, k = begin, 0
+    for i in range(len(left)):
+        if k < len(bends) and bends[k] == i:
+            fractions[i], here = at[k], portals[i, at[k]]
+            k += 1
+            continue
+        there = portals[bends[k], at[k]] if k < len(bends) else end
+        along, span, away = there - here, portals[i, 1] - portals[i, 0], here - portals[i, 0]
+        across = turns(along, span)
+        share = (
+            turns(along, away) / across if across != 0 else (np.conj(span) * away).real / max(abs(span) ** 2, 1e-300)
+        )
+        fractions[i] = min(max(share, 0.0), 1.0)
+    return left, fractions
+
+
+@compiled
+def shortest_lines(
+    faces: Faces,
+    queue: Queue,
+    starts: NDArray[np.int64],
+    start_points: NDArray[np.complex128],
+    start_at: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    end_points: NDArray[np.complex128],
+    end_at: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    """Shortest paths for many pairs of points: halfedges crossed, fractions along them, their number for each pair.
+
+    The faces at the i-th start are ``starts[start_at[i] : start_at[i + 1]]``, and `start_points` has its position in
+    the layout of each; likewise for ends; `queue` is an empty one of edges. The number is −1 where there is no path.
+    """
+    n_edges = len(queue.places)
+    cost = np.full(n_edges, np.inf)
+    leave, enter = np.empty(n_edges, np.int64), np.empty(n_edges, np.int64)
+    counts = np.empty(len(start_at) - 1, np.int64)
+    sides, fractions = [0], [0.0]
+    sides.pop()
+    fractions.pop()
+    for job in range(len(counts)):
+        some, others = slice(start_at[job], start_at[job + 1]), slice(end_at[job], end_at[job + 1])
+        places = starts[some], start_points[some], ends[others], end_points[others]
+        left, entered = find_sleeve(faces, *places, cost, leave, enter, queue)
+        if len(left) == 0:
+            counts[job] = -1
+            continue
+        crossed, where = straighten(faces, left, entered, *places)
+        counts[job] = len(crossed)
+        for k in range(len(crossed)):
+            sides.append(crossed[k])
+            fractions.append(where[k])
+    return np.array(sides), np.array(fractions), counts

@@ -1,4 +1,7 @@
-"""Regular grids as a discretisation: diffusion by sweeps, integration by cosine transforms (Sec. 8)."""
+"""Regular grids as a discretisation: diffusion by sweeps, integration by cosine transforms (Sec. 8).
+
+C is inverted by the cosine transform, and constraints are corrections of that solution.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +12,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.linalg import lsqr
 
 from ..area_elements import sample_on_grid
-from ..discretization import DiffusesEach, discretize
+from ..discretization import DiffusesEach, Levels, SolvesEach, discretize
 from ..errors import MemoryLimitError, SourceError
-from ..memory import available_memory, libraries
+from ..linear.conjugate_gradients import conjugate_gradients
+from ..memory import available_memory, libraries, refuse_beyond_memory
 from .grid import Grid
-from .grid_integration import GridIntegration
 from .grid_source import GridSource
-from .multilevel import Level, collapse, diffuse_multilevel, unit_vectors
-from .stencil import divergence
+from .multilevel import Level, collapse, diffuse_multilevel, quotients, skip_finest, unit_vectors
+from .node_sources import NodeSources
+from .stencil import divergence, interpolation_stencil, laplacian, solve_poisson
 from .wavefront import padded_shape
 
 BYTES_PER_NODE, BYTES_PER_AREA = {1: 42, 2: 42, 3: 25, 4: 42}, 930
@@ -135,3 +140,156 @@ def _(domain: Grid) -> GridDiscretization:
         raise SourceError(f"grids have up to 4 dimensions here, not {domain.dimension}", element="domain")
     refuse_large_grid(domain)
     return GridDiscretization(domain)
+
+
+TOLERANCE = 1e-6
+"""Relative residual at which conjugate gradients stop."""
+STIFFNESS = 10.0
+"""Penalty of the augmented Lagrangian, in 1/h."""
+LEAST, STIFFEST = 1e-6, 30.0
+"""Of penalties, relative to the default: in the preconditioner, and as a penalty."""
+MULTIPLIER_STEPS = 5
+"""Steps of the augmented Lagrangian."""
+BYTES_IF_EXACT = 83
+"""Measured peak memory for each node, beyond what is held already, of imposing rows exactly."""
+NEGLIGIBLE = 1e-6
+"""Rows of samples that differ by less are taken as equal, and their levels as contradictory."""
+
+
+@dataclass(frozen=True, eq=False)
+class GridIntegration(SolvesEach):
+    """Step 3 on a grid."""
+
+    grid: Grid
+
+    @property
+    def soft_weight(self) -> float:
+        """λ of `Soft` where none is given, in 1/length."""
+        return STIFFNESS / float(self.grid.spacing.mean())
+
+    def solve(self, divergence: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
+        """Minimise ∫|∇φ − Y|² with nothing imposed: ``C φ = b`` (Eq. 13)."""
+        phi = solve_poisson(divergence, self.grid.spacing, overwrite=True)
+        phi -= np.average(source.at_samples(phi), weights=source.weights)
+        return phi
+
+    def fit(self, divergence: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
+        """Subtract from φ a smooth function that takes its error at the samples (in place of Eq. 14).
+
+        At a node it is the mean of the errors of all samples, weighted by area and nearness: errors and areas are
+        diffused as the normals were, and divided.
+        """
+        phi = self.solve(divergence, source)
+        excess = deviation(source.at_samples(phi), source, levels)
+        phi -= diffused_mean(source, excess)
+        return phi
+
+    def penalize(self, divergence: NDArray[np.float64], source: GridSource, strength: float) -> NDArray[np.float64]:
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas of the samples.
+
+        What is as good as nothing imposes nothing. Beyond `STIFFEST`, where conjugate gradients would not end, the
+        level is imposed exactly.
+        """
+        levels = Levels(np.zeros(len(source.weights)))
+        if strength < LEAST**2 * self.soft_weight:
+            return self.solve(divergence, source)
+        if strength > STIFFEST * self.soft_weight:
+            return self.fit_exactly(divergence, source, levels)
+        zero = np.zeros(len(source.weights))
+        return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
+
+    def fit_exactly(self, divergence: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
+        """Solve Eq. 14 by an augmented Lagrangian, then the least correction at the nodes around the samples.
+
+        The multipliers take up what the penalty leaves, except for what nearly dependent rows hide from it: that is
+        small, and corrected directly. Rows that contradict each other are met in the least-squares sense.
+        """
+        refuse_beyond_memory(
+            f"the zero set imposed exactly on {self.grid.n_nodes:,} nodes",
+            self.grid.n_nodes,
+            lambda count: BYTES_IF_EXACT * count,
+            lambda count: f"leave out hard=True, or use at most {count:,} nodes",
+        )
+        strength = self.soft_weight
+        phi = self.fit(divergence.copy(), source, levels)
+        multipliers = np.zeros(len(source.weights))
+        for _ in range(MULTIPLIER_STEPS):
+            phi = self._penalized(divergence, source, levels, strength, multipliers, phi)
+            multipliers += strength * deviation(source.at_samples(phi), source, levels)
+        return phi - least_correction(deviation(source.at_samples(phi), source, levels), source).reshape(phi.shape)
+
+    def _penalized(
+        self,
+        divergence: NDArray[np.float64],
+        source: GridSource,
+        levels: Levels,
+        strength: float,
+        multipliers: NDArray[np.float64],
+        start: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Minimise ∫|∇φ − Y|² + Σ w (strength · d² + 2 · multiplier · d), d the `deviation` of φ from the levels."""
+        volume = float(np.prod(self.grid.spacing))
+        rows, weights = source.interpolation, source.weights / volume
+        free = Levels(np.zeros_like(levels.values), levels.groups)
+
+        def spread(at_samples: NDArray[np.float64]) -> NDArray[np.float64]:
+            at_nodes: NDArray[np.float64] = rows.T @ (weights * at_samples)
+            return at_nodes.reshape(self.grid.shape)
+
+        def apply(phi: NDArray[np.float64]) -> NDArray[np.float64]:
+            pull = strength * deviation(rows @ phi, source, free)
+            return (laplacian(phi.reshape(self.grid.shape), self.grid.spacing) + spread(pull)).ravel()
+
+        # constants are in the kernel of C; their cost is that of the penalty alone, and they are settled at the end
+        constant = max(strength, LEAST * self.soft_weight) * float(weights.sum()) / self.grid.n_nodes
+
+        def precondition(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+            inverse = solve_poisson(residual.reshape(self.grid.shape), self.grid.spacing)
+            result: NDArray[np.float64] = inverse + residual.mean() / constant
+            return result.ravel()
+
+        wanted = strength * deviation(levels.values, source, free) - deviation(multipliers, source, free)
+        right_hand_side = (divergence + spread(wanted)).ravel()
+        phi = conjugate_gradients(apply, right_hand_side, precondition, start.ravel(), TOLERANCE)
+        phi += np.average(wanted / strength - deviation(rows @ phi, source, free), weights=source.weights)
+        return phi.reshape(self.grid.shape)
+
+
+def deviation(values: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
+    """(s,) values at the samples minus their levels; with groups, also minus the mean of the group."""
+    excess = values - levels.values
+    if levels.groups is not None:
+        sums = np.bincount(levels.groups, source.weights * excess)
+        sizes = np.bincount(levels.groups, source.weights)
+        excess = excess - (sums / np.where(sizes > 0, sizes, 1))[levels.groups]
+    return excess
+
+
+def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(*grid.shape) mean of values at the samples, weighted by area and by heat: diffused as the normals are.
+
+    It varies slowly, so the finest level of the hierarchy is skipped.
+    """
+    largest = np.abs(values).max()
+    if largest == 0.0:
+        return np.zeros(source.grid.shape, dtype=np.float32)
+    finest, axes = source.vectors, slice(-source.grid.dimension, None)
+    left_out, shape, steps = skip_finest(finest.shape, finest.steps, max(1, source.finest))
+    ratios = finest.steps[axes] / np.where(steps[axes] > 0, steps[axes], np.inf)
+    stencil = interpolation_stencil(source.samples.positions * ratios, shape[axes])
+    weights = source.weights / source.weights.max()
+    pairs = np.stack([weights, weights * values / largest], axis=1)
+    nodes = NodeSources.scattered(shape, steps, *stencil, pairs)
+    levels = left_out + diffuse_multilevel(nodes, source.time_on, rounds=1)
+    mean = collapse(levels, finest.shape, 1, quotients).reshape(source.grid.shape)
+    mean *= np.float32(largest)
+    return mean
+
+
+def least_correction(values: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
+    """(n_nodes,) grid function of least norm that interpolates these values at the samples, in least squares."""
+    touched = np.unique(source.interpolation.indices)
+    change = np.zeros(source.grid.n_nodes)
+    columns = source.interpolation[:, touched]
+    change[touched] = lsqr(columns, values, damp=NEGLIGIBLE, atol=1e-10, btol=1e-10, iter_lim=20000)[0]
+    return change

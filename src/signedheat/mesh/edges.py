@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled import compiled
 from ..frozen import Frozen, read_only
 from .components import connected_components, grouped
-from .triangle_kernels import find_edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,3 +224,48 @@ def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
 def edge_keys(one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[np.int64]:
     """(k,) a number for each pair of vertices, whichever comes first."""
     return (np.minimum(one, other).astype(np.int64) << 32) | np.maximum(one, other)
+
+
+@compiled
+def find_edges(
+    tails: NDArray[np.int64], heads: NDArray[np.int64], used: NDArray[np.bool_], n_vertices: int
+) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Edges of halfedges, in order of first appearance; those that are not used have none.
+
+    There is one list per vertex: an edge is in that of its end with fewer halfedges, so that lists stay short.
+
+    Returns
+    -------
+    edges : (h,) int
+        Edge of each halfedge, or −1.
+    forward : (h,) bool
+        Whether it runs as the first along its edge does.
+    counts, first, second : (e,) int
+        Halfedges of each edge; the first and the second, or −1.
+    """
+    degrees, last = np.zeros(n_vertices, dtype=np.int64), np.full(n_vertices, -1)
+    for h in range(len(tails)):
+        degrees[tails[h]] += 1
+        degrees[heads[h]] += 1
+    following, counts = np.empty(len(tails), dtype=np.int64), np.zeros(len(tails), dtype=np.int64)
+    first, second = np.empty(len(tails), dtype=np.int64), np.full(len(tails), -1)
+    edges, forward = np.full(len(tails), -1), np.zeros(len(tails), dtype=np.bool_)
+    n_edges = 0
+    for h in range(len(tails)):
+        if not used[h]:
+            continue
+        keeper, other = tails[h], heads[h]
+        if degrees[other] < degrees[keeper] or (degrees[other] == degrees[keeper] and other < keeper):
+            keeper, other = other, keeper
+        edge = last[keeper]
+        while edge >= 0 and tails[first[edge]] + heads[first[edge]] - keeper != other:
+            edge = following[edge]
+        if edge < 0:
+            edge = n_edges
+            first[edge], following[edge], last[keeper] = h, last[keeper], edge
+            n_edges += 1
+        elif counts[edge] == 1:
+            second[edge] = h
+        counts[edge] += 1
+        edges[h], forward[h] = edge, tails[h] == tails[first[edge]]
+    return edges, forward, counts[:n_edges].copy(), first[:n_edges].copy(), second[:n_edges].copy()

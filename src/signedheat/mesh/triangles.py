@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled import compiled
 from .components import element_components
 from .edges import EdgeTable
 
@@ -83,3 +84,59 @@ def gradients_along(sides: NDArray[np.float64], rises: NDArray[np.float64]) -> N
     square = np.einsum("pd,pd->p", normals, normals)
     across = rises[:, :1] * sides[:, 1] - rises[:, 1:] * sides[:, 0]
     return np.cross(across, normals) / np.where(square > 0, square, np.inf)[:, None]
+
+
+EPSILON = 2.0**-52
+"""Distance from 1 to the next larger number."""
+
+
+@compiled
+def areas_of_polygons(
+    vertices: NDArray[np.float64], corners: NDArray[np.int64], offsets: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """(p,) areas of polygons; and which are degenerate: without area, to roundoff, or with a vertex twice.
+
+    An area is none if it is below what moving the corners by a few units in the last place of the coordinates makes.
+    Polygon f has the corners from ``offsets[f]`` to ``offsets[f + 1]``.
+    """
+    n = len(offsets) - 1
+    areas, degenerate = np.empty(n), np.zeros(n, dtype=np.bool_)
+    seen = np.full(len(vertices), -1)
+    middle, away, after, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for f in range(n):
+        middle[:], normal[:] = 0.0, 0.0
+        largest, radius = 0.0, 0.0
+        for c in range(offsets[f], offsets[f + 1]):
+            v = corners[c]
+            degenerate[f] |= seen[v] == f
+            seen[v] = f
+            for d in range(3):
+                middle[d] += vertices[v, d] / (offsets[f + 1] - offsets[f])
+                largest = max(largest, abs(vertices[v, d]))
+        for c in range(offsets[f], offsets[f + 1]):
+            here, there = corners[c], corners[c + 1 if c + 1 < offsets[f + 1] else offsets[f]]
+            for d in range(3):
+                away[d], after[d] = vertices[here, d] - middle[d], vertices[there, d] - middle[d]
+                radius = max(radius, abs(away[d]))
+            for d in range(3):
+                normal[d] += away[d - 2] * after[d - 1] - away[d - 1] * after[d - 2]  # a cross product, cyclically
+        areas[f] = 0.5 * np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+        degenerate[f] |= areas[f] <= 4.0 * EPSILON * radius * largest
+    return areas, degenerate
+
+
+@compiled
+def areas_and_volumes(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int64], center: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(m,) areas of triangles, and volumes of the tetrahedra they make with a center: positive if it is behind them."""
+    areas, volumes = np.empty(len(triangles)), np.empty(len(triangles))
+    for t in range(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        ux, uy, uz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
+        wx, wy, wz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        areas[t] = 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
+        px, py, pz = vertices[a, 0] - center[0], vertices[a, 1] - center[1], vertices[a, 2] - center[2]
+        volumes[t] = (px * nx + py * ny + pz * nz) / 6.0
+    return areas, volumes

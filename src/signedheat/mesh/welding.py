@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..frozen import read_only
-from .triangle_kernels import find_edges
+from .edges import find_edges
 
 SINGLE, DOUBLE = 2.0**-22, 2.0**-46
 """How far apart, over the largest coordinate, the same place may come out in single and in double precision."""

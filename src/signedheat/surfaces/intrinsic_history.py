@@ -1,4 +1,10 @@
-"""The steps by which an intrinsic triangulation was made, and the transfer of points and lines through them."""
+"""The steps by which an intrinsic triangulation was made, and the transfer of points and lines through them.
+
+Every step (an edge flip, or a split of a face or an edge) exchanges simplices on four points with one affine dependency
+``Σ c_k p_k = 0``. The weights of a point on the old simplex are moved along c until another one vanishes; then they are
+nonnegative on a new simplex. No angle is measured and no line is traced, so the transfer cannot fail, and a point on an
+edge that stays remains on it exactly.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +17,19 @@ from numpy.typing import NDArray
 
 from ..frozen import Frozen
 from ..mesh.delaunay import glue
-from ..mesh.gluing_kernels import Gluing
+from ..mesh.gluing_kernels import (
+    FLIP,
+    SPLIT_EDGE,
+    SPLIT_FACE,
+    TURN,
+    Gluing,
+    apex_position,
+    diamond,
+    faces_around,
+    following,
+    kernel,
+)
 from ..mesh.intrinsic_mesh import IntrinsicMesh
-from .transfer_kernels import find_successors, trace_both_ways, transfer_backward, transfer_forward
 
 
 class Lines(NamedTuple):
@@ -169,3 +185,330 @@ def misplaced_lines(triangles: IntrinsicMesh, lines: Lines, lengths: NDArray[np.
         traced, rounding = np.abs((along * corners).sum(axis=1)), 1e-5 * (np.abs(along) * np.abs(corners)).sum(axis=1)
     finite = np.isfinite(lines.starts).all(axis=1) & np.isfinite(lines.ends).all(axis=1)
     return np.unique(lines.owners[~(finite & (traced <= 2 * lengths[lines.owners] + rounding))])
+
+
+BEFORE = np.full((4, 3, 3), -1)
+"""By kind of step, face and corner: which of the four points is that corner before the step; `AFTER`, after it."""
+AFTER = np.full((4, 3, 3), -1)
+BEFORE[FLIP, :2], AFTER[FLIP, :2] = [[0, 1, 2], [1, 0, 3]], [[3, 2, 0], [2, 3, 1]]
+BEFORE[SPLIT_EDGE, 0], AFTER[SPLIT_EDGE, :2] = [0, 1, 2], [[0, 3, 2], [3, 1, 2]]
+BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
+
+OUTWARD = 1e-6
+"""Sine of the angle up to which a line that leaves the surface is one along its boundary, but for rounding."""
+ALONG = 1e-9
+"""Barycentric coordinates of a point and of a direction, over the largest, below which a line runs along an edge.
+From face to face lines drift by some 1e-15; results are the same from 1e-12 to 1e-7."""
+ROUNDING = 1e-10
+"""Of squared lengths, in parts of the size of their terms."""
+
+
+@kernel
+def find_successors(steps: NDArray[np.int64], n_faces: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """First step that changes each face, and (n, 3) the next that changes each face of a step; −1 if there is none."""
+    first = np.full(n_faces, -1, np.int32)
+    later = np.full((len(steps), 3), -1, np.int32)
+    around, start = np.empty(3, np.int64), np.empty(3, np.int64)
+    for m in range(len(steps)):
+        n = len(steps) - 1 - m
+        faces_around(steps, n, around, start)
+        for k in range(3):
+            if around[k] >= 0:
+                later[n, k] = first[around[k]]
+        for k in range(3):
+            if around[k] >= 0:
+                first[around[k]] = n
+    return first, later
+
+
+@kernel
+def transfer_forward(
+    steps: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    first: NDArray[np.int32],
+    later: NDArray[np.int32],
+    faces: NDArray[np.int64],
+    barycentric: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+) -> None:
+    """Transfer points and vectors at them from the first triangulation of a history to the last; in place.
+
+    Every point takes the steps that change its face, and no others: the time does not depend on the length of the
+    history. `first` and `later` are as `find_successors` returns them; for the rest see `transfer_backward`.
+    """
+    around, start = np.empty(3, np.int64), np.zeros(3, np.int64)
+    for p in range(len(faces)):
+        n = first[faces[p]]
+        while n >= 0:
+            faces_around(steps, n, around, start)
+            kind, place = steps[n, 0], 0
+            if kind == TURN:
+                swap_last(barycentric[p])
+                for k in range(vectors.shape[1]):
+                    swap_last(vectors[p, k])
+            else:
+                side = 1 if faces[p] == around[1] else 0
+                place = exchange(
+                    kind,
+                    weights[n],
+                    True,
+                    BEFORE[kind, side],
+                    start[side],
+                    AFTER[kind],
+                    start,
+                    barycentric[p],
+                    vectors[p],
+                )
+                faces[p] = around[place]
+            n = later[n, place]
+
+
+@kernel
+def transfer_backward(
+    steps: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    n_faces: int,
+    faces: NDArray[np.int64],
+    barycentric: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+) -> None:
+    """Transfer points and vectors at them from the last triangulation of a history to the first; in place.
+
+    Parameters
+    ----------
+    steps, weights : (n, 4) int and float
+        The history.
+    n_faces : int
+        Number of faces of the last triangulation.
+    faces : (p,) int
+        Face of each point. Points without a face (−1) stand for the new vertices, in the order in which they were
+        inserted, at the end of the array; they get the position at which they were inserted.
+    barycentric : (p, 3) float
+        Barycentric coordinates in the face.
+    vectors : (p, k, 3) float
+        Differences of barycentric coordinates.
+    """
+    first = np.full(n_faces, -1)
+    later = np.full(len(faces), -1)
+    born = len(faces) - 1
+    for p in range(len(faces)):
+        if faces[p] >= 0:
+            later[p] = first[faces[p]]
+            first[faces[p]] = p
+    around, start, heads = np.empty(3, np.int64), np.zeros(3, np.int64), np.empty(3, np.int64)
+    for m in range(len(steps)):
+        n = len(steps) - 1 - m
+        kind = steps[n, 0]
+        faces_around(steps, n, around, start)
+        if kind == TURN:
+            p = first[around[0]]
+            while p >= 0:
+                swap_last(barycentric[p])
+                for k in range(vectors.shape[1]):
+                    swap_last(vectors[p, k])
+                p = later[p]
+            continue
+        for k in range(3):
+            heads[k] = -1
+            if AFTER[kind, k, 0] >= 0:
+                heads[k] = first[around[k]]
+                first[around[k]] = -1
+        for k in range(3):
+            p = heads[k]
+            while p >= 0:
+                q = later[p]
+                place = exchange(
+                    kind, weights[n], False, AFTER[kind, k], start[k], BEFORE[kind], start, barycentric[p], vectors[p]
+                )
+                faces[p] = around[place]
+                later[p] = first[faces[p]]
+                first[faces[p]] = p
+                p = q
+        is_last = steps[n, 3] >= 0 and (n == 0 or steps[n - 1, 3] != steps[n, 3])
+        if is_last and born >= 0 and faces[born] < 0:
+            faces[born] = around[0]
+            for k in range(3):
+                barycentric[born, (start[0] + k) % 3] = weights[n, k]
+            later[born] = first[around[0]]
+            first[around[0]] = born
+            born -= 1
+
+
+@kernel
+def swap_last(w: NDArray[np.float64]) -> None:
+    """Exchange the last two entries, as a face that is turned over does with its corners."""
+    w[1], w[2] = w[2], w[1]
+
+
+@kernel
+def exchange(
+    kind: int,
+    c: NDArray[np.float64],
+    forward: bool,
+    corners: NDArray[np.int64],
+    start: int,
+    new_corners: NDArray[np.int64],
+    new_start: NDArray[np.int64],
+    w: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+) -> int:
+    """Transfer one point, and vectors at it, over one step; returns which of the step's new faces contains it."""
+    lead = 3 if kind == SPLIT_FACE else 2  # the points before it are on one side of the dependency
+    x = np.zeros(4)
+    for k in range(3):
+        x[corners[k]] = w[(start + k) % 3]
+    gone, amount = -1, np.inf
+    for l in range(4):
+        if (l < lead) == forward and c[l] > 0.0 and x[l] / c[l] < amount:
+            gone, amount = l, x[l] / c[l]
+    place = 0
+    while has(new_corners[place], gone):
+        place += 1
+    shift(x, c, lead, gone, amount if forward else -amount)
+    for k in range(3):
+        w[(new_start[place] + k) % 3] = x[new_corners[place, k]]
+    for v in range(len(vectors)):
+        x[:] = 0.0
+        for k in range(3):
+            x[corners[k]] = vectors[v, (start + k) % 3]
+        shift(x, c, lead, gone, x[gone] / c[gone] if forward else -x[gone] / c[gone])
+        for k in range(3):
+            vectors[v, (new_start[place] + k) % 3] = x[new_corners[place, k]]
+    return place
+
+
+@kernel
+def has(corners: NDArray[np.int64], l: int) -> bool:
+    """Whether point l of a step is a corner of a face."""
+    return corners[0] == l or corners[1] == l or corners[2] == l
+
+
+@kernel
+def shift(x: NDArray[np.float64], c: NDArray[np.float64], lead: int, gone: int, amount: float) -> None:
+    """Move weights along the affine dependency c, so that the one of point `gone` vanishes."""
+    for l in range(4):
+        x[l] += -amount * c[l] if l < lead else amount * c[l]
+    x[gone] = 0.0
+
+
+@kernel
+def squared_length(g: Gluing, f: int, v: NDArray[np.float64]) -> tuple[float, float]:
+    """Of a vector in a face, and the sum of the sizes of its terms."""
+    square, size = 0.0, 0.0
+    for k in range(3):
+        term = v[k] * v[(k + 1) % 3] * g.length[g.edge[3 * f + k]] ** 2
+        square -= term
+        size += abs(term)
+    return square, size
+
+
+@kernel
+def keep_on_edges(w: NDArray[np.float64], v: NDArray[np.float64]) -> None:
+    """Let a line that runs along an edge but for rounding run along it: else it may cross to the other side midway."""
+    largest = max(abs(v[0]), abs(v[1]), abs(v[2]))
+    for k in range(3):
+        if w[k] < ALONG and abs(v[k]) < ALONG * largest:
+            w[k] = v[k] = 0.0
+
+
+@kernel
+def trace_geodesic(
+    g: Gluing,
+    face: int,
+    barycentric: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    forward: bool,
+    out_faces: NDArray[np.int64],
+    out_starts: NDArray[np.float64],
+    out_ends: NDArray[np.float64],
+    out_vectors: NDArray[np.float64],
+    n: int,
+) -> int:
+    """Trace a geodesic from a point along its first vector, or against it, over its length; other vectors are carried.
+
+    Writes one row per face crossed, from row n on, as far as there is room: the face, where the line enters and leaves
+    it, and the vectors there. Returns the next row. A line ends where faces as thin as rounding have made it longer.
+    """
+    f, left, slides = face, 1.0, 0
+    w, v = barycentric.copy(), vectors.copy()
+    square, rounding = squared_length(g, f, v[0])
+    longest = 4.0 * (abs(square) + ROUNDING * rounding)
+    sign = 1.0 if forward else -1.0
+    for _ in range(1000000):
+        keep_on_edges(w, v[0])
+        step, leaving = left, -1
+        for k in range(3):
+            slope = sign * v[0, k]
+            if slope < 0.0 and w[k] < -slope * step:
+                step, leaving = w[k] / -slope, k
+        if n < len(out_faces):
+            out_faces[n] = f
+            for k in range(3):
+                out_starts[n, k] = w[k]
+                for m in range(len(v)):
+                    out_vectors[n, m, k] = v[m, k]
+        for k in range(3):
+            w[k] = max(w[k] + sign * step * v[0, k], 0.0)
+        if leaving >= 0:
+            w[leaving] = 0.0
+        total = w[0] + w[1] + w[2]
+        for k in range(3):
+            w[k] /= total
+            if n < len(out_faces):
+                out_ends[n, k] = w[k]
+        n += 1
+        left -= step
+        square, rounding = squared_length(g, f, v[0])
+        if leaving < 0 or left < 1e-12 or not square <= longest + ROUNDING * rounding:
+            break
+        h = 3 * f + (leaving + 1) % 3
+        t = g.sibling[h]
+        i, j, a = h % 3, following(h) % 3, leaving
+        slides = 0 if step > 0.0 else slides
+        if t == h or g.sibling[t] != h:  # where no single face goes on; only rounding leads out: go along the edge
+            x, y = apex_position(g, h)
+            base = g.length[g.edge[h]]
+            if slides == 2 or y * abs(v[0, a]) > OUTWARD * abs(base * v[0, j] + x * v[0, a]):
+                break
+            slides += 1
+            v[0, i] += v[0, a] * (1.0 - x / base)
+            v[0, j] += v[0, a] * x / base
+            v[0, a] = 0.0
+            continue
+        ti, tj = (t % 3, following(t) % 3) if g.forward[h] == g.forward[t] else (following(t) % 3, t % 3)
+        tb = 3 - ti - tj
+        c_i, c_j, c_a, c_b, _ = diamond(g, h)
+        if not c_a > 0.0:
+            break
+        w_i, w_j = w[i], w[j]
+        w[ti], w[tj], w[tb] = w_i, w_j, 0.0
+        for k in range(len(v)):
+            v_i, v_j, v_a = v[k, i], v[k, j], v[k, a] / c_a
+            v[k, ti], v[k, tj], v[k, tb] = v_i + v_a * c_i, v_j + v_a * c_j, -v_a * c_b
+        f = t // 3
+    return n
+
+
+@kernel
+def trace_both_ways(
+    g: Gluing,
+    faces: NDArray[np.int64],
+    barycentric: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    out_faces: NDArray[np.int64],
+    out_starts: NDArray[np.float64],
+    out_ends: NDArray[np.float64],
+    out_vectors: NDArray[np.float64],
+    owners: NDArray[np.int64],
+) -> int:
+    """Trace half of the first vector both ways from every point p; rows of the backward half have owner −1 − p."""
+    n = 0
+    for p in range(len(faces)):
+        for way in range(2):
+            begin = n
+            n = trace_geodesic(
+                g, faces[p], barycentric[p], vectors[p], way == 0, out_faces, out_starts, out_ends, out_vectors, n
+            )
+            for k in range(begin, min(n, len(owners))):
+                owners[k] = p if way == 0 else -1 - p
+    return n

@@ -1,4 +1,9 @@
-"""Polygon meshes: faces with any number of corners, which may be nonconvex and mildly nonplanar."""
+"""Polygon meshes: faces with any number of corners, which may be nonconvex and mildly nonplanar.
+
+They are refined virtually: into fans of triangles around a virtual vertex (Bunge, Herholz, Kazhdan & Botsch 2020),
+which minimises the sum of the squared areas of the triangles that it spans with the sides of its polygon. It is an
+affine combination of the corners, so that functions on the corners can be prolonged to the fan.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +15,16 @@ from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
 
 from ..errors import GeometryError
 from ..exchange import Elements, Exchangeable
+from ..mesh.components import sums_of
+from ..mesh.ear_clipping import cut_into_ears
+from ..mesh.triangles import area_vectors
 from ..validation import array_of, coordinates, frozen, used_bounds, whole_numbers
 from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh
-from .virtual_refinement import VirtualRefinement, virtual_refinement
 
 Polygons = Sequence[Sequence[int] | NDArray[np.int64]] | NDArray[np.int64]
 """Vertex ids of each polygon."""
@@ -174,3 +182,144 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
 
     def __repr__(self) -> str:
         return f"PolygonMesh({self.n_vertices} vertices, {self.n_polygons} polygons)"
+
+
+_SLIVER = 1e-6  # a fan triangle whose area is less than this fraction of its polygon's counts as turned over
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualRefinement:
+    """Triangles that subdivide polygons.
+
+    Attributes
+    ----------
+    faces : (m, 3) int
+        Vertex ids; virtual vertices follow the given ones. Polygon after polygon, side after side.
+    face_polygons : (m,) int
+        Polygon that each triangle is part of.
+    virtual_vertices : (q, 3) float
+        Positions.
+    prolongation : (n + q, n) sparse
+        P: identity on the given vertices; each virtual vertex is an affine combination of the corners of its polygon.
+    """
+
+    faces: NDArray[np.int64]
+    face_polygons: NDArray[np.int64]
+    virtual_vertices: NDArray[np.float64]
+    prolongation: sparse.csr_matrix
+
+
+def virtual_refinement(
+    vertices: NDArray[np.float64], corners: NDArray[np.int64], offsets: NDArray[np.int64]
+) -> VirtualRefinement:
+    """Subdivide polygons into triangles; polygon k has the vertices ``corners[offsets[k]:offsets[k + 1]]``.
+
+    Triangles are not subdivided, so that results on triangle meshes are those of the triangles. A polygon so far from
+    convex that a triangle of its fan would turn over is cut along diagonals instead. A corner that equals the one
+    before it is skipped.
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> fan = virtual_refinement(square, np.array([0, 1, 2, 3]), np.array([0, 4]))
+    >>> fan.faces.tolist()
+    [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    >>> fan.virtual_vertices
+    array([[0.5, 0.5, 0. ]])
+    >>> fan.prolongation[[4]].toarray()
+    array([[0.25, 0.25, 0.25, 0.25]])
+    """
+    corners, polygons = _without_repeats(corners, offsets)
+    counts = np.bincount(polygons, minlength=len(offsets) - 1)
+    begin = np.cumsum(counts) - counts
+    following = np.arange(1, len(corners) + 1)
+    following[(begin + counts - 1)[counts > 0]] = begin[counts > 0]
+
+    in_fan = counts[polygons] > 3
+    fans, fan_of = np.unique(polygons[in_fan], return_inverse=True)
+    tails, heads = corners[in_fan], corners[following[in_fan]]
+    centers, weights = virtual_vertices(vertices, tails, heads, fan_of, len(fans))
+
+    whole = area_vectors(np.stack([vertices[tails], vertices[heads], centers[fan_of]], axis=1))
+    total = sums_of(whole, fan_of, len(fans))
+    part = (whole * total[fan_of]).sum(axis=1)
+    turned = np.zeros(len(fans), dtype=bool)
+    turned[fan_of[part < _SLIVER * (total * total).sum(axis=1)[fan_of]]] = True
+    cuts = {k: _cut(vertices[corners[polygons == fans[k]]]) for k in np.flatnonzero(turned)}
+    cuts = {k: triangles for k, triangles in cuts.items() if len(triangles)}
+    kept = np.ones(len(fans), dtype=bool)
+    kept[list(cuts)] = False
+
+    number = np.cumsum(kept) - 1
+    fan_of_kept = kept[fan_of]
+    faces = [
+        corners[begin[counts == 3][:, None] + np.arange(3)],
+        np.stack([tails, heads, len(vertices) + number[fan_of]], axis=1)[fan_of_kept],
+        *(corners[begin[fans[k]] + triangles] for k, triangles in cuts.items()),
+    ]
+    owners = [
+        np.flatnonzero(counts == 3),
+        fans[fan_of[fan_of_kept]],
+        *(np.full(len(triangles), fans[k]) for k, triangles in cuts.items()),
+    ]
+    order = np.argsort(np.concatenate(owners), kind="stable")
+    rows, n = number[fan_of[fan_of_kept]], len(vertices)
+    average = sparse.csr_matrix((weights[fan_of_kept], (rows, tails[fan_of_kept])), shape=(int(kept.sum()), n))
+    return VirtualRefinement(
+        np.concatenate(faces)[order],
+        np.concatenate(owners)[order],
+        centers[kept],
+        sparse.vstack([sparse.identity(n, format="csr"), average], format="csr"),
+    )
+
+
+def virtual_vertices(
+    vertices: NDArray[np.float64],
+    tails: NDArray[np.int64],
+    heads: NDArray[np.int64],
+    polygons: NDArray[np.int64],
+    n_polygons: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The points that minimise Σ |fan triangle|², and their affine weights of least norm.
+
+    Twice the area vector of the triangle of side ``a → b`` and apex x is ``a × b + (b − a) × x``, linear in x: three
+    equations for each polygon. Side k runs from vertex ``tails[k]`` to ``heads[k]`` of polygon ``polygons[k]``.
+    """
+    count = np.bincount(polygons, minlength=n_polygons)
+    mean = sums_of(vertices[tails], polygons, n_polygons) / count[:, None]
+    a, b = vertices[tails] - mean[polygons], vertices[heads] - mean[polygons]
+    side = b - a
+    normal_matrix = sums_of(
+        (side * side).sum(axis=1)[:, None, None] * np.eye(3) - side[:, :, None] * side[:, None, :], polygons, n_polygons
+    )
+    load = sums_of(np.cross(side, np.cross(a, b)), polygons, n_polygons)
+    offset = _solve_symmetric(normal_matrix, load)
+    spread = sums_of(a[:, :, None] * a[:, None, :], polygons, n_polygons)
+    slope = _solve_symmetric(spread, offset)
+    weights = 1.0 / count[polygons] + (a * slope[polygons]).sum(axis=1)
+    return mean + sums_of(weights[:, None] * a, polygons, n_polygons), weights
+
+
+def _cut(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(k − 2, 3) corners of the triangles of a polygon cut along diagonals."""
+    center = np.broadcast_to(polygon.mean(axis=0), polygon.shape)
+    normal = area_vectors(np.stack([polygon, np.roll(polygon, -1, axis=0), center], axis=1)).sum(axis=0)
+    return np.sort(cut_into_ears(polygon, normal), axis=1)
+
+
+def _without_repeats(
+    corners: NDArray[np.int64], offsets: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Corners that differ from the one before them in their polygon, and the polygon of each."""
+    polygons = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    before = np.roll(corners, 1)
+    before[offsets[:-1]] = corners[offsets[1:] - 1]
+    differs = corners != before
+    return corners[differs], polygons[differs]
+
+
+def _solve_symmetric(matrices: NDArray[np.float64], loads: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Nearly minimum-norm solutions of semidefinite systems: a flat polygon does not determine x along its normal."""
+    size = np.trace(matrices, axis1=1, axis2=2)
+    held = matrices + (1e-11 * np.where(size > 0, size, 1))[:, None, None] * np.eye(3)
+    return np.linalg.solve(held, loads[..., None])[..., 0].astype(np.float64, copy=False)

@@ -26,14 +26,13 @@ from ..spring_integration import SpringIntegration
 from .cotan import cotan_matrix, divergence
 from .digital_surface import DigitalSurface
 from .intrinsic_triangulation import IntrinsicTriangulation
-from .nonmanifold_frames import nonmanifold_frames
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
 from .source_segments import segments_of_each
 from .surface_source import SurfaceSource, ends_among, surface_source
 from .surfels import count_surfels, separated_edges
 from .triangle_mesh import TriangleMesh
-from .vector_heat import VectorHeat, extrapolated
+from .vector_heat import VectorHeat, extrapolated, nonmanifold_frames
 
 TIMES = 2
 """Diffusion times whose factors are kept: where curves end another one is used."""

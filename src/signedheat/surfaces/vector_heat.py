@@ -1,20 +1,28 @@
-"""Step 1 on an intrinsic mesh: one factorisation, with restarts where the solution would underflow."""
+"""Step 1 on an intrinsic mesh: vector heat on its edges, by one factorisation, with restarts against underflow.
+
+The connection Laplacian and mass are those of Crouzeix and Raviart (Eq. 8, Eq. 9). Frames at nonmanifold edges are
+chosen so that heat enters the edge from its first face.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.sparse import csr_array
 
+from ..geodesics.exact_distance import distances_along_edges
 from ..linear import Factor, factorize
 from ..linear.restarts import Stage, restart, scaled
+from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.surface_points import concatenated
 from ..mesh.unit_vectors import unit
-from .crouzeix_raviart import vector_heat_forces, vector_heat_matrix
+from .cotan import assemble
 
 EXPONENTS = (-1.0, 0.5)
 """Powers of t in the error of Y: cells that do not resolve exp(−r/√t) give h²/t, smoothing gives √t."""
@@ -121,3 +129,127 @@ def extrapolated(columns: NDArray[np.complex128]) -> NDArray[np.complex128]:
         one, two = -sum(1.0 / e for e in EXPONENTS), 1.0 / float(np.prod(EXPONENTS))
         factor = 1.0 + 1j * one * turn + two * (1j * bend - turn**2)
     return unit(x.copy()) * np.where(np.isfinite(factor), factor, 1.0)
+
+
+def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matrix:
+    """Upper triangle of ``M + t L``, the matrix of Eq. 12: one vector unknown per edge, in the frame of the edge.
+
+    L is the connection Laplacian of Eq. 9, positive semidefinite here: ``2 (cot α + cot β)`` on the diagonal, α and β
+    the corners of a face at the two ends of the edge, and ``−2 cot θ conj(z_fe) z_fg`` between edges e and g that meet
+    in the corner θ; ``conj(z_fe) z_fg`` is the rotation of Eq. 8. M is diagonal: a third of the area of each face. No
+    face may be degenerate.
+
+    Complex Hermitian (e, e) where all frames agree with their faces; otherwise, since a reflection is not a complex
+    number, the real form (2e, 2e) with the real and imaginary part of each unknown in turn.
+    """
+    edge, z = triangles.edges.face_edges, triangles.edge_directions
+    diagonal, factor = _local_entries(triangles, time, slice(None))
+    if triangles.is_consistently_oriented:
+        return assemble(edge, diagonal, factor * np.conj(z) * np.roll(z, -1, axis=1), triangles.n_edges)
+    return _real_form(triangles, diagonal, factor)
+
+
+def vector_heat_forces(
+    triangles: IntrinsicMesh, time: float, vectors: NDArray[np.complex128], faces: NDArray[np.int64]
+) -> NDArray[np.complex128]:
+    """``(M + t L) X`` of Eq. 12, summed over some faces only: complete at edges all of whose faces are among them."""
+    diagonal, factor = _local_entries(triangles, time, faces)
+    x = triangles.in_face_frames(vectors, faces)
+    forces = diagonal * x + factor * np.roll(x, -1, axis=1) + np.roll(factor * x, 1, axis=1)
+    sums = np.zeros(len(vectors), dtype=np.complex128)
+    np.add.at(sums, triangles.edges.face_edges[faces], triangles.in_edge_frames(forces, faces))
+    return sums
+
+
+def _local_entries(
+    triangles: IntrinsicMesh, time: float, faces: NDArray[np.int64] | slice
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(m, 3) diagonal entries of M + tL; (m, 3) entries between each edge and the next, before the turn of Eq. 8."""
+    cot = triangles.corner_cotangents[faces]
+    following = np.roll(cot, -1, axis=1)  # at the corner that edge k shares with edge k + 1
+    return triangles.face_areas[faces, None] / 3.0 + 2.0 * time * (cot + following), -2.0 * time * following
+
+
+def _real_form(triangles: IntrinsicMesh, diagonal: np.ndarray, factor: np.ndarray) -> sparse.csr_matrix:
+    """The real matrix of blocks ``B_feᵀ B_fg``; the columns of B_fe are the axes of the edge's frame in the face."""
+    edge, z = triangles.edges.face_edges, triangles.edge_directions
+    rows, columns = edge.ravel(), np.roll(edge, -1, axis=1).ravel()
+    second = np.where(triangles.reflected, -1j, 1j) * z
+    frame = np.stack([_components(z), _components(second)], axis=-1)
+    blocks = factor[..., None, None] * np.einsum("fkab,fkac->fkbc", frame, np.roll(frame, -1, axis=1))
+    bits = np.arange(2)
+    i = np.broadcast_to(2 * rows[:, None, None] + bits[:, None], (len(rows), 2, 2)).ravel()
+    j = np.broadcast_to(2 * columns[:, None, None] + bits, (len(rows), 2, 2)).ravel()
+    k = (2 * edge.ravel()[:, None] + bits).ravel()
+    n = 2 * triangles.n_edges
+    ij = np.concatenate([i, j, k]), np.concatenate([j, i, k])
+    values = np.concatenate([blocks.ravel(), blocks.ravel(), np.repeat(diagonal.ravel(), 2)])
+    matrix = sparse.triu(sparse.coo_matrix((values, ij), shape=(n, n)), format="csr")
+    matrix.sum_duplicates()
+    return matrix
+
+
+def _components(vectors: np.ndarray) -> np.ndarray:
+    return np.stack([vectors.real, vectors.imag], axis=-1)
+
+
+def nonmanifold_frames(
+    triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
+) -> tuple[IntrinsicMesh, Sequence[Sequence[CurveSegments]]]:
+    """Make the face that is nearest to the sources the first face of every edge with more than two faces.
+
+    Heat that leaves one face through such an edge enters all the others. The frame of the edge distinguishes its first
+    face from the others, so the first must be the face that heat comes from: vectors that pass between two of the
+    others would be reflected. Edges whose ends are nearer than every opposite corner, which heat passes or runs along,
+    keep their first face. Where none changes, the same triangles are returned.
+
+    Examples
+    --------
+    >>> from signedheat.surfaces.surface_curves import Curve
+    >>> from signedheat.surfaces.source_segments import segments_of_each
+    >>> three = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [1, 0, 3], [1, 0, 4]]), np.ones((3, 3)), 5)
+    >>> on_the_last = segments_of_each([Curve([2, 2], [[0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])], three)
+    >>> nonmanifold_frames(three, on_the_last)[0].first_halfedges.tolist()
+    [6, 1, 2, 4, 5, 7, 8]
+    """
+    table = triangles.edges
+    if table.face_counts.max(initial=0) <= 2:
+        return triangles, groups
+    parts = [part for group in groups for part in group]
+    if not parts:
+        return triangles, groups
+    distance = _distances(triangles, parts)
+    holds = np.zeros(triangles.n_faces, dtype=bool)
+    holds[np.concatenate([part.faces[part.edges < 0] for part in parts])] = True
+    side = np.flatnonzero(table.face_counts[table.face_edges].ravel() > 2)
+    edge = table.face_edges.ravel()[side]
+    opposite = np.roll(triangles.corner_vertices, -2, axis=1).ravel()[side]
+    ends = distance[table.vertices[edge]].mean(axis=1)
+    first = np.full(triangles.n_edges, -1)
+    first[table.face_edges.ravel()[triangles.first_halfedges]] = triangles.first_halfedges
+    away = np.where(holds[side // 3], -1.0, distance[opposite])
+    order = np.lexsort([side != first[edge], away, edge])  # among equally near faces the first stays first
+    nearest = order[np.append(True, np.diff(edge[order]) > 0)]
+    nearest = nearest[(away[nearest] < ends[nearest]) & (side[nearest] != first[edge[nearest]])]
+    if not len(nearest):
+        return triangles, groups
+    changed = np.zeros(triangles.n_edges, dtype=bool)
+    changed[edge[nearest]] = True
+    first[edge[nearest]] = side[nearest]
+    turned = replace(triangles, leading_sides=first[first >= 0])
+    return turned, [[mirrored(part, changed) for part in group] for group in groups]
+
+
+def mirrored(part: CurveSegments, changed: NDArray[np.bool_]) -> CurveSegments:
+    """The segments, with the vectors on edges whose frames have changed reflected."""
+    here = (part.edges >= 0) & changed[part.edges]
+    return replace(part, vectors=np.where(here, np.conj(part.vectors), part.vectors)) if here.any() else part
+
+
+def _distances(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.float64]:
+    """(n_vertices,) distance of every vertex from the sources along edges, from the corners of their faces on."""
+    nodes = concatenated([part.nodes for part in parts])
+    corners = triangles.corner_positions[nodes.faces]
+    at = np.einsum("nk,nk->n", nodes.barycentric, corners)
+    vertices = triangles.corner_vertices[nodes.faces].ravel()
+    return distances_along_edges(triangles, vertices, np.abs(corners - at[:, None]).ravel())
