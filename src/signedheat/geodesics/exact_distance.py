@@ -88,17 +88,7 @@ def distance_to_zero_line(
 def distance_to_segments(
     triangles: IntrinsicMesh, placed: Sequence[PlacedSegments], tolerance: float = 1e-4, report: Report | None = None
 ) -> tuple[NDArray[np.float64], int]:
-    """Distance of every vertex to segments and points: inside faces, along edges, at vertices; for the rest see above.
-
-    Examples
-    --------
-    >>> from signedheat.mesh.curve_segments import CurveSegments
-    >>> from signedheat.mesh.surface_points import points_at_vertices
-    >>> triangles = IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.array([[4.0, 5.0, 3.0]]), 3)
-    >>> point = CurveSegments.of_points(points_at_vertices(triangles, np.array([1])))
-    >>> distance_to_segments(triangles, [PlacedSegments.of(triangles, [point])])[0].tolist()
-    [4.0, 0.0, 5.0]
-    """
+    """Distance of every vertex to segments and points: in faces, along edges, at vertices; the rest is as above."""
     limit = window_limit(triangles)
     placed = [through_vertices(triangles, each) for each in placed]
     many = min(MANY_PER_EDGE * triangles.n_edges + MANY_WINDOWS, limit)
@@ -141,21 +131,11 @@ def window_limit(triangles: IntrinsicMesh) -> int:
 
 @dataclass(frozen=True, eq=False)
 class PausedSearch:
-    """A search on some triangles, in short calls of kernels between which it can be ended.
-
-    Attributes
-    ----------
-    triangles : IntrinsicMesh
-        The surface.
-    search : Search
-        What it has found; going on changes it.
-    tolerance : float
-        See `distance_to_zero_line`.
-    """
+    """A search on some triangles, in short calls of kernels between which it can be ended."""
 
     triangles: IntrinsicMesh
-    search: Search
-    tolerance: float
+    search: Search  # what it has found; going on changes it
+    tolerance: float  # see `distance_to_zero_line`
 
     @classmethod
     def start(cls, triangles: IntrinsicMesh, placed: Sequence[PlacedSegments], tolerance: float) -> PausedSearch:

@@ -37,23 +37,15 @@ Points = NDArray[np.complex128]
 
 
 class GeodesicSources(NamedTuple):
-    """Where distance is zero, and the directions in which it grows. Positions are in the layouts of the faces.
+    """Where distance is zero, and the directions in which it grows. Positions are in the layouts of the faces."""
 
-    Attributes
-    ----------
-    vertices : (v,) int
-        Vertices at which distance is zero; those of curves among them.
-    beam_faces, beam_starts, beam_stops : (b,) int, complex, complex
-        Segments from which a parallel beam leaves to the left.
-    fan_faces, fan_points, fan_firsts, fan_seconds : (a,) int, complex, complex, complex
-        Points from which circular waves leave, in directions of more than 90° from the first and the second given; 0
-        for none.
-    """
-
-    vertices: Ids
+    vertices: Ids  # (v,) vertices at which distance is zero; those of curves among them
+    # (b,) segments from which a parallel beam leaves to the left
     beam_faces: Ids
     beam_starts: Points
     beam_stops: Points
+    # (a,) points from which circular waves leave, in directions of more than 90° from the first and the second given; 0
+    # for none
     fan_faces: Ids
     fan_points: Points
     fan_firsts: Points
@@ -62,33 +54,18 @@ class GeodesicSources(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PlacedSegments:
-    """Segments with the positions of their ends in the layouts of faces; unlike nodes, these are never ambiguous.
+    """Segments with the positions of their ends in the layouts of faces; unlike nodes, these are never ambiguous."""
 
-    Attributes
-    ----------
-    nodes : LocatedPoints
-        (s,) distinct points.
-    ends : (k, 2) int
-        The nodes that each segment joins.
-    faces : (k,) int
-        The face that each segment lies in. A segment along an edge is listed once for every face at the edge.
-    positions : (k, 2) complex
-        Of both ends, in the layout of the face; along an edge in the direction that has the face to its left.
-    along_edge : (k,) bool
-        Whether the segment runs along an edge of its face.
-    sides : (k,) int
-        1 where φ grows to the left of the segment, −1 where it grows to the right, 0 where it does so on both sides.
-    given : (k,) int
-        Index of the segment among those given.
-    """
-
-    nodes: LocatedPoints
-    ends: Ids
+    nodes: LocatedPoints  # (s,) distinct points
+    ends: Ids  # (k, 2) the nodes that each segment joins
+    # (k,) the face that each segment lies in. A segment along an edge is listed once for every face at the edge.
     faces: Ids
+    # (k, 2) of both ends, in the layout of the face; along an edge in the direction that has the face to its left
     positions: Points
-    along_edge: Mask
+    along_edge: Mask  # (k,) whether the segment runs along an edge of its face
+    # (k,) 1 where φ grows to the left of the segment, −1 where it grows to the right, 0 where it does so on both sides
     sides: Ids
-    given: Ids
+    given: Ids  # (k,) index of the segment among those given
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> PlacedSegments:

@@ -20,16 +20,7 @@ class Queue(NamedTuple):
 
     @classmethod
     def empty(cls, n_items: int) -> Queue:
-        """A queue for items 0 to n_items − 1.
-
-        Examples
-        --------
-        >>> queue = Queue.empty(3)
-        >>> for item, key in ((0, 2.0), (1, 5.0), (2, 3.0), (1, 1.0)):
-        ...     push(queue, item, key)
-        >>> [pop(queue) for _ in range(3)]
-        [1, 0, 2]
-        """
+        """A queue for items 0 to n_items − 1."""
         return cls(np.empty(n_items, np.int64), np.full(n_items, -1), np.empty(n_items), np.zeros(1, np.int64))
 
 

@@ -25,29 +25,15 @@ NODES = SIDE**3
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Which blocks of a grid are there.
+    """Which blocks of a grid are there."""
 
-    Attributes
-    ----------
-    places : (n, 3) int32
-        Their first nodes, divided by `SIDE`, in the order of cubes and within each of rows.
-    shape : tuple of 3 int
-        Nodes of the grid along each axis.
-    """
-
+    # (n, 3) their first nodes, divided by `SIDE`, in the order of cubes and within each of rows
     places: NDArray[np.int32]
-    shape: tuple[int, int, int]
+    shape: tuple[int, int, int]  # nodes of the grid along each axis
 
     @classmethod
     def of(cls, places: NDArray[np.integer], shape: tuple[int, ...]) -> Blocks:
-        """Blocks at (n, 3) places, each once, in order.
-
-        Examples
-        --------
-        >>> blocks = Blocks.of(np.array([[1, 0, 0], [0, 0, 0], [1, 0, 0]]), (16, 16, 16))
-        >>> blocks.places.tolist(), blocks.rows(np.array([[1, 0, 0], [1, 1, 0]])).tolist()
-        ([[0, 0, 0], [1, 0, 0]], [1, -1])
-        """
+        """Blocks at (n, 3) places, each once, in order."""
         cubes = -(-np.array(shape) // (SIDE * CUBE))
         ranked = np.asarray(places, dtype=np.int64).reshape(-1, 3)
         cube = np.ravel_multi_index(tuple((ranked // CUBE).T), tuple(cubes))
@@ -89,25 +75,10 @@ class Blocks:
 
 @dataclass(frozen=True, eq=False)
 class BlockValues:
-    """Values at the nodes of blocks, indexed by nodes as an array of the whole grid is.
+    """Values at the nodes of blocks, indexed by nodes as an array of the whole grid is."""
 
-    Attributes
-    ----------
-    blocks : Blocks
-        Which nodes have a value.
-    values : (n, 8, 8, 8) float
-        Their values; NaN where they have none.
-
-    Examples
-    --------
-    >>> blocks = Blocks.of(np.zeros((1, 3), dtype=int), (16, 16, 16))
-    >>> heights = BlockValues(blocks, np.full((1, 8, 8, 8), 0.5, dtype=np.float32))
-    >>> heights[np.array([3, 9]), np.array([0, 0]), np.array([7, 7])].tolist()
-    [0.5, nan]
-    """
-
-    blocks: Blocks
-    values: NDArray[np.floating[Any]]
+    blocks: Blocks  # which nodes have a value
+    values: NDArray[np.floating[Any]]  # (n, 8, 8, 8) their values; NaN where they have none
 
     @property
     def shape(self) -> tuple[int, ...]:

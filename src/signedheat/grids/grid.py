@@ -256,13 +256,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
 
 
 def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = ROOM) -> float:
-    """Padding that leaves room around a box for what has to be completed, and for offsets up to `reach`.
-
-    Examples
-    --------
-    >>> room_around([[0, 0, 0], [1, 2, 4]], reach=1.0, share=0.5)
-    3.05
-    """
+    """Padding that leaves room around a box for what has to be completed, and for offsets up to `reach`."""
     lower, upper = np.asarray(bounds, dtype=np.float64)
     return share * float((upper - lower).max()) + 1.05 * reach
 

@@ -38,11 +38,6 @@ def memory_estimate(grid: Grid, per_node: float | None = None, extra: float = 0.
     """Estimated peak memory of a distance computation on the grid, in bytes; of others, if `per_node` is given.
 
     `extra` bytes, needed for neither nodes nor libraries, are added.
-
-    Examples
-    --------
-    >>> memory_estimate(Grid((0, 0, 0), 1.0, (512, 512, 512))) < 10e9
-    True
     """
     if per_node is None:
         per_node = BYTES_PER_NODE[grid.dimension]
@@ -50,13 +45,7 @@ def memory_estimate(grid: Grid, per_node: float | None = None, extra: float = 0.
 
 
 def bytes_of_area(area: float, spacing: NDArray[np.float64], n_nodes: float) -> float:
-    """What so much surface adds on a grid of this spacing, in space.
-
-    Examples
-    --------
-    >>> bytes_of_area(0.5, np.full(3, 0.01), 10**6)
-    4650000.0
-    """
+    """What so much surface adds on a grid of this spacing, in space."""
     if len(spacing) != 3:
         return 0.0
     cells = float(area / float(np.prod(spacing)) ** (2 / 3))

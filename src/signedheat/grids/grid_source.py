@@ -17,21 +17,11 @@ from .stencil import interpolation_stencil
 
 @dataclass(frozen=True, eq=False)
 class GridSource:
-    """Sources lowered to a grid.
+    """Sources lowered to a grid."""
 
-    Attributes
-    ----------
-    samples : AreaSamples
-        Area elements, merged per cell and component, and X₀.
-    grid : Grid
-        The domain.
-    diffusion : float
-        τ in ``t = τ max(h, h_source)²``.
-    """
-
-    samples: AreaSamples
+    samples: AreaSamples  # area elements, merged per cell and component, and X₀
     grid: Grid
-    diffusion: float
+    diffusion: float  # τ in ``t = τ max(h, h_source)²``
 
     def time_on(self, spacing: float) -> float:
         """t on a coarser grid of this mean spacing: as on this grid, but at least such that √t spans a cell."""

@@ -52,21 +52,12 @@ ROUNDS_EVERYWHERE = 12
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """The diffused vectors on one grid of the hierarchy.
+    """The diffused vectors on one grid of the hierarchy."""
 
-    Attributes
-    ----------
-    vectors : (l₀, l₁, l₂, n, 4) float32, or None on a level that was skipped
-        X, within the band.
-    inside : (l₀, l₁, l₂, stretches) bool, or None
-        Stretches of lines in which these values are valid; elsewhere those of the coarser level are.
-    factors : (4,) int
-        Cells of this grid per cell of the next coarser one: see `coarsening`.
-    """
-
-    vectors: NDArray[np.float32] | None
+    vectors: NDArray[np.float32] | None  # (l₀, l₁, l₂, n, 4) X within the band; None if skipped
+    # (l₀, l₁, l₂, stretches) where these values are valid; elsewhere those of the coarser level are
     inside: NDArray[np.bool_] | None
-    factors: NDArray[np.int64]
+    factors: NDArray[np.int64]  # (4,) cells of this grid per cell of the next coarser one: see `coarsening`
 
 
 Guess = tuple[NDArray[np.float32], NDArray[np.bool_]]

@@ -18,25 +18,14 @@ STRETCH = 8
 
 @dataclass(frozen=True, eq=False)
 class NodeSources:
-    """Vectors at the nodes of a grid.
+    """Vectors at the nodes of a grid."""
 
-    Attributes
-    ----------
-    places : (l₀, l₁, l₂, ⌈n / STRETCH⌉) int32
-        Row of `sums` for each stretch of the lines along the last axis; −1 where all vectors are zero. The grid is
-        padded to four axes in front.
-    sums : (k, STRETCH, 4) float32
-        The vectors, padded to four components.
-    shape : tuple of 4 int
-        Nodes along each axis.
-    steps : (4,) float
-        Spacing of the grid; 0 along axes of one node.
-    """
-
+    # (l₀, l₁, l₂, ⌈n / STRETCH⌉) row of `sums` for each stretch of the lines along the last axis; −1 where all vectors
+    # are zero. The grid is padded to four axes in front.
     places: NDArray[np.int32]
-    sums: NDArray[np.float32]
-    shape: tuple[int, ...]
-    steps: NDArray[np.float64]
+    sums: NDArray[np.float32]  # (k, STRETCH, 4) the vectors, padded to four components
+    shape: tuple[int, ...]  # nodes along each axis
+    steps: NDArray[np.float64]  # (4,) spacing of the grid; 0 along axes of one node
 
     @classmethod
     def empty(cls, shape: tuple[int, ...], steps: NDArray[np.float64]) -> NodeSources:

@@ -138,37 +138,20 @@ radius, distances are .04 cells off at the most, with .1 by .01; of clipped ones
 
 
 class Contour(NamedTuple):
-    """The zero set of an array.
+    """The zero set of an array."""
 
-    Attributes
-    ----------
-    vertices, faces : (v, 3) float, (m, 3) int
-        The contour of values that are linear along edges: axes 1 to 3. None in four dimensions.
-    numbers : (v,) int
-        The crossing at each vertex; −1 at such as are on no edge of the array.
-    zeros : (k, 3) float
-        Nodes that are zero, without a negative neighbour.
-    curved : (c, 18) float
-        Crossings, normals and shape operators of the cubic interpolant: see `crossings_at`.
-    points : (c, 4) float
-        The crossings: where smooth on the zero set of the cubic interpolant, else of values linear along edges.
-    smooth : (c,) bool
-        Whether the interpolant tells distance around a crossing.
-    uneven : float
-        How much distance to the interpolant may differ from that to the triangles.
-    reach : float
-        No point of the zero set is farther from its nearest crossing.
-    """
-
+    # (v, 3) and (m, 3): the contour of values that are linear along edges: axes 1 to 3. None in four dimensions.
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
-    numbers: NDArray[np.int64]
-    zeros: NDArray[np.float64]
+    numbers: NDArray[np.int64]  # (v,) the crossing at each vertex; −1 at such as are on no edge of the array
+    zeros: NDArray[np.float64]  # (k, 3) nodes that are zero, without a negative neighbour
+    # (c, 18) crossings, normals and shape operators of the cubic interpolant: see `crossings_at`
     curved: NDArray[np.float64]
+    # (c, 4) the crossings: where smooth on the zero set of the cubic interpolant, else of values linear along edges
     points: NDArray[np.float64]
-    smooth: NDArray[np.bool_]
-    uneven: float
-    reach: float
+    smooth: NDArray[np.bool_]  # (c,) whether the interpolant tells distance around a crossing
+    uneven: float  # how much distance to the interpolant may differ from that to the triangles
+    reach: float  # no point of the zero set is farther from its nearest crossing
 
 
 def smoothed_signs(signs: NDArray[np.float64]) -> NDArray[np.float64]:

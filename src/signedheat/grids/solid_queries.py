@@ -71,18 +71,10 @@ class SolidQueries(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Scaled:
-    """The distance to a solid times a number, which is not 0.
-
-    Attributes
-    ----------
-    solid : SolidQueries
-        The solid.
-    factor : float
-        What its distance is multiplied by; where it is negative inside and outside are exchanged.
-    """
+    """The distance to a solid times a number, which is not 0."""
 
     solid: SolidQueries
-    factor: float
+    factor: float  # what its distance is multiplied by; where it is negative inside and outside are exchanged
 
     @property
     def triangles(self) -> NDArray[np.float64]:

@@ -23,38 +23,17 @@ MOST_ITERATIONS = 5000
 
 @dataclass(frozen=True, eq=False)
 class IncompleteCholesky:
-    """A symmetric positive definite matrix with its IC(0) factor, in a chosen order of unknowns.
+    """A symmetric positive definite matrix with its IC(0) factor, in a chosen order of unknowns."""
 
-    Attributes
-    ----------
-    order : (k,) int
-        Unknowns to solve for, in this order; the others stay zero.
-    matrix : (k, k) sparse
-        Rows and columns in that order.
-    factor : (k, k) sparse
-        Strictly lower triangle of the factor.
-    pivots : (k,) float
-        Its inverse diagonal.
-    n : int
-        Number of unknowns, solved for or not.
-    """
-
-    order: NDArray[np.int64]
-    matrix: sparse.csr_matrix
-    factor: sparse.csr_matrix
-    pivots: NDArray[np.float64]
-    n: int
+    order: NDArray[np.int64]  # (k,) unknowns to solve for, in this order; the others stay zero
+    matrix: sparse.csr_matrix  # (k, k) rows and columns in that order
+    factor: sparse.csr_matrix  # (k, k) strictly lower triangle of the factor
+    pivots: NDArray[np.float64]  # (k,) its inverse diagonal
+    n: int  # number of unknowns, solved for or not
 
     @classmethod
     def of(cls, matrix: sparse.csr_matrix, order: NDArray[np.int64]) -> IncompleteCholesky:
-        """Factorise; if a pivot is not positive, again with a larger diagonal (Manteuffel 1980).
-
-        Examples
-        --------
-        >>> A = sparse.csr_matrix([[4.0, -1.0], [-1.0, 4.0]])
-        >>> IncompleteCholesky.of(A, np.arange(2)).solve(np.array([3.0, 3.0]))
-        array([1., 1.])
-        """
+        """Factorise; if a pivot is not positive, again with a larger diagonal (Manteuffel 1980)."""
         chosen = sparse.csr_matrix(matrix[order][:, order])
         factor = sparse.csr_matrix(sparse.tril(chosen, -1))
         factor.sort_indices()
@@ -107,14 +86,7 @@ class IncompleteCholesky:
 
 
 def outward_order(matrix: sparse.csr_matrix, seeds: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The unknowns that are connected to the seeds in the graph of the matrix, in order of distance from them.
-
-    Examples
-    --------
-    >>> chain = sparse.csr_matrix([[1, 1, 0], [1, 1, 1], [0, 1, 1]])
-    >>> outward_order(chain, np.array([1]))
-    array([1, 0, 2])
-    """
+    """The unknowns that are connected to the seeds in the graph of the matrix, in order of distance from them."""
     n = matrix.shape[0]
     links = sparse.csr_matrix((np.ones(len(seeds)), (np.full(len(seeds), n), seeds)), shape=(n + 1, n + 1))
     graph = sparse.csr_matrix((matrix.data != 0, matrix.indices, matrix.indptr), shape=matrix.shape)

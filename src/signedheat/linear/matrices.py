@@ -9,14 +9,7 @@ from scipy import sparse
 
 
 def upper_triangle(matrix: Any) -> sparse.csr_matrix:
-    """Upper triangle, diagonal included, as sorted CSR, from a whole Hermitian matrix or its upper triangle.
-
-    Examples
-    --------
-    >>> upper_triangle(sparse.csr_matrix([[2.0, 1.0], [1.0, 3.0]])).toarray()
-    array([[2., 1.],
-           [0., 3.]])
-    """
+    """Upper triangle, diagonal included, as sorted CSR, from a whole Hermitian matrix or its upper triangle."""
     if sparse.issparse(matrix) and matrix.format == "csr" and _is_upper(matrix):
         return matrix
     upper = sparse.triu(matrix, format="csr")
@@ -30,14 +23,7 @@ def upper_triangle(matrix: Any) -> sparse.csr_matrix:
 
 
 def whole(upper: sparse.csr_matrix) -> sparse.csr_matrix:
-    """The whole Hermitian matrix from its upper triangle.
-
-    Examples
-    --------
-    >>> whole(sparse.csr_matrix([[2.0, 1.0], [0.0, 3.0]])).toarray()
-    array([[2., 1.],
-           [1., 3.]])
-    """
+    """The whole Hermitian matrix from its upper triangle."""
     return sparse.csr_matrix(upper + sparse.triu(upper, 1).conj().T)
 
 

@@ -18,18 +18,10 @@ Forces = Callable[[NDArray[Any], NDArray[np.bool_]], tuple[NDArray[np.bool_], ND
 
 
 class Stage(NamedTuple):
-    """Part of a solution: ``values · exp(logarithm)``.
+    """Part of a solution: ``values · exp(logarithm)``."""
 
-    Attributes
-    ----------
-    values : (n, k) or (n,) float or complex
-        NaN on rows that an earlier stage knows well.
-    logarithm : float
-        Natural logarithm of the factor that belongs to them.
-    """
-
-    values: NDArray[Any]
-    logarithm: float
+    values: NDArray[Any]  # (n, k) or (n,), NaN on rows that an earlier stage knows well
+    logarithm: float  # natural logarithm of the factor that belongs to them
 
 
 def solve_with_restarts(solve: Solve, border_forces: Forces, loads: NDArray[Any], size: float = 1.0) -> list[Stage]:

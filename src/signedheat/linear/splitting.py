@@ -14,23 +14,15 @@ Map = Callable[[NDArray[Any]], NDArray[Any]]
 
 
 class Round(NamedTuple):
-    """The state after one round.
+    """The state after one round."""
 
-    Attributes
-    ----------
-    solution, image : array
-        x, and K x.
-    split, before : array
-        z, and z in the round before.
-    scaled_dual : array
-        Multipliers over the penalty. The next round sees what is changed in place.
-    """
-
+    # x, and K x
     solution: NDArray[Any]
     image: NDArray[Any]
+    # z, and z in the round before
     split: NDArray[Any]
     before: NDArray[Any]
-    scaled_dual: NDArray[Any]
+    scaled_dual: NDArray[Any]  # multipliers over the penalty. The next round sees what is changed in place.
 
 
 def split_rounds(

@@ -31,24 +31,12 @@ ON_EDGE, IN_FACE, EDGES, EDGE_AND_FACE = range(4)
 
 
 class Arrangement(NamedTuple):
-    """Pieces of faces that meet in whole edges.
+    """Pieces of faces that meet in whole edges."""
 
-    Attributes
-    ----------
-    points : (n, 3) float
-        Those that were given, and where faces meet.
-    faces : (p, 3) int
-        Pieces, in order of the faces.
-    origins : (p,) int
-        Face that each is a piece of, ascending.
-    cells : (p,) int
-        Pieces of a face that hang together without a line between them have the same.
-    """
-
-    points: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    origins: NDArray[np.int64]
-    cells: NDArray[np.int64]
+    points: NDArray[np.float64]  # (n, 3) those that were given, and where faces meet
+    faces: NDArray[np.int64]  # (p, 3) pieces, in order of the faces
+    origins: NDArray[np.int64]  # (p,) face that each is a piece of, ascending
+    cells: NDArray[np.int64]  # (p,) pieces of a face that hang together without a line between them have the same
 
 
 class Incidence(NamedTuple):
@@ -137,24 +125,12 @@ def arranged(
 
 
 class Lines(NamedTuple):
-    """Edges, and after them segments along which two faces meet.
+    """Edges, and after them segments along which two faces meet."""
 
-    Attributes
-    ----------
-    ends : (l, 2) int
-        Points at which each line begins and ends.
-    on : Incidence
-        Points on lines, but for their ends.
-    within : Incidence
-        Points in faces, beside those on their edges.
-    sides : (s, 2) int
-        The two faces of each segment.
-    """
-
-    ends: NDArray[np.int64]
-    on: Incidence
-    within: Incidence
-    sides: NDArray[np.int64] = np.zeros((0, 2), dtype=np.int64)
+    ends: NDArray[np.int64]  # (l, 2) points at which each line begins and ends
+    on: Incidence  # points on lines, but for their ends
+    within: Incidence  # points in faces, beside those on their edges
+    sides: NDArray[np.int64] = np.zeros((0, 2), dtype=np.int64)  # (s, 2) the two faces of each segment
 
     def renamed(self, rename: NDArray[np.int64]) -> Lines:
         """With points that have become one."""

@@ -10,13 +10,7 @@ from ..frozen import read_only
 
 
 def connected_components(n: int, one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[np.int64]:
-    """(n,) connected component of each node of a graph with edges from `one` to `other`, numbered by first appearance.
-
-    Examples
-    --------
-    >>> connected_components(4, np.array([0, 3]), np.array([2, 3])).tolist()
-    [0, 1, 0, 2]
-    """
+    """(n,) component of each node of a graph with edges from `one` to `other`, numbered by first appearance."""
     return _labels(n, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (one, other)))
 
 
@@ -24,11 +18,6 @@ def element_components(elements: NDArray[np.int64]) -> NDArray[np.int64]:
     """(m,) connected component of each element, numbered by first appearance: those that share a vertex are connected.
 
     The (m, k) elements may name their edges or faces instead of vertices.
-
-    Examples
-    --------
-    >>> element_components(np.array([[0, 1, 2], [3, 4, 5], [2, 6, 7]])).tolist()
-    [0, 1, 0]
     """
     links = np.repeat(elements[:, 0], elements.shape[1] - 1), elements[:, 1:].ravel()
     labels = connected_components(int(elements.max()) + 1, *links)[elements[:, 0]]
@@ -36,13 +25,7 @@ def element_components(elements: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """New numbers for ids below n, in order of first appearance; and the old id of each number.
-
-    Examples
-    --------
-    >>> by_first_use(np.array([4, 1, 4, 2]), 5)
-    (array([0, 1, 0, 2]), array([4, 1, 2]))
-    """
+    """New numbers for ids below n, in order of first appearance; and the old id of each number."""
     first = np.full(n, -1)
     first[ids[::-1]] = np.arange(len(ids))[::-1]
     used = np.flatnonzero(first >= 0)
@@ -76,13 +59,7 @@ def _labels(n: int, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray
 
 
 def grouped(groups: NDArray[np.integer], n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(n + 1,) where the members of each of n groups begin, and the members in order: each is in one of `groups`.
-
-    Examples
-    --------
-    >>> grouped(np.array([2, 0, 2]), 3)
-    (array([0, 1, 1, 3]), array([1, 0, 2]))
-    """
+    """(n + 1,) where the members of each of n groups begin, and the members in order: each is in one of `groups`."""
     starts, members = _grouped(read_only(np.ascontiguousarray(groups, dtype=np.int64)), n)
     return starts, members
 
@@ -90,26 +67,14 @@ def grouped(groups: NDArray[np.integer], n: int) -> tuple[NDArray[np.int64], NDA
 def members_of(
     starts: NDArray[np.int64], members: NDArray[np.int64], chosen: NDArray[np.integer]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """All members of some groups, as pairs: index into `chosen`, and member.
-
-    Examples
-    --------
-    >>> members_of(*grouped(np.array([2, 0, 2]), 3), np.array([0, 2, 1]))
-    (array([0, 1, 1]), array([1, 0, 2]))
-    """
+    """All members of some groups, as pairs: index into `chosen`, and member."""
     begin, count = starts[chosen], starts[chosen + 1] - starts[chosen]
     which = np.repeat(np.arange(len(chosen)), count)
     return which, members[np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(which))]
 
 
 def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -> NDArray[np.float64]:
-    """(n, ...) sums of the rows of (k, ...) values in each of n groups.
-
-    Examples
-    --------
-    >>> sums_of(np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]), np.array([2, 0, 2]), 3).tolist()
-    [[3.0, 4.0], [0.0, 0.0], [6.0, 8.0]]
-    """
+    """(n, ...) sums of the rows of (k, ...) values in each of n groups."""
     columns = values.reshape(len(values), int(np.prod(values.shape[1:]))).T
     sums = np.stack([np.bincount(groups, column, n) for column in columns], axis=1)
     return np.asarray(sums.reshape(n, *values.shape[1:]), np.float64)

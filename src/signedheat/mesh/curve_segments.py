@@ -36,30 +36,15 @@ rounded. How far all of them are off the line between the outer ones decides the
 
 @dataclass(frozen=True, eq=False)
 class CurveSegments:
-    """One source as straight segments, each of which lies in one face or along one edge.
+    """One source as straight segments, each of which lies in one face or along one edge."""
 
-    Attributes
-    ----------
-    nodes : LocatedPoints
-        (s,) distinct points of the source, in order of first appearance.
-    ends : (k, 2) int
-        The nodes that each segment joins; no segments for isolated points.
-    faces : (k,) int
-        A face that contains the segment.
-    edges : (k,) int
-        The edge that the segment runs along, or −1 for a segment inside its face.
-    vectors : (k,) complex
-        Normal times length: the direction in which φ grows, in the layout of the face, or in the frame of the edge.
-    oriented : bool
-        Whether the curve has a positive and a negative side.
-    """
-
-    nodes: LocatedPoints
-    ends: NDArray[np.int64]
-    faces: NDArray[np.int64]
-    edges: NDArray[np.int64]
+    nodes: LocatedPoints  # (s,) distinct points of the source, in order of first appearance
+    ends: NDArray[np.int64]  # (k, 2) the nodes that each segment joins; no segments for isolated points
+    faces: NDArray[np.int64]  # (k,) a face that contains the segment
+    edges: NDArray[np.int64]  # (k,) the edge that the segment runs along, or −1 for a segment inside its face
+    # (k,) normal times length: the direction in which φ grows, in the layout of the face, or in the frame of the edge
     vectors: NDArray[np.complex128]
-    oriented: bool
+    oriented: bool  # whether the curve has a positive and a negative side
 
     @classmethod
     def of_points(cls, nodes: LocatedPoints) -> CurveSegments:

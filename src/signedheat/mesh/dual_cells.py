@@ -37,47 +37,25 @@ AFTER = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """Edges of a grid that a level set crosses.
+    """Edges of a grid that a level set crosses."""
 
-    Attributes
-    ----------
-    nodes, axes : (e, 3) int, (e,) int
-        First node of each, and what it runs along.
-    rising : (e,) bool
-        Whether the first node is inside.
-    shares : (e,) float
-        How far from the first node the crossing is, in cells.
-    """
-
+    # (e, 3) and (e,): first node of each, and what it runs along
     nodes: NDArray[np.int64]
     axes: NDArray[np.int64]
-    rising: NDArray[np.bool_]
-    shares: NDArray[np.float64]
+    rising: NDArray[np.bool_]  # (e,) whether the first node is inside
+    shares: NDArray[np.float64]  # (e,) how far from the first node the crossing is, in cells
 
 
 @dataclass(frozen=True, eq=False)
 class DualCells:
-    """Cells that a level set passes through.
+    """Cells that a level set passes through."""
 
-    Attributes
-    ----------
-    places : (c, 3) int
-        First node of each.
-    edges : (c, 12) int
-        Number of each crossed edge; −1 where an edge is not crossed.
-    pieces : (c, 12) int
-        The piece of the level set to which each crossed edge belongs; −1 where an edge is not crossed.
-    owners : (v,) int
-        The cell of each piece.
-    quads : (e, 4) int
-        The pieces around each crossed edge, counter-clockwise as seen from its end.
-    """
-
-    places: NDArray[np.int64]
-    edges: NDArray[np.int64]
+    places: NDArray[np.int64]  # (c, 3) first node of each
+    edges: NDArray[np.int64]  # (c, 12) number of each crossed edge; −1 where an edge is not crossed
+    # (c, 12) the piece of the level set to which each crossed edge belongs; −1 where an edge is not crossed
     pieces: NDArray[np.int64]
-    owners: NDArray[np.int64]
-    quads: NDArray[np.int64]
+    owners: NDArray[np.int64]  # (v,) the cell of each piece
+    quads: NDArray[np.int64]  # (e, 4) the pieces around each crossed edge, counter-clockwise as seen from its end
 
 
 def cells_around(

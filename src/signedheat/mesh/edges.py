@@ -15,20 +15,11 @@ from .components import connected_components, grouped
 
 @dataclass(frozen=True, eq=False)
 class HalfedgePairs:
-    """Edges of polygons, and the halfedges that run along them; halfedge c begins at the face's corner c.
+    """Edges of polygons, and the halfedges that run along them; halfedge c begins at the face's corner c."""
 
-    Attributes
-    ----------
-    edges : (h,) int
-        Edge of each halfedge; −1 where it joins a vertex to itself or its face is left out.
-    counts : (e,) int
-        Halfedges of each edge.
-    first, second : (e,) int
-        Least halfedge of each edge and the next; −1 where there is none.
-    """
-
-    edges: NDArray[np.int64]
-    counts: NDArray[np.int64]
+    edges: NDArray[np.int64]  # (h,) edge of each halfedge; −1 where it joins a vertex to itself or its face is left out
+    counts: NDArray[np.int64]  # (e,) halfedges of each edge
+    # (e,) least halfedge of each edge and the next; −1 where there is none
     first: NDArray[np.int64]
     second: NDArray[np.int64]
 
@@ -40,25 +31,14 @@ class HalfedgePairs:
 
 @dataclass(frozen=True, eq=False)
 class FaceOrientation:
-    """Parts of faces that hang together across edges of two faces, and how the faces of each agree.
+    """Parts of faces that hang together across edges of two faces, and how the faces of each agree."""
 
-    Attributes
-    ----------
-    parts : (n_faces,) int
-        Part of each face; parts are numbered by first appearance.
-    turned : (n_faces,) bool
-        Which faces must turn; of parts that cannot be oriented, none.
-    orientable, closed : (n_parts,) bool
-        Whether all neighbours of the part can agree; whether each of its edges has two faces.
-    disagreeing : int
-        Edges whose two faces run along them the same way.
-    """
-
-    parts: NDArray[np.int64]
-    turned: NDArray[np.bool_]
+    parts: NDArray[np.int64]  # (n_faces,) part of each face; parts are numbered by first appearance
+    turned: NDArray[np.bool_]  # (n_faces,) which faces must turn; of parts that cannot be oriented, none
+    # (n_parts,) whether all neighbours of the part can agree; whether each of its edges has two faces
     orientable: NDArray[np.bool_]
     closed: NDArray[np.bool_]
-    disagreeing: int
+    disagreeing: int  # edges whose two faces run along them the same way
 
 
 def following_corners(offsets: NDArray[np.int64]) -> NDArray[np.int32]:
@@ -121,12 +101,6 @@ def may_coincide(pairs: HalfedgePairs, tails: NDArray[np.int64], following: NDAr
     """Whether any two faces may be on the same corners: they would share an edge, and a corner next to it.
 
     `following` is the halfedge that follows each around its face.
-
-    Examples
-    --------
-    >>> tails, heads = np.array([0, 1, 2, 2, 1, 3]), np.array([1, 2, 0, 1, 3, 2])
-    >>> may_coincide(pair_halfedges(tails, heads, 4), tails, np.array([1, 2, 0, 4, 5, 3]))
-    False
     """
     two = pairs.counts == 2
     one, other = pairs.first[two], pairs.second[two]
@@ -140,21 +114,11 @@ def may_coincide(pairs: HalfedgePairs, tails: NDArray[np.int64], following: NDAr
 
 @dataclass(frozen=True, eq=False)
 class EdgeTable(Frozen):
-    """Edges, and how faces and edges are incident.
+    """Edges, and how faces and edges are incident."""
 
-    Attributes
-    ----------
-    vertices : (e, 2) int
-        Tail and head: the direction in which the FIRST face of the edge runs along it.
-    face_edges : (m, 3) int
-        Edge from corner k to corner k + 1 of each face.
-    forward : (m, 3) bool
-        Whether the face runs along that edge from tail to head.
-    """
-
-    vertices: NDArray[np.int64]
-    face_edges: NDArray[np.int64]
-    forward: NDArray[np.bool_]
+    vertices: NDArray[np.int64]  # (e, 2) tail and head: the direction in which the FIRST face of the edge runs along it
+    face_edges: NDArray[np.int64]  # (m, 3) edge from corner k to corner k + 1 of each face
+    forward: NDArray[np.bool_]  # (m, 3) whether the face runs along that edge from tail to head
 
     @cached_property
     def face_counts(self) -> NDArray[np.int64]:

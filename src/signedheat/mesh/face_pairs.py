@@ -17,27 +17,17 @@ class FacePairs:
 
     Around an edge with three or more faces each is paired with the next, cyclically, and each pair has weight ½:
     separating one face from all others then costs as much as separating two faces at a manifold edge.
-
-    Attributes
-    ----------
-    faces : (p, 2) int
-        The two faces.
-    sides : (p, 2) int
-        Local index of the edge in each of the two faces; side k runs from corner k to corner k + 1.
-    edges : (p,) int
-        The edge.
-    tails, heads : (p, 2) int
-        In each face the corner at the edge's tail, and the one at its head, as an index into raveled (m, 3) corners.
-    shares : (p,) float
-        Weight of each pair: 1, or ½ where three or more faces meet.
     """
 
-    faces: NDArray[np.int64]
+    faces: NDArray[np.int64]  # (p, 2) the two faces
+    # (p, 2) local index of the edge in each of the two faces; side k runs from corner k to corner k + 1
     sides: NDArray[np.int64]
-    edges: NDArray[np.int64]
+    edges: NDArray[np.int64]  # (p,) the edge
+    # (p, 2) in each face the corner at the edge's tail, and the one at its head, as an index into raveled (m, 3)
+    # corners
     tails: NDArray[np.int64]
     heads: NDArray[np.int64]
-    shares: NDArray[np.float64]
+    shares: NDArray[np.float64]  # (p,) weight of each pair: 1, or ½ where three or more faces meet
 
     def ends(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(p, 2) difference, first face less second, of (m, 3) corner values at the edge's tail and at its head.
@@ -50,15 +40,7 @@ class FacePairs:
 
 
 def face_pairs(triangles: IntrinsicMesh) -> FacePairs:
-    """Pair the faces at every edge; boundary edges have no pair.
-
-    Examples
-    --------
-    >>> two = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [2, 1, 3]]), np.ones((2, 3)), 4)
-    >>> pairs = face_pairs(two)
-    >>> pairs.faces.tolist(), pairs.sides.tolist(), pairs.edges.tolist()
-    ([[0, 1]], [[1, 0]], [1])
-    """
+    """Pair the faces at every edge; boundary edges have no pair."""
     edge = triangles.edges.face_edges.ravel()
     starts, order = triangles.edges.halfedges
     count = np.diff(starts)
@@ -83,15 +65,6 @@ def face_pairs(triangles: IntrinsicMesh) -> FacePairs:
 
 
 def split_corners(triangles: IntrinsicMesh, pairs: FacePairs, cut: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(3m,) vertex of each corner, once the surface is cut open between some of the pairs (p,): ids from zero.
-
-    Examples
-    --------
-    >>> two = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [2, 1, 3]]), np.ones((2, 3)), 4)
-    >>> split_corners(two, face_pairs(two), np.array([False])).tolist()
-    [0, 1, 2, 2, 1, 3]
-    >>> split_corners(two, face_pairs(two), np.array([True])).tolist()
-    [0, 1, 2, 3, 4, 5]
-    """
+    """(3m,) vertex of each corner, once the surface is cut open between some of the pairs (p,): ids from zero."""
     ends = np.concatenate([pairs.tails[~cut], pairs.heads[~cut]])
     return connected_components(triangles.corner_vertices.size, *ends.T)

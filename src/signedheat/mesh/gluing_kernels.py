@@ -22,51 +22,27 @@ MOST_FLIPS = 1000
 
 
 class Gluing(NamedTuple):
-    """An intrinsic triangulation under construction; arrays are longer than the part that is in use.
+    """An intrinsic triangulation under construction; arrays are longer than the part that is in use."""
 
-    Attributes
-    ----------
-    tail, edge : (3 m,) int
-        Tail vertex and edge of every halfedge.
-    forward : (3 m,) bool
-        Whether the halfedge runs in the direction of its edge.
-    front : (3 m,) bool
-        Which of the two sides of its edge the halfedge is on: it stays through all steps, so that the two sides of a
-        source do, until the edge is flipped.
-    sibling : (3 m,) int
-        Next halfedge of the same edge, cyclically; the halfedge itself at a boundary.
-    start : (e,) int
-        One halfedge of every edge.
-    length : (e,) float
-        Length of every edge, in multiples of `unit`.
-    fixed : (e,) bool
-        Edges that must not be flipped.
-    flips : (e,) int
-        How often each edge has been flipped.
-    counts : (5,) int
-        Numbers of faces, edges, vertices, steps of the history, and edges on the stack.
-    steps, weights : (s, 4) int, (s, 4) float
-        The history: kind of the step, two halfedges or faces, the new vertex; and the affine dependency of its points.
-    scratch : int array
-        Work array.
-    unit : float
-        Unit of length.
-    """
-
+    # (3 m,) tail vertex and edge of every halfedge
     tail: NDArray[np.int64]
     edge: NDArray[np.int64]
-    forward: NDArray[np.bool_]
+    forward: NDArray[np.bool_]  # (3 m,) whether the halfedge runs in the direction of its edge
+    # (3 m,) which of the two sides of its edge the halfedge is on: it stays through all steps, so that the two sides of
+    # a source do, until the edge is flipped
     front: NDArray[np.bool_]
-    sibling: NDArray[np.int64]
-    start: NDArray[np.int64]
-    length: NDArray[np.float64]
-    fixed: NDArray[np.bool_]
-    flips: NDArray[np.int64]
-    counts: NDArray[np.int64]
+    sibling: NDArray[np.int64]  # (3 m,) next halfedge of the same edge, cyclically; the halfedge itself at a boundary
+    start: NDArray[np.int64]  # (e,) one halfedge of every edge
+    length: NDArray[np.float64]  # (e,) length of every edge, in multiples of `unit`
+    fixed: NDArray[np.bool_]  # (e,) edges that must not be flipped
+    flips: NDArray[np.int64]  # (e,) how often each edge has been flipped
+    counts: NDArray[np.int64]  # (5,) numbers of faces, edges, vertices, steps of the history, and edges on the stack
+    # (s, 4) and (s, 4): the history: kind of the step, two halfedges or faces, the new vertex; and the affine
+    # dependency of its points
     steps: NDArray[np.int64]
     weights: NDArray[np.float64]
-    scratch: NDArray[np.int64]
-    unit: float
+    scratch: NDArray[np.int64]  # work array
+    unit: float  # unit of length
 
 
 @kernel

@@ -27,26 +27,13 @@ FLATTEST = 1e-18
 
 @dataclass(frozen=True, eq=False)
 class IntrinsicMesh(Frozen):
-    """Triangles given by their vertices, their edges and their shapes alone, without positions in space.
+    """Triangles given by their vertices, their edges and their shapes alone, without positions in space."""
 
-    Attributes
-    ----------
-    corner_vertices : (m, 3) int
-        Vertex ids.
-    corner_positions : (m, 3) complex
-        Corners in the plane of the face, counter-clockwise.
-    edges : EdgeTable
-        Edge k of a face runs from corner k to corner k + 1. Two edges may join the same two vertices.
-    n_vertices : int
-        Number of vertices, used or not.
-    leading_sides : (e,) int, optional
-        Halfedge 3 f + k of each edge whose face f counts as the first face of the edge; by default the lowest face.
-    """
-
-    corner_vertices: NDArray[np.int64]
-    corner_positions: NDArray[np.complex128]
-    edges: EdgeTable
-    n_vertices: int
+    corner_vertices: NDArray[np.int64]  # (m, 3) vertex ids
+    corner_positions: NDArray[np.complex128]  # (m, 3) corners in the plane of the face, counter-clockwise
+    edges: EdgeTable  # edge k of a face runs from corner k to corner k + 1. Two edges may join the same two vertices.
+    n_vertices: int  # number of vertices, used or not
+    # (e,) halfedge 3 f + k of each edge whose face f counts as the first face of the edge; by default the lowest face
     leading_sides: NDArray[np.int64] | None = None
 
     @classmethod
@@ -235,16 +222,7 @@ def mollify(lengths: NDArray[np.float64], margin: float) -> tuple[NDArray[np.flo
 
 
 def laid_out(mesh: Triangles, margin: float) -> tuple[IntrinsicMesh, float]:
-    """The intrinsic mesh of a mesh, mollified, and the length that mollification has added to all edges.
-
-    Examples
-    --------
-    >>> from signedheat import TriangleMesh
-    >>> flat = TriangleMesh([[0, 0, 0], [4, 0, 0], [1, 1, 0], [0, 0, 0]], [[0, 1, 2], [0, 1, 3]])
-    >>> triangles, added = laid_out(flat, 1e-6)
-    >>> bool(0 < added < 1e-5 and triangles.face_areas.min() > 0)
-    True
-    """
+    """The intrinsic mesh of a mesh, mollified, and the length that mollification has added to all edges."""
     corners = mesh.vertices[mesh.faces]
     sides = np.roll(corners, -1, axis=1) - corners
     lengths = np.linalg.norm(sides, axis=2)

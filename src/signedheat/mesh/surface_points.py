@@ -21,27 +21,14 @@ SNAP = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class LocatedPoints:
-    """Points of a surface, each with the lowest-dimensional element that contains it.
+    """Points of a surface, each with the lowest-dimensional element that contains it."""
 
-    Attributes
-    ----------
-    faces : (n,) int
-        A face that contains the point.
-    barycentric : (n, 3) float
-        Barycentric coordinates in that face; exact zeros on edges and at vertices.
-    kinds : (n,) int
-        `VERTEX`, `EDGE` or `FACE`.
-    elements : (n,) int
-        Id of the vertex, edge or face.
-    along : (n,) float
-        On edges, the fraction of the way from tail to head; otherwise 0.
-    """
-
-    faces: NDArray[np.int64]
+    faces: NDArray[np.int64]  # (n,) a face that contains the point
+    # (n, 3) barycentric coordinates in that face; exact zeros on edges and at vertices
     barycentric: NDArray[np.float64]
-    kinds: NDArray[np.int64]
-    elements: NDArray[np.int64]
-    along: NDArray[np.float64]
+    kinds: NDArray[np.int64]  # (n,) `VERTEX`, `EDGE` or `FACE`
+    elements: NDArray[np.int64]  # (n,) id of the vertex, edge or face
+    along: NDArray[np.float64]  # (n,) on edges, the fraction of the way from tail to head; otherwise 0
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -159,27 +146,14 @@ def barycentric_on_edges(
 def edges_between(
     triangles: IntrinsicMesh, faces: NDArray[np.int64], starts: NDArray[np.float64], ends: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(n,) the edge along which a segment in a face runs, given by barycentric coordinates, or −1; and its side there.
-
-    Examples
-    --------
-    >>> one = IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.array([[4.0, 5.0, 3.0]]), 3)
-    >>> edges_between(one, np.array([0, 0]), np.eye(3)[[1, 1]], np.array([[0.0, 0.5, 0.5], [0.5, 0.2, 0.3]]))
-    (array([ 1, -1]), array([1, 1]))
-    """
+    """(n,) the edge along which a segment in a face, by barycentric coordinates, runs, or −1; and its side there."""
     empty = (starts == 0) & (ends == 0)
     sides = (empty.argmax(axis=1) + 1) % 3
     return np.where(empty.any(axis=1), triangles.edges.face_edges[faces, sides], -1), sides
 
 
 def barycentric_on_sides(sides: NDArray[np.int64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3) barycentric coordinates of points at a share of the way along sides of faces.
-
-    Examples
-    --------
-    >>> barycentric_on_sides(np.array([1, 2]), np.array([0.25, 1.0])).tolist()
-    [[0.0, 0.75, 0.25], [1.0, 0.0, 0.0]]
-    """
+    """(n, 3) barycentric coordinates of points at a share of the way along sides of faces."""
     weights, row = np.zeros((len(sides), 3)), np.arange(len(sides))
     weights[row, sides] = 1 - shares
     weights[row, (sides + 1) % 3] = shares
@@ -190,11 +164,6 @@ def crossed_sides(above: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> tuple[
     """Faces that a level set crosses, and the (k, 2) sides at which it enters and leaves: what is above is to its left.
 
     Each corner of each face is above the level, (m, 3), or not; only chosen faces, (m,), are looked at.
-
-    Examples
-    --------
-    >>> crossed_sides(np.array([[True, True, True], [False, True, False]]), np.array([True, True]))
-    (array([1]), array([[1, 0]]))
     """
     faces = np.flatnonzero(chosen & above.any(axis=1) & ~above.all(axis=1))
     here, there = above[faces], np.roll(above[faces], -1, axis=1)

@@ -19,18 +19,10 @@ FACE_CORNERS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 @dataclass(frozen=True, eq=False)
 class FaceTable:
-    """The faces of tets, and how tets and faces are incident.
+    """The faces of tets, and how tets and faces are incident."""
 
-    Attributes
-    ----------
-    vertices : (f, 3) int
-        Vertex ids, counter-clockwise as seen from outside the FIRST tet at the face.
-    tet_faces : (m, 4) int
-        Face opposite each corner of each tet.
-    """
-
-    vertices: NDArray[np.int64]
-    tet_faces: NDArray[np.int64]
+    vertices: NDArray[np.int64]  # (f, 3) vertex ids, counter-clockwise as seen from outside the FIRST tet at the face
+    tet_faces: NDArray[np.int64]  # (m, 4) face opposite each corner of each tet
 
     @cached_property
     def tet_counts(self) -> NDArray[np.int64]:
@@ -50,16 +42,7 @@ class FaceTable:
 
 
 def face_table(tets: NDArray[np.int64]) -> FaceTable:
-    """Find the faces of tets, numbered by first appearance, in linear time.
-
-    Examples
-    --------
-    >>> table = face_table(np.array([[0, 1, 2, 3], [4, 1, 3, 2]]))
-    >>> table.tet_faces.tolist()
-    [[0, 1, 2, 3], [0, 4, 5, 6]]
-    >>> table.tet_counts.tolist(), table.neighbors.tolist()
-    ([2, 1, 1, 1, 1, 1, 1], [[1, -1, -1, -1], [0, -1, -1, -1]])
-    """
+    """Find the faces of tets, numbered by first appearance, in linear time."""
     corners = tets[:, FACE_CORNERS].reshape(-1, 3)
     number, first = distinct_rows(np.sort(corners, axis=1))
     return FaceTable(corners[first], number.reshape(-1, 4))
@@ -67,18 +50,10 @@ def face_table(tets: NDArray[np.int64]) -> FaceTable:
 
 @dataclass(frozen=True, eq=False)
 class TetShapes:
-    """Tets in space.
+    """Tets in space."""
 
-    Attributes
-    ----------
-    vertices : (n, 3) float
-        Positions.
-    tets : (m, 4) int
-        Corners; of positive volume, or degenerate.
-    """
-
-    vertices: NDArray[np.float64]
-    tets: NDArray[np.int64]
+    vertices: NDArray[np.float64]  # (n, 3) positions
+    tets: NDArray[np.int64]  # (m, 4) corners; of positive volume, or degenerate
 
     @cached_property
     def area_vectors(self) -> NDArray[np.float64]:
@@ -116,12 +91,6 @@ class TetShapes:
 
 
 def signed_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(m,) volumes, negative for inverted tets.
-
-    Examples
-    --------
-    >>> signed_volumes(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]])) * 6
-    array([1.])
-    """
+    """(m,) volumes, negative for inverted tets."""
     a, b, c, d = (vertices[tets[:, k]] for k in range(4))
     return np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6

@@ -59,14 +59,7 @@ def welded_vertices(
 
 
 def joined_rims(points: NDArray[np.float64], tails: NDArray[np.int64], heads: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(n,) first vertex at the place of each that is on a rim, as of a seam; other vertices are on their own.
-
-    Examples
-    --------
-    >>> apart = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    >>> joined_rims(apart, np.array([0, 1, 2, 3, 4, 5]), np.array([1, 2, 0, 4, 5, 3])).tolist()
-    [0, 1, 2, 1, 4, 2]
-    """
+    """(n,) first vertex at the place of each that is on a rim, as of a seam; other vertices are on their own."""
     edges, _, counts, _, _ = find_edges(read_only(tails), read_only(heads), tails != heads, len(points))
     is_open = (edges >= 0) & (np.append(counts, 0)[edges] == 1)
     rims, ends = np.unique(np.stack([tails[is_open], heads[is_open]]), return_inverse=True)
@@ -92,61 +85,31 @@ def welded(points: NDArray[np.float64], tolerance: float | NDArray[np.float64]) 
 
     Chains are not followed: a point is compared with such only as stand for themselves. Takes O(n) time as long as few
     points stand for themselves within one cell of 16 tolerances.
-
-    Examples
-    --------
-    >>> welded(np.array([[0.0, 0, 0], [1, 0, 0], [1e-9, 0, 0], [1, 0, 0]]), 1e-6).tolist()
-    [0, 1, 0, 1]
     """
     smallest = float(np.nextafter(np.abs(points).max(initial=0.0), np.inf)) * 2.0**-60
     return _weld(np.ascontiguousarray(points), np.maximum(np.broadcast_to(tolerance, 3), max(smallest, 1e-300)))
 
 
 def same_positions(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(n,) first point at exactly the same position as each of (n, d) points.
-
-    Examples
-    --------
-    >>> same_positions(np.array([[0.0, 1.0], [2.0, 3.0], [-0.0, 1.0]])).tolist()
-    [0, 1, 0]
-    """
+    """(n,) first point at exactly the same position as each of (n, d) points."""
     return same_rows((np.ascontiguousarray(points) + 0.0).view(np.uint64))  # −0 becomes 0
 
 
 def indexed(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """(n, 3) points of (m, 3, 3) triangles in order of first use, and (m, 3) triangles between them.
-
-    Examples
-    --------
-    >>> corners = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [0, 1, 0]]])
-    >>> indexed(corners)[1].tolist()
-    [[0, 1, 2], [1, 3, 2]]
-    """
+    """(n, 3) points of (m, 3, 3) triangles in order of first use, and (m, 3) triangles between them."""
     corners = triangles.reshape(-1, 3)
     used, faces = np.unique(same_positions(corners), return_inverse=True)
     return corners[used], faces.reshape(-1, 3)
 
 
 def same_rows(rows: NDArray[np.integer]) -> NDArray[np.int64]:
-    """(n,) first row that equals each of (n, k) rows, in O(n) time.
-
-    Examples
-    --------
-    >>> same_rows(np.array([[5, 5, 5], [1, 2, 3], [5, 5, 5]])).tolist()
-    [0, 1, 0]
-    """
+    """(n,) first row that equals each of (n, k) rows, in O(n) time."""
     numbers = np.ascontiguousarray(rows)
     return _same_rows(numbers.view(np.int64) if numbers.itemsize == 8 else numbers.astype(np.int64))
 
 
 def distinct_rows(rows: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Number of each of (n, k) rows among the different ones, in order of first appearance; and the first of each kind.
-
-    Examples
-    --------
-    >>> distinct_rows(np.array([[5, 5, 5], [1, 2, 3], [5, 5, 5]]))
-    (array([0, 1, 0]), array([0, 1]))
-    """
+    """Number of each of (n, k) rows among the different ones, in order of first appearance; and the first of each."""
     first = same_rows(rows)
     is_first = first == np.arange(len(first))
     return (np.cumsum(is_first) - 1)[first], np.flatnonzero(is_first)
@@ -158,11 +121,6 @@ def coincident_faces(
     """First face on the same corners as each, and whether it runs the other way round.
 
     Returned: first (p,), reversed (p,).
-
-    Examples
-    --------
-    >>> coincident_faces(np.array([0, 1, 2, 1, 2, 0, 0, 2, 1, 3, 3, 1]), np.array([0, 3, 6, 9, 12]))
-    (array([ 0,  0,  0, -1]), array([False, False,  True, False]))
     """
     sizes = np.diff(offsets)
     first, reverse = np.arange(len(sizes)), np.zeros(len(sizes), dtype=bool)

@@ -24,61 +24,35 @@ class FaceFeatures(NamedTuple):
     An edge is regular if exactly two faces share it, run along it in opposite directions and do not lie on each other;
     a vertex is, if all edges around it are and its faces make one fan. There the sign of ``(x − y) · normal`` is the
     side of a point x whose nearest place is y.
-
-    Attributes
-    ----------
-    corners : (m, 9) float
-        Corners of the faces, each face once, in the order of a space-filling curve.
-    rows : (m, 16) float
-        The same as `foot_on_triangle` wants it.
-    vertices : (n, 3) float
-        Their positions.
-    faces, edges : (m, 3) int
-        Vertices, which are different where positions are; and edges, corner k to corner k + 1.
-    face_normals, edge_normals, vertex_normals : (·, 3) float
-        Unit normals of the faces, their sums at edges, and angle-weighted at vertices.
-    edge_regular, vertex_regular : (·,) bool
-        Whether the surface is closed and consistent there.
-    across, apexes : (m, 3) int
-        The face on the other side of each edge, and its vertex that is not on it; −1 where the edge is not regular.
-    vertex_starts, vertex_corners : (n + 1,), (3 m,) int
-        Corners around each vertex, in compressed rows: three times the face, plus 0, 1 or 2.
-    trusted : (m,) float
-        Confidence in each face: 1 where it was there, less where it was put back.
-    ids : (m,) int
-        Which of the triangles given each is.
     """
 
-    corners: NDArray[np.float64]
-    rows: NDArray[np.float64]
-    vertices: NDArray[np.float64]
+    corners: NDArray[np.float64]  # (m, 9) corners of the faces, each face once, in the order of a space-filling curve
+    rows: NDArray[np.float64]  # (m, 16) the same as `foot_on_triangle` wants it
+    vertices: NDArray[np.float64]  # (n, 3) their positions
+    # (m, 3) vertices, which are different where positions are; and edges, corner k to corner k + 1
     faces: NDArray[np.int32]
     edges: NDArray[np.int32]
+    # (·, 3) unit normals of the faces, their sums at edges, and angle-weighted at vertices
     face_normals: NDArray[np.float64]
     edge_normals: NDArray[np.float64]
     vertex_normals: NDArray[np.float64]
+    # (·,) whether the surface is closed and consistent there
     edge_regular: NDArray[np.bool_]
     vertex_regular: NDArray[np.bool_]
+    # (m, 3) the face on the other side of each edge, and its vertex that is not on it; −1 where the edge is not regular
     across: NDArray[np.int32]
     apexes: NDArray[np.int32]
+    # (n + 1,) and (3 m,): corners around each vertex, in compressed rows: three times the face, plus 0, 1 or 2
     vertex_starts: NDArray[np.int64]
     vertex_corners: NDArray[np.int32]
-    trusted: NDArray[np.float32]
-    ids: NDArray[np.int64]
+    trusted: NDArray[np.float32]  # (m,) confidence in each face: 1 where it was there, less where it was put back
+    ids: NDArray[np.int64]  # (m,) which of the triangles given each is
 
     @classmethod
     def of(
         cls, vertices: NDArray[np.float64], faces: NDArray[np.int64], trusted: NDArray[np.float32] | None = None
     ) -> FaceFeatures:
-        """Features of (m, 3) faces. Vertices at one position are one; faces without extent and copies are left out.
-
-        Examples
-        --------
-        >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]])
-        >>> features = FaceFeatures.of(np.eye(4)[:, :3], faces)
-        >>> len(features.corners), bool(features.edge_regular.all())
-        (4, True)
-        """
+        """Features of (m, 3) faces. Vertices at one position are one; faces without extent and copies are left out."""
         faces = same_positions(vertices)[faces]
         trusted = np.ones(len(faces), dtype=np.float32) if trusted is None else trusted
         ids = np.arange(len(faces))

@@ -34,18 +34,10 @@ grows with distance, nor the other angle then moves the nearest place by more th
 
 @dataclass(frozen=True, eq=False)
 class FaceTree:
-    """Faces, and a tree of boxes around them.
-
-    Attributes
-    ----------
-    features : FaceFeatures
-        The faces.
-    tree : BoxTree
-        Over their boxes.
-    """
+    """Faces, and a tree of boxes around them."""
 
     features: FaceFeatures
-    tree: BoxTree
+    tree: BoxTree  # over their boxes
 
     @classmethod
     def of(cls, features: FaceFeatures) -> FaceTree:
@@ -153,29 +145,15 @@ STEPS = 24
 
 @dataclass(frozen=True, eq=False)
 class NearestFaces:
-    """The nearest face of each of some points.
+    """The nearest face of each of some points."""
 
-    Attributes
-    ----------
-    faces : (n,) int
-        Which one.
-    distances : (n,) float
-        To it.
-    places : (n, 3) float
-        The nearest place.
-    features : (n,) int
-        What it lies on, in the code of `foot_on_triangle`.
-    cosines : (n,) float
-        Of the angle between the way from the foot to the point and the normal there: positive in front of the face.
-    regular : (n,) bool
-        Whether that decides the side: the nearest place is inside a face, or on a regular edge or vertex.
-    """
-
-    faces: NDArray[np.int32]
-    distances: NDArray[np.float64]
-    places: NDArray[np.float64]
-    features: NDArray[np.int8]
+    faces: NDArray[np.int32]  # (n,) which one
+    distances: NDArray[np.float64]  # (n,) to it
+    places: NDArray[np.float64]  # (n, 3) the nearest place
+    features: NDArray[np.int8]  # (n,) what it lies on, in the code of `foot_on_triangle`
+    # (n,) of the angle between the way from the foot to the point and the normal there: positive in front of the face
     cosines: NDArray[np.float32]
+    # (n,) whether that decides the side: the nearest place is inside a face, or on a regular edge or vertex
     regular: NDArray[np.bool_]
 
 

@@ -198,18 +198,10 @@ def weights_in(triangles: NDArray[np.float64], places: NDArray[np.float64]) -> N
 
 @dataclass(frozen=True, eq=False)
 class TriangleTree:
-    """Triangles in a tree of boxes, in which the nearest to points are found.
+    """Triangles in a tree of boxes, in which the nearest to points are found."""
 
-    Attributes
-    ----------
-    rows : (m, 16) float
-        The triangles, as `triangle_rows` gives them.
-    tree : BoxTree
-        Of their bounding boxes.
-    """
-
-    rows: NDArray[np.float64]
-    tree: BoxTree
+    rows: NDArray[np.float64]  # (m, 16) the triangles, as `triangle_rows` gives them
+    tree: BoxTree  # of their bounding boxes
 
     @classmethod
     def of(cls, triangles: NDArray[np.float64]) -> TriangleTree:
@@ -222,15 +214,7 @@ class TriangleTree:
         return np.full((len(self.tree.bounds), 8), -1.0)
 
     def nearest(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Closest triangle to each of (k, 3) points, and barycentric coordinates of the closest point in it.
-
-        Examples
-        --------
-        >>> tree = TriangleTree.of(np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]))
-        >>> faces, weights = tree.nearest(np.array([[0.5, -1.0, 3.0], [2.0, 2.0, 0.0]]))
-        >>> faces.tolist(), weights.round(9).tolist()
-        ([0, 0], [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]])
-        """
+        """Closest triangle to each of (k, 3) points, and barycentric coordinates of the closest point in it."""
         points = np.ascontiguousarray(points)
         found, _ = nearest_faces(self.rows, self.tree, self._no_discs, points, TOGETHER * max(len(points), 1))
         return found.astype(np.int64), barycentric_on_triangles(self.rows, found, points)

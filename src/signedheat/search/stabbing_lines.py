@@ -21,27 +21,13 @@ from ..mesh.components import grouped
 
 @dataclass(frozen=True, eq=False)
 class LineCrossings:
-    """Where lines cross triangles, line after line and along each in order.
+    """Where lines cross triangles, line after line and along each in order."""
 
-    Attributes
-    ----------
-    starts : (n_lines + 1,) int
-        Where the crossings of each line begin.
-    crossed : (k,) int
-        Triangle of each crossing, or the face that it is part of.
-    entering : (k,) bool
-        Whether the line comes from the side to which the triangle's normal points.
-    depths : (k,) float
-        Place along the line, in units of length.
-    cosines : (k,) float
-        Of the angle between line and normal, not negative.
-    """
-
-    starts: NDArray[np.int64]
-    crossed: NDArray[np.integer]
-    entering: NDArray[np.bool_]
-    depths: NDArray[np.float64]
-    cosines: NDArray[np.float64]
+    starts: NDArray[np.int64]  # (n_lines + 1,) where the crossings of each line begin
+    crossed: NDArray[np.integer]  # (k,) triangle of each crossing, or the face that it is part of
+    entering: NDArray[np.bool_]  # (k,) whether the line comes from the side to which the triangle's normal points
+    depths: NDArray[np.float64]  # (k,) place along the line, in units of length
+    cosines: NDArray[np.float64]  # (k,) of the angle between line and normal, not negative
 
     def chosen(self, kept: NDArray[np.bool_]) -> LineCrossings:
         """Some of the crossings, of as many lines."""
@@ -60,14 +46,6 @@ def stabbing_lines(
 
     Lines that pass between triangles which share an edge by vertex ids cross exactly one of them. Many may miss the
     shape. `bounds`, (2, 3), is a box around it.
-
-    Examples
-    --------
-    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
-    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
-    >>> lines = stabbing_lines(corners, faces, np.array([[0, 0, 0], [1, 1, 1]]), 1000)
-    >>> sorted(set(np.diff(lines.starts).tolist()))
-    [0, 2]
     """
     frames = line_frames(n_directions)
     center, half = 0.5 * (bounds[0] + bounds[1]), 0.5 * (bounds[1] - bounds[0])

@@ -29,28 +29,10 @@ OPENING = 1.25
 
 @dataclass(frozen=True, eq=False)
 class WindingTree:
-    """Triangles in a tree, of which each node can replace its triangles for points far away.
+    """Triangles in a tree, of which each node can replace its triangles for points far away."""
 
-    Attributes
-    ----------
-    triangles : (m, 3, 3) float
-        Their corners, counterclockwise from outside.
-    tree : BoxTree
-        Over their boxes.
-
-    Examples
-    --------
-    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    >>> faces = corners[np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])]
-    >>> tree = WindingTree.of(faces)
-    >>> tree.numbers(np.array([[0.2, 0.2, 0.2], [1, 1, 1]])).round(2).tolist()
-    [1.0, 0.0]
-    >>> tree.behind(np.arange(4), faces.mean(axis=1)).round(2).tolist()
-    [1.0, 1.0, 1.0, 1.0]
-    """
-
-    triangles: NDArray[np.float64]
-    tree: BoxTree
+    triangles: NDArray[np.float64]  # (m, 3, 3) their corners, counterclockwise from outside
+    tree: BoxTree  # over their boxes
 
     @classmethod
     def of(cls, triangles: NDArray[np.float64]) -> WindingTree:

@@ -22,17 +22,10 @@ ROUND = 0.15
 
 @dataclass(frozen=True, eq=False)
 class CurveGroups:
-    """Groups of open oriented curves.
+    """Groups of open oriented curves."""
 
-    Attributes
-    ----------
-    lengths : (g,) float
-        Of all pieces of each.
-    scales : (g,) float
-        Mean length of the pieces of each, by length; of a single piece, which is bent nearly to a circle, less.
-    """
-
-    lengths: NDArray[np.float64]
+    lengths: NDArray[np.float64]  # (g,) of all pieces of each
+    # (g,) mean length of the pieces of each, by length; of a single piece, which is bent nearly to a circle, less
     scales: NDArray[np.float64]
 
     @classmethod

@@ -18,24 +18,15 @@ TIE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class CurveSides:
-    """The sides of the vertices of a surface, as far as oriented curves decide them.
+    """The sides of the vertices of a surface, as far as oriented curves decide them."""
 
-    Attributes
-    ----------
-    regions : (n,) int
-        1 or −1 in regions that the curves bound from one side only, without a free end in it; 0 elsewhere.
-    nearby : (n,) int
-        The side of the nearest segment among those in the faces at a vertex; 0 where there is none, and near free
-        ends.
-    reach : (n,) float
-        Distance to that segment; inf where there is none.
-    free_ends : (k,) int
-        Nodes at which curves end, away from the boundary of the surface, or run head to head.
-    """
-
+    # (n,) 1 or −1 in regions that the curves bound from one side only, without a free end in it; 0 elsewhere
     regions: NDArray[np.int64]
+    # (n,) the side of the nearest segment among those in the faces at a vertex; 0 where there is none, and near free
+    # ends
     nearby: NDArray[np.int64]
-    reach: NDArray[np.float64]
+    reach: NDArray[np.float64]  # (n,) distance to that segment; inf where there is none
+    # (k,) nodes at which curves end, away from the boundary of the surface, or run head to head
     free_ends: NDArray[np.int64]
 
 

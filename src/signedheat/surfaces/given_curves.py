@@ -19,13 +19,7 @@ ONE_POINT = 1e-14
 
 
 def is_element_list(source: object) -> bool:
-    """Whether something is a curve in the format of potpourri3d: a list of (element, barycentric coordinates).
-
-    Examples
-    --------
-    >>> is_element_list([(3, []), (7, [0.5])]), is_element_list([3, 7])
-    (True, False)
-    """
+    """Whether something is a curve in the format of potpourri3d: a list of (element, barycentric coordinates)."""
     return (
         isinstance(source, Sequence)
         and len(source) > 0

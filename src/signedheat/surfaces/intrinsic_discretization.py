@@ -94,14 +94,7 @@ def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
 
 
 def is_spoiled(mesh: TriangleMesh) -> bool:
-    """Whether so much of the area has a large angle, or is needles, that the mesh is to be refined.
-
-    Examples
-    --------
-    >>> strip = TriangleMesh([[0, 0, 0], [8, 0, 0], [0, 1, 0], [8, 1, 0]], [[0, 1, 2], [1, 3, 2]])
-    >>> is_spoiled(strip), is_spoiled(TriangleMesh(strip.vertices * [0.5, 1, 1], strip.faces))
-    (True, False)
-    """
+    """Whether so much of the area has a large angle, or is needles, that the mesh is to be refined."""
     a, b, c = np.sort(mesh.edge_lengths[mesh.edges.face_edges], axis=1).T
     areas = mesh.face_areas
     total = max(float(areas.sum()), 1e-300)

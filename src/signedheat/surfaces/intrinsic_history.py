@@ -33,24 +33,14 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 
 
 class Lines(NamedTuple):
-    """Straight lines, one row for each face that one of them crosses, in order along each line.
+    """Straight lines, one row for each face that one of them crosses, in order along each line."""
 
-    Attributes
-    ----------
-    owners : (r,) int
-        Which line.
-    faces : (r,) int
-        The face crossed.
-    starts, ends : (r, 3) float
-        Barycentric coordinates of where the line enters and leaves the face.
-    vectors : (r, k, 3) float
-        Vectors transported along the line, as differences of barycentric coordinates.
-    """
-
-    owners: NDArray[np.int64]
-    faces: NDArray[np.int64]
+    owners: NDArray[np.int64]  # (r,) which line
+    faces: NDArray[np.int64]  # (r,) the face crossed
+    # (r, 3) barycentric coordinates of where the line enters and leaves the face
     starts: NDArray[np.float64]
     ends: NDArray[np.float64]
+    # (r, k, 3) vectors transported along the line, as differences of barycentric coordinates
     vectors: NDArray[np.float64]
 
     def chosen(self, rows: NDArray[np.int64]) -> Lines:
@@ -60,18 +50,12 @@ class Lines(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class History(Frozen):
-    """Two triangulations of one surface and the steps from one to the other.
+    """Two triangulations of one surface and the steps from one to the other."""
 
-    Attributes
-    ----------
-    before, after : IntrinsicMesh
-        Vertices of `before` keep their ids; new ones follow.
-    steps, weights : (n, 4) int and float
-        As `gluing_kernels.record` writes them.
-    """
-
+    # vertices of `before` keep their ids; new ones follow
     before: IntrinsicMesh
     after: IntrinsicMesh
+    # (n, 4) as `gluing_kernels.record` writes them
     steps: NDArray[np.int64]
     weights: NDArray[np.float64]
 

@@ -33,24 +33,12 @@ from .intrinsic_history import History, misplaced_lines, straight_lines
 
 @dataclass(frozen=True, eq=False)
 class ConformingRefinement(Frozen):
-    """Triangles cut so that some curves run along edges.
+    """Triangles cut so that some curves run along edges."""
 
-    Attributes
-    ----------
-    triangles : IntrinsicMesh
-        After the cuts; old vertices first.
-    marked : (e,) bool
-        Edges along which the curves run.
-    parents : (m,) int
-        The face, before the cuts, that each face is part of.
-    corners : (m, 3, 3) float
-        Barycentric coordinates of the corners of each face in its parent.
-    """
-
-    triangles: IntrinsicMesh
-    marked: NDArray[np.bool_]
-    parents: NDArray[np.int64]
-    corners: NDArray[np.float64]
+    triangles: IntrinsicMesh  # after the cuts; old vertices first
+    marked: NDArray[np.bool_]  # (e,) edges along which the curves run
+    parents: NDArray[np.int64]  # (m,) the face, before the cuts, that each face is part of
+    corners: NDArray[np.float64]  # (m, 3, 3) barycentric coordinates of the corners of each face in its parent
 
     @classmethod
     def of(

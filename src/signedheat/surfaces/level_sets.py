@@ -54,13 +54,6 @@ def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
     """Curves whose points differ: those in a row that differ by rounding alone are one, and one alone is no curve.
 
     Of points less than `SAME` of a face's least height apart the last stays, whose face holds what follows.
-
-    Examples
-    --------
-    >>> import signedheat as sh
-    >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    >>> without_repeats(mesh, [Curve([0, 0, 0], [[1, 0, 0], [0, 1 - 1e-12, 1e-12], [0, 1, 0]])])
-    [Curve(2 points, open, oriented)]
     """
     found = []
     for curve in curves:
@@ -79,14 +72,7 @@ def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
 
 
 def snapped(values: NDArray[np.float64], ends: NDArray[np.int64], level: float) -> NDArray[np.float64]:
-    """Values; those that differ from a level by rounding only are set to that level.
-
-    Examples
-    --------
-    >>> chain = np.array([[0, 1], [1, 2]])
-    >>> snapped(np.array([-1.0, 1e-16, 2.0]), chain, 0.0).tolist()
-    [-1.0, 0.0, 2.0]
-    """
+    """Values; those that differ from a level by rounding only are set to that level."""
     with np.errstate(invalid="ignore"):  # values may be infinite
         steps = np.abs(values[ends[:, 0]] - values[ends[:, 1]])
     steps[~np.isfinite(steps)] = 0.0

@@ -55,17 +55,10 @@ _CHUNK = 65536
 
 @dataclass(frozen=True, eq=False)
 class LocalTriangulations:
-    """Triangles on points.
+    """Triangles on points."""
 
-    Attributes
-    ----------
-    faces : (m, 3) int
-        Point ids, oriented alike as far as the surface allows.
-    normals : (n, 3) float
-        Unit normals, on the side from which the faces at each point run counter-clockwise.
-    """
-
-    faces: NDArray[np.int64]
+    faces: NDArray[np.int64]  # (m, 3) point ids, oriented alike as far as the surface allows
+    # (n, 3) unit normals, on the side from which the faces at each point run counter-clockwise
     normals: NDArray[np.float64]
 
 
@@ -83,12 +76,6 @@ def local_triangulations(
     -----
     Where the local triangulations disagree, triangles are split at points that all proposals have left out, and small
     holes are filled.
-
-    Examples
-    --------
-    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    >>> local_triangulations(square, np.tile([0.0, 0, 1], (4, 1)), n_neighbors=3).faces.tolist()
-    [[0, 1, 2], [0, 2, 3]]
     """
     planes = TangentPlanes.of(points, normals, n_neighbors)
     faces, candidates = joined_triangles(planes)
@@ -137,33 +124,15 @@ def islands(planes: TangentPlanes, faces: NDArray[np.int64]) -> NDArray[np.bool_
 
 @dataclass(frozen=True, eq=False)
 class TangentPlanes:
-    """Tangent planes at points, into which their neighbours are unfolded.
+    """Tangent planes at points, into which their neighbours are unfolded."""
 
-    Attributes
-    ----------
-    points : (n, 3) float
-        Positions.
-    normals : (n, 3) float
-        Unit normals of the planes.
-    axes : (n, 2, 3) float
-        Two axes in each plane.
-    outward : (n, 3) float
-        Unit vectors in the planes, away from the neighbours on the same side.
-    neighbors : (n, k) int
-        Ids of the nearest points, where those with other normals count as farther.
-    reach : (n,) float
-        Distance to the last of them, counted so.
-    flat : (n,) float
-        Height over the plane up to which points lie in it.
-    """
-
-    points: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    axes: NDArray[np.float64]
-    outward: NDArray[np.float64]
-    neighbors: NDArray[np.int64]
-    reach: NDArray[np.float64]
-    flat: NDArray[np.float64]
+    points: NDArray[np.float64]  # (n, 3) positions
+    normals: NDArray[np.float64]  # (n, 3) unit normals of the planes
+    axes: NDArray[np.float64]  # (n, 2, 3) two axes in each plane
+    outward: NDArray[np.float64]  # (n, 3) unit vectors in the planes, away from the neighbours on the same side
+    neighbors: NDArray[np.int64]  # (n, k) ids of the nearest points, where those with other normals count as farther
+    reach: NDArray[np.float64]  # (n,) distance to the last of them, counted so
+    flat: NDArray[np.float64]  # (n,) height over the plane up to which points lie in it
 
     @classmethod
     def of(cls, points: NDArray[np.float64], normals: NDArray[np.float64], n_neighbors: int) -> TangentPlanes:
@@ -236,12 +205,6 @@ def turned_alike(
 
     On the same side a normal may be turned by mistake, and is turned back: where the other point lies in the tangent
     plane, or is below the point and the point above it.
-
-    Examples
-    --------
-    >>> up, down = np.array([0.0, 0, 1]), np.array([[0.0, 0, -1], [0, 0, -1]])
-    >>> turned_alike(np.array([[1.0, 0, -1], [1, 0, 0]]), up, down, np.array(0.1))[1].tolist()
-    [True, False]
     """
     contrary = dot(normal, others) < OPPOSITE
     over, under = dot(offsets, normal), -dot(offsets, others)
@@ -351,12 +314,6 @@ def split_at_points_left(
 
     Tangent planes around such a point lie so differently that each triangle proposed at it overlaps others. Points
     without candidates are outliers.
-
-    Examples
-    --------
-    >>> corners = np.array([[0.0, 0, 0], [3, 0, 0], [0, 3, 0], [1, 1, 0.5], [1, 1, 9]])
-    >>> split_at_points_left(corners, np.array([[0, 1, 2]]), np.array([[0, 1, 2], [0, 1, 3]])).tolist()
-    [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
     """
     while len(left := np.setdiff1d(candidates, faces)):
         nearest, _ = TriangleTree.of(points[faces]).nearest(points[left])

@@ -189,23 +189,14 @@ _SLIVER = 1e-6  # a fan triangle whose area is less than this fraction of its po
 
 @dataclass(frozen=True, eq=False)
 class VirtualRefinement:
-    """Triangles that subdivide polygons.
+    """Triangles that subdivide polygons."""
 
-    Attributes
-    ----------
-    faces : (m, 3) int
-        Vertex ids; virtual vertices follow the given ones. Polygon after polygon, side after side.
-    face_polygons : (m,) int
-        Polygon that each triangle is part of.
-    virtual_vertices : (q, 3) float
-        Positions.
-    prolongation : (n + q, n) sparse
-        P: identity on the given vertices; each virtual vertex is an affine combination of the corners of its polygon.
-    """
-
+    # (m, 3) vertex ids; virtual vertices follow the given ones. Polygon after polygon, side after side.
     faces: NDArray[np.int64]
-    face_polygons: NDArray[np.int64]
-    virtual_vertices: NDArray[np.float64]
+    face_polygons: NDArray[np.int64]  # (m,) polygon that each triangle is part of
+    virtual_vertices: NDArray[np.float64]  # (q, 3) positions
+    # (n + q, n) P: identity on the given vertices; each virtual vertex is an affine combination of the corners of its
+    # polygon
     prolongation: sparse.csr_matrix
 
 

@@ -145,24 +145,12 @@ def nearest_zero(
 
 @dataclass(frozen=True, eq=False)
 class CurvesThere:
-    """The curves on the triangles of a surface, and exact distance to them.
+    """The curves on the triangles of a surface, and exact distance to them."""
 
-    Attributes
-    ----------
-    placed : PlacedSegments
-        All of them.
-    distance : (n,) float
-        Of every vertex to them.
-    sides : CurveSides
-        Those of the oriented ones.
-    windows : int
-        A measure of the work.
-    """
-
-    placed: PlacedSegments
-    distance: NDArray[np.float64]
-    sides: CurveSides
-    windows: int
+    placed: PlacedSegments  # all of them
+    distance: NDArray[np.float64]  # (n,) of every vertex to them
+    sides: CurveSides  # those of the oriented ones
+    windows: int  # a measure of the work
 
     @classmethod
     def on(

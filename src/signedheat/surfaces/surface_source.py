@@ -30,42 +30,20 @@ from .source_segments import segments_of_each
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSource(Frozen):
-    """Curves and points, lowered to an intrinsic mesh.
+    """Curves and points, lowered to an intrinsic mesh."""
 
-    Attributes
-    ----------
-    vectors : (1, e) complex sparse
-        X₀, in the frames of the edges.
-    time : float
-        t of Eq. 12.
-    interpolation : (s, n_vertices) sparse
-        Row i interpolates φ at sample i; samples are the distinct points of every source.
-    weights : (s,) float
-        Length of curve that belongs to each sample; h for isolated points.
-    components : (s,) int
-        Connected component of the union of all sources, numbered by first appearance.
-    source_ids : (s,) int
-        Source that each sample belongs to.
-    oriented : bool
-        Whether any source is oriented; if none is, φ is an unsigned distance.
-    triangles : IntrinsicMesh
-        The triangles that the sources are lowered to; the first vertices are those of the domain's own triangles.
-    parts : list of CurveSegments
-        The sources on these triangles.
-    extrapolated : bool
-        Whether directions are to be extrapolated in t.
-    """
-
-    vectors: csr_array
-    time: float
+    vectors: csr_array  # (1, e) X₀, in the frames of the edges
+    time: float  # t of Eq. 12.
+    # (s, n_vertices) row i interpolates φ at sample i; samples are the distinct points of every source
     interpolation: csr_matrix
-    weights: NDArray[np.float64]
-    components: NDArray[np.int64]
-    source_ids: NDArray[np.int64]
-    oriented: bool
+    weights: NDArray[np.float64]  # (s,) length of curve that belongs to each sample; h for isolated points
+    components: NDArray[np.int64]  # (s,) connected component of the union of all sources, numbered by first appearance
+    source_ids: NDArray[np.int64]  # (s,) source that each sample belongs to
+    oriented: bool  # whether any source is oriented; if none is, φ is an unsigned distance
+    # the triangles that the sources are lowered to; the first vertices are those of the domain's own triangles
     triangles: IntrinsicMesh
-    parts: Sequence[CurveSegments]
-    extrapolated: bool = False
+    parts: Sequence[CurveSegments]  # the sources on these triangles
+    extrapolated: bool = False  # whether directions are to be extrapolated in t
 
     @cached_property
     def ending(self) -> NDArray[np.bool_]:
@@ -116,14 +94,6 @@ def surface_source(
         h: mean distance between unknowns. An isolated point has the weight of a curve of this length.
     positions : (n_vertices, 3) float, optional
         Vertices in space, for curves whose normals are given.
-
-    Examples
-    --------
-    >>> from signedheat import Curve
-    >>> triangles = IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.ones((1, 3)), 3)
-    >>> across = Curve([0, 0], [[0.5, 0.5, 0.0], [0.5, 0.0, 0.5]])
-    >>> surface_source(triangles, [across], 1.0, 0.5).weights
-    array([0.25, 0.25])
     """
     groups = segments_of_each(sources, triangles, positions)
     parts = [part for group in groups for part in group]

@@ -21,38 +21,18 @@ _WIDEST, _NARROWEST = 1e3, 1e-3  # of blurs, in extents of the volume and in vox
 
 @dataclass(frozen=True, eq=False)
 class Surfels:
-    """Boundary squares of a set of voxels.
+    """Boundary squares of a set of voxels."""
 
-    Attributes
-    ----------
-    corners : (m, 4) int
-        Vertex ids, counter-clockwise seen from outside.
-    vertices : (n, 3) int
-        Lattice points: corner ``(i, j, k)`` is where voxel ``(i, j, k)`` begins.
-    voxels : (m, 3) int
-        The voxel inside each surfel.
-    axes : (m,) int
-        Axis to which the surfel is orthogonal.
-    signs : (m,) int
-        +1 where the outward normal points along the positive axis, −1 where along the negative one.
-    """
-
-    corners: NDArray[np.int64]
-    vertices: NDArray[np.int64]
-    voxels: NDArray[np.int64]
-    axes: NDArray[np.int64]
+    corners: NDArray[np.int64]  # (m, 4) vertex ids, counter-clockwise seen from outside
+    vertices: NDArray[np.int64]  # (n, 3) lattice points: corner ``(i, j, k)`` is where voxel ``(i, j, k)`` begins
+    voxels: NDArray[np.int64]  # (m, 3) the voxel inside each surfel
+    axes: NDArray[np.int64]  # (m,) axis to which the surfel is orthogonal
+    # (m,) +1 where the outward normal points along the positive axis, −1 where along the negative one
     signs: NDArray[np.int64]
 
 
 def boundary_surfels(volume: NDArray[np.bool_]) -> Surfels:
-    """Surfels of a volume, in order of their voxels; everything beyond the array is outside.
-
-    Examples
-    --------
-    >>> found = boundary_surfels(np.ones((1, 1, 1), dtype=bool))
-    >>> len(found.corners), len(found.vertices)
-    (6, 8)
-    """
+    """Surfels of a volume, in order of their voxels; everything beyond the array is outside."""
     voxels, axes, signs = [], [], []
     for axis in range(3):
         for sign in (-1, 1):
@@ -82,13 +62,7 @@ def boundary_surfels(volume: NDArray[np.bool_]) -> Surfels:
 
 
 def count_surfels(volume: NDArray[np.bool_]) -> int:
-    """Number of boundary squares of a set of voxels, found slice by slice.
-
-    Examples
-    --------
-    >>> count_surfels(np.ones((2, 1, 1), dtype=bool))
-    10
-    """
+    """Number of boundary squares of a set of voxels, found slice by slice."""
     total = 0
     for axis in range(3):
         before: NDArray[np.bool_] | bool = False
