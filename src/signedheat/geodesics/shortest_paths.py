@@ -35,16 +35,8 @@ def join(
 ) -> tuple[LocatedPoints, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Join pairs of points, by geodesic paths where the two share no face, as segments that lie in one face each.
 
-    `name` is what the points belong to, for messages.
-
-    Returns
-    -------
-    located : LocatedPoints
-        All points, the given ones first.
-    start, end : (s,) int
-        The points that each segment joins, in order.
-    pairs : (s,) int
-        The pair that each segment belongs to.
+    Returns all points, the given ones first; the two that each segment (s,) joins, in order; and the pair that it
+    belongs to. `name` is what the points belong to, for messages.
     """
     apart = np.flatnonzero(shared_faces(triangles, located[start], located[end]) < 0)
     added = np.zeros(len(start), dtype=np.int64)

@@ -333,23 +333,9 @@ def diffuse_by_sweeps(
 ) -> NDArray[np.float32]:
     """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j``, Eq. 12, with no flux through the walls.
 
-    Parameters
-    ----------
-    sources : NodeSources
-        B, on a grid of (l₀, l₁, l₂, n) nodes.
-    active : (l₀, l₁, l₂, ⌈n / STRETCH⌉) bool
-        Stretches in which to solve.
-    ratios : (4,) float
-        a = t / h² along each axis.
-    rounds : int
-        How often each combination of sweep directions is used.
-    given : (l₀, l₁, l₂, n, 4) float32, optional
-        X in all other stretches, zero by default; overwritten.
-
-    Returns
-    -------
-    (l₀, l₁, l₂, n, 4) float32
-        X; memory outside the active stretches is never touched, so that it costs nothing.
+    It is solved in the `active` stretches, (l₀, l₁, l₂, ⌈n / STRETCH⌉), of a grid of (l₀, l₁, l₂, n) nodes, whose
+    `ratios`, (4,), are a = t / h². X, (l₀, l₁, l₂, n, 4), is `given` elsewhere and overwritten; by default it is zero,
+    and its memory there is never touched, so that it costs nothing.
     """
     shape = sources.shape
     vectors = untouched_zeros((*shape, 4), np.float32) if given is None else given

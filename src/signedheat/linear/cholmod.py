@@ -16,14 +16,9 @@ cholmod: Any = lazy_module("sksparse.cholmod", "factors of CHOLMOD")
 
 
 class CholmodFactor:
-    """Supernodal Cholesky factor of a Hermitian positive definite matrix.
+    """Supernodal Cholesky factor of a Hermitian positive definite matrix, from its upper triangle.
 
-    Parameters
-    ----------
-    upper : sparse CSR, float64 or complex128
-        Upper triangle.
-    order : (n,) int, optional
-        Elimination order: ``order[k]`` is the unknown eliminated k-th. Without it, CHOLMOD finds one.
+    ``order[k]`` is the unknown eliminated k-th; without it, CHOLMOD finds an order.
     """
 
     backend = "cholmod"

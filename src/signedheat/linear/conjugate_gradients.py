@@ -22,26 +22,10 @@ def conjugate_gradients(
     """Solve ``A x = b``, A symmetric and positive definite; or semidefinite, with b within its range.
 
     Preconditioned conjugate gradients (Hestenes & Stiefel 1952; Saad, *Iterative Methods for Sparse Linear Systems*,
-    2nd ed., Alg. 9.1). A system stops once ``rᵀ P r ≤ tolerance² · max(r₀ᵀ P r₀, bᵀ P b)``, P the preconditioner and r
-    the residual that the recurrence keeps; once A has no curvature left along the search direction; all of them after
-    `limit` steps, or once `converged` says so.
-
-    Parameters
-    ----------
-    operator : callable
-        A times an array of the shape of `rhs`.
-    rhs : (n,) or (n, k) float
-        b; each column is a system of its own.
-    precondition : callable, optional
-        P, about A⁻¹ and symmetric positive definite; by default the identity.
-    start : array of the shape of `rhs`, optional
-        Zero by default.
-    tolerance : float
-        Of the stopping criterion; zero leaves it to `converged` and `limit`.
-    limit : int
-        Most steps.
-    converged : callable, optional
-        From x and r, whether to stop.
+    2nd ed., Alg. 9.1). `operator` is A, `precondition` P, about A⁻¹ and positive definite, by default the identity;
+    each column of `rhs`, (n,) or (n, k), is a system of its own. One stops once ``rᵀ P r ≤ tolerance² · max(r₀ᵀ P r₀,
+    bᵀ P b)``, r the residual that the recurrence keeps; once A has no curvature left along the search direction; all of
+    them after `limit` steps, or once `converged` says so, of x and r.
 
     Examples
     --------

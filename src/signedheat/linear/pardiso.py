@@ -30,14 +30,9 @@ _CAUSES = {
 
 
 class PardisoFactor:
-    """Cholesky factor of a Hermitian positive definite matrix; its memory is released with the object.
+    """Cholesky factor of a Hermitian positive definite matrix, from its `upper_triangle`; memory goes with the object.
 
-    Parameters
-    ----------
-    upper : sparse CSR, float64 or complex128
-        Upper triangle, as `upper_triangle` makes it.
-    order : (n,) int, optional
-        Elimination order: ``order[k]`` is the unknown eliminated k-th. Without it, METIS finds one.
+    ``order[k]`` is the unknown eliminated k-th; without it, METIS finds an order.
     """
 
     backend = "pardiso"

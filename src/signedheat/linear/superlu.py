@@ -20,15 +20,10 @@ from .ordering import elimination_order
 
 
 class SuperLUFactor:
-    """LU factor without pivoting of a Hermitian positive definite matrix.
+    """LU factor without pivoting of a Hermitian positive definite matrix, from its upper triangle.
 
-    Parameters
-    ----------
-    upper : sparse CSR, float64 or complex128
-        Upper triangle.
-    order : (n,) int, optional
-        Elimination order: ``order[k]`` is the unknown eliminated k-th. Without it, nested dissection finds one: with
-        SuperLU's own minimum degree, surfaces of 100 000 unknowns take minutes instead of a second.
+    ``order[k]`` is the unknown eliminated k-th; without it, nested dissection finds an order: with SuperLU's own
+    minimum degree, surfaces of 100 000 unknowns take minutes instead of a second.
     """
 
     backend = "superlu"

@@ -46,27 +46,10 @@ def cut_along(
     unfit: Sequence[bool] | None = None,
     begin: NDArray[np.int64] | None = None,
 ) -> tuple[IntrinsicMesh, MergedSources, NDArray[np.bool_], NDArray[np.int64]]:
-    """Cut faces so that sources run along edges.
+    """Cut faces so that sources run along edges: triangles, sources on them, which faces are new, and their parents.
 
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        The surface.
-    parts : sequence of CurveSegments
-        The sources.
-    unfit : sequence of bool, optional
-        Which of them must run along edges; all by default. Others are cut only in faces, and at edges, that these cut.
-    begin : (m,) int, optional
-        The corner at which each face begins, on which the triangles that it is cut into depend; the first by default.
-
-    Returns
-    -------
-    triangles : IntrinsicMesh
-        After the cuts; the same where there are none.
-    merged : MergedSources
-        The sources on them.
-    is_new, parents : (m,) bool, (m,) int
-        Faces that are parts of others, and the face before the cuts that each is part of.
+    Only sources that are `unfit` must run along edges, by default all. Others are cut only in faces, and at edges, that
+    these cut. The triangles into which a face is cut depend on the corner at which it begins, `begin` (m,).
     """
     merged = MergedSources.of(parts)
     faces, edges = affected_elements(triangles, merged, [True] * len(parts) if unfit is None else unfit)

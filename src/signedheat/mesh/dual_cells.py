@@ -63,14 +63,8 @@ def cells_around(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """The cells around crossed edges, none of which is on a wall of a grid with so many nodes along each axis.
 
-    Returns
-    -------
-    places : (c, 3) int
-        First nodes of the cells.
-    edges : (c, 12) int
-        Crossed edges of each; −1 where an edge is not crossed.
-    rows, sides : (e, 4) int
-        The cells around each edge, as in `AROUND`, and which of their edges it is.
+    Returns the first nodes (c, 3) of the cells, the crossed edges (c, 12) of each, −1 where an edge is not crossed; and
+    the cells around each edge (e, 4), as in `AROUND`, with which of their edges it is.
     """
     axes, each = crossings.axes, np.arange(len(crossings.axes))[:, None]
     around = np.repeat(crossings.nodes[:, None], 4, axis=1)
@@ -179,20 +173,12 @@ ROUNDS = 8
 def dual_triangles(
     cells: DualCells, crossings: Crossings, vertices: NDArray[np.float64], fanned: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles between the vertices of pieces, counter-clockwise as seen from outside.
+    """Triangles (m, 3) between the vertices of pieces, counter-clockwise as seen from outside.
 
     The four vertices around an edge make two triangles. Of the two diagonals between them, if both are possible, the
     one is taken that passes nearer to the crossing of the edge; if they are equally near, the shorter one. `vertices`,
-    (v, 3), are in cells, each within its own; the crossings of `fanned` edges, (e,), become vertices anyway.
-
-    Returns
-    -------
-    vertices : (v + k, 3) float
-        With the crossings that became vertices.
-    faces : (m, 3) int
-        Vertices of triangles.
-    centres : (k,) int
-        The edges of those crossings.
+    (v, 3), are in cells, each within its own. The crossings of `fanned` edges, (e,), become vertices anyway: they
+    follow the others, and their edges (k,) are returned as well.
     """
     quads, axes, shares = cells.quads, crossings.axes, crossings.shares
     around = vertices[quads] - crossings.nodes[:, None]

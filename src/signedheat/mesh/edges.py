@@ -194,18 +194,11 @@ def edge_keys(one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[n
 def find_edges(
     tails: NDArray[np.int64], heads: NDArray[np.int64], used: NDArray[np.bool_], n_vertices: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Edges of halfedges, in order of first appearance; those that are not used have none.
+    """Edges of halfedges (h,), in order of first appearance; those that are not used have none.
 
-    There is one list per vertex: an edge is in that of its end with fewer halfedges, so that lists stay short.
-
-    Returns
-    -------
-    edges : (h,) int
-        Edge of each halfedge, or −1.
-    forward : (h,) bool
-        Whether it runs as the first along its edge does.
-    counts, first, second : (e,) int
-        Halfedges of each edge; the first and the second, or −1.
+    There is one list per vertex: an edge is in that of its end with fewer halfedges, so that lists stay short. Returns
+    the edge of each halfedge, or −1, and whether it runs as the first along its edge does; how many halfedges each edge
+    (e,) has, the first, and the second, or −1.
     """
     degrees, last = np.zeros(n_vertices, dtype=np.int64), np.full(n_vertices, -1)
     for h in range(len(tails)):

@@ -11,12 +11,8 @@ def assemble_polylines(
 ) -> list[tuple[NDArray[np.int64], NDArray[np.bool_], bool]]:
     """Join segments end to end into polylines, which end where not exactly two segments meet.
 
-    Segments join nodes. Unless they are directed they are reversed where needed.
-
-    Returns
-    -------
-    list of (segments, backwards, closed)
-        Segment ids in order, which of them run from head to tail, and whether the polyline is closed.
+    Segments join nodes. Unless they are directed they are reversed where needed. Of each polyline: segments in order,
+    which of them run from head to tail, and whether it is closed.
 
     Examples
     --------

@@ -242,28 +242,14 @@ def descend(
     out_faces: NDArray[np.int32],
     out_squares: NDArray[np.float64],
 ) -> None:
-    """Nearest face of each point, and the square of its distance, down a tree of boxes.
+    """Nearest face of each point (n, 3), and the square of its distance, down a tree of boxes; into `out_…`, (n,).
 
     Points that follow each other go down together, where any of them may find something nearer, so that processors do
-    several at once. Every `run` points the search starts anew, in between from the face before. Where a node has a disc
-    (`FaceTree.discs`) that is farther than its box, it counts. All in one function, since calls cost as much as boxes.
-
-    Parameters
-    ----------
-    rows : (m, 16) float
-        The faces, as `triangle_rows` gives them; there is at least one.
-    bounds, items : arrays
-        Of a `BoxTree`.
-    discs : (2 · leaves, 8) float
-        See `FaceTree.discs`.
-    points : (n, 3) float
-        Positions.
-    run : int
-        See above; a multiple of how many points go together.
-    best : (k,) float
-        As long as there are points that go together. The compiler must not know how many: it does few one by one.
-    out_faces, out_squares : (n,)
-        What is found.
+    several at once. Every `run` points, a multiple of how many go together, the search starts anew, in between from the
+    face before. Where a node has a disc (`FaceTree.discs`) that is farther than its box, it counts. All in one
+    function, since calls cost as much as boxes. There is at least one face; `rows` are as `triangle_rows` gives them.
+    `best` is as long as there are points that go together: the compiler must not know how many, or it does few one by
+    one.
     """
     leaves, together, middle = len(bounds) // 2, len(best), len(best) // 2
     places, which = np.empty((3, together)), np.zeros(together, dtype=np.int64)

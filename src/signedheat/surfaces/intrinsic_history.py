@@ -258,19 +258,9 @@ def transfer_backward(
 ) -> None:
     """Transfer points and vectors at them from the last triangulation of a history to the first; in place.
 
-    Parameters
-    ----------
-    steps, weights : (n, 4) int and float
-        The history.
-    n_faces : int
-        Number of faces of the last triangulation.
-    faces : (p,) int
-        Face of each point. Points without a face (−1) stand for the new vertices, in the order in which they were
-        inserted, at the end of the array; they get the position at which they were inserted.
-    barycentric : (p, 3) float
-        Barycentric coordinates in the face.
-    vectors : (p, k, 3) float
-        Differences of barycentric coordinates.
+    Points have faces (p,) of the `n_faces` last ones, barycentric coordinates (p, 3) and vectors (p, k, 3), which are
+    differences of such. Those without a face (−1) stand for the new vertices, in the order in which they were inserted,
+    at the end of the array; they get the position at which they were inserted.
     """
     first = np.full(n_faces, -1)
     later = np.full(len(faces), -1)

@@ -40,35 +40,16 @@ PATIENCE = 5000
 def refine_all(
     gluing: Gluing, angle: float, coarsest: float, max_vertices: int, progress: Callable[[float], None] | None = None
 ) -> tuple[Gluing, NDArray[np.int64], NDArray[np.bool_], bool]:
-    """Refine a Delaunay triangulation until no face is thin and then none is large, where that is possible.
+    """Refine a Delaunay triangulation, in place, until no face is thin and then none is large, where that is possible.
 
     Fixed, boundary and nonmanifold edges may be split but are not flipped. Small angles remain where fixed edges meet
     at less than 60°, at vertices with a total angle of less than 60°, at vertices that nearly coincide, and where the
-    limit on the number of vertices is reached first.
+    limit on the number of vertices is reached first. `angle` is in radians; `coarsest` is the largest circumradius, in
+    multiples of that of an equilateral triangle of the mean area once no face is thin; `progress` is called now and
+    then with an estimate of the fraction done, and an exception that it raises cancels.
 
-    Parameters
-    ----------
-    gluing : Gluing
-        Delaunay, as `flip_all` returns it; changed in place.
-    angle : float
-        Smallest angle, in radians.
-    coarsest : float
-        Largest circumradius, in multiples of that of an equilateral triangle of the mean area once no face is thin.
-    max_vertices : int
-        Stop when there are as many.
-    progress : callable, optional
-        Called now and then with an estimate of the fraction done; an exception that it raises cancels.
-
-    Returns
-    -------
-    Gluing
-        The refined triangulation.
-    (e,) int
-        The fixed edge of the input that each edge is part of, or −1.
-    (m,) bool
-        Faces at vertices that nearly coincide, which may be thin.
-    bool
-        Whether refinement ended before the limit on the number of vertices.
+    Returns the refined triangulation; the fixed edge of the input that each edge (e,) is part of, or −1; faces (m,) at
+    vertices that nearly coincide, which may be thin; and whether it ended before the limit on the number of vertices.
     """
     segments, agenda = agenda_of(gluing)
     goal = Goal(np.tan(angle / 2) ** 2, np.inf, max_vertices)

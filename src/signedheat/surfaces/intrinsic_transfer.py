@@ -85,14 +85,8 @@ def in_order(
 ) -> tuple[IntrinsicMesh, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Triangles with faces, their corners and edges in the order of the heights (m, 3) of the corners.
 
-    Returns
-    -------
-    triangles : IntrinsicMesh
-        With the same vertices; each face begins at its lowest corner.
-    edges, faces : (e,) int, (m,) int
-        The number that each had.
-    turns : (m, 3) int
-        The corner that each was.
+    Each face begins at its lowest corner. Also the number that each edge (e,) and face (m,) had, and each corner (m,
+    3).
     """
     faces = np.argsort(heights.sum(axis=1), kind="stable")
     turns = (heights[faces].argmin(axis=1)[:, None] + np.arange(3)) % 3
@@ -263,12 +257,8 @@ def level_lines(
     """The zero set of a function that is linear on the triangles after a history, on those before the refinement.
 
     Every segment is straight on an intrinsic triangle, and is traced across the faces of the mesh below. The triangles
-    must be consistently oriented.
-
-    Returns
-    -------
-    list of (faces, barycentric, closed)
-        Points of one polyline each, in order, with larger values to its left.
+    must be consistently oriented. Of each polyline: faces and barycentric coordinates of its points, in order, with
+    larger values to its left; and whether it is closed.
     """
     least = LEAST * max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-300)
     line = zero_line(history.after, cleared(history.after, values, least))

@@ -79,21 +79,11 @@ def surface_source(
     spacing: float,
     positions: NDArray[np.float64] | None = None,
 ) -> SurfaceSource:
-    """Lower sources to an intrinsic mesh.
+    """Lower sources to an intrinsic mesh, whose faces they refer to; ``t = diffusion · spacing²``.
 
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        The surface; face ids of the sources refer to it.
-    sources : sequence of Curve, SurfacePoints, CurveSegments or sequences of them
-        What distance is measured to; a sequence in it counts as one source. Unoriented curves must run along edges: see
-        `refine_to_conform`.
-    diffusion : float
-        τ in ``t = τ h²``.
-    spacing : float
-        h: mean distance between unknowns. An isolated point has the weight of a curve of this length.
-    positions : (n_vertices, 3) float, optional
-        Vertices in space, for curves whose normals are given.
+    A sequence among the sources counts as one. Unoriented curves must run along edges: see `refine_to_conform`. An
+    isolated point has the weight of a curve as long as `spacing`, h, the mean distance between unknowns. Curves with
+    given normals need the `positions`, (n_vertices, 3), in space.
     """
     groups = segments_of_each(sources, triangles, positions)
     parts = [part for group in groups for part in group]

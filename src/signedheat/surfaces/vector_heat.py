@@ -30,19 +30,10 @@ EXPONENTS = (-1.0, 0.5)
 
 @dataclass(frozen=True, eq=False)
 class VectorHeat:
-    """Solver of ``(M + tL) X = X₀`` (Eq. 12) on the edges of triangles.
+    """Solver of ``(M + tL) X = X₀`` (Eq. 12) on the edges of triangles, which are eliminated in a fill-reducing order.
 
     X falls like exp(−r/√t) and leaves the range of floating-point numbers at about 300 mean edge lengths. What lies
     beyond is solved for again with the same factor (`linear.restarts`).
-
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        The surface.
-    time : float
-        t.
-    order : (n_edges,) int
-        Fill-reducing order of the edges.
     """
 
     triangles: IntrinsicMesh
