@@ -19,16 +19,29 @@ FEW = 64
 
 @dataclass(frozen=True, eq=False)
 class BoxTree:
-    """A complete binary tree over boxes in Morton order: node i has the children 2i and 2i + 1, the root is 1."""
+    """A complete binary tree over boxes in Morton order: node i has the children 2i and 2i + 1, the root is 1.
 
-    # (2 · leaves, 6) lower and upper corner of the box around everything below each node; an empty node has lower >
-    # upper
+    Attributes
+    ----------
+    bounds : (2 · leaves, 6) float
+        Lower and upper corner of the box around everything below each node; an empty node has lower > upper.
+    items : (leaves · LEAF,) int
+        Boxes in each leaf, −1 where there are none.
+    """
+
     bounds: NDArray[np.float64]
-    items: NDArray[np.int64]  # (leaves · LEAF,) boxes in each leaf, −1 where there are none
+    items: NDArray[np.int64]
 
     @classmethod
     def of(cls, lower: NDArray[np.float64], upper: NDArray[np.float64]) -> BoxTree:
-        """Build the tree over boxes given by (n, 3) lower and (n, 3) upper corners, in O(n log n) time."""
+        """Build the tree over boxes given by (n, 3) lower and (n, 3) upper corners, in O(n log n) time.
+
+        Examples
+        --------
+        >>> corners = np.arange(6.0).reshape(2, 3)
+        >>> BoxTree.of(corners, corners + 1).bounds[1]
+        array([0., 1., 2., 4., 5., 6.])
+        """
         return cls.in_order(lower, upper, np.argsort(morton_codes((lower + upper) / 2), kind="stable"))
 
     @classmethod

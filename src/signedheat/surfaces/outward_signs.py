@@ -52,11 +52,21 @@ _CHUNK = 4096
 
 @dataclass(frozen=True, eq=False)
 class OutwardSigns:
-    """Signs that turn axes outwards."""
+    """Signs that turn axes outwards.
 
-    signs: NDArray[np.float64]  # (n,) 1 or −1
-    sided: bool  # whether some link decides which side is out
-    coherence: float  # share of the weights of links that the signs agree with, less the share that they contradict
+    Attributes
+    ----------
+    signs : (n,) float
+        1 or −1.
+    sided : bool
+        Whether some link decides which side is out.
+    coherence : float
+        Share of the weights of links that the signs agree with, less the share that they contradict.
+    """
+
+    signs: NDArray[np.float64]
+    sided: bool
+    coherence: float
 
 
 def outward_normals(
@@ -179,6 +189,14 @@ def sign_links(
     between neighbours alone, and none with the outside.
 
     Shapes: `places` (n, 3), `axes` (n, 3), `reaches` (n,).
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> ball = samples.sphere(1).vertices
+    >>> links, _ = sign_links(ball, ball, np.ones(len(ball)))
+    >>> bool((links.weights >= 0).all())
+    True
     """
     near = _neighbor_links(places, axes, 1.0 if noisy else DIRECT_WEIGHT)
     moves = np.random.default_rng(0).uniform(-1, 1, places.shape) * (JOGGLE * reaches[:, None])
@@ -246,7 +264,13 @@ def _neighbor_links(places: NDArray[np.float64], axes: NDArray[np.float64], weig
 
 
 def spread_out(points: NDArray[np.float64], radii: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Ids of points, none within the radius of an earlier one, and every point within that of one of them."""
+    """Ids of points, none within the radius of an earlier one, and every point within that of one of them.
+
+    Examples
+    --------
+    >>> spread_out(np.array([[0.0, 0, 0], [0.4, 0, 0], [0.8, 0, 0]]), np.full(3, 0.5)).tolist()
+    [0, 2]
+    """
     tree = scipy.spatial.cKDTree(points)
     free = np.ones(len(points), dtype=bool)
     for begin in range(0, len(points), _CHUNK):
