@@ -20,8 +20,8 @@ import numpy as np
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.grids.block_contours import block_contour
 from signedheat.grids.blocks import SIDE, Blocks
+from signedheat.grids.marching import block_contour
 
 CELLS = 4.0
 """Half width of the band, in cells."""

@@ -27,10 +27,10 @@ from signedheat.memory import libraries
 from signedheat.solids.completion import bytes_to_complete, complete
 from signedheat.solids.sampling import BYTES_PER_SAMPLE
 from signedheat.solids.tiles import BYTES_AT_WORK, BYTES_IN_BAND, BYTES_PER_NODE, blocks_near
+from signedheat.surfaces.digital_surface import count_surfels
 from signedheat.surfaces.intrinsic_discretization import BYTES_REFINED
 from signedheat.surfaces.surface_discretization import BYTES_PER_POINT, BYTES_PER_VOXEL, LIGHTER, NEIGHBORS
 from signedheat.surfaces.surface_discretization import memory_estimate as surface_estimate
-from signedheat.surfaces.surfels import count_surfels
 from signedheat.tets.tet_discretization import memory_estimate as tet_estimate
 
 SIZES = {

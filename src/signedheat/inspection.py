@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .foreign import Shape
 from .mesh.components import connected_components
 from .mesh.edges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
-from .mesh.tetrahedral import FLAT
+from .mesh.tet_shapes import FLAT
 from .mesh.triangles import areas_of_polygons
 from .mesh.welding import coincident_faces, same_positions
 from .surfaces.digital_surface import DigitalSurface

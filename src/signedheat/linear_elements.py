@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from .mesh.intrinsic_mesh import IntrinsicMesh
-from .mesh.tetrahedral import Tetrahedra
+from .mesh.tet_shapes import Tetrahedra
 
 
 @dataclass(frozen=True, eq=False)

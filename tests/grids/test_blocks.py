@@ -1,9 +1,8 @@
 import numpy as np
 
 from shapes.grid_cases import sphere
-from signedheat.grids.block_contours import block_contour
 from signedheat.grids.blocks import NODES, SIDE, Blocks, BlockValues
-from signedheat.grids.marching import closed_surface
+from signedheat.grids.marching import block_contour, closed_surface
 from signedheat.search.face_features import FaceFeatures
 from signedheat.search.face_tree import FaceTree
 

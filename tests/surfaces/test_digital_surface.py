@@ -15,7 +15,7 @@ from signedheat.mesh.self_intersections import self_intersections
 from signedheat.mesh.triangles import area_vectors
 from signedheat.mesh.unit_vectors import unit
 from signedheat.solids.completion import complete
-from signedheat.surfaces.surfels import boundary_surfels
+from signedheat.surfaces.digital_surface import boundary_surfels
 
 AXIS = np.array([0.3, 0.2, 0.9]) / np.linalg.norm([0.3, 0.2, 0.9])
 

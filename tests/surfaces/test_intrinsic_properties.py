@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import signedheat as sh
 from shapes.strategies import in_space, meshes, surface_points
-from signedheat.mesh.delaunay import flip_all, glue, lay_out
+from signedheat.mesh.gluing import flip_all, glue, lay_out
 from signedheat.surfaces.source_segments import segments_of
 
 

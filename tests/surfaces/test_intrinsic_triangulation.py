@@ -12,7 +12,7 @@ from shapes.degenerate_meshes import stretched_square, with_caps, with_needles
 from shapes.surface_cases import band, book, flipped, sphere, square
 from signedheat.diagnostics import IntrinsicTriangles
 from signedheat.discretization import discretize
-from signedheat.mesh.delaunay import flip_all, glue, lay_out
+from signedheat.mesh.gluing import flip_all, glue, lay_out
 from signedheat.mesh.intrinsic_mesh import IntrinsicMesh
 from signedheat.mesh.surface_points import barycentric_in
 from signedheat.surfaces import intrinsic_discretization as lowering

@@ -11,8 +11,8 @@ import signedheat as sh
 from refusals import refused
 from shapes.surface_cases import band, book, flipped, laid_out, positions, sphere, square
 from signedheat.mesh.surface_points import EDGE, FACE, VERTEX, locate_points, unique_points
-from signedheat.surfaces.projection import closest_points
 from signedheat.surfaces.source_segments import segments_of
+from signedheat.surfaces.surface import closest_points
 
 
 def through_every_face(mesh, faces, weights):

@@ -26,8 +26,8 @@ from ..mesh.surface_points import (
     points_at_vertices,
     shared_faces,
 )
+from .geodesic_windows import Faces
 from .heap_kernels import Queue, pop, push
-from .initial_windows import Faces
 
 
 def join(

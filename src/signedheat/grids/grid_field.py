@@ -23,10 +23,9 @@ from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import contiguous, finite_number, query_points, shaped
-from .block_contours import Refine, block_contour, contour_parts
 from .blocks import SIDE, Blocks, BlockValues
 from .grid import Dimension, Grid
-from .marching import closed_surface, level_lines
+from .marching import Refine, block_contour, closed_surface, contour_parts, level_lines
 from .polyline import Polyline
 from .solid_queries import Closest, SolidQueries, scaled
 

@@ -19,7 +19,7 @@ from ..mesh.surface_points import locate_points
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
-from ..surfaces.projection import closest_points
+from ..surfaces.surface import closest_points
 from ..surfaces.surface_curves import Curve, CurveOrPoints, SurfacePoints
 from ..surfaces.triangle_mesh import TriangleMesh
 from .files import PathLike, format_for, reading, replacing, text

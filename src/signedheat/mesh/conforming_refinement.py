@@ -16,8 +16,8 @@ from scipy.sparse.csgraph import breadth_first_order
 from ..errors import SourceError
 from .constrained_triangulation import Triangulation, edges_of
 from .curve_segments import CurveSegments, MergedSources
-from .delaunay import flip_all, glue, lay_out
 from .edges import EdgeTable
+from .gluing import flip_all, glue, lay_out
 from .intrinsic_mesh import IntrinsicMesh
 from .surface_points import EDGE, FACE, VERTEX, LocatedPoints, barycentric_on_edges, points_at_vertices
 

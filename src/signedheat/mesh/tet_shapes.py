@@ -1,4 +1,9 @@
-"""Tets in space: their faces, areas and volumes."""
+"""Tets in space: their faces, areas, volumes, and operators on them (Sec. 8.1, App. B).
+
+Diffusion has Crouzeix–Raviart functions on faces, integration linear ones on vertices. Everything follows from the area
+vectors N_k of the face opposite corner k, pointing out of the tet T: the barycentric coordinate λ_k has gradient
+``−N_k / (3|T|)``, the Crouzeix–Raviart function ``ψ_k = 1 − 3λ_k`` has ``N_k / |T|``.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +12,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from .box_tree import BoxTree
-from .components import grouped
+from .components import grouped, sums_of
 from .triangles import area_vectors
 from .welding import distinct_rows
 
@@ -94,3 +100,99 @@ def signed_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int64]) -> ND
     """(m,) volumes, negative for inverted tets."""
     a, b, c, d = (vertices[tets[:, k]] for k in range(4))
     return np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6
+
+
+THIN = 1e-2
+"""Volume over the cube of the longest edge below which a tet has a reduced weight; it is 0.118 for a regular tet."""
+FLAT = 1e-6
+"""Volume over the cube of the longest edge below which a tet counts as flat."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tetrahedra(TetShapes):
+    """Operators of tets."""
+
+    @cached_property
+    def stiffness_factors(self) -> NDArray[np.float64]:
+        """(m,) w / |T|, w the `weights`, by which every term of thin tets is reduced.
+
+        The equations stay consistent with any positive weights. These keep the stiffness of flat tets bounded.
+        """
+        thick = self.thickness >= THIN
+        cubes = np.where(self.longest_edges > 0, self.longest_edges, 1) ** 3
+        return 1 / np.where(thick, np.maximum(self.volumes, np.finfo(float).tiny), THIN * cubes)
+
+    @cached_property
+    def weights(self) -> NDArray[np.float64]:
+        """(m,) w: one, less than one for thin tets, zero for flat ones."""
+        return np.minimum(self.thickness / THIN, 1)
+
+    @cached_property
+    def ties(self) -> NDArray[np.float64]:
+        """(m,) extra stiffness between any two faces of a flat tet, whose own stiffness is nearly zero."""
+        lengths = np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
+        return lengths * (1 - np.minimum(self.thickness / FLAT, 1))
+
+    def face_mass(self) -> NDArray[np.float64]:
+        """(f,) M of Eq. 12, lumped: a quarter of the volume at each face.
+
+        The consistent mass of Eq. 23 has 2/5 of the volume on its diagonal and −1/20 between two faces of a tet. These
+        quarters are its row sums; they are as accurate, and simpler.
+        """
+        quarter = np.repeat(self.weights * self.volumes / 4, 4)
+        return np.asarray(np.bincount(self.faces.tet_faces.ravel(), quarter, len(self.faces.vertices)), np.float64)
+
+    def face_laplacian(self) -> sparse.csr_matrix:
+        """(f, f) Laplacian of faces (Eq. 20, Eq. 21): L_ab = Σ_T N_a·N_b / |T|, −(3/2) |e| cot θ between two faces.
+
+        e is the edge that the two faces share, θ the dihedral angle of the tet there.
+        The faces of flat tets are coupled by the `ties` besides, so that directions pass through these unchanged.
+        """
+        faces = self.faces
+        return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.tet_faces, len(faces.vertices))
+
+    def vertex_laplacian(self, corners: NDArray[np.int64], n: int) -> sparse.csr_matrix:
+        """(n, n) cotan Laplacian, Eq. 10 in tets: C_ij = Σ_T N_i·N_j / (9|T|), −(1/6) |e| cot θ between two vertices.
+
+        e is the edge of the tet opposite edge ij, θ the dihedral angle there.
+        The vertices of flat tets are coupled by weak `ties` besides, since some belong to no other tet.
+        """
+        return _assemble(self.area_vectors, self.stiffness_factors / 9, 1e-4 * self.ties, corners, n)
+
+    def divergence(self, directions: NDArray[np.float64], corners: NDArray[np.int64], n: int) -> NDArray[np.float64]:
+        """(n,) b of Eq. 13 for one vector Y per tet: the divergence of Eq. 22, ``∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T``.
+
+        Eq. 22 is printed without the ⅓, and with the opposite sign, as the paper's Laplacian is negative semidefinite.
+        """
+        parts = np.einsum("mki,mi->mk", self.area_vectors, directions) * (self.weights / -3)[:, None]
+        return np.asarray(np.bincount(corners.ravel(), parts.ravel(), n), np.float64)
+
+    def gradients(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, 3) gradient of the linear interpolant of (m, 4) corner values; zero on flat tets."""
+        flat = self.thickness < 1e-10
+        sums = np.einsum("mki,mk->mi", self.area_vectors, corner_values)
+        return np.where(flat[:, None], 0.0, sums / (-3 * np.where(flat, 1.0, self.volumes))[:, None])
+
+    def mean_gradients(self, values: NDArray[np.float64], corners: NDArray[np.int64], n: int) -> NDArray[np.float64]:
+        """(n, 3) gradients at vertices: volume-weighted means over the tets around each that have values, else NaN."""
+        sums = np.einsum("mki,mk->mi", self.area_vectors, values[corners]) * (self.weights / -3)[:, None]
+        finite = np.isfinite(sums).all(axis=1)
+        ids, volumes = corners[finite].ravel(), (self.weights * self.volumes)[finite]
+        total = np.bincount(ids, np.repeat(volumes, 4), n)
+        totals = sums_of(np.repeat(sums[finite], 4, axis=0), ids, n)
+        return totals / np.where(total > 0, total, np.nan)[:, None]
+
+
+def _assemble(
+    vectors: NDArray[np.float64],
+    factors: NDArray[np.float64],
+    ties: NDArray[np.float64],
+    ids: NDArray[np.int64],
+    n: int,
+) -> sparse.csr_matrix:
+    """Sparse (n, n) matrix with ``Σ_T factor · N_a·N_b`` at the entry (id of a, id of b), plus the ties."""
+    entries = np.einsum("mai,mbi->mab", vectors, vectors) * factors[:, None, None]
+    entries += ties[:, None, None] * (4.0 * np.eye(4) - 1.0)
+    corners = ids.astype(np.int32)
+    rows, columns = np.repeat(corners, 4, axis=1), np.tile(corners, 4)
+    return sparse.coo_matrix((entries.ravel(), (rows.ravel(), columns.ravel())), shape=(n, n)).tocsr()

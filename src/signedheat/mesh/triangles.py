@@ -117,20 +117,3 @@ def areas_of_polygons(
         areas[f] = 0.5 * np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
         degenerate[f] |= areas[f] <= 4.0 * EPSILON * radius * largest
     return areas, degenerate
-
-
-@compiled
-def areas_and_volumes(
-    vertices: NDArray[np.float64], triangles: NDArray[np.int64], center: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(m,) areas of triangles, and volumes of the tetrahedra they make with a center: positive if it is behind them."""
-    areas, volumes = np.empty(len(triangles)), np.empty(len(triangles))
-    for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        ux, uy, uz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
-        wx, wy, wz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
-        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-        areas[t] = 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
-        px, py, pz = vertices[a, 0] - center[0], vertices[a, 1] - center[1], vertices[a, 2] - center[2]
-        volumes[t] = (px * nx + py * ny + pz * nz) / 6.0
-    return areas, volumes

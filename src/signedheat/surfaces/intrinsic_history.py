@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frozen import Frozen
-from ..mesh.delaunay import glue
-from ..mesh.gluing_kernels import (
+from ..mesh.gluing import (
     FLIP,
     SPLIT_EDGE,
     SPLIT_FACE,
@@ -27,6 +26,7 @@ from ..mesh.gluing_kernels import (
     diamond,
     faces_around,
     following,
+    glue,
     kernel,
 )
 from ..mesh.intrinsic_mesh import IntrinsicMesh
@@ -55,7 +55,7 @@ class History(Frozen):
     # vertices of `before` keep their ids; new ones follow
     before: IntrinsicMesh
     after: IntrinsicMesh
-    # (n, 4) as `gluing_kernels.record` writes them
+    # (n, 4) as `gluing.record` writes them
     steps: NDArray[np.int64]
     weights: NDArray[np.float64]
 

@@ -13,14 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..mesh.delaunay import doubled, lay_out
-from ..mesh.gluing_kernels import (
+from ..mesh.gluing import (
     Gluing,
     apex_position,
+    doubled,
     faces_around,
     flip_until_delaunay,
     following,
     kernel,
+    lay_out,
     look_at,
     preceding,
     sibling_count,

@@ -22,7 +22,7 @@ from ..exchange import Displayed
 from ..foreign import ForeignShape, converted
 from ..frozen import Frozen
 from ..mesh.curve_segments import CurveSegments, without_straight_nodes
-from ..mesh.delaunay import flip_all, glue, lay_out
+from ..mesh.gluing import flip_all, glue, lay_out
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.triangles import gradients_along
 from ..progress import Progress, Stopwatch

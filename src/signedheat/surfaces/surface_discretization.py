@@ -24,13 +24,12 @@ from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import IntrinsicMesh, laid_out, mollify
 from ..spring_integration import SpringIntegration
 from .cotan import cotan_matrix, divergence
-from .digital_surface import DigitalSurface
+from .digital_surface import DigitalSurface, count_surfels, separated_edges
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
 from .source_segments import segments_of_each
 from .surface_source import SurfaceSource, ends_among, surface_source
-from .surfels import count_surfels, separated_edges
 from .triangle_mesh import TriangleMesh
 from .vector_heat import VectorHeat, extrapolated, nonmanifold_frames
 

@@ -24,8 +24,8 @@ from ..validation import array_of, finite_number, query_points, shaped
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
-from .projection import closest_points
 from .subdivision import common_subdivision
+from .surface import closest_points
 from .surface_curves import Curve, SurfacePoints
 from .triangle_mesh import TriangleMesh
 

@@ -15,8 +15,7 @@ from ..errors import GeometryError
 from ..exchange import Displayed, shapes, tets_of_meshio, tets_of_pyvista
 from ..frozen import Frozen
 from ..mesh.components import element_components
-from ..mesh.tet_shapes import FaceTable, signed_volumes
-from ..mesh.tetrahedral import Tetrahedra
+from ..mesh.tet_shapes import FaceTable, Tetrahedra, signed_volumes
 from ..packages import lazy_module
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import coordinates, element_ids, frozen, used_bounds
