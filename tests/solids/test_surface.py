@@ -9,7 +9,7 @@ from refusals import refused
 from shapes.bodies import box
 from shapes.grid_cases import assert_closed_manifold
 from signedheat import samples
-from signedheat.errors import OutsideError
+from signedheat.errors import InexactWarning, OutsideError
 from signedheat.mesh.edges import edge_table
 from signedheat.mesh.self_intersections import self_intersections
 from signedheat.solids import dual_vertices as features
@@ -53,11 +53,38 @@ def solid(request):
     return complete(SHAPES[request.param]())
 
 
+@pytest.mark.filterwarnings("ignore:cells of")  # .04 below the faces of the plate are .02 left, a third of a cell
 @pytest.mark.parametrize("level", [0.0, 0.06, -0.04])
 def test_closed_and_apart(solid, level):
     surface = solid.surface(level, resolution=34)
     assert_closed_manifold(surface)
     assert not len(self_intersections(surface.vertices, surface.faces))
+
+
+WIRE = box((-1.0, -0.012, -0.012), (1.0, 0.012, 0.012))
+GRAIN = samples.sphere(2, radius=0.01, center=(0.3, 1.2, 0.1))
+
+
+@pytest.mark.parametrize("sharp", [True, False])
+@pytest.mark.parametrize(
+    ("shape", "level"), [(WIRE, 0.0), (WIRE, 0.005), (samples.union(samples.sphere(4), GRAIN), 0.0)]
+)
+def test_what_is_thinner_than_a_cell_is_announced(shape, level, sharp):
+    solid = complete(turned(shape))
+    with pytest.warns(InexactWarning, match="smaller"):
+        solid.surface(level, sharp=sharp, resolution=30)
+    solid.surface(level, sharp=sharp, spacing=0.007)
+
+
+def test_tips_and_edges_are_not_announced():
+    """Every cone is thinner than a cell at its tip, and every wedge along its edge."""
+    angles = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    rim = np.c_[0.3 * np.cos(angles), 0.3 * np.sin(angles), np.zeros(40)]
+    next_ones = np.roll(np.arange(40), -1)
+    sides = [np.c_[np.arange(40), next_ones, np.full(40, tip)] for tip in (40, 41)]
+    cone = sh.TriangleMesh(np.vstack([rim, [[0, 0, 1.5]], [[0, 0, 0]]]), np.vstack([sides[0], sides[1][:, ::-1]]))
+    for shape in (cone, box((-1.0, -1.0, 0.0), (1.0, 1.0, 0.2))):
+        complete(turned(shape)).surface(resolution=40)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -12,23 +12,32 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import OutsideError
+from ..errors import InexactWarning, OutsideError, warn_user
 from ..field_levels import on_level
 from ..grids.blocks import SIDE, Blocks, BlockValues
 from ..grids.grid import Grid
 from ..grids.marching import CLEARANCE
+from ..mesh.components import element_components
 from ..mesh.dual_cells import Crossings, DualCells, cells_around, dual_cells, open_cells, separate_triangles
 from ..progress import Progress
 from ..surfaces.triangle_mesh import TriangleMesh
 from .dual_vertices import divided_along_creases, placed
+from .gauss import Pieces, sampled
 from .node_distances import solved
 from .offsets import Offset
 from .tiles import blocks_where, in_threads, prepared, tiles_of
 
 WINDOW = 8
 """Blocks along each edge of a window in which crossed edges are looked for together."""
+AROUND = np.array(list(np.ndindex(3, 3, 3))) - 1
+"""(27, 3) a cell and those that touch it."""
 IN_BLOCK = np.array(list(np.ndindex(SIDE, SIDE, SIDE)))
 """(512, 3) nodes of a block."""
+SAMPLED = 4096
+"""Places on a surface at which its contour is looked for, besides one for each part."""
+LOST = 0.01
+"""Share of the surface without its contour nearby above which that is announced: edges and tips are thinner than a cell
+somewhere on most parts, walls are not."""
 STEEPEST = 2.0
 """Change of the height above a surface, over how far one goes, up to which blocks near it are found from coarse to
 fine: distance changes by 1 at most, and where one that varies does so by more, blocks are found as its surface goes on.
@@ -79,8 +88,48 @@ def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) 
     crossings = replace(crossings, shares=np.clip(shares, CLEARANCE, 1 - CLEARANCE))
     vertices, faces = separate_triangles(cells, crossings, choices)
     vertices, faces = divided_along_creases(offset, grid.spacing, grid.origin + vertices * grid.spacing, faces)
+    announce_lost(offset, grid, vertices)
     report(1.0, "faces")
     return TriangleMesh(vertices, faces)
+
+
+def announce_lost(offset: Offset, grid: Grid, vertices: NDArray[np.float64]) -> None:
+    """Warn where the contour of a surface, with (n, 3) vertices, misses whole parts of it or a share of its area."""
+    parts, lost = _lost(offset, grid, vertices)
+    n_parts = len(np.unique(parts))
+    gone = n_parts - len(np.unique(parts[~lost]))
+    if gone == 0 and lost.sum() <= LOST * len(lost):
+        return
+    missing = f"{gone} of {n_parts} parts" if gone else f"{lost.mean():.0%} of the surface"
+    remedy = "make the cells smaller, or keep the faces" if offset.level == 0 else "make the cells smaller"
+    warn_user(f"cells of {grid.spacing.max():.3g} are too large for {missing}, lost here: {remedy}", InexactWarning)
+
+
+def _lost(offset: Offset, grid: Grid, vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Parts of a solid that places on a surface belong to, and which places have no vertex of its contour nearby.
+
+    Places are taken on the faces of the solid, and moved along their normals, either way, if that leads to the surface.
+    """
+    features = offset.solid.tree.features
+    faces = (
+        np.arange(len(features.faces)) if np.any(offset.reach) else np.flatnonzero(offset.solid.bounding[features.ids])
+    )
+    if not len(faces):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool)
+    parts = element_components(features.faces[faces])
+    chosen, bases = sampled(Pieces(features.corners[faces].reshape(-1, 3, 3), parts), SAMPLED)
+    reach = offset.reach(bases) if callable(offset.reach) else np.full(len(bases), offset.reach)
+    moves = reach[:, None] * features.face_normals[faces[chosen]]
+    places, parts = np.concatenate([bases + moves, bases - moves]), np.tile(parts[chosen], 2)
+    cells = np.floor((places - grid.origin) / grid.spacing).astype(np.int64)
+    on_surface = ((cells >= 0) & (cells < np.array(grid.shape) - 1)).all(axis=1)
+    if np.any(reach):
+        on_surface &= np.abs(offset.distance(places)) < 1e-3 * float(grid.spacing.min())
+    size = np.array(grid.shape) + 2
+    filled = np.floor((vertices - grid.origin) / grid.spacing).astype(np.int64) + 1
+    around = (cells[on_surface, None] + AROUND + 1).reshape(-1, 3)
+    near = np.isin(*(np.ravel_multi_index(tuple(places.T), size, "clip") for places in (around, filled)))
+    return parts[on_surface], ~near.reshape(-1, len(AROUND)).any(axis=1)
 
 
 def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCells]:

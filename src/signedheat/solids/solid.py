@@ -30,7 +30,7 @@ from ..search.face_tree import FaceTree, NearestFaces
 from ..search.nearest_triangles import weights_in
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import finite_number, flag, positive_number, query_points, shaped
-from .contouring import sharp_surface
+from .contouring import announce_lost, sharp_surface
 from .kept_faces import given_surface, outward, unjoined
 from .offsets import Offset, Reach
 from .sample_set import Samples
@@ -332,8 +332,9 @@ class Solid(Displayed, Represented, Frozen):
     ) -> TriangleMesh:
         """The surface on which distance has a level: closed, manifold, its normals pointing to greater distance.
 
-        Sharp surfaces have the edges and corners of the level, and triangles that do not pass through each other. Parts
-        thinner than a cell may be missing. Memory grows with the surface, not with the grid.
+        Sharp surfaces have the edges and corners of the level, and triangles that do not pass through each other. What
+        is thinner than a cell may be missing, with an `InexactWarning` if that is more than edges and tips. Memory
+        grows with the surface, not with the grid.
 
         Parameters
         ----------
@@ -405,7 +406,9 @@ class Solid(Displayed, Represented, Frozen):
         where = Grid.around(reach, resolution, None, spacing)
         if sharp:
             return sharp_surface(Offset(self, height), where, progress)
-        return dense_field(self, where, progress).contour(height)
+        contour = dense_field(self, where, progress).contour(height)
+        announce_lost(Offset(self, height), where, contour.vertices)
+        return contour
 
     def offset(
         self,
