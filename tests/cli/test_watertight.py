@@ -48,6 +48,15 @@ def test_contours_say_how_far_they_are_from_the_faces(tmp_path, folder, capsys):
 
 
 @pytest.mark.usefixtures("in_this_process")
+@pytest.mark.parametrize(("surface", "bad_edges"), [("stl", 1), ("ply", 0)])
+def test_edges_that_the_format_joins_are_counted(tmp_path, capsys, surface, bad_edges):
+    """STL files have no ids: two cubes that touch along an edge have one of four faces there."""
+    samples.union(box((0, 0, 0), (1, 1, 1)), box((1, 1, 0), (2, 2, 1))).save(tmp_path / "two.ply")
+    (found,) = figures(tmp_path, capsys, tmp_path / "two.ply", "--surface", surface)["shapes"]
+    assert (found["bodies"], found["bad_edges"], found["self_intersections"]) == (2, bad_edges, 0)
+
+
+@pytest.mark.usefixtures("in_this_process")
 def test_sheets_need_a_thickness(tmp_path, capsys):
     sheet([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0.1]]).save(tmp_path / "sheet.ply")
     command = ["watertight", str(tmp_path / "sheet.ply"), "-o", str(tmp_path / "out"), "--workers", "1"]

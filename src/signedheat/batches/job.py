@@ -26,8 +26,9 @@ from ..solids.sample_set import Layout
 from ..solids.sampling import WIDTHS, sample
 from ..solids.solid_distance import distance_to_shapes
 from ..solids.training import training_points
-from ..solids.watertight import closed_surface, figures_of
+from ..solids.watertight import closed_surface, faults_of, figures_of
 from ..surfaces.digital_surface import DigitalSurface
+from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import positive_number, whole_number
 from .inputs import Input
 
@@ -285,10 +286,13 @@ class Watertight:
         with warnings.catch_warnings(record=True) as losses:
             warnings.simplefilter("always", InexactWarning)
             save(surface, f"{stem}{self.surfaces}")
+        # as it was written: rounded, and joined where parts touch
+        faults = faults_of(cast("TriangleMesh", read(Path(f"{stem}{self.surfaces}"))))
         way = "; ".join([way, *(str(loss.message) for loss in losses)])
         if self.samples is not None:
             on, around = training_points(surface, self.samples, self.normalize)
             write_npz(f"{stem}_surface.npz", **on)
             write_npz(f"{stem}_sdf.npz", **around)
         notes = [str(note) for note in solid.diagnostics.notes] + [str(each.message) for each in caught]
-        return {"way": way, **figures_of(surface, solid, 0.5 * (self.thickness or 0.0)), "notes": notes}
+        figures = figures_of(surface, solid, 0.5 * (self.thickness or 0.0))
+        return {"way": way, **figures, **faults, "notes": notes}

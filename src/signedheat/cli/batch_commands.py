@@ -210,12 +210,13 @@ def one_watertight(arguments: Namespace, job: sh.batches.Watertight) -> Summary:
 def in_words(figures: dict[str, object]) -> str:
     """One line of what `figures_of` found."""
     bodies, openings, meeting = (figures[key] for key in ("bodies", "openings", "self_intersections"))
+    bad_edges = f"{figures['bad_edges']} edges that two faces do not share, " if figures["bad_edges"] else ""
     share = 100 * float(str(figures["completed_area"])) / max(float(str(figures["area"])), 1e-300)
     return (
         f"{bodies} {'body' if bodies == 1 else 'bodies'}, volume {figures['volume']:.4g}, {figures['faces']} faces, "
         f"{openings} {'opening' if openings == 1 else 'openings'} completed ({share:.2g} % of the area), "
         f"{figures['to_faces']:.2g} from the faces and {figures['from_faces']:.2g} back at most, "
-        f"{meeting or 'no'} self-intersections; {figures['way']}"
+        f"{bad_edges}{meeting or 'no'} self-intersections; {figures['way']}"
     )
 
 

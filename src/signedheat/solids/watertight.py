@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, SourceError
 from ..grids.grid import Grid
 from ..mesh.components import element_components
+from ..mesh.edges import edge_table
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import face_areas, part_volumes
 from ..search.face_tree import FaceTree
@@ -62,6 +63,7 @@ def closed_surface(
 def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[str, object]:
     """Counts and sizes of a closed surface, and its distances from the faces of a solid and back.
 
+    `bad_edges` are those that not exactly two faces share.
     `to_faces` is the largest distance from the surface, but where it lies on the completion, to its level around the
     faces that were given; `from_faces` that from faces that bound the solid to the surface, less the level.
     """
@@ -83,7 +85,14 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
         "completed_area": float(face_areas(made).sum()),
         "to_faces": float(off.max(initial=0.0)),
         "from_faces": float(np.abs(back).max(initial=0.0)),
+    }
+
+
+def faults_of(surface: TriangleMesh) -> dict[str, object]:
+    """Pairs of faces that cross, and edges that not exactly two faces share."""
+    return {
         "self_intersections": len(self_intersections(surface.vertices, surface.faces)),
+        "bad_edges": int((edge_table(surface.faces).face_counts != 2).sum()),
     }
 
 
