@@ -78,6 +78,30 @@ def test_a_file_edited_before_the_first_call(cache, shifted, tmp_path):
     assert shifted(factor=9.0)[0] == 28.0
 
 
+def test_named_tuples_that_move_are_other_types(cache, tmp_path, monkeypatch):
+    """Numba's cache has them by the names of their modules, and would not find them where they were."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    pair = "from __future__ import annotations\nfrom typing import NamedTuple\nclass Pair(NamedTuple):\n    x: float\n"
+    kernel = """from __future__ import annotations
+from {module} import Pair
+from signedheat.compiled import compiled
+
+@compiled
+def first(pair: Pair) -> float:
+    return pair.x
+"""
+    for module in ("old_home", "new_home"):
+        for name in ("pairs", "old_home"):
+            sys.modules.pop(name, None)
+            (tmp_path / f"{name}.py").unlink(missing_ok=True)
+        (tmp_path / f"{module}.py").write_text(pair)
+        (tmp_path / "pairs.py").write_text(kernel.format(module=module))
+        importlib.invalidate_caches()
+        pairs = importlib.import_module("pairs")
+        assert pairs.first(pairs.Pair(2.0)) == 2.0
+
+
 def test_digests_are_the_same_in_every_process():
     code = """
         from signedheat.compiled import _digest, compiled

@@ -10,8 +10,9 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
+import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
@@ -33,6 +34,7 @@ logger: logging.Logger = logging.getLogger("signedheat")
 MOST_THREADS = 1024
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """Dividing by zero is no exception; C does not call kernels, so that what it would call is not compiled."""
+WORD = re.compile(r"\w+")
 DAMAGE = OSError, EOFError, UnpicklingError
 """What reading or writing the cache raises where files are damaged or cannot be written. Kernels raise none of them."""
 _lock = RLock()
@@ -128,7 +130,10 @@ def cache_folder() -> Path:
 
 
 def _digest(kernel: Kernel[..., Any]) -> str:
-    """A digest of Numba's version and of the code, options and constants of a kernel and of those that it calls."""
+    """A digest of Numba's version and of the code, options, constants and classes of a kernel and of those it calls.
+
+    Numba's cache knows named tuples by their modules, and does not find those that have moved.
+    """
     digest, seen, waiting = hashlib.sha256(repr(numba.version_info).encode()), set(), [kernel]
     while waiting:
         one = waiting.pop()
@@ -137,6 +142,8 @@ def _digest(kernel: Kernel[..., Any]) -> str:
         seen.add(one)
         function = one.function
         digest.update(repr((one.__module__, one.options, _spelled(function.__code__))).encode())
+        mentioned = [*function.__annotations__.values(), *function.__code__.co_names]
+        digest.update("".join(_named_tuples(mentioned, function.__globals__)).encode())
         cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
         names = {name: function.__globals__.get(name) for name in function.__code__.co_names}
         for name, value in {**names, **{name: cell.cell_contents for name, cell in cells}}.items():
@@ -147,6 +154,15 @@ def _digest(kernel: Kernel[..., Any]) -> str:
             elif isinstance(value, bool | int | float | complex | str | tuple | np.generic):
                 digest.update(f"{name}={value!r}".encode())
     return digest.hexdigest()[:16]
+
+
+def _named_tuples(mentioned: Iterable[Any], names: dict[str, Any]) -> Iterator[str]:
+    """Where the named tuples that annotations mention are from, and what they hold, down to those within them."""
+    for word in WORD.findall(" ".join(map(str, mentioned))):
+        value = names.get(word)
+        if isinstance(value, type) and hasattr(value, "_fields"):
+            yield f"{value.__module__}.{value.__qualname__}{value.__annotations__}"
+            yield from _named_tuples(value.__annotations__.values(), vars(sys.modules[value.__module__]))
 
 
 def _spelled(value: Any) -> Any:
