@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,17 @@ ROUNDS = 64
 """Times that all edges are looked at; most faces need three."""
 
 
+class Planar(NamedTuple):
+    """The triangulation of one face; edge k of a triangle begins at its vertex k."""
+
+    x: NDArray[np.float64]  # (n, 2) positions
+    tri: NDArray[np.int64]  # (t, 3) vertices of triangles, counter-clockwise
+    adj: NDArray[np.int64]  # (t, 3) triangle across each edge, or −1
+    fixed: NDArray[np.bool_]  # (t, 3) whether it is part of a segment
+    at: NDArray[np.int64]  # (n,) a triangle at each vertex
+    flat: float  # height below which a triangle is flat
+
+
 @compiled
 def triangulate_faces(
     points: NDArray[np.float64],
@@ -27,25 +40,11 @@ def triangulate_faces(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Triangulate faces, each with points on its rim and within, so that segments between these are edges.
 
-    Parameters
-    ----------
-    points : (n, 3) float
-        Positions.
-    starts, members : (m + 1,), (s,) int
-        Points of each face: those on its rim first, in order from the first corner on, then those within.
-    corners : (m, 3) int
-        Places of the second and third corner among the points of the face, and how many are on its rim.
-    segment_starts, segments : (m + 1,), (t, 2) int
-        Segments of each face, as places among its points.
-
-    Returns
-    -------
-    triangles : (k, 3) int
-        Points of each.
-    owners : (k,) int
-        Face of each, ascending.
-    cells : (k,) int
-        Which hang together without a segment between them, numbered from zero.
+    The `members` of each face, from ``starts[f]`` on, are those of the `points` (n, 3) on its rim, in order from the
+    first corner on, then those within. `corners`, (m, 3), are the places of the second and third corner among them, and
+    how many are on the rim; `segments`, (t, 2), from ``segment_starts[f]`` on, join two such places each. Returns
+    triangles (k, 3), the face of each, ascending, and its cell: numbers from zero of what hangs together without a
+    segment between.
     """
     m = len(corners)
     total = np.int64(0)
@@ -57,18 +56,16 @@ def triangulate_faces(
         begin, n, rim = starts[f], starts[f + 1] - starts[f], corners[f, 2]
         x = _flattened(points, members[begin : begin + n], corners[f])
         size = max(np.ptp(x[:, 0]), np.ptp(x[:, 1]))
-        flat = FLAT * size
         count = 2 * n - rim - 2
-        tri = np.empty((count, 3), np.int64)
-        adj = np.full((count, 3), -1, np.int64)
+        tri, adj = np.empty((count, 3), np.int64), np.full((count, 3), -1, np.int64)
         fixed = np.zeros((count, 3), np.bool_)
-        at = np.zeros(n, np.int64)
-        last = _rim(tri, adj, at, corners[f])
+        mesh = Planar(x, tri, adj, fixed, np.zeros(n, np.int64), FLAT * size)
+        last = _rim(mesh, corners[f])
         for i in range(rim, n):
-            last = _insert(x, tri, adj, fixed, at, last, i, flat)
+            last = _insert(mesh, last, i)
         for s in range(segment_starts[f], segment_starts[f + 1]):
-            _connect(x, tri, adj, fixed, at, segments[s, 0], segments[s, 1], flat)
-        _improve(x, tri, adj, fixed, at, flat)
+            _connect(mesh, segments[s, 0], segments[s, 1])
+        _improve(mesh)
         n_cells = _number_cells(adj, fixed, cells[filled : filled + last], n_cells)
         for t in range(last):
             for k in range(3):
@@ -134,8 +131,9 @@ def _length(x: NDArray[np.float64], a: int, b: int) -> float:
 
 
 @compiled
-def _rim(tri: NDArray[np.int64], adj: NDArray[np.int64], at: NDArray[np.int64], corners: NDArray[np.int64]) -> int:
+def _rim(mesh: Planar, corners: NDArray[np.int64]) -> int:
     """Divide the face at the points on its rim; returns how many triangles there are."""
+    tri, at = mesh.tri, mesh.at
     tri[0, 0], tri[0, 1], tri[0, 2] = 0, corners[0], corners[1]
     at[0] = at[corners[0]] = at[corners[1]] = 0
     count = 1
@@ -143,8 +141,8 @@ def _rim(tri: NDArray[np.int64], adj: NDArray[np.int64], at: NDArray[np.int64], 
         begin = 0 if side == 0 else corners[side - 1]
         end = corners[side] if side < 2 else corners[2]
         for i in range(begin + 1, end):
-            edge = _edge(tri, adj, at, i - 1, end % corners[2])
-            _split(tri, adj, at, edge // 3, edge % 3, i, count)
+            edge = _edge(mesh, i - 1, end % corners[2])
+            _split(mesh, edge // 3, edge % 3, i, count)
             count += 1
     return count
 
@@ -159,10 +157,9 @@ def _point_to(tri: NDArray[np.int64], adj: NDArray[np.int64], t: int, tail: int,
 
 
 @compiled
-def _split(
-    tri: NDArray[np.int64], adj: NDArray[np.int64], at: NDArray[np.int64], t: int, k: int, i: int, new: int
-) -> None:
+def _split(mesh: Planar, t: int, k: int, i: int, new: int) -> None:
     """Put a vertex on edge k of a triangle: the half from the vertex to the edge's head is new."""
+    tri, adj, at = mesh.tri, mesh.adj, mesh.at
     a, b = (k + 1) % 3, (k + 2) % 3
     u, v, w = tri[t, k], tri[t, a], tri[t, b]
     beyond = adj[t, a]
@@ -175,10 +172,9 @@ def _split(
 
 
 @compiled
-def _flip(
-    tri: NDArray[np.int64], adj: NDArray[np.int64], fixed: NDArray[np.bool_], at: NDArray[np.int64], t: int, k: int
-) -> int:
+def _flip(mesh: Planar, t: int, k: int) -> int:
     """Replace edge k of a triangle by the one between the apexes: (c, a, d) and (d, b, c). Returns the second."""
+    tri, adj, fixed, at = mesh.tri, mesh.adj, mesh.fixed, mesh.at
     s = adj[t, k]
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
     j = _place(tri, s, b)
@@ -198,24 +194,16 @@ def _flip(
 
 
 @compiled
-def _insert(
-    x: NDArray[np.float64],
-    tri: NDArray[np.int64],
-    adj: NDArray[np.int64],
-    fixed: NDArray[np.bool_],
-    at: NDArray[np.int64],
-    count: int,
-    i: int,
-    flat: float,
-) -> int:
+def _insert(mesh: Planar, count: int, i: int) -> int:
     """Put a point into the triangle that has it, and flip edges until they are Delaunay; the number of triangles."""
-    t, k, depth = _locate(x, tri, adj, count, i)
+    x, tri, adj, at, flat = mesh.x, mesh.tri, mesh.adj, mesh.at, mesh.flat
+    t, k, depth = _locate(mesh, count, i)
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
     s = adj[t, k]
     if s >= 0 and depth <= flat * _length(x, a, b):  # on an edge: four
         j = _place(tri, s, b)
-        _split(tri, adj, at, t, k, i, count)
-        _split(tri, adj, at, s, j, i, count + 1)
+        _split(mesh, t, k, i, count)
+        _split(mesh, s, j, i, count + 1)
         first, second = count, count + 1  # (i, b, c) and (i, a, d); t is (a, i, c), s is (b, i, d)
         _point_to(tri, adj, t, a, second)
         _point_to(tri, adj, second, i, t)
@@ -235,28 +223,21 @@ def _insert(
         _point_to(tri, adj, ca, a, second)
         at[i], at[a], at[b], at[c] = t, t, t, first
         count += 2
-    _legalize(x, tri, adj, fixed, at, i, flat)
+    _legalize(mesh, i)
     return count
 
 
 @compiled
-def _legalize(
-    x: NDArray[np.float64],
-    tri: NDArray[np.int64],
-    adj: NDArray[np.int64],
-    fixed: NDArray[np.bool_],
-    at: NDArray[np.int64],
-    i: int,
-    flat: float,
-) -> None:
+def _legalize(mesh: Planar, i: int) -> None:
     """Flip edges opposite a new point until they are Delaunay."""
+    tri, adj, fixed, at = mesh.tri, mesh.adj, mesh.fixed, mesh.at
     first = at[i]
     t = first
     while True:
         k = _place(tri, t, i)
         edge = (k + 1) % 3
-        if adj[t, edge] >= 0 and not fixed[t, edge] and _bad(x, tri, adj, t, edge, flat):
-            _flip(tri, adj, fixed, at, t, edge)  # t is (i, a, d): looked at again
+        if adj[t, edge] >= 0 and not fixed[t, edge] and _bad(mesh, t, edge):
+            _flip(mesh, t, edge)  # t is (i, a, d): looked at again
             first = t
             continue
         t = adj[t, (k + 2) % 3]  # across the edge back to i, counter-clockwise
@@ -265,29 +246,24 @@ def _legalize(
 
 
 @compiled
-def _improve(
-    x: NDArray[np.float64],
-    tri: NDArray[np.int64],
-    adj: NDArray[np.int64],
-    fixed: NDArray[np.bool_],
-    at: NDArray[np.int64],
-    flat: float,
-) -> None:
+def _improve(mesh: Planar) -> None:
     """Flip edges that are not Delaunay."""
+    tri, adj, fixed = mesh.tri, mesh.adj, mesh.fixed
     for _ in range(ROUNDS):
         flips = 0
         for t in range(len(tri)):
             for k in range(3):
-                if adj[t, k] > t and not fixed[t, k] and _bad(x, tri, adj, t, k, flat):
-                    _flip(tri, adj, fixed, at, t, k)
+                if adj[t, k] > t and not fixed[t, k] and _bad(mesh, t, k):
+                    _flip(mesh, t, k)
                     flips += 1
         if flips == 0:
             return
 
 
 @compiled
-def _bad(x: NDArray[np.float64], tri: NDArray[np.int64], adj: NDArray[np.int64], t: int, k: int, flat: float) -> bool:
+def _bad(mesh: Planar, t: int, k: int) -> bool:
     """Whether an edge is not Delaunay, and can be flipped."""
+    x, tri, adj, flat = mesh.x, mesh.tri, mesh.adj, mesh.flat
     s = adj[t, k]
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
     j = _place(tri, s, b)
@@ -310,10 +286,9 @@ def _convex(x: NDArray[np.float64], a: int, b: int, c: int, d: int, flat: float)
 
 
 @compiled
-def _locate(
-    x: NDArray[np.float64], tri: NDArray[np.int64], adj: NDArray[np.int64], count: int, i: int
-) -> tuple[int, int, float]:
+def _locate(mesh: Planar, count: int, i: int) -> tuple[int, int, float]:
     """The triangle that has a point, the edge that it is nearest to, and twice the area between."""
+    x, tri, adj = mesh.x, mesh.tri, mesh.adj
     t = count - 1
     for _ in range(count):
         k, depth = _side(x, tri, t, i)
@@ -343,8 +318,9 @@ def _side(x: NDArray[np.float64], tri: NDArray[np.int64], t: int, i: int) -> tup
 
 
 @compiled
-def _edge(tri: NDArray[np.int64], adj: NDArray[np.int64], at: NDArray[np.int64], u: int, v: int) -> int:
+def _edge(mesh: Planar, u: int, v: int) -> int:
     """The edge from one vertex to another as three times its triangle plus its place there; −1 if there is none."""
+    tri, adj, at = mesh.tri, mesh.adj, mesh.at
     first = at[u]
     t, back = first, False
     while t >= 0:
@@ -360,27 +336,19 @@ def _edge(tri: NDArray[np.int64], adj: NDArray[np.int64], at: NDArray[np.int64],
 
 
 @compiled
-def _connect(
-    x: NDArray[np.float64],
-    tri: NDArray[np.int64],
-    adj: NDArray[np.int64],
-    fixed: NDArray[np.bool_],
-    at: NDArray[np.int64],
-    a: int,
-    b: int,
-    flat: float,
-) -> bool:
+def _connect(mesh: Planar, a: int, b: int) -> bool:
     """Make a segment an edge, or edges through the points that it meets, by flips (Sloan 1993)."""
+    fixed = mesh.fixed
     while a != b:
-        t, k, goal = _aim(x, tri, adj, at, a, b, flat)
+        t, k, goal = _aim(mesh, a, b)
         if goal < 0:
             if t < 0:
                 return False
-            goal = _clear(x, tri, adj, fixed, at, t, k, a, b, flat)
+            goal = _clear(mesh, t, k, a, b)
             if goal < 0:
                 return False
         for tail, head in ((a, goal), (goal, a)):
-            edge = _edge(tri, adj, at, tail, head)
+            edge = _edge(mesh, tail, head)
             if edge >= 0:
                 fixed[edge // 3, edge % 3] = True
         a = goal
@@ -388,16 +356,9 @@ def _connect(
 
 
 @compiled
-def _aim(
-    x: NDArray[np.float64],
-    tri: NDArray[np.int64],
-    adj: NDArray[np.int64],
-    at: NDArray[np.int64],
-    a: int,
-    b: int,
-    flat: float,
-) -> tuple[int, int, int]:
+def _aim(mesh: Planar, a: int, b: int) -> tuple[int, int, int]:
     """The triangle around a, and its edge, that a segment to b leaves through; or the neighbour of a that it meets."""
+    x, tri, adj, at, flat = mesh.x, mesh.tri, mesh.adj, mesh.at, mesh.flat
     first = at[a]
     t, back, length = first, False, _length(x, a, b)
     found, edge = -1, -1
@@ -429,19 +390,9 @@ def _place(tri: NDArray[np.int64], t: int, a: int) -> int:
 
 
 @compiled
-def _clear(
-    x: NDArray[np.float64],
-    tri: NDArray[np.int64],
-    adj: NDArray[np.int64],
-    fixed: NDArray[np.bool_],
-    at: NDArray[np.int64],
-    t: int,
-    k: int,
-    a: int,
-    b: int,
-    flat: float,
-) -> int:
+def _clear(mesh: Planar, t: int, k: int, a: int, b: int) -> int:
     """Flip the edges that a segment crosses, beginning with edge k of a triangle, up to the point it meets; or −1."""
+    x, tri, adj, fixed, flat = mesh.x, mesh.tri, mesh.adj, mesh.fixed, mesh.flat
     tails, heads = [tri[t, k]], [tri[t, (k + 1) % 3]]
     length = _length(x, a, b)
     while True:  # edges across the segment: tails on its right, heads on its left
@@ -464,7 +415,7 @@ def _clear(
             return -1
         u, w = tails[begin], heads[begin]
         begin += 1
-        edge = _edge(tri, adj, at, u, w)
+        edge = _edge(mesh, u, w)
         t, k = edge // 3, edge % 3
         c = tri[t, (k + 2) % 3]
         s = adj[t, k]
@@ -474,7 +425,7 @@ def _clear(
             tails.append(u)
             heads.append(w)
             continue
-        _flip(tri, adj, fixed, at, t, k)
+        _flip(mesh, t, k)
         if c not in (a, z) and d not in (a, z) and _turn(x, a, z, c) * _turn(x, a, z, d) < 0.0:
             right = _turn(x, a, z, c) < 0.0
             tails.append(c if right else d)
