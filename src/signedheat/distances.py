@@ -22,7 +22,9 @@ from .kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources,
 from .mesh.outlines import FillRule
 from .progress import Progress
 from .solids.bounding import Nesting
+from .solids.completion import Completing, Lids
 from .solids.facing import orient
+from .solids.heat_surfaces import Heat
 from .solids.solid import Solid
 from .solids.solid_distance import distance_to_shapes
 from .solver import SignedHeatSolver
@@ -44,8 +46,8 @@ def signed_distance(
     spacing: ArrayLike | None = None,
     padding: float | None = None,
     band: float | None = None,
-    completion: Literal["lids", "heat"] = "lids",
-    lids: Literal["bent", "flat"] = "bent",
+    completion: Completing = "lids",
+    lids: Lids = "bent",
     nested: Nesting = "given",
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
@@ -74,8 +76,8 @@ def signed_distance(
     domain: Grid[Dimension],
     *,
     band: float | None = None,
-    completion: Literal["lids", "heat"] = "lids",
-    lids: Literal["bent", "flat"] = "bent",
+    completion: Completing = "lids",
+    lids: Lids = "bent",
     nested: Nesting = "given",
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
@@ -88,8 +90,8 @@ def signed_distance(
     source: Shapes,
     domain: TetMesh,
     *,
-    completion: Literal["lids", "heat"] = "lids",
-    lids: Literal["bent", "flat"] = "bent",
+    completion: Completing = "lids",
+    lids: Lids = "bent",
     nested: Nesting = "given",
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
@@ -242,15 +244,14 @@ def distance_to_solid(
 def plain_distance(
     shape: Any,
     domain: Grid | TetMesh,
-    constraint: Constraint,
-    diffusion: float,
+    method: Heat,
     as_oriented: bool,
     progress: Progress | None = None,
 ) -> Any:
     """The method's own field of a shape in space: its faces are oriented, and nothing is completed or sharpened."""
     if isinstance(shape, TriangleMesh | PolygonMesh) and not as_oriented:
         shape = orient(shape)
-    return SignedHeatSolver[Any](domain, diffusion, progress).distance(shape, constraint)
+    return SignedHeatSolver[Any](domain, method.diffusion, progress).distance(shape, method.constraint)
 
 
 def grid_around(

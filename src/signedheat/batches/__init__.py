@@ -1,4 +1,4 @@
-"""Many shapes: one job for each, in processes of this machine or a cluster, and a manifest of what came of them."""
+"""Run one job on many shapes, in processes of this machine or on a cluster, and record the outcomes in a manifest."""
 
 from .job import Job, Sampling, Watertight
 from .manifest import Outcome

@@ -1,4 +1,4 @@
-"""Which shapes a batch has, and under what name the results of each are kept."""
+"""Find the shapes of a batch, and name the results of each."""
 
 from __future__ import annotations
 
@@ -17,29 +17,27 @@ MAGIC = frozenset("*?[")
 
 @dataclass(frozen=True)
 class Input:
-    """A file, and the name of its results: a path without extension, relative to the folder of the results."""
+    """A file, and the name of its results: a path without extension, relative to the folder for results."""
 
     path: Path
     name: str
 
 
 def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None) -> list[Input]:
-    """Every shape among files, folders and patterns, once, in order.
+    """List every shape among files, folders and patterns once, in order.
 
-    Folders, with those in them, give the files whose extensions are those of shapes; files that are named are taken
-    whatever they are called. What lies in the folder `results` is left out of folders.
-
-    Names follow the files: ``parts/a.stl`` in the folder ``.`` gives ``parts/a``. Two files that differ in extension
-    alone keep it in their names.
+    Folders are searched recursively for files with the extension of a shape, except in `results`. Files that are named
+    are taken whatever their extension. Results are named after the files: ``parts/a.stl`` in the folder ``.`` gives
+    ``parts/a``, and files that differ only in extension keep it.
     """
-    paths: dict[str, Path] = {}  # by where each is, links apart
-    below: dict[str, str] = {}  # names below the folder that each was found in
-    for each in inputs:
+    paths: dict[str, Path] = {}  # by resolved path
+    below: dict[str, str] = {}  # path relative to the folder that was searched, by resolved path
+    for name in inputs:
         try:
-            files, root = _files(named_path(each), results)
+            files, root = _files(named_path(name), results)
         except OSError as error:
             cause = f"cannot be searched ({error.strerror})"
-            raise FileFormatError(cause, remedy="check the name", path=error.filename or each) from error
+            raise FileFormatError(cause, remedy="check the name", path=error.filename or name) from error
         for path in files:
             place = os.path.join(os.path.realpath(path.parent), path.name)
             inner = path.relative_to(root)
@@ -51,7 +49,7 @@ def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None
 
 
 def named_path(name: str | os.PathLike[str]) -> Path:
-    """The path with a name; an empty one, as of a variable that is not set, is refused."""
+    """The path with a name; an empty name, such as of an unset variable, is refused."""
     if not os.fspath(name) or "\0" in str(name):
         cause = "holds a null character" if os.fspath(name) else "is empty"
         raise FileFormatError(f"the name {cause}", remedy="name a file or a folder, or . for this one", path=name)
@@ -59,13 +57,13 @@ def named_path(name: str | os.PathLike[str]) -> Path:
 
 
 def _files(path: Path, results: Path | None) -> tuple[list[Path], Path]:
-    """Files, and the folder that their names are relative to."""
+    """Files of an input, and the folder that their names are relative to."""
     if path.is_dir():
         avoided = None if results is None else os.path.realpath(results)
         if avoided is not None and Path(os.path.realpath(path)).is_relative_to(avoided):
             raise FileFormatError(
-                "results would lie among the shapes, and be taken for some the next time",
-                remedy="name another folder for them, such as one in this one",
+                "results would lie among the shapes, and the next run would take them for shapes",
+                remedy="name another folder for them, such as a subfolder",
                 path=path,
             )
         inner = (Path(folder, name) for folder, _, names in os.walk(path, onerror=_fail) for name in names)
@@ -74,7 +72,7 @@ def _files(path: Path, results: Path | None) -> tuple[list[Path], Path]:
             shapes = [file for file in shapes if not Path(os.path.realpath(file)).is_relative_to(avoided)]
         return shapes, path
     if path.exists() or not MAGIC & set(str(path)):
-        return [path], path.parent  # whether it can be read is for its worker to say
+        return [path], path.parent  # the worker reports a file that cannot be read
     fixed = next(k for k, part in enumerate(path.parts) if MAGIC & set(part))
     root, pattern = Path(*path.parts[:fixed]), path.parts[fixed:]
     if pattern[-1] == "**":
@@ -87,23 +85,23 @@ def _files(path: Path, results: Path | None) -> tuple[list[Path], Path]:
 
 
 def _fail(error: OSError) -> None:
-    raise error  # what is in a folder that cannot be read must not be missed
+    raise error  # shapes in a folder that cannot be read must not be skipped silently
 
 
 def _is_hidden(path: Path, pattern: tuple[str, ...]) -> bool:
-    """Whether a name is hidden: some part begins with a dot, but none of the pattern does, as in shells."""
+    """Whether a part of a name begins with a dot and no part of the pattern does, as in shells."""
     return any(name.startswith(".") and name != ".." for name in path.parts) and not any(
         part.startswith(".") and part != ".." for part in pattern
     )
 
 
 def _is_file_or_broken_link(path: Path) -> bool:
-    """Broken links are kept, so that they are reported as shapes that cannot be read."""
+    """Whether to list a path; broken links are listed, and reported as shapes that cannot be read."""
     return path.is_file() or (path.is_symlink() and not path.exists())
 
 
 def _names(below: dict[str, str]) -> list[str]:
-    """A unique name for each file: without extension, with it, or with folders from further up."""
+    """Unique names for files: without extension, with it, or with more of their folders."""
     alike: dict[str, list[str]] = {}
     for place in below:
         alike.setdefault(os.path.basename(place).lower(), []).append(os.path.dirname(place))
@@ -111,15 +109,15 @@ def _names(below: dict[str, str]) -> list[str]:
     names = [_without_extension(name) for name in below.values()]
     for longer in (list(below.values()), above):
         count = Counter(name.lower() for name in names)  # file systems may ignore case
-        names = [name if count[name.lower()] == 1 else other for name, other in zip(names, longer, strict=True)]
+        names = [name if count[name.lower()] == 1 else long for name, long in zip(names, longer, strict=True)]
     name, times = Counter(names).most_common(1)[0]
     if times > 1:
-        raise FileFormatError("the results of two shapes would have this name", remedy="rename one", path=name)
+        raise FileFormatError("results of two shapes would have the same name", remedy="rename one", path=name)
     return names
 
 
 def _without_extension(name: str) -> str:
-    """A name without its extension, unless a folder would be left, as of ``..stl``.
+    """A name without its extension, unless only dots would be left, as of ``..stl``.
 
     Examples
     --------

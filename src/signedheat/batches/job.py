@@ -1,4 +1,4 @@
-"""What is made of each shape of a batch."""
+"""Jobs for the shapes of a batch."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 from ..constraints import Constraint, ZeroSet
 from ..distances import grid_around, plain_distance
@@ -21,12 +21,14 @@ from ..io.shape_files import read, save
 from ..io.voxel_files import LABEL_FORMATS, read_labels
 from ..kinds import ShapeLike
 from ..solids.bounding import Nesting
-from ..solids.completion import complete
+from ..solids.completion import Completion, Lids, complete
+from ..solids.heat_surfaces import Heat
 from ..solids.sample_set import Layout
 from ..solids.sampling import WIDTHS, sample
-from ..solids.solid_distance import distance_to_shapes
+from ..solids.solid_distance import completed_distance
 from ..solids.training import training_points
 from ..solids.watertight import closed_surface, faults_of, figures_of
+from ..solver import checked
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import positive_number, whole_number
@@ -35,22 +37,22 @@ from .inputs import Input
 
 @dataclass(frozen=True)
 class Sampling:
-    """Which samples are taken (`signedheat.sample`), and how they are kept (`Samples.save`).
+    """How to sample a shape (`signedheat.sample`) and store the samples (`Samples.save`).
 
     Attributes
     ----------
     n : int
         Number of points.
     near : float
-        Share of them near the surface.
+        Fraction of the points near the surface.
     widths : tuple of float
-        Standard deviations of the noise, over the radius of the shape.
+        Standard deviations of the noise, relative to the radius of the shape.
     seed : int
-        Of the random numbers.
+        Seed of the random numbers.
     normalize : bool
         Move and scale the shape into the unit sphere.
     layout : "arrays" or "deepsdf"
-        How they are kept in the file.
+        Layout of the file.
 
     Examples
     --------
@@ -68,20 +70,20 @@ class Sampling:
 
 @dataclass(frozen=True)
 class Job:
-    """What `run` makes of each shape: any of a field, offsets, samples and a report, of one distance.
+    """Compute the distance to a shape, and write any of its field, offsets, samples and a report.
 
     Attributes
     ----------
     volume : str, optional
         Extension of the file of the field, such as ``".npz"``.
     offsets : tuple of float
-        Distances at which closed surfaces are written, ``NAME_+0.5.stl``.
+        Distances at which to write closed surfaces, such as ``NAME_+0.5.stl``.
     surfaces : str
         Extension of their files.
     samples : Sampling, optional
-        Points to learn from, ``NAME.npz``; ``NAME_samples.npz`` next to a field of that name.
+        Training points, written to ``NAME.npz``, or to ``NAME_samples.npz`` if that is the field.
     info : bool
-        Report counts and defects of the shape, as ``signedheat info`` does, in the manifest.
+        Report counts and defects of the shape in the manifest, as ``signedheat info`` does.
     resolution, spacing, padding
         The grid around each shape, as for `signed_distance`; by default with room for the offsets.
     band : float, optional
@@ -92,7 +94,7 @@ class Job:
     Raises
     ------
     SignedHeatError
-        If there is nothing to make, samples are wanted of a plain field, or offsets beyond the band.
+        If nothing is asked for, samples are asked for of a plain field, or offsets lie beyond the band.
 
     Examples
     --------
@@ -118,7 +120,7 @@ class Job:
     diffusion: float = 1.0
     as_oriented: bool = False
     keep_overlaps: bool = False
-    lids: Literal["bent", "flat"] = "bent"
+    lids: Lids = "bent"
     nested: Nesting = "given"
     plain: bool = False
 
@@ -126,10 +128,10 @@ class Job:
         reach = max(map(abs, self.offsets), default=0.0)
         cause = remedy = ""
         if not (self._measures or self.info):
-            cause, remedy = "there is nothing to make of the shapes", "ask for a volume, offsets, samples or info"
+            cause, remedy = "the job has no results", "ask for a volume, offsets, samples or info"
         elif self.plain and (self.samples is not None or self.band is not None):
-            what = "samples have" if self.samples is not None else "a band has"
-            cause, remedy = f"{what} distances to the shape itself, and a plain field has others", "leave out plain"
+            result = "samples" if self.samples is not None else "a band"
+            cause, remedy = f"a plain field has no distances to the shape, as {result} would need", "leave out plain"
         elif self.band is not None and self.volume not in (None, *BAND_FORMATS):
             cause, remedy = f"a band cannot be written as {self.volume}", f"use {' or '.join(sorted(BAND_FORMATS))}"
         elif self.band is not None and reach > self.band:
@@ -147,7 +149,7 @@ class Job:
         return "_samples.npz" if self.volume == ".npz" else ".npz"
 
     def refuse_shared_names(self, shapes: Iterable[Input]) -> None:
-        """Refuse shapes of which two would have results of one name.
+        """Refuse two shapes whose results would have the same name.
 
         Parameters
         ----------
@@ -168,18 +170,18 @@ class Job:
         endings += [] if self.volume is None else [self.volume]
         endings += [] if self.samples is None else [self._of_samples]
         owners: dict[str, Input] = {}
-        for each in shapes:
+        for shape in shapes:
             for ending in endings:
-                other = owners.setdefault(f"{each.name}{ending}".lower(), each)
-                if other is not each:
+                owner = owners.setdefault(f"{shape.name}{ending}".lower(), shape)
+                if owner is not shape:
                     raise FileFormatError(
-                        f"a result of {other.path.name} would have the name of one of this shape, {each.name}{ending}",
+                        f"this shape and {owner.path.name} would both have the result {shape.name}{ending}",
                         remedy="rename one of the two",
-                        path=each.path,
+                        path=shape.path,
                     )
 
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
-        """Make it of one shape: files that begin with `stem`. Returns figures, and important notes under "notes"."""
+        """Write the results of one shape to files that begin with `stem`; return figures and important notes."""
         shape = read(path)
         figures: dict[str, object] = {"info": shape_figures(shape)} if self.info else {}
         if not self._measures:
@@ -199,48 +201,47 @@ class Job:
         if surfaces:
             figures["surfaces"] = surfaces
         if self.samples is not None:
-            wanted = self.samples
-            taken = sample(phi, wanted.n, near=wanted.near, widths=wanted.widths, seed=wanted.seed)
-            (taken.normalized() if wanted.normalize else taken).save(f"{stem}{self._of_samples}", wanted.layout)
+            how = self.samples
+            taken = sample(phi, how.n, near=how.near, widths=how.widths, seed=how.seed)
+            (taken.normalized() if how.normalize else taken).save(f"{stem}{self._of_samples}", how.layout)
             figures["samples"] = taken.figures
         return figures
 
     def _distance(self, shape: ShapeLike, grid: Grid) -> GridField:
+        method = Heat(checked(self.constraint), positive_number(self.diffusion, "diffusion"))
         if self.plain:
-            return cast("GridField", plain_distance(shape, grid, self.constraint, self.diffusion, self.as_oriented))
-        options: dict[str, Any] = {"as_oriented": self.as_oriented, "keep_overlaps": self.keep_overlaps}
-        options |= {"lids": self.lids, "nested": self.nested}
-        options |= {"constraint": self.constraint, "diffusion": self.diffusion}
-        return cast("GridField", distance_to_shapes(shape, grid, band=self.band, **options))
+            return cast("GridField", plain_distance(shape, grid, method, self.as_oriented))
+        options = Completion("lids", self.lids, self.nested, self.as_oriented, self.keep_overlaps)
+        return cast("GridField", completed_distance(shape, grid, options, method, self.band))
 
 
 @dataclass(frozen=True)
 class Watertight:
-    """A closed mesh of each shape, for `run`.
+    """Write a closed mesh of a shape.
 
-    The faces that were given are kept where they bound the solid and join with its completion; elsewhere the surface is
-    contoured, with its edges and corners.
+    Faces of the shape are kept where they bound the solid and join with its completion. Elsewhere the surface is
+    contoured with its edges and corners.
 
     Attributes
     ----------
     surfaces : str
         Extension of the files.
     thickness : float, optional
-        Of sheets, which bound nothing by themselves: the surface is at half of this distance from everything.
+        Thickness of sheets, which bound nothing themselves: the surface is at half this distance from the shape.
     contoured : bool
-        Contour everything: even triangles in place of few.
+        Contour the whole surface, which gives more and evenly sized triangles.
     tolerance : float, optional
         Simplify the surface, by no more than this distance.
     resolution, spacing
         Of the contour, as for `Solid.surface`.
     samples : int, optional
-        Points of each kind that are taken of the surface, in two files in the layout of public trainers of generators:
-        ``_surface.npz`` with ``random_surface`` and ``sharp_surface``, places and normals; ``_sdf.npz`` with points in
-        the volume, near the surface and near sharp edges, and their signed distances.
+        Number of training points of each kind, in two files that public shape generators read: ``_surface.npz`` with
+        positions and normals in ``random_surface`` and ``sharp_surface``, and ``_sdf.npz`` with points in the volume,
+        near the surface and near sharp edges, and their signed distances.
     normalize : bool
-        Move and scale the shape into the unit sphere, for the samples.
+        Move and scale the samples into the unit sphere.
     label : float, optional
-        Of an image of labels, the voxels with this one; the surface lies where the image does.
+        In an image of labels, take the voxels with this label, in the coordinates of the image.
 
     Examples
     --------
@@ -272,7 +273,7 @@ class Watertight:
             positive_number(self.tolerance, "tolerance")
 
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
-        """Make it of one shape, in a file that begins with `stem`; figures, and all notes under "notes"."""
+        """Write the closed mesh of one shape to a file that begins with `stem`; return figures and all notes."""
         if extension(path) in LABEL_FORMATS:
             image = read_labels(path)
             solid = complete(image.to_world(image.surface(self.label)))
@@ -293,6 +294,6 @@ class Watertight:
             on, around = training_points(surface, self.samples, self.normalize)
             write_npz(f"{stem}_surface.npz", **on)
             write_npz(f"{stem}_sdf.npz", **around)
-        notes = [str(note) for note in solid.diagnostics.notes] + [str(each.message) for each in caught]
+        notes = [str(note) for note in solid.diagnostics.notes] + [str(warning.message) for warning in caught]
         figures = figures_of(surface, solid, 0.5 * (self.thickness or 0.0))
         return {"way": way, **figures, **faults, "notes": notes}

@@ -1,4 +1,4 @@
-"""The manifest of a batch: one line of JSON for each shape, written as soon as it is known."""
+"""The manifest of a batch: one line of JSON for each shape, written as soon as its task ends."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from typing import Any, Literal
 from ..io.files import contents, replacing, writing
 
 State = Literal["done", "failed", "timed out", "died"]
-"""done: everything was written; failed: with an error; timed out: stopped at the time limit; died: its process did."""
+"""How a task ended: all results written, an error, stopped at the time limit, or its process died."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one shape: a line of the manifest.
+    """Outcome of one shape: a line of the manifest.
 
     Attributes
     ----------
@@ -31,15 +31,15 @@ class Outcome:
     seconds : float
         How long it took.
     message : str
-        What went wrong; of what is done, what to know before trusting it.
+        The error, or if it is done, what to know before trusting the results.
     outputs : tuple of str
         Files, in the folder of the batch.
     figures : mapping
         Figures of quality, as ``--json`` prints them.
     job : str
-        What was to be made of it, and by which version of this package.
+        The job, and the version of this package.
     source : tuple of int
-        Size of the file in bytes, and when it was modified, in nanoseconds.
+        Size of the file in bytes, and its time of modification in nanoseconds.
 
     Examples
     --------
@@ -59,26 +59,26 @@ class Outcome:
 
     @property
     def is_done(self) -> bool:
-        """Whether everything was written."""
+        """Whether all results were written."""
         return self.state == "done"
 
 
 class Manifest:
-    """The manifest in a folder, as it was left, and open for what follows."""
+    """The manifest in a folder, with the outcomes of earlier runs."""
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / "manifest.jsonl"
         self.outcomes = _read(self.path)
 
     def still_holds(self, name: str, path: Path, job: str) -> Outcome | None:
-        """The outcome of a shape that is done: the same file, the same job, and all its results still there."""
+        """The earlier outcome of a shape, if the file and the job are the same and all results still exist."""
         outcome = self.outcomes.get(name)
         if outcome is None or not outcome.is_done or outcome.job != job or outcome.source != source_of(path):
             return None
         return outcome if all((self.path.parent / output).is_file() for output in outcome.outputs) else None
 
     def add(self, outcome: Outcome) -> None:
-        """Append a line, at once: whatever happens next, it stays."""
+        """Append a line, and flush it to disk."""
         with writing(self.path), self.path.open("a", encoding="utf-8") as file:
             file.write(_line(outcome))
             file.flush()
@@ -99,13 +99,13 @@ def source_of(path: Path) -> tuple[int, int]:
 
 
 def _line(outcome: Outcome) -> str:
-    """One line that people can read; names of files may hold bytes that are no text, and separators of lines."""
+    """A readable line; escaped where names of files hold separators of lines or bytes that are not text."""
     line = json.dumps(asdict(outcome), ensure_ascii=False)
     return (line if line.isprintable() else json.dumps(asdict(outcome))) + "\n"
 
 
 def _read(path: Path) -> dict[str, Outcome]:
-    """Outcomes by name, the last of each; lines that are damaged or cut off are left out."""
+    """The last outcome of each name; damaged and truncated lines are skipped."""
     outcomes: dict[str, Outcome] = {}
     if not os.path.lexists(path) or (path.is_file() and not path.stat().st_size):
         return outcomes
@@ -117,9 +117,9 @@ def _read(path: Path) -> dict[str, Outcome]:
 
 
 def _outcome(entries: dict[str, Any]) -> Outcome:
-    """An outcome as it was written; ValueError, TypeError or KeyError if these are other things."""
+    """An outcome from its entries; ValueError, TypeError or KeyError if they are not those of an outcome."""
     outcome = Outcome(**{**entries, "outputs": tuple(entries["outputs"]), "source": tuple(entries["source"])})
     texts = (outcome.name, outcome.input, outcome.state, outcome.message, outcome.job, *outcome.outputs)
     if not all(isinstance(text, str) and "\0" not in text for text in texts):
-        raise TypeError("these are no outcomes")
+        raise TypeError("this is not an outcome")
     return outcome

@@ -1,4 +1,4 @@
-"""One job for many shapes."""
+"""Run one job on many shapes."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from .worker import Done, Function, Task, Worker, do_apart
 
 try:
     import fcntl
-except ImportError:  # where folders cannot be locked, two batches at once are not noticed
+except ImportError:  # on Windows, two batches in one folder are not detected
     fcntl = None  # type: ignore[assignment]
 
 
 @dataclass(frozen=True)
 class Batch:
-    """What came of many shapes.
+    """Outcomes of a batch.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Batch:
     manifest : Path
         The file that holds them, a line of JSON each.
     skipped : int
-        Number of shapes that were done before.
+        Number of shapes that an earlier run had done.
 
     Examples
     --------
@@ -58,7 +58,7 @@ class Batch:
 
     @property
     def failures(self) -> list[Outcome]:
-        """Those that are not done."""
+        """Outcomes of the shapes that are not done."""
         return [outcome for outcome in self.outcomes if not outcome.is_done]
 
     def __repr__(self) -> str:
@@ -78,47 +78,47 @@ def run(
     progress: Progress | None = None,
     report: Callable[[Outcome], None] | None = None,
 ) -> Batch:
-    """Do one job for many shapes, each in a worker process, and keep a manifest of what came of them.
+    """Run one job on many shapes in worker processes, and record the outcomes in a manifest.
 
-    A shape that fails, takes too long or kills its process does not stop the others; where memory was short, it is
-    tried once more when the others are done, alone. Whoever starts a batch again, after it was stopped or with more
-    inputs, gets what is not there yet: shapes are skipped that are done, with the same job of the same version, from a
-    file that has not changed, and whose results are still there. Results do not depend on the number of workers.
+    A shape that fails, takes too long or kills its process does not stop the others. If memory ran out, the shape is
+    tried once more, alone, after the others. A batch can be started again after it was stopped or with more inputs: it
+    skips each shape whose file has not changed, if the same version has done the same job and the results still exist.
+    Results do not depend on the number of workers.
 
     Parameters
     ----------
     inputs : path, or sequence of paths
-        Files, folders (with all in them), patterns such as ``"parts/**/*.stl"``.
+        Files, folders (searched recursively), and patterns such as ``"parts/**/*.stl"``.
     folder : path
-        Where results go, under the names of the inputs; and ``manifest.jsonl``, a line of JSON for each shape: its
-        state, seconds, message, and figures of quality.
+        Folder for the results, which are named after the inputs, and for ``manifest.jsonl``, which has a line of JSON
+        for each shape with its state, seconds, message and figures of quality.
     job : Job, Watertight, or callable
-        What to make of each shape: ``job(path, stem)`` writes files whose names begin with `stem`, and returns a
-        dictionary of figures. It must be importable by the workers.
+        Called for each shape as ``job(path, stem)``: writes files whose names begin with `stem`, and returns a
+        dictionary of figures. The workers must be able to import it.
     workers : int, optional
-        Number of processes; by default one for each processor.
+        Number of processes. By default, one for each processor.
     threads : int
         Threads of each process.
     scheduler : str, optional
-        Address of a running Dask cluster, ``tcp://host:port``, whose workers see the same files under the same names.
+        Address of a running Dask cluster, ``tcp://host:port``. Its workers must see the same files at the same paths.
     time_limit : float, optional
-        Seconds after which a shape is given up.
+        Seconds after which a shape is abandoned.
     progress : callable, optional
-        Called as ``progress(fraction, text)``; what it raises stops the batch.
+        Called as ``progress(fraction, text)``. An exception that it raises stops the batch.
     report : callable, optional
-        Called with the `Outcome` of each shape, as soon as it is known.
+        Called with the `Outcome` of each shape as soon as it ends.
 
     Returns
     -------
     Batch
-        The outcomes, and where the manifest is.
+        The outcomes, and the path of the manifest.
 
     Raises
     ------
     FileFormatError
-        If there is no input, the folder cannot be made, or two shapes would have results of one name.
+        If there is no input, the folder cannot be made, or results of two shapes would have the same name.
     SignedHeatError
-        If the job cannot be sent to workers, or none can be started; if numbers make no sense, or another batch is
+        If the job cannot be sent to workers, no worker can be started, a number is out of range, or another batch is
         writing into the folder.
     MissingPackageError
         If a scheduler is given and Dask is not installed.
@@ -138,20 +138,20 @@ def run(
     _refuse_odd(workers, threads, time_limit)
     target = named_path(folder)
     if os.path.lexists(target) and not target.is_dir():
-        raise FileFormatError("this is no folder", remedy="choose another one", path=target)
-    every = expand([inputs] if isinstance(inputs, str | os.PathLike) else inputs, target)
+        raise FileFormatError("this is not a folder", remedy="choose another one", path=target)
+    shapes = expand([inputs] if isinstance(inputs, str | os.PathLike) else inputs, target)
     if isinstance(job, Job):
-        job.refuse_shared_names(every)
+        job.refuse_shared_names(shapes)
     described = _described(job)
     with ExitStack() as stack:
         scratch = stack.enter_context(_locked(target))
         manifest = Manifest(target)
-        found = {each.name: manifest.still_holds(each.name, each.path, described) for each in every}
-        done = {name: outcome for name, outcome in found.items() if outcome is not None}
+        earlier = {shape.name: manifest.still_holds(shape.name, shape.path, described) for shape in shapes}
+        done = {name: outcome for name, outcome in earlier.items() if outcome is not None}
         skipped = len(done)
         manifest.write(done.values())
-        todo = [each for each in every if each.name not in done]
-        tasks = [Task(job, described, each, target.absolute(), scratch / str(k)) for k, each in enumerate(todo)]
+        todo = [shape for shape in shapes if shape.name not in done]
+        tasks = [Task(job, described, shape, target.absolute(), scratch / str(k)) for k, shape in enumerate(todo)]
         if scheduler is not None:
             outcomes = _on_cluster(tasks, scheduler, threads, time_limit)
         else:
@@ -159,8 +159,8 @@ def run(
         stack.enter_context(closing(outcomes))
         begin, failed = time.perf_counter(), 0
         if progress is not None:
-            progress(skipped / len(every), f"{skipped} of {len(every)} shapes")
-        for now, outcome in enumerate(outcomes, 1):
+            progress(skipped / len(shapes), f"{skipped} of {len(shapes)} shapes")
+        for n_ended, outcome in enumerate(outcomes, 1):
             done[outcome.name] = outcome
             manifest.add(outcome)
             logger.info("%s: %s (%.1f s) %s", outcome.name, outcome.state, outcome.seconds, outcome.message)
@@ -168,37 +168,38 @@ def run(
                 report(outcome)
             failed += not outcome.is_done
             if progress is not None:
-                text = f"{len(done)} of {len(every)} shapes" + (f", {failed} not done" if failed else "")
-                left = (time.perf_counter() - begin) / now * (len(todo) - now)
-                progress(len(done) / len(every), text + (f", about {duration(left)} left" if now < len(todo) else ""))
-        manifest.write(done[each.name] for each in every)
-    return Batch(tuple(done[each.name] for each in every), manifest.path, skipped)
+                text = f"{len(done)} of {len(shapes)} shapes"
+                if failed:
+                    text += f", {failed} not done"
+                n_left = len(todo) - n_ended
+                if n_left:
+                    text += f", about {duration((time.perf_counter() - begin) / n_ended * n_left)} left"
+                progress(len(done) / len(shapes), text)
+        outcomes_in_order = tuple(done[shape.name] for shape in shapes)
+        manifest.write(outcomes_in_order)
+    return Batch(outcomes_in_order, manifest.path, skipped)
 
 
 def _described(job: Function) -> str:
-    """A text that identifies a job and the version of the package: shapes that have another one are done again."""
+    """A text that identifies a job and the version of the package; shapes with another one are done again."""
     text = repr(job) if is_dataclass(job) else f"{getattr(job, '__module__', '')}.{getattr(job, '__qualname__', job)}"
     package = __name__.partition(".")[0]
     return f"{text} by {package} {import_module(package).__version__}"
 
 
 def _refuse_odd(workers: object, threads: object, time_limit: object) -> None:
-    """Refuse numbers of processes, threads and seconds that make no sense."""
+    """Refuse numbers of processes, threads and seconds that are out of range."""
     for name, number in (("workers", 1 if workers is None else workers), ("threads", threads)):
         if whole_number(number, name, 1, SignedHeatError) > MOST_THREADS:
             raise SignedHeatError(f"{name} must be at most {MOST_THREADS}, not {number}", element=name)
     if time_limit is not None and positive_number(time_limit, "time limit") > threading.TIMEOUT_MAX:
-        cause = f"the time limit is {time_limit:g} s, longer than can be waited"
+        cause = f"the time limit is {time_limit:g} s, which is too long to wait"
         raise SignedHeatError(cause, remedy="leave it out", element="time limit")
 
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[Path]:
-    """Make a folder, and keep other batches out: each would leave the lines of the other out of the manifest.
-
-    Gives a place in it for what is not finished, without what a batch has left there that was killed. The system
-    releases the lock when the process ends, however it does.
-    """
+    """Make a folder, lock it against other batches, and yield an empty scratch folder in it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -212,7 +213,7 @@ def _locked(folder: Path) -> Iterator[Path]:
             try:
                 fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
-                if error.errno in (errno.EWOULDBLOCK, errno.EACCES):  # and not a file system without locks
+                if error.errno in (errno.EWOULDBLOCK, errno.EACCES):  # other errors: a file system without locks
                     cause, remedy = "another batch is writing into this folder", "wait for it, or choose another folder"
                     raise SignedHeatError(cause, remedy=remedy, path=folder) from error
         shutil.rmtree(scratch, ignore_errors=True)
@@ -223,7 +224,7 @@ def _locked(folder: Path) -> Iterator[Path]:
 def _in_processes(
     tasks: list[Task], number: int, threads: int, time_limit: float | None
 ) -> Generator[Outcome, None, None]:
-    """Outcomes as they come; shapes that ran out of memory are tried once more at the end, alone."""
+    """Yield outcomes as tasks end; shapes that ran out of memory are tried once more at the end, alone."""
     starved = []
     workers = [Worker(threads) for _ in range(max(1, min(number, len(tasks))))]
     idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()
@@ -239,11 +240,11 @@ def _in_processes(
 
     pool = ThreadPoolExecutor(len(workers))
     try:
-        jobs = {pool.submit(do, task): task for task in tasks}
-        for job in as_completed(jobs):
-            outcome, is_starved = job.result()
+        futures = {pool.submit(do, task): task for task in tasks}
+        for future in as_completed(futures):
+            outcome, is_starved = future.result()
             if is_starved and len(workers) > 1:
-                starved.append(jobs[job])
+                starved.append(futures[future])
             else:
                 yield outcome
         for worker in workers[1:]:
@@ -260,17 +261,17 @@ def _in_processes(
 def _on_cluster(
     tasks: list[Task], address: str, threads: int, time_limit: float | None
 ) -> Generator[Outcome, None, None]:
-    """Outcomes as they come from a Dask cluster, each task in a process of its own on the worker that got it."""
+    """Yield outcomes as tasks end on a Dask cluster, each in a separate process of a Dask worker."""
     with connected(address) as client:
         pool = client.get_executor(pure=False)
-        jobs = {pool.submit(do_apart, task, threads, time_limit): task for task in tasks}
-        for job in as_completed(jobs):
+        futures = {pool.submit(do_apart, task, threads, time_limit): task for task in tasks}
+        for future in as_completed(futures):
             try:
-                yield job.result()[0]
+                yield future.result()[0]
             except SignedHeatError:
                 raise
             except Exception as error:
-                yield jobs[job].outcome("died", 0.0, f"its Dask worker died ({error})")
+                yield futures[future].outcome("died", 0.0, f"its Dask worker died ({error})")
 
 
 def duration(seconds: float) -> str:

@@ -1,7 +1,8 @@
-"""Processes that do one shape after the other, under a time limit; when one dies, it is started again.
+"""Worker processes that run one task after another under a time limit, and are replaced when they die.
 
-They are started by `subprocess`: `multiprocessing` would run the script of the user in each of them. A process lives as
-long as the batch, because starting one takes two seconds, which is as long as a small shape takes.
+`concurrent.futures`, loky and Dask cannot stop a running task, and fail other tasks when a process dies, so this module
+has its own worker. It uses `subprocess`, because `multiprocessing` would run the user's script in each process. A
+process serves many tasks, because starting one takes two seconds.
 """
 
 from __future__ import annotations
@@ -31,21 +32,18 @@ from .inputs import Input
 from .manifest import Outcome, State, source_of
 
 Function = Callable[[Path, Path], Mapping[str, object]]
-"""Called with a file and the beginning of the names of what it writes; returns figures, ready for JSON."""
+"""Takes a file and the common beginning of the names of its results; returns figures that JSON can hold."""
 Done = tuple[Outcome, bool]
-"""What came of a shape, and whether memory was short: it may suffice when other processes have ended."""
+"""The outcome of a shape, and whether memory ran out, so that it may succeed once other processes have ended."""
 DEATHS = (EOFError, OSError, pickle.UnpicklingError)
-"""What reading from a process that has died raises, and writing to it."""
+"""Exceptions when reading from or writing to a process that has died."""
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-"""Variables that say how many threads a process takes."""
+"""Environment variables that set the number of threads of a process."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """One shape: what is to be made of it, and the folder of the results.
-
-    They are made in `scratch`, a folder of its own: what is not finished never gets a name that stays.
-    """
+    """A job for one shape. Results are written to `scratch` and moved to `folder` once they are complete."""
 
     job: Function
     description: str
@@ -54,7 +52,7 @@ class Task:
     scratch: Path
 
     def attempt(self) -> Done:
-        """Do it; errors become outcomes."""
+        """Run the job and turn errors into outcomes."""
         begin, target = time.perf_counter(), self.folder / self.shape.name
         state: State = "failed"
         figures: dict[str, Any] = {}
@@ -66,8 +64,8 @@ class Task:
                 self.scratch.mkdir(parents=True)
                 figures = dict(self.job(self.shape.path.absolute(), self.scratch / target.name))
                 outputs = [(Path(self.shape.name).parent / name).as_posix() for name in self._move_to(target.parent)]
-                said = [str(each.message) for each in caught if issubclass(each.category, UserWarning)]
-                message = "; ".join(map(str, [*figures.pop("notes", []), *dict.fromkeys(said)]))
+                warned = [str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)]
+                message = "; ".join(map(str, [*figures.pop("notes", []), *dict.fromkeys(warned)]))
                 state = "done"
             except MemoryError:
                 message, is_starved = "there was not enough memory", True
@@ -87,35 +85,45 @@ class Task:
         outputs: tuple[str, ...] = (),
         figures: Mapping[str, object] | None = None,
     ) -> Outcome:
-        """What came of it."""
-        path, found = self.shape.path, (state, round(seconds, 3), message, outputs, figures or {})
-        return Outcome(self.shape.name, str(path), *found, self.description, source_of(path))
+        """The outcome of this task in the manifest."""
+        path = self.shape.path
+        return Outcome(
+            name=self.shape.name,
+            input=str(path),
+            state=state,
+            seconds=round(seconds, 3),
+            message=message,
+            outputs=outputs,
+            figures=figures or {},
+            job=self.description,
+            source=source_of(path),
+        )
 
     def _move_to(self, folder: Path) -> list[str]:
-        """Give what was made its place, all or nothing of it unless the disk breaks, and return the names."""
-        made = sorted(self.scratch.iterdir())
+        """Move all results to the folder, or none unless the disk fails, and return their names."""
+        results = sorted(self.scratch.iterdir())
         with writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
-        for file in made:
+        for file in results:
             if os.path.realpath(folder / file.name) == os.path.realpath(self.shape.path):
-                cause = "the result would replace the shape that it is made of"
+                cause = "the result would replace its own input"
                 raise FileFormatError(cause, remedy="choose another folder", path=folder / file.name)
             with writing(folder / file.name):
                 replaceable(folder / file.name)
-        for file in made:
+        for file in results:
             move_into_place(file, folder / file.name)
-        return [file.name for file in made]
+        return [file.name for file in results]
 
 
 class Worker:
-    """A process that does one task after the other, started when it is first needed and again when it has died."""
+    """A process that runs one task after another; it is started at the first task, and again after it has died."""
 
     def __init__(self, threads: int) -> None:
         self.threads, self.is_closed = threads, False
         self._process: subprocess.Popen[bytes] | None = None
 
     def do(self, task: Task, time_limit: float | None) -> Done:
-        """Do a task; what takes longer than `time_limit` seconds is stopped."""
+        """Run a task, and stop it after `time_limit` seconds."""
         try:
             message = pickle.dumps(task)
         except Exception as error:
@@ -144,10 +152,10 @@ class Worker:
         return (task.outcome("failed", 0.0, done), False) if isinstance(done, str) else done
 
     def _ready(self, tries: int = 2) -> subprocess.Popen[bytes]:
-        """The process, once it waits for a task. One that dies before says nothing about the shape, and is replaced.
+        """The process, once it waits for a task.
 
-        So it is where a process cannot start for a moment, as while the package that it imports is being updated, or
-        where the system took its memory as it waited. One of `DEATHS` is raised if the next dies, too.
+        A process may die before it gets a task, for example while the package is being updated. Since that says nothing
+        about the shape, it is replaced once.
         """
         process = self._process = self._process or self._started()
         try:
@@ -162,18 +170,18 @@ class Worker:
         return process
 
     def stop(self) -> None:
-        """Kill the process, whatever it is doing, and start none again; its task then ends as one that died."""
+        """Kill the process and start no other; its current task ends as one whose process died."""
         self.is_closed = True
         if self._process is not None:
             self._process.kill()
 
     def close(self) -> str:
-        """Wait for the process, which has died or been killed, and return how it ended."""
+        """Wait for the process to end, and describe how it ended."""
         process, self._process = self._process, None
         if process is None:
             return "it was stopped"
         with suppress(subprocess.TimeoutExpired):
-            process.wait(1.0)  # after its last word
+            process.wait(1.0)  # it may still be exiting
         process.kill()
         process.communicate()
         with self._errors:
@@ -181,8 +189,8 @@ class Worker:
             lines = self._errors.read().decode("utf-8", errors="replace").splitlines()
         code = process.returncode
         if code < 0 and Signals(-code).name == "SIGKILL":
-            return "its process was killed, as it is where memory ends"
-        last = next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+            return "its process was killed, probably because memory ran out"
+        last = next((line.strip() for line in reversed(lines) if line.strip()), "no error message")
         return printable(f"its process died (status {code}: {last:.200})")
 
     def _started(self) -> subprocess.Popen[bytes]:
@@ -197,26 +205,26 @@ class Worker:
 
 
 _here = threading.local()
-"""The worker of each thread of a Dask worker."""
+"""Holds one `Worker` for each thread of a Dask worker."""
 
 
 def do_apart(task: Task, threads: int, time_limit: float | None) -> Done:
-    """Do a task in a process of its own on the machine of a Dask worker: Dask cannot stop what takes too long."""
+    """Run a task in a separate process on the machine of a Dask worker, since Dask cannot stop a running task."""
     if getattr(_here, "worker", None) is None or _here.worker.threads != threads:
         _here.worker = Worker(threads)
     return _here.worker.do(task, time_limit)
 
 
 def serve() -> None:
-    """Do tasks from standard input, in a worker's process: say that it is ready, and answer, for each."""
-    signal(SIGINT, SIG_IGN)  # for the process that started this one
+    """Serve tasks from standard input: announce readiness, run a task and write its result, in turn."""
+    signal(SIGINT, SIG_IGN)  # the parent process handles it
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what anybody prints must not come between the answers
+    os.dup2(2, 1)  # printed text must not mix with the answers
     with suppress(OSError):
-        Path("/proc/self/oom_score_adj").write_text("800")  # where memory ends, let it be this process that dies
+        Path("/proc/self/oom_score_adj").write_text("800")  # when memory runs out, the system should kill this process
     tasks: queue.Queue[Task | str] = queue.Queue()
     threading.Thread(target=_receive, args=(tasks,), daemon=True).start()
-    import_module(f"{__name__.partition('.')[0]}.public")  # all of it, so that no shape's time is spent on that
+    import_module(f"{__name__.partition('.')[0]}.public")  # so that imports do not count towards the time of a shape
     with suppress(BrokenPipeError):
         while True:
             pickle.dump("ready", answers)
@@ -228,11 +236,11 @@ def serve() -> None:
 
 
 def _receive(tasks: queue.Queue[Task | str]) -> None:
-    """Hand tasks on; exit at once if there are no more, or if the process that sends them has ended."""
+    """Queue the tasks that arrive, and exit at once when the parent process closes the pipe or ends."""
     while True:
         try:
             tasks.put(pickle.load(sys.stdin.buffer))
         except EOFError:
             os._exit(0)
-        except Exception as error:  # its module, most likely, cannot be imported here
+        except Exception as error:  # most likely, its module cannot be imported here
             tasks.put(f"the job cannot be received by a worker ({type(error).__name__}: {error})")

@@ -40,8 +40,9 @@ from ..io.scenes import METRES, unit_of
 from ..io.voxel_files import LabelImage, read_labels
 from ..memory import refuse_beyond_memory
 from ..progress import Progress, within
-from ..solids.completion import complete
-from ..solids.solid_distance import distance_to_shapes
+from ..solids.completion import Completion, completed
+from ..solids.heat_surfaces import Heat
+from ..solids.solid_distance import completed_distance
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..tets.lattice import tetrahedralize
@@ -179,19 +180,24 @@ def compute(shape: Any, domain: TetMesh, arguments: Namespace) -> TetField: ...
 def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridField | TetField:
     """Distance to a solid in space, to polylines in the plane; what matters about it goes to standard error."""
     field: GridField | TetField
-    constraint = constraint_of(arguments.constraint)
-    options: dict[str, Any] = {"constraint": constraint, "diffusion": arguments.diffusion}
-    repair = {name: getattr(arguments, name) for name in ("as_oriented", "keep_overlaps", "lids", "nested")}
+    method = Heat(constraint_of(arguments.constraint), arguments.diffusion)
+    as_oriented = arguments.as_oriented
+    options = Completion(
+        lids=arguments.lids,
+        nested=arguments.nested,
+        as_oriented=as_oriented,
+        keep_overlaps=arguments.keep_overlaps,
+    )
     with ProgressBar(is_quiet(arguments)) as progress:
         if isinstance(domain, Grid) and arguments.band is not None:
-            solid = complete(shape, **options, **repair, progress=within(progress, 0.0, COMPLETED))
+            solid = completed(shape, options, method, within(progress, 0.0, COMPLETED))
             field = in_band(solid, domain, arguments, within(progress, COMPLETED, 1.0))
-        elif arguments.plain or not isinstance(constraint, Free | ZeroSet | Soft):
-            field = plain_distance(shape, domain, **options, as_oriented=arguments.as_oriented, progress=progress)
+        elif arguments.plain or not isinstance(method.constraint, Free | ZeroSet | Soft):
+            field = plain_distance(shape, domain, method, as_oriented, progress)
         elif isinstance(domain, Grid) and domain.dimension == 2:
-            field = distance_to_lines(shape, domain, **options, as_oriented=arguments.as_oriented, progress=progress)
+            field = distance_to_lines(shape, domain, **vars(method), as_oriented=as_oriented, progress=progress)
         else:
-            field = distance_to_shapes(shape, domain, **options, **repair, progress=progress)
+            field = completed_distance(shape, domain, options, method, progress=progress)
     if not arguments.quiet:
         for note in field.diagnostics.important:
             say(printable(f"signedheat: {note}"))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import scipy
@@ -50,12 +50,35 @@ MATCH = (1e-6, 0.75)
 SEAM = 0.75
 """Cells from faces within which the zero set of φ is taken for those faces."""
 
+Completing = Literal["lids", "heat"]
+Lids = Literal["bent", "flat"]
+
+
+@dataclass(frozen=True)
+class Completion:
+    """Options for completing a shape, described at `complete`."""
+
+    completion: Completing = "lids"
+    lids: Lids = "bent"
+    nested: Nesting = "given"
+    as_oriented: bool = False
+    keep_overlaps: bool = False
+
+    def __post_init__(self) -> None:
+        for name, choices in (("completion", Completing), ("lids", Lids), ("nested", Nesting)):
+            value, allowed = getattr(self, name), get_args(choices)
+            if value not in allowed:
+                listed = " or ".join(f'"{choice}"' for choice in allowed)
+                raise SignedHeatError(f"{name} must be {listed}, not {value!r}", element=name)
+        for name in ("as_oriented", "keep_overlaps"):
+            flag(getattr(self, name), name)
+
 
 def complete(
     shape: ShapeLike | Sequence[ShapeLike],
     *,
-    completion: Literal["lids", "heat"] = "lids",
-    lids: Literal["bent", "flat"] = "bent",
+    completion: Completing = "lids",
+    lids: Lids = "bent",
     as_oriented: bool = False,
     keep_overlaps: bool = False,
     nested: Nesting = "given",
@@ -114,13 +137,14 @@ def complete(
     """
     if isinstance(shape, Solid):
         return shape
-    if completion not in ("lids", "heat"):
-        raise SignedHeatError(f'completion must be "lids" or "heat", not {completion!r}', element="completion")
-    if lids not in ("bent", "flat"):
-        raise SignedHeatError(f'lids must be "bent" or "flat", not {lids!r}', element="lids")
-    if nested not in ("given", "cavities", "bodies"):
-        raise SignedHeatError(f'nested must be "given", "cavities" or "bodies", not {nested!r}', element="nested")
-    as_oriented, keep_overlaps = flag(as_oriented, "as_oriented"), flag(keep_overlaps, "keep_overlaps")
+    options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
+    return completed(shape, options, Heat(constraint, diffusion), progress)
+
+
+def completed(
+    shape: ShapeLike | Sequence[ShapeLike], options: Completion, method: Heat, progress: Progress | None = None
+) -> Solid:
+    """The solid of a shape that is not a solid yet: see `complete`."""
     joined = joined_shape(shape)
     count = joined.n_points if isinstance(joined, PointCloud) else joined.triangulation.n_faces
     refuse_beyond_memory(
@@ -129,22 +153,19 @@ def complete(
         lambda n: bytes_to_complete(joined, n),
         lambda n: f"simplify it to {n} faces, or free memory",
     )
-    method = Heat(constraint, diffusion)
     stopwatch = Stopwatch(progress, STEPS)
     if isinstance(joined, PointCloud):
         with stopwatch("orient") as run:
-            cloud, notes = (joined, ()) if as_oriented else run(partial(oriented_points, joined))
+            cloud, notes = (joined, ()) if options.as_oriented else run(partial(oriented_points, joined))
         with stopwatch("complete") as run:
             solid = run(partial(_from_points, cloud, method))
     else:
         with stopwatch("orient") as run:
             chain = run(lambda: Chain.of(joined.triangulation))
-            decided = bounding(chain, nested, as_oriented)
-            notes = () if as_oriented else (oriented_as(joined, chain, decided).note,)
+            decided = bounding(chain, options.nested, options.as_oriented)
+            notes = () if options.as_oriented else (oriented_as(joined, chain, decided).note,)
         with stopwatch("complete") as run:
-            solid = run(
-                partial(completed, joined.triangulation, chain, decided, completion, lids, keep_overlaps, method)
-            )
+            solid = run(partial(_from_mesh, joined.triangulation, chain, decided, options, method))
             owners = owners_of(joined)
             solid = replace(solid, origins=np.where(solid.origins >= 0, owners[solid.origins], -1))
     source = joined if isinstance(joined, TriangleMesh) else None
@@ -168,38 +189,32 @@ def oriented_points(cloud: PointCloud) -> tuple[PointCloud, tuple[Note, ...]]:
     return points.cloud, (OrientedPoints(points.n_fitted, points.n_turned),)
 
 
-def completed(
-    mesh: TriangleMesh,
-    chain: Chain,
-    decided: Bounding,
-    completion: Literal["lids", "heat"],
-    lids: Literal["bent", "flat"],
-    keep_overlaps: bool,
-    method: Heat,
-) -> Solid:
-    """The solid of a mesh of which it is decided what bounds; its origins are the triangles of the mesh."""
+def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
+    """The solid of a mesh, from the decision which of its faces bound it; origins are triangles of the mesh."""
     if not chain.areas.any():
         raise SourceError("no face of the shape has an area", element="shape")
     vertices = mesh.vertices
     counts = np.abs(decided.counts)
     faces = np.where((decided.counts < 0)[:, None], chain.faces[:, ::-1], chain.faces)
-    torn = np.where(counts > 0, 0, -1) if completion == "heat" else decided.torn
+    torn = np.where(counts > 0, 0, -1) if options.completion == "heat" else decided.torn
     surfaces, notes = [], []
     for group in np.unique(torn[torn >= 0]):
         chosen = np.flatnonzero((torn == group) & (counts > 0))
-        surfaces += _torn(vertices, faces[chosen], chain.firsts[chosen], decided.pieces[chosen], method, completion)
+        surfaces += _torn(
+            vertices, faces[chosen], chain.firsts[chosen], decided.pieces[chosen], method, options.completion
+        )
     bounds = np.repeat(np.arange(len(faces)), np.where(torn < 0, counts, 0))
     if len(bounds):
         lost = small_lids(vertices, faces[bounds])
         whole = np.concatenate([faces[bounds], lost])
-        places, added = closed_by(vertices, whole, bent=lids == "bent")
+        places, added = closed_by(vertices, whole, bent=options.lids == "bent")
         surfaces.append(_made_from(places, whole, added, chain.firsts[bounds]))
         if len(lost):
             restored = float(face_areas(vertices[lost]).sum() / face_areas(vertices[faces[bounds]]).sum())
             notes.append(FacesRestored(len(lost), restored / (1 + restored)))
     idle = np.flatnonzero(counts == 0)
     surfaces.append(Surface(vertices[chain.faces[idle]], chain.faces[idle], chain.firsts[idle], False))
-    return united(surfaces, keep_overlaps, notes)
+    return united(surfaces, options.keep_overlaps, notes)
 
 
 def _made_from(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
 
 from numpy.typing import ArrayLike
 
@@ -22,7 +21,8 @@ from ..tets.tet_field import TetField
 from ..tets.tet_mesh import TetMesh
 from ..validation import positive_number
 from .bounding import Nesting
-from .completion import complete
+from .completion import Completing, Completion, Lids, completed
+from .heat_surfaces import Heat
 
 
 def distance_to_shapes(
@@ -33,8 +33,8 @@ def distance_to_shapes(
     spacing: ArrayLike | None = None,
     padding: float | None = None,
     band: float | None = None,
-    completion: Literal["lids", "heat"] = "lids",
-    lids: Literal["bent", "flat"] = "bent",
+    completion: Completing = "lids",
+    lids: Lids = "bent",
     nested: Nesting = "given",
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
@@ -46,9 +46,23 @@ def distance_to_shapes(
 
     On tets, distance is along paths around walls, with the signs of φ.
     """
+    options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
+    method = Heat(checked(constraint), positive_number(diffusion, "diffusion"))
     joined = joined_shape(shape)
     if domain is None:
         domain = Grid.around(bounds_around([joined]), resolution, padding, spacing)
+    return completed_distance(joined, domain, options, method, band, progress)
+
+
+def completed_distance(
+    shape: Shapes,
+    domain: Grid | TetMesh,
+    options: Completion,
+    method: Heat,
+    band: float | None = None,
+    progress: Progress | None = None,
+) -> GridField | TetField:
+    """Complete a shape, then measure the distance to it on a grid or on tets."""
     if not isinstance(domain, Grid | TetMesh):
         kind = type(domain).__name__
         raise UnsupportedTypeError(
@@ -59,23 +73,14 @@ def distance_to_shapes(
         raise UnsupportedTypeError(
             "a band is computed around solids, on a grid in space without walls", remedy="leave out the band"
         )
-    diffusion, constraint = positive_number(diffusion, "diffusion"), checked(constraint)
-    solid = complete(
-        joined,
-        completion=completion,
-        lids=lids,
-        nested=nested,
-        as_oriented=as_oriented,
-        keep_overlaps=keep_overlaps,
-        constraint=constraint,
-        diffusion=diffusion,
-        progress=within(progress, 0.0, 0.5),
-    )
-    then = within(progress, 0.5, 1.0)
+    joined = joined_shape(shape)
+    solid = completed(joined, options, method, within(progress, 0.0, 0.5))
+    progress = within(progress, 0.5, 1.0)
     if isinstance(domain, Grid) and in_space:
-        return solid.field(grid=domain, band=band, progress=then)
+        return solid.field(grid=domain, band=band, progress=progress)
     source = joined if isinstance(joined, PointCloud) else solid.boundary
-    phi: GridField | TetField = SignedHeatSolver(domain, diffusion, then).distance(source, constraint)  # type: ignore[assignment]
+    solver = SignedHeatSolver(domain, method.diffusion, progress)
+    phi: GridField | TetField = solver.distance(source, method.constraint)  # type: ignore[assignment]
     if isinstance(phi, TetField):
         phi = sharpen(phi, solid.boundary)
     return replace(phi, diagnostics=phi.diagnostics.noting(*solid.diagnostics.notes))
