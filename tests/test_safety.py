@@ -12,7 +12,7 @@ import signedheat as sh
 from refusals import refused
 from signedheat import samples
 from signedheat.cli import main
-from signedheat.processes import command_for
+from signedheat.jobs import command_for
 
 HOSTILE = ("secrets", "socket", "json", "queue", "numpy", "pickle")
 

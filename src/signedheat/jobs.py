@@ -1,7 +1,10 @@
-"""Jobs on threads of their own, on which progress is reported and for which nobody waits for ever."""
+"""Run a job on a thread with progress reports or a time limit, or a function in a new Python process."""
 
 from __future__ import annotations
 
+import json
+import os
+import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -10,14 +13,18 @@ from threading import Thread
 from typing import Any
 
 INTERVAL = 0.1
-"""Seconds between two progress reports."""
+"""Seconds between progress reports."""
+RUN = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from importlib import import_module; "
+    "module, name = sys.argv[2].split(':'); getattr(import_module(module), name)(*sys.argv[3:])"
+)
+"""Program of such a process: it starts isolated, and then takes over the import path."""
 
 
 def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:
-    """Run a job on a thread of its own, calling `report` every `INTERVAL` until it ends; returns the job's result.
+    """Run a job on its own thread, call `report` every `INTERVAL` seconds until it ends, and return its result.
 
-    An exception that `report` raises is raised at once. The job is then no longer waited for: it goes on to its end,
-    and its result is dropped.
+    An exception from `report` is raised at once; the job then runs on in the background and its result is dropped.
 
     Examples
     --------
@@ -45,7 +52,7 @@ def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -
 
 
 def run_limited(job: Callable[[], Any], seconds: float) -> Any:
-    """Run a job on a thread of its own, and wait for it no longer than so many seconds; returns the job's result.
+    """Run a job on its own thread and return its result; raise `TimeoutError` after some seconds.
 
     Examples
     --------
@@ -59,3 +66,26 @@ def run_limited(job: Callable[[], Any], seconds: float) -> Any:
             raise TimeoutError(f"it takes more than {seconds:.0f} seconds")
 
     return run_cancellable(job, refuse_to_wait)
+
+
+def command_for(entry: str, *arguments: str) -> list[str]:
+    """The command that calls a function in a new Python process.
+
+    The process can import what this one can, but nothing from the current folder, which ``python -c`` and
+    `multiprocessing` would search first.
+
+    Parameters
+    ----------
+    entry : str
+        The function, as ``"module:name"``.
+    arguments : str
+        Arguments of the function.
+
+    Examples
+    --------
+    >>> import subprocess
+    >>> subprocess.run(command_for("builtins:print", "a b"), capture_output=True).stdout.decode().strip()
+    'a b'
+    """
+    path = [os.path.abspath(folder) for folder in sys.path if folder]
+    return [sys.executable, "-I", "-c", RUN, json.dumps(path), entry, *arguments]

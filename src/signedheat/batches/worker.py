@@ -27,7 +27,7 @@ from typing import Any
 
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, printable
 from ..io.files import move_into_place, replaceable, writing
-from ..processes import command_for
+from ..jobs import command_for
 from .inputs import Input
 from .manifest import Outcome, State, source_of
 

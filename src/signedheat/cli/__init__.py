@@ -1,6 +1,6 @@
-"""The command line: commands are declared where they are run, `solids`, `curves`, `batch`, `info`, `view`, `shell`.
+"""The command line. Each command is declared next to the function that runs it, in the modules ``*_commands``.
 
-However a command ends, it ends here: with a status, and with one line on standard error if it failed.
+Every command ends here, with an exit status, and with one line on standard error if it failed.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     with Signals() as signals, _warnings_in_lines():
         try:
             return _run(argv)
-        except SystemExit as stop:  # argparse: help was wanted, or the usage is wrong
+        except SystemExit as stop:  # from argparse, after help or an error of usage
             return int(stop.code or 0)
         except BaseException as error:
-            if signals.caught or isinstance(error, KeyboardInterrupt):  # whatever else it became on its way
+            if signals.caught or isinstance(error, KeyboardInterrupt):  # it may have been converted on its way
                 say("signedheat: stopped; nothing half-written is left behind")
                 return 128 + int(signals.caught or 2)
             if os.environ.get("SIGNEDHEAT_TRACEBACK"):
@@ -41,9 +41,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    """Everything else is imported here, where all that may go wrong is caught."""
+    """Import the commands, inside the caller's error handling, and run one."""
     parser = parser_of(import_module(f"{__name__}.shell").COMMANDS)
-    if "_ARGCOMPLETE" in os.environ:  # set by the shell function of argcomplete, which waits for words
+    if "_ARGCOMPLETE" in os.environ:  # set by argcomplete's shell function
         import_module("argcomplete").autocomplete(parser)
     arguments = parser.parse_args(without_exponents(sys.argv[1:] if argv is None else argv))
     if "run" not in arguments:
@@ -62,18 +62,18 @@ def _run(argv: Sequence[str] | None) -> int:
         write_out(standard.named(json.dumps(summary)))
     elif text and not (arguments.quiet or standard.takes_output):
         write_out(standard.named(text))
-    return FAILED if summary.get("failed") else 0  # of many, some
+    return FAILED if summary.get("failed") else 0  # some of many inputs failed
 
 
 def _say_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
-    """A warning on a line of its own; not those of packages about each other, which some have always shown."""
+    """Print a warning on one line, except deprecation warnings of other packages."""
     if sys.warnoptions or not issubclass(category, DeprecationWarning | PendingDeprecationWarning):
         say(printable(f"signedheat: {' '.join(str(message).split())}"))
 
 
 @contextmanager
 def _warnings_in_lines() -> Iterator[None]:
-    """Say what a result is not, in a line, instead of where in the code that was found."""
+    """Print each warning on one line, without its place in the code."""
     with warnings.catch_warnings():
         if not sys.warnoptions:
             warnings.simplefilter("default", UserWarning)
@@ -82,7 +82,7 @@ def _warnings_in_lines() -> Iterator[None]:
 
 
 def _is_expected(error: BaseException) -> bool:
-    """Whether what happened is due to the input or the system, and not to a fault in this program."""
+    """Whether an error is due to the input or the system, rather than a bug."""
     return isinstance(error, SignedHeatError | MemoryError | OSError | Warning)
 
 

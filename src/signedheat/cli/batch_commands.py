@@ -44,26 +44,24 @@ MANY = (
         "inputs",
         metavar="FILE",
         nargs="+",
-        help="files, folders with all in them, patterns in quotes; - takes a list from standard input, a line for each",
+        help="files, folders (searched recursively) or quoted patterns; - reads a list from standard input, one a line",
     ),
-    option("--surface", choices=SURFACE_FILES, help="files of surfaces (stl)"),
+    option("--surface", choices=SURFACE_FILES, help="format of surfaces (stl)"),
     workers("processes (one for each processor)"),
-    option("--time-limit", type=positive, metavar="S", help="seconds after which a shape is given up"),
+    option("--time-limit", type=positive, metavar="S", help="seconds after which a shape is abandoned"),
 )
-"""What commands take that make something of many shapes."""
+"""Options of commands on many shapes."""
 WANTED = group(
-    "what is made of each shape, one or more of",
+    "results for each shape, at least one of",
     option(
         "--volume",
         nargs="?",
         const="npz",
         choices=("npz", "vti", "nrrd", "npy", "vdb"),
-        help="the field, as .npz if nothing is said",
+        help="the field (npz)",
     ),
     option("--offset", type=finite, nargs="+", default=[], metavar="D", help="closed surfaces at distances"),
-    option(
-        "--sample", type=whole_number(1), nargs="?", const=250_000, metavar="N", help="points to learn from (250000)"
-    ),
+    option("--sample", type=whole_number(1), nargs="?", const=250_000, metavar="N", help="training points (250000)"),
     option("--info", action="store_true", help="counts and defects, in the manifest"),
 )
 RUNNING = group(
@@ -74,7 +72,7 @@ RUNNING = group(
 
 
 def check_batch(arguments: Namespace) -> None:
-    """Reject a batch that makes nothing, and options that contradict each other."""
+    """Reject a batch without results, and options that contradict each other."""
     check_grid(arguments)
     try:
         job_of(arguments)
@@ -84,16 +82,16 @@ def check_batch(arguments: Namespace) -> None:
 
 @command(
     "batch",
-    "the same for many shapes",
-    "Fields, offsets, samples and reports of many shapes, each in a process of its own, with a manifest of what came "
-    "of each. What is done is skipped when the batch is started again.",
+    "run one job on many shapes",
+    "Fields, offsets, samples and reports of many shapes, each in a separate process, with a manifest of the outcomes. "
+    "A batch that is started again skips the shapes that are done.",
     output("results, and manifest.jsonl", "FOLDER"),
     *(*MANY, WANTED, RUNNING, SAMPLING, ROOM, STEPS, METHOD),
     check=check_batch,
     usage="FILE [FILE ...] -o FOLDER [--volume] [--offset D ...] [--sample] [--info] [options]",
 )
 def batch(arguments: Namespace) -> Summary:
-    """Do the job for every shape."""
+    """Run the job on every shape."""
     options = {"threads": arguments.threads, "scheduler": arguments.scheduler}
     done = made_of_each(arguments, arguments.output, job_of(arguments), **options)
     states = [outcome.state for outcome in done.outcomes]
@@ -108,20 +106,20 @@ def batch(arguments: Namespace) -> Summary:
         "seconds": round(seconds, 3),
         "failed": len(done.failures),
     }
-    each = ", ".join(f"{number} {state}" for state, number in counts.items())
+    by_state = ", ".join(f"{number} {state}" for state, number in counts.items())
     before = f" ({done.skipped} of them before)" if done.skipped else ""
-    counted = f"{len(states)} shapes, {each}{before}, {pool.duration(seconds)} of work"
+    counted = f"{len(states)} shapes, {by_state}{before}, {pool.duration(seconds)} of work"
     return summary, f"{printable(str(done.manifest))}: {counted}"
 
 
 def names_surface(output: str) -> bool:
-    """Whether an output is the name of a surface's file, and not of a folder."""
+    """Whether an output names a file of a surface rather than a folder."""
     is_folder = output.endswith(("/", os.sep)) or os.path.isdir(output)
     return not is_folder and Path(output).suffix.lower().lstrip(".") in SURFACE_FILES
 
 
 def check_watertight(arguments: Namespace) -> None:
-    """Reject options that contradict each other; take the format from the name of the output."""
+    """Reject options that contradict each other, and take the format from the name of the output."""
     refuse_together(arguments, "--spacing", "--resolution")
     if names_surface(arguments.output):
         ending = Path(arguments.output).suffix.lower().lstrip(".")
@@ -156,7 +154,7 @@ def check_watertight(arguments: Namespace) -> None:
     usage="FILE [FILE ...] -o OUT [options]",
 )
 def watertight(arguments: Namespace) -> Summary:
-    """Do it for every shape; a line for each."""
+    """Write the closed mesh of each shape, and print a line about each."""
     job = sh.batches.Watertight(
         surfaces=f".{arguments.surface or 'stl'}",
         thickness=arguments.thickness,
@@ -174,7 +172,7 @@ def watertight(arguments: Namespace) -> Summary:
     summary = {
         "inputs": arguments.inputs,
         "manifest": str(done.manifest),
-        "shapes": [{"output": each.outputs, **each.figures} for each in done.outcomes if each.is_done],
+        "shapes": [{"output": outcome.outputs, **outcome.figures} for outcome in done.outcomes if outcome.is_done],
         "skipped": done.skipped,
         "failed": len(done.failures),
     }
@@ -183,7 +181,7 @@ def watertight(arguments: Namespace) -> Summary:
 
 
 def one_watertight(arguments: Namespace, job: sh.batches.Watertight) -> Summary:
-    """Do it for one shape, in files that are named after the output."""
+    """Write the closed mesh of one shape to files that are named after the output."""
     target = Path(arguments.output)
     n_shapes = len(inputs.expand(listed(arguments.inputs)))
     if n_shapes != 1:
@@ -193,10 +191,11 @@ def one_watertight(arguments: Namespace, job: sh.batches.Watertight) -> Summary:
         done = made_of_each(arguments, folder, job)
         (outcome,) = done.outcomes
         stem = Path(outcome.name).name
-        names = {made: target.with_name(target.stem + Path(made).name.removeprefix(stem)) for made in outcome.outputs}
-        for made, name in names.items():
-            files.move_into_place(Path(folder, made), name)
-    written = [str(name) for name in names.values()]
+        written = []
+        for output in outcome.outputs:
+            path = target.with_name(target.stem + Path(output).name.removeprefix(stem))
+            files.move_into_place(Path(folder, output), path)
+            written.append(str(path))
     summary = {
         "inputs": arguments.inputs,
         "manifest": None,
@@ -208,7 +207,7 @@ def one_watertight(arguments: Namespace, job: sh.batches.Watertight) -> Summary:
 
 
 def in_words(figures: dict[str, object]) -> str:
-    """One line of what `figures_of` found."""
+    """Describe the figures of a closed mesh in one line."""
     bodies, openings, meeting = (figures[key] for key in ("bodies", "openings", "self_intersections"))
     bad_edges = f"{figures['bad_edges']} edges that two faces do not share, " if figures["bad_edges"] else ""
     share = 100 * float(str(figures["completed_area"])) / max(float(str(figures["area"])), 1e-300)
@@ -227,10 +226,9 @@ def made_of_each(
     line: Callable[[dict[str, object]], str] | None = None,
     **options: Any,
 ) -> sh.batches.Batch:
-    """Do a job for every shape: a line on standard error for each that is not done, and perhaps one for each that is.
+    """Run a job on every shape, and report those that fail on standard error.
 
-    `line` makes the line about a shape that is done, from its figures; `options` are further ones of
-    `signedheat.batches.run`.
+    `line` describes a shape that is done from its figures; `options` go to `signedheat.batches.run`.
     """
     with ProgressBar(is_quiet(arguments)) as progress:
 
@@ -255,14 +253,14 @@ def made_of_each(
 
 
 def listed(inputs: list[str]) -> list[str]:
-    """Inputs, with the lines of standard input in place of ``-``."""
+    """The inputs, with ``-`` replaced by the lines of standard input."""
     if "-" not in inputs:
         return inputs
     lines = [line.rstrip("\r\n") for line in (sys.stdin or ()) if line.strip()]
     if not lines:
-        raise SourceError("there is nothing on standard input", remedy="write a file name on each line", path="-")
-    at = inputs.index("-")
-    return [*inputs[:at], *lines, *(each for each in inputs[at + 1 :] if each != "-")]
+        raise SourceError("standard input is empty", remedy="write a file name on each line", path="-")
+    position = inputs.index("-")
+    return [*inputs[:position], *lines, *(name for name in inputs[position + 1 :] if name != "-")]
 
 
 def job_of(arguments: Namespace) -> sh.batches.Job:

@@ -1,7 +1,4 @@
-"""Parts of the package that commands use, imported when one of them is first used.
-
-So help and errors of usage come at once, without NumPy, although a command is declared next to what runs it.
-"""
+"""Modules that commands use, imported at first use, so that help and errors of usage need not wait for NumPy."""
 
 from __future__ import annotations
 

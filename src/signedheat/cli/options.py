@@ -1,6 +1,6 @@
-"""How commands are declared: options as data next to the function that runs them, and one parser made of all.
+"""Declarations of commands: options as data next to the function that runs them, and the parser built from them.
 
-Nothing here imports NumPy, so that help and errors of usage come at once.
+This module does not import NumPy, so that help and errors of usage appear at once.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ MOST_WORKERS = 1024
 PLANAR = (".csv", ".svg")
 """Extensions of files with polylines in the plane."""
 IMAGES = (".npy", ".nrrd", ".vti", ".nii", ".nii.gz")
-"""Extensions of files that may have images of labels."""
+"""Extensions of files that may hold images of labels."""
 SURFACES = "surface: .stl .obj .ply .off .vtp"
 UNITS = ("micron", "mm", "millimeter", "cm", "centimeter", "inch", "foot", "m", "meter")
 """Units of length."""
 CONSTRAINTS = ("free", "zero-set", "hard", "each-component")
-"""Names of the constraints that have no number."""
+"""Names of the constraints without a number."""
 ABSENT: Mapping[str, Any] = {
     **dict.fromkeys(("origin", "grid_shape", "spacing", "padding", "resolution", "band", "preview")),
     **dict.fromkeys(("tiles", "workers", "scheduler", "label", "units", "transform")),
@@ -44,7 +44,7 @@ ABSENT: Mapping[str, Any] = {
     "constraint": "zero-set",
     "diffusion": 1.0,
 }
-"""Values of the options that a command does not have, so that all commands can share what reads them."""
+"""Defaults of options that a command lacks, so that all commands can share the functions that read them."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -56,12 +56,12 @@ class Parser(argparse.ArgumentParser):
         raise SystemExit(2)
 
     def _print_message(self, message: str, file: object = None) -> None:
-        write_out(message.rstrip("\n"))  # help and version, the only messages that are no errors
+        write_out(message.rstrip("\n"))  # only help and version; errors go through `error`
 
 
 @dataclass(frozen=True)
 class Option:
-    """An argument of a command: its names, and its settings for argparse."""
+    """An argument of a command: its names and its settings for argparse."""
 
     names: tuple[str, ...]
     settings: Mapping[str, Any]
@@ -69,7 +69,7 @@ class Option:
 
 @dataclass(frozen=True)
 class Group:
-    """Options under a title of their own."""
+    """Options under a common title."""
 
     title: str
     options: tuple[Option, ...]
@@ -77,7 +77,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Command:
-    """A command: what `command` declares, and the function that runs it."""
+    """A command, as `command` declares it, and the function that runs it."""
 
     name: str
     run: Run
@@ -103,10 +103,10 @@ class Command:
             metavar="EXT",
             help="format of standard input, where - stands for a file",
         )
-        for each in self.options:
-            inside = parser.add_argument_group(each.title) if isinstance(each, Group) else parser
-            for given in each.options if isinstance(each, Group) else (each,):
-                inside.add_argument(*given.names, **given.settings)
+        for entry in self.options:
+            section = parser.add_argument_group(entry.title) if isinstance(entry, Group) else parser
+            for argument in entry.options if isinstance(entry, Group) else (entry,):
+                section.add_argument(*argument.names, **argument.settings)
 
 
 def command(
@@ -118,40 +118,40 @@ def command(
     usage: str | None = None,
     **absent: Any,
 ) -> Callable[[Run], Command]:
-    """Declare a command: the decorator of the function that runs it.
+    """Decorate the function that runs a command, and so declare the command.
 
     Parameters
     ----------
     name, help, description : str
-        As they stand in the help.
+        Texts of the help.
     *options : Option or Group
-        In the order of the help, after those that all commands have.
+        In the order of the help, after the options that all commands have.
     check : callable, optional
-        What exits with status 2 where arguments contradict each other.
+        Exits with status 2 if arguments contradict each other.
     usage : str, optional
-        What follows the name of the command in the first line of its help.
+        Text after the name of the command in the first line of its help.
     **absent
-        Values for options that it does not have, if others than those of `ABSENT`.
+        Values for options that the command lacks, where they differ from `ABSENT`.
     """
     return lambda run: Command(name, run, help, description, options, check, usage, absent)
 
 
 def parser_of(commands: Iterable[Command]) -> Parser:
     """The parser of the whole command line."""
-    whole = Parser(
+    parser = Parser(
         prog="signedheat",
         description="Generalized signed distance to broken geometry: negative inside, positive outside, "
         "in the units of the file.",
     )
-    whole.add_argument("--version", action="version", version=f"signedheat {__version__}")
-    added = whole.add_subparsers(metavar="COMMAND", parser_class=Parser)
-    for each in commands:
-        each.add_to(added)
-    return whole
+    parser.add_argument("--version", action="version", version=f"signedheat {__version__}")
+    subparsers = parser.add_subparsers(metavar="COMMAND", parser_class=Parser)
+    for declared in commands:
+        declared.add_to(subparsers)
+    return parser
 
 
 def without_exponents(words: Iterable[str]) -> list[str]:
-    """Words with negative numbers such as -1e-3 in plain digits, for argparse would take them for options.
+    """Write negative numbers such as -1e-3 in plain digits, since argparse takes them for options.
 
     Examples
     --------
@@ -163,21 +163,21 @@ def without_exponents(words: Iterable[str]) -> list[str]:
 
 
 def option(*names: str, **settings: Any) -> Option:
-    """An option or an argument, with its settings for argparse."""
+    """Declare an option or an argument, with its settings for argparse."""
     return Option(names, settings)
 
 
 def group(title: str, *options: Option) -> Group:
-    """Options under a title of their own."""
+    """Declare options under a common title."""
     return Group(title, options)
 
 
 INPUTS = ("shape", "mesh", "field", "file", "files", "inputs", "curves", "scan", "nominal", "tets")
-"""Arguments that may name a file that is read."""
+"""Arguments that may name an input file."""
 
 
 def refuse_output_over_input(arguments: Namespace) -> None:
-    """Raise `FileFormatError` if a file that would be written is one that is read."""
+    """Raise `FileFormatError` if an output file is also an input."""
     for written in _names(getattr(arguments, "output", None)):
         for read in (name for argument in INPUTS for name in _names(getattr(arguments, argument, None))):
             if written != "-" and os.path.realpath(written) == os.path.realpath(read) and not os.path.isdir(read):
@@ -185,23 +185,23 @@ def refuse_output_over_input(arguments: Namespace) -> None:
 
 
 def _names(value: Any) -> list[str]:
-    """The names of files in the value of an argument, but for those that cannot be any."""
+    """The valid names of files in the value of an argument."""
     values = value if isinstance(value, list) else [value]
     return [name for name in values if isinstance(name, str) and "\0" not in name]
 
 
 def output(help: str, metavar: str = "OUT") -> Option:
-    """The option for what is written."""
+    """The option that names the output."""
     return option("-o", "--output", required=True, metavar=metavar, help=help)
 
 
 def format_option(standard: str) -> Option:
-    """The option for what is written to standard output, with the format if nothing is said."""
+    """The option for the format of standard output, with its default."""
     return option("--format", default=standard, metavar="EXT", help=f"of standard output, with -o - ({standard})")
 
 
 def is_quiet(arguments: Namespace) -> bool:
-    """Whether nothing but the result is to be printed."""
+    """Whether to print nothing but the result."""
     return bool(arguments.quiet or arguments.json)
 
 
@@ -212,14 +212,14 @@ def finite(word: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"'{word}' is no finite number")
+        raise argparse.ArgumentTypeError(f"'{word}' is not a finite number")
     return value
 
 
 def ending(word: str) -> str:
     """The extension of a file, without its first dot."""
     if not re.fullmatch(r"\.?\w+(\.gz)?", word):
-        raise argparse.ArgumentTypeError(f"{word!r} is no extension of a file")
+        raise argparse.ArgumentTypeError(f"{word!r} is not an extension of a file")
     return word.removeprefix(".")
 
 
@@ -248,39 +248,39 @@ def fraction(word: str) -> float:
 
 
 def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
-    """A function that parses a whole number of at least `least`, and at most `most`."""
+    """A parser of whole numbers from `least` to `most`."""
     upper = "on" if most is None else f"to {most}"
 
     def parse(word: str) -> int:
         is_number = re.fullmatch(r"[-+]?\d{1,4000}", word)
         if not is_number or int(word) < least or (most is not None and int(word) > most):
-            raise argparse.ArgumentTypeError(f"'{word}' is no whole number from {least} {upper}")
+            raise argparse.ArgumentTypeError(f"'{word}' is not a whole number from {least} {upper}")
         return int(word)
 
     return parse
 
 
 def units(word: str) -> str:
-    """One unit, or two with a colon between."""
+    """Check that a word is a unit, or two units separated by a colon."""
     for unit in word.split(":", 1):
         if unit not in UNITS:
-            raise argparse.ArgumentTypeError(f"'{unit}' is none of {', '.join(UNITS)}")
+            raise argparse.ArgumentTypeError(f"'{unit}' is not one of {', '.join(UNITS)}")
     return word
 
 
 def constraint(word: str, with_numbers: str = "soft, soft:WEIGHT") -> str:
-    """The name of a constraint, with its number if it has one; messages also name those `with_numbers`."""
+    """Check the name of a constraint and its number; error messages also list `with_numbers`."""
     name, _, weight = word.partition(":")
     if name == "soft":
         if weight:
             positive(weight)
     elif word not in CONSTRAINTS:
-        raise argparse.ArgumentTypeError(f"'{word}' is none of {', '.join(CONSTRAINTS)}, {with_numbers}")
+        raise argparse.ArgumentTypeError(f"'{word}' is not one of {', '.join(CONSTRAINTS)}, {with_numbers}")
     return word
 
 
 def surface_constraint(word: str) -> str:
-    """The name of a constraint, with its numbers; on surfaces also given levels."""
+    """Check the name of a constraint on surfaces, which may also have levels."""
     name, _, values = word.partition(":")
     if name == "levels":
         for value in values.split(","):
@@ -290,20 +290,20 @@ def surface_constraint(word: str) -> str:
 
 
 def shape_option(planar: str = "") -> Option:
-    """The shape that a command is about, with what it may be `planar`."""
+    """The argument for the shape of a command; `planar` lists formats of drawings in the plane."""
     return option(
         "shape", metavar="SHAPE", help=f"surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc{planar}"
     )
 
 
 FLAT_SHAPE = shape_option("; in the plane, polylines: .svg .csv")
-UP = option("--up", choices=["x", "y", "z"], default="z", help="axis that points upwards in the picture (z)")
+UP = option("--up", choices=["x", "y", "z"], default="z", help="axis that points up in the picture (z)")
 LABEL = option(
     "--label",
     type=finite,
     metavar="N",
-    help="of an image of labels (.nrrd .nii .nii.gz .vti .npy) the voxels with this one; the result lies where the "
-    "image does",
+    help="in an image of labels (.nrrd .nii .nii.gz .vti .npy), take the voxels with this one; the result has the "
+    "coordinates of the image",
 )
 PLACE = group(
     "place of the shape (by default that of the file, in its units)",
@@ -311,8 +311,8 @@ PLACE = group(
         "--units",
         type=units,
         metavar="[FROM:]TO",
-        help="units of all numbers: mm, cm, m, inch, foot, micron; FROM: those of a file that does not say so, as .3mf "
-        "and .glb do, and is in others than TO",
+        help="units of all numbers: mm, cm, m, inch, foot, micron; FROM: units of the file, if they differ and it does "
+        "not state them, as .3mf and .glb do",
     ),
     option("--transform", nargs="+", metavar="M", help="16 numbers of a matrix by rows, or 12, or a file of them"),
 )
@@ -322,43 +322,43 @@ ROOM = group(
     option(
         "--spacing", type=positive, nargs="+", metavar="H", help="distance between nodes: one, or one for each axis"
     ),
-    option("--padding", type=not_negative, metavar="P", help="room around the shape, in its units"),
+    option("--padding", type=not_negative, metavar="P", help="margin around the shape, in its units"),
     option(
         "--band",
         type=positive,
         metavar="B",
-        help="fine nodes only up to this distance from the surface, in the units of the shape, and coarse ones beyond: "
-        "for grids too fine to be computed whole",
+        help="fine nodes only within this distance of the surface, in the units of the shape, and coarse nodes beyond: "
+        "for very fine grids",
     ),
 )
 GRID = group(
     ROOM.title,
     *ROOM.options,
-    option("--origin", type=finite, nargs="+", metavar="X", help="first node of a grid of your own: X Y Z, or X Y"),
+    option("--origin", type=finite, nargs="+", metavar="X", help="first node of a custom grid: X Y Z, or X Y"),
     option(
         "--shape",
         type=whole_number(2),
         nargs="+",
         metavar="NX",
         dest="grid_shape",
-        help="its nodes: NX NY NZ, or NX NY",
+        help="number of its nodes: NX NY NZ, or NX NY",
     ),
 )
 REPAIR = group(
     "steps (all taken by default)",
-    option("--as-oriented", action="store_true", help="turn no face, normal or line, put back no face"),
-    option("--keep-overlaps", action="store_true", help="count what lies inside other bodies as surface"),
+    option("--as-oriented", action="store_true", help="turn no face, normal or line, and restore no face"),
+    option("--keep-overlaps", action="store_true", help="keep surfaces that lie inside other bodies"),
     option(
         "--lids",
         choices=("bent", "flat"),
         default="bent",
-        help="lids go on as the surface bends towards them, or are flat, as of half models and hulls",
+        help="lids continue the bend of the surface, or are flat, as for half models and hulls",
     ),
     option(
         "--nested",
         choices=("given", "cavities", "bodies"),
         default="given",
-        help="what closed pieces within others are: as their faces say, cavities as slicers take them, or bodies",
+        help="closed pieces inside others are what their orientation says, cavities as in slicers, or bodies",
     ),
 )
 STEPS = group(
@@ -390,8 +390,8 @@ TILES = group(
     option(
         "--tiles",
         metavar="FOLDER",
-        help="compute the band in tiles, which are kept in this folder: for bands larger than memory; the same command "
-        "continues where it was stopped",
+        help="compute the band in tiles and store them in this folder, for bands larger than memory; the same command "
+        "resumes after a stop",
     ),
     workers("threads that compute them (one for each processor)"),
     SCHEDULER,
@@ -399,16 +399,16 @@ TILES = group(
 SLICES = option("--preview", metavar="PNG", help="draw the result: in space, three slices")
 SAMPLING = group(
     "samples",
-    option("--near", type=fraction, default=0.8, metavar="S", help="share near the surface, from 0 to 1 (.8)"),
+    option("--near", type=fraction, default=0.8, metavar="S", help="fraction near the surface, from 0 to 1 (.8)"),
     option(
         "--widths",
         type=not_negative,
         nargs="+",
         default=[0.05, 0.0158],
         metavar="W",
-        help="standard deviations of the noise, over the radius of the shape; each gets the same share (.05 .0158)",
+        help="standard deviations of the noise, relative to the radius of the shape, used equally (.05 .0158)",
     ),
-    option("--seed", type=whole_number(0), default=0, metavar="K", help="of the random numbers (0)"),
+    option("--seed", type=whole_number(0), default=0, metavar="K", help="seed of the random numbers (0)"),
     option("--normalize", action="store_true", help="move and scale the shape into the unit sphere"),
     option(
         "--layout",
@@ -420,12 +420,12 @@ SAMPLING = group(
 
 
 def is_planar(path: Any) -> bool:
-    """Whether a file holds polylines in the plane."""
+    """Whether the extension of a file is one of polylines in the plane."""
     return Path(path).suffix.lower() in PLANAR
 
 
 def refuse_together(arguments: Namespace, first: str, *others: str) -> None:
-    """Exit if an option is given, and one of some others with it."""
+    """Exit with an error if an option is given together with one of some others."""
 
     def is_given(option: str) -> bool:
         name = "grid_shape" if option == "--shape" else option.lstrip("-").replace("-", "_")
@@ -438,7 +438,7 @@ def refuse_together(arguments: Namespace, first: str, *others: str) -> None:
 
 def check_grid(arguments: Namespace) -> None:
     """Reject options that contradict each other, and numbers for another dimension."""
-    error, own = arguments.parser.error, (arguments.origin, arguments.spacing, arguments.grid_shape)
+    error = arguments.parser.error
     dimension = 2 if is_planar(getattr(arguments, "shape", "")) else 3
     for name, numbers, counts in (
         ("--spacing", arguments.spacing, (1, dimension)),
@@ -453,12 +453,13 @@ def check_grid(arguments: Namespace) -> None:
     refuse_together(arguments, "--scheduler", "--workers")
     if arguments.band is not None and dimension == 2:
         error("--band is for shapes in space")
-    if (arguments.origin, arguments.grid_shape) != (None, None) and None in own:
-        error("a grid of your own needs all of --origin, --spacing and --shape")
+    own_grid = (arguments.origin, arguments.spacing, arguments.grid_shape)
+    if (arguments.origin, arguments.grid_shape) != (None, None) and None in own_grid:
+        error("a custom grid needs all of --origin, --spacing and --shape")
 
 
 def check_tiles(arguments: Namespace) -> None:
-    """The same; and reject tiles without a band, and workers without tiles."""
+    """Reject what `check_grid` does, tiles without a band, and workers without tiles."""
     check_grid(arguments)
     if arguments.tiles is not None and arguments.band is None:
         arguments.parser.error("--tiles goes with --band")

@@ -10,16 +10,15 @@ from argparse import Namespace
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 
 from ..errors import SignedHeatError
-from ..processes import command_for
+from ..jobs import command_for
 from ..progress import Announcement
 from .batch_commands import batch, watertight
 from .curve_commands import close, surface
-from .info_command import info
 from .late_imports import compiled, kernel_runs, parallel
 from .options import Command, Summary, command, is_quiet
 from .solid_commands import contour, morph, offset, sample, volume
 from .terminal import ProgressBar, say
-from .view_commands import demo, deviation, view
+from .view_commands import demo, deviation, info, view
 
 TICK = 0.5
 """Seconds after which the progress of compiling is drawn again."""

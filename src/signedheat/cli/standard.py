@@ -1,4 +1,4 @@
-"""``-`` as a file: standard input and standard output, through files of their own in a folder that is removed."""
+"""``-`` as a file name: standard input and standard output, passed through temporary files."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from pathlib import Path
 from ..errors import FileFormatError, SignedHeatError
 
 INPUTS = ("shape", "mesh", "field", "file")
-"""Arguments that may be standard input."""
+"""Arguments that may name standard input."""
 
 
 @dataclass(frozen=True)
 class StandardFiles:
-    """What became of ``-`` among the arguments.
+    """Replacements for ``-`` among the arguments.
 
     Attributes
     ----------
     takes_output : bool
-        Whether standard output is for what is made.
+        Whether the result goes to standard output.
     names : dict
-        By the path of a file that stands for it, what to call it.
+        Names to print in place of the paths of temporary files.
     """
 
     takes_output: bool = False
     names: Mapping[str, str] = field(default_factory=dict)
 
     def named(self, text: str) -> str:
-        """A text that calls standard input what it is."""
+        """A text with the paths of temporary files replaced."""
         for path, name in self.names.items():
             text = text.replace(path, name)
         return text
@@ -40,7 +40,7 @@ class StandardFiles:
 
 @contextmanager
 def standard_files(arguments: Namespace) -> Iterator[StandardFiles]:
-    """Put files in place of ``-`` among the arguments, and write what was made."""
+    """Replace ``-`` among the arguments by temporary files, and write the result to standard output."""
     inputs = [name for name in INPUTS if getattr(arguments, name, None) == "-"]
     output = getattr(arguments, "output", None) == "-"
     listed = getattr(arguments, "files", []) == ["-"]
@@ -52,7 +52,7 @@ def standard_files(arguments: Namespace) -> Iterator[StandardFiles]:
         if inputs or listed:
             if arguments.input_format is None:
                 raise FileFormatError(
-                    "nothing says what format it has", remedy="add --from, as in --from ply", path="standard input"
+                    "its format is unknown", remedy="add --from, as in --from ply", path="standard input"
                 )
             path = Path(folder, f"input.{arguments.input_format}")
             path.write_bytes(sys.stdin.buffer.read() if sys.stdin is not None else b"")
@@ -77,7 +77,7 @@ def standard_files(arguments: Namespace) -> Iterator[StandardFiles]:
 def _write(path: Path) -> None:
     if not path.is_file():
         raise FileFormatError(
-            "there are several files", remedy="name a file instead of standard output", path="standard output"
+            "the result is several files", remedy="name a file instead of standard output", path="standard output"
         )
     try:
         sys.stdout.buffer.write(path.read_bytes())

@@ -1,4 +1,4 @@
-"""The terminal: text to standard output and error, whatever these are; a progress bar; signals that stop it."""
+"""The terminal: text on standard output and error, a progress bar, and signals."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ PLAIN = str.maketrans(
         "╌": "-",
     }
 )
-"""What is written instead of characters that a stream cannot hold."""
+"""Replacements for characters that a stream cannot encode."""
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 CLEAR = "\r\x1b[2K"
-"""Takes away what is on the present line of a terminal."""
+"""Clears the current line of a terminal."""
 APART = 1.0
-"""Seconds within which a further signal is taken for the same one."""
+"""Seconds within which further signals are ignored."""
 
 
 def open_standard_streams() -> None:
-    """Give closed standard streams to the null device, so that no file of ours gets their numbers."""
+    """Open closed standard streams on the null device, so that no other file gets their numbers."""
     for number in range(3):
         try:
             os.fstat(number)
@@ -107,7 +107,7 @@ def write_out(text: str) -> None:
 
 
 def _abandon(stream: TextIO | None) -> None:
-    """Let what is still in the buffer of a broken stream go nowhere, instead of failing once more at the end."""
+    """Discard the buffer of a broken stream, which would otherwise fail again at exit."""
     try:
         if stream is not None:
             null = os.open(os.devnull, os.O_WRONLY)
@@ -118,7 +118,7 @@ def _abandon(stream: TextIO | None) -> None:
 
 
 class ProgressBar:
-    """A progress callback that draws a bar on standard error, if this is a terminal."""
+    """A progress callback that draws a bar on standard error if this is a terminal."""
 
     def __init__(self, quiet: bool) -> None:
         self._is_shown = not quiet and sys.stderr is not None and sys.stderr.isatty()
@@ -133,7 +133,7 @@ class ProgressBar:
         _write_error(CLEAR, f"{'━' * full}{'╌' * (width - full)} {fraction:4.0%} {seconds:6.1f} s  {step}", "")
 
     def clear(self) -> None:
-        """Take the bar away, for a line of text."""
+        """Clear the bar to make room for a line of text."""
         if self._is_shown:
             _write_error(CLEAR, "", "")
 
@@ -145,14 +145,14 @@ class ProgressBar:
 
 
 class Stopped(KeyboardInterrupt):
-    """What signals raise: where Python runs text, it notes `KeyboardInterrupt` itself, and ends by SIGINT later."""
+    """Raised by signals; a subclass, because Python treats `KeyboardInterrupt` itself specially in ``python -c``."""
 
 
 class Signals:
-    """While this is entered, signals raise `Stopped`, and `caught` is the number of the last one.
+    """A context in which signals raise `Stopped`, so that temporary files are removed; `caught` is the last one.
 
-    So temporary files are removed on the way out. Signals that are ignored, as under ``nohup``, or that somebody else
-    handles, are left alone; so are all where this is not entered by the main thread.
+    Signals that are ignored, as under ``nohup``, or that have another handler keep it. Outside the main thread the
+    context does nothing.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Commands that show: `view` a file, `deviation` of a scan, and the `demo`."""
+"""Commands that report and draw: `info`, `view`, `deviation` and `demo`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import ctypes
 import os
 import sys
 from argparse import Namespace
+from collections.abc import Iterator
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,30 +14,92 @@ from typing import Any
 
 import signedheat as sh
 
-from ..errors import FileFormatError, MissingPackageError, printable
+from ..errors import FileFormatError, MissingPackageError, SignedHeatError, printable
 from ..jobs import run_limited
-from .late_imports import inspection, samples
+from .late_imports import inputs, inspection, reports, samples
 from .late_imports import operands as shapes
 from .options import UP, Summary, command, is_quiet, option, positive, whole_number
-from .terminal import ProgressBar, say
+from .terminal import ProgressBar, say, say_error
 
 PATIENCE = 5.0
-"""Seconds within which a display must answer."""
+"""Seconds to wait for a display to answer."""
 DISTANCE = 0.15
-"""Of the surface around the duck of the demo."""
+"""Offset of the surface in the demo."""
+CURVES = (".json",)
+"""Extensions of files that hold only curves."""
+
+
+def check_files(arguments: Namespace) -> None:
+    """Take a second file with curves as ``--curves``; reject curves with several shapes."""
+    last = Path(arguments.files[-1]).suffix.lower()
+    if len(arguments.files) == 2 and last in CURVES and arguments.curves is None:
+        arguments.curves = arguments.files.pop()
+    if arguments.curves is not None and len(arguments.files) > 1:
+        arguments.parser.error(f"curves lie on one shape, but {len(arguments.files)} are given")
+
+
+@command(
+    "info",
+    "contents and defects of a file",
+    "Counts, open, nonmanifold and inconsistent edges, degenerate and duplicate elements, bounds; which way the parts "
+    "of a mesh face, doubled walls, bodies within others, sheets, the thinnest wall and gap; the memory that grids "
+    "around a shape take. Of a field: its grid and range.",
+    option(
+        "files",
+        metavar="FILE",
+        nargs="+",
+        help="shapes, polylines in the plane, fields, folders of shapes; a .json file after a shape has curves on it",
+    ),
+    option("--curves", metavar="CURVES", help="curves on the shape: .json .obj .csv"),
+    option(
+        "--resolution",
+        type=whole_number(2),
+        nargs="+",
+        default=[64, 128, 256, 512],
+        metavar="N",
+        help="resolutions at which to estimate memory",
+    ),
+    check=check_files,
+    usage="FILE [FILE ...] [--curves CURVES] [options]",
+)
+def info(arguments: Namespace) -> Summary:
+    """Inspect files; one that cannot be read does not stop the others."""
+    arguments.files = list(_without_folders(arguments.files))
+    if len(arguments.files) == 1:
+        return reports.report(arguments.files[0], arguments)
+    summaries, texts, failed = [], [], 0
+    for file in arguments.files:
+        try:
+            summary, text = reports.report(file, arguments)
+        except SignedHeatError as error:
+            say_error(error if error.path else error.at(file))
+            failed += 1
+        else:
+            summaries.append(summary)
+            texts.append(text)
+    return {"files": summaries, "failed": failed}, "\n\n".join(texts)
+
+
+def _without_folders(names: list[str]) -> Iterator[str]:
+    """The names of files, with each folder replaced by its shapes."""
+    for name in names:
+        if os.path.isdir(name):
+            yield from (str(shape.path) for shape in inputs.expand([name]))
+        else:
+            yield name
 
 
 @command(
     "view",
-    "a shape or a field in a window, or as a picture",
-    "In a window where there is a display and PyVista; otherwise, or with --output, as a picture: slices through a "
-    "field; a shape, outsides yellow, insides red.",
+    "show a shape or a field in a window, or as a picture",
+    "Opens a window if there is a display and PyVista. Otherwise, or with --output, writes a picture: slices through a "
+    "field, or a shape with yellow outsides and red insides.",
     option("file", metavar="FILE", help="a shape or a field"),
     UP,
     option("-o", "--output", metavar="FILE", help="picture: .png .pdf .svg .jpg (a window, or FILE.png here)"),
 )
 def view(arguments: Namespace) -> Summary:
-    """Draw."""
+    """Show the file in a window, or write a picture."""
     output, up = arguments.output, "xyz".index(arguments.up)
     if output is None and has_window():
         with shapes.prefix_errors(arguments.file):
@@ -64,7 +127,7 @@ def has_window() -> bool:
 
 
 def display_answers() -> bool:
-    """Whether there is an X server: where there is none, VTK shows nothing, and says so in no way."""
+    """Whether an X server answers; without one, VTK would silently show nothing."""
     name = os.environ.get("DISPLAY", "")
     if not name:
         return False
@@ -72,37 +135,37 @@ def display_answers() -> bool:
         library = ctypes.CDLL("libX11.so.6")
         library.XOpenDisplay.restype, library.XOpenDisplay.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
         library.XCloseDisplay.argtypes = [ctypes.c_void_p]
-        found = run_limited(lambda: library.XOpenDisplay(os.fsencode(name)), PATIENCE)
-    except (OSError, TimeoutError):  # no such library, or a server that says nothing
-        found = None
-    if found:
-        library.XCloseDisplay(found)
+        display = run_limited(lambda: library.XOpenDisplay(os.fsencode(name)), PATIENCE)
+    except (OSError, TimeoutError):  # no such library, or a server that does not answer
+        display = None
+    if display:
+        library.XCloseDisplay(display)
         return True
     say(f"signedheat: no window can be opened on the display {name}: a picture is written instead")
     return False
 
 
 def shape_or_field(path: str) -> Any:
-    """What a file holds; those of tets may hold either."""
-    found = shapes.field_or_image(path)
-    if isinstance(found, sh.io.LabelImage):
+    """Read the shape or field in a file."""
+    field = shapes.field_or_image(path)
+    if isinstance(field, sh.io.LabelImage):
         with shapes.prefix_errors(path):
-            return shapes.thing_of(found)
-    if found is not None:
-        return found
+            return shapes.thing_of(field)
+    if field is not None:
+        return field
     ending = Path(path).suffix.lower()
     if ending in sh.io.VALUE_FORMATS:
         with suppress(FileFormatError):  # a shape without values
             return sh.load_field(path)
-    thing = sh.read(path)
-    if isinstance(thing, sh.TetMesh) and ending in sh.io.TET_FIELD_FORMATS:
-        with suppress(FileFormatError):
+    shape = sh.read(path)
+    if isinstance(shape, sh.TetMesh) and ending in sh.io.TET_FIELD_FORMATS:
+        with suppress(FileFormatError):  # tets without values
             return sh.load_field(path)
-    return thing
+    return shape
 
 
 def check_deviation(arguments: Namespace) -> None:
-    """Take SCAN and NOMINAL from behind the outputs, if those came first; reject a line without them."""
+    """Take SCAN and NOMINAL from the end of the outputs if they follow ``-o``; exit if they are missing."""
     shapes_named = [name for name in (arguments.scan, arguments.nominal) if name is not None]
     missing = 2 - len(shapes_named)
     if missing:
@@ -115,9 +178,9 @@ def check_deviation(arguments: Namespace) -> None:
 
 @command(
     "deviation",
-    "how far a scan is off a nominal part",
-    "Signed distances of a scan's points to a nominal part, positive outside of it: percentiles; the scan in colours, "
-    "a picture with the histogram, or a table. Both must be in one place: nothing is aligned.",
+    "deviation of a scan from a nominal part",
+    "Signed distances of a scan's points to a nominal part, positive outside: percentiles, and optionally the scan in "
+    "colours, a picture with a histogram, or a table. The scan must be aligned with the part.",
     option(
         "scan", metavar="SCAN", nargs="?", help="mesh or points: .stl .obj .ply .off .vtp .glb .xyz .pcd .las .laz .e57"
     ),
@@ -131,7 +194,7 @@ def check_deviation(arguments: Namespace) -> None:
         default=[],
         help="any of: coloured .ply, picture .png .pdf .svg .jpg, table .csv",
     ),
-    option("--tolerance", type=positive, metavar="T", help="say which share of the points is within it"),
+    option("--tolerance", type=positive, metavar="T", help="report the share of points within this distance"),
     check=check_deviation,
     usage="SCAN NOMINAL [-o OUT ...] [--tolerance T]",
 )
@@ -141,32 +204,33 @@ def deviation(arguments: Namespace) -> Summary:
         sh.io.ensure_writable(output, sh.view.DEVIATION_FORMATS, "deviations")
     scan, nominal = sh.read(arguments.scan), sh.read(arguments.nominal)
     with shapes.prefix_errors(arguments.nominal), ProgressBar(is_quiet(arguments)) as progress:
-        found = sh.deviation(scan, nominal, progress)
-    summary: dict[str, Any] = {"scan": arguments.scan, "nominal": arguments.nominal, **found.figures}
-    low, middle, high = found.percentiles((1, 50, 99))
-    text = f"{printable(arguments.scan)}: {len(found.of_surface)} points, 98 % of them {low:.4g} to {high:.4g} off "
-    text += f"{arguments.nominal}, median {middle:.4g}, root mean square {found.rms:.4g}"
+        deviations = sh.deviation(scan, nominal, progress)
+    summary: dict[str, Any] = {"scan": arguments.scan, "nominal": arguments.nominal, **deviations.figures}
+    low, median, high = deviations.percentiles((1, 50, 99))
+    n_points = len(deviations.of_surface)
+    text = f"{printable(arguments.scan)}: {n_points} points, 98 % of them {low:.4g} to {high:.4g} off "
+    text += f"{arguments.nominal}, median {median:.4g}, root mean square {deviations.rms:.4g}"
     if arguments.tolerance is not None:
-        share = found.within(arguments.tolerance)
+        share = deviations.within(arguments.tolerance)
         summary |= {"tolerance": arguments.tolerance, "within": share}
         text += f", {share:.2%} within {arguments.tolerance:g}"
-    if found.beyond_rim.any():
-        text += f"; {summary['beyond_rim']:.2%} beyond the rim of it"
+    if deviations.beyond_rim.any():
+        text += f"; {summary['beyond_rim']:.2%} beyond its rim"
     for output in arguments.output:
-        found.save(output)
+        deviations.save(output)
         text += f"; {output}"
     return summary | {"output": arguments.output}, text
 
 
 @command(
     "demo",
-    "try it on a broken duck that comes along",
-    "Make a broken shape, its distance field, an offset surface and a picture.",
-    option("-o", "--output", default="demo", metavar="FOLDER", help="where to (demo)"),
+    "try it on a broken duck",
+    "Write a broken shape, its distance field, an offset surface and a picture.",
+    option("-o", "--output", default="demo", metavar="FOLDER", help="folder for the results (demo)"),
     option("--resolution", type=whole_number(8), default=128, metavar="N", help="nodes along the longest side"),
 )
 def demo(arguments: Namespace) -> Summary:
-    """Write everything to one folder."""
+    """Write a broken shape and all results to one folder."""
     folder = Path(arguments.output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -179,10 +243,10 @@ def demo(arguments: Namespace) -> Summary:
         sh.io.ensure_writable(path, {path.suffix}, "a file")
     try:
         sh.view.ensure_picture_writable(files["picture.png"])
-    except MissingPackageError as error:  # the rest is worth having
+    except MissingPackageError as error:  # still write the other files
         del files["picture.png"]
         if not arguments.quiet:
-            say(f"signedheat: no picture is made: {error}")
+            say(f"signedheat: no picture is written: {error}")
     shape = samples.broken_duck()
     shape.save(files["duck.stl"])
     grid = sh.Grid.around(shape.bounds, arguments.resolution, padding=3 * DISTANCE)
@@ -208,7 +272,8 @@ def demo(arguments: Namespace) -> Summary:
 
 
 def _defects(shape: sh.TriangleMesh) -> str:
-    found: Any = inspection.inspect(shape)
+    counts: Any = inspection.inspect(shape)
     return (
-        f"{found.open_edges} open edges, {found.nonmanifold_edges} nonmanifold, {found.inconsistent_edges} inconsistent"
+        f"{counts.open_edges} open edges, {counts.nonmanifold_edges} nonmanifold, "
+        f"{counts.inconsistent_edges} inconsistent"
     )
