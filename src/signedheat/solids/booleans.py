@@ -26,17 +26,17 @@ BOX = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6
 
 
 def union(a: Solid, b: Solid) -> Solid:
-    """What lies in one of two solids or in both."""
+    """The union of two solids."""
     return _combination(a, b, turned=False)
 
 
 def difference(a: Solid, b: Solid) -> Solid:
-    """What lies in the first solid and not in the second."""
+    """The part of the first solid outside the second."""
     return _combination(a, b, turned=True)
 
 
 def intersection(a: Solid, b: Solid) -> Solid:
-    """What lies in both solids."""
+    """The intersection of two solids."""
     bounds = np.stack([np.minimum(a.bounds[0], b.bounds[0]), np.maximum(a.bounds[1], b.bounds[1])])
     room = float(np.ptp(bounds, axis=0).max())
     lower, upper = bounds[0] - room, bounds[1] + room
@@ -46,18 +46,12 @@ def intersection(a: Solid, b: Solid) -> Solid:
 
 
 def _combination(a: Solid, b: Solid, turned: bool, around: NDArray[np.float64] | None = None) -> Solid:
-    """The solid whose winding number is that of two, of which the second may be turned, and of triangles around them.
-
-    Raises
-    ------
-    SourceError
-        If nothing is inside.
-    """
+    """The solid whose winding number is the sum of those of `a`, of `b`, turned or not, and of triangles `around`."""
     first, of_first = outward(a)
     second, of_second = outward(b)
     triangles = np.concatenate([first, second[:, ::-1] if turned else second])
     if not len(triangles):
-        raise SourceError("neither encloses anything", remedy="combine solids, not sheets", element="solid")
+        raise SourceError("neither of the two encloses anything", remedy="combine solids, not sheets", element="solid")
     chain = triangles if around is None else np.concatenate([triangles, around])
     cut = arranged(*indexed(triangles))
     windings = Windings(chain)

@@ -1,4 +1,4 @@
-"""Complete a broken shape, once: what bounds it, and what closes it where it is open."""
+"""Complete a broken shape: decide which faces bound it, and close it where it is open."""
 
 from __future__ import annotations
 
@@ -38,17 +38,17 @@ from .solid import Solid
 from .union import Surface, united
 
 STEPS = 2
-"""Steps that are timed."""
+"""Number of timed steps."""
 BYTES_PER_FACE = 1300
-"""Measured peak for each face of meshes of 330,000, closed or open; points take less."""
+"""Peak memory per face, measured on meshes of 330,000 faces; points take less."""
 BYTES_IF_LOOSE, BYTES_OF_HEAT = 3400, 150_000_000
-"""The same for loose triangles; and of the grid that they and points are completed on."""
+"""The same for loose triangles; and memory of the grid on which they and points are completed."""
 CELLS = 2.0
 """Cells between neighbouring points of a cloud."""
 MATCH = (1e-6, 0.75)
-"""Distance of corners over the size of pieces between which they were one corner, before noise moved them."""
+"""Range of distances, relative to the size of pieces, between corners that noise has separated."""
 SEAM = 0.75
-"""Cells from faces within which the zero set of φ is taken for those faces."""
+"""Distance in cells within which the zero set of φ stands for the faces."""
 
 Completing = Literal["lids", "heat"]
 Lids = Literal["bent", "flat"]
@@ -86,46 +86,46 @@ def complete(
     diffusion: float = 1.0,
     progress: Progress | None = None,
 ) -> Solid:
-    """The solid that a shape is, or is a broken picture of.
+    """Complete a shape to the solid it represents, broken or not.
 
-    Faces are turned to agree and to face outwards. Parts that bound something are closed by lids: thin plates that go
-    on over their rims where the surface bends towards them, and are flat elsewhere. Points, and loose triangles that
+    Faces are turned to agree and to face outwards. Parts that bound something are closed by lids: thin plates that
+    continue the surface where it bends towards its rim, and are flat elsewhere. Points, and loose triangles that
     scatter around a surface, are completed by the signed heat method. Bodies that overlap are united. Sheets bound
-    nothing: distance to them is positive on both sides. None of this depends on where distance is wanted, nor on
+    nothing: distance to them is positive on both sides. The result does not depend on where distance is wanted, nor on
     rotation, position and scale.
 
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh; or several meshes
-        Broken or not; points with normals or without. Objects of trimesh, PyVista, meshio and Open3D and pairs
-        (vertices, faces) are taken wherever a shape is. A `Solid` is returned as it is.
+        A shape, broken or not; points may lack normals. Like every function that takes shapes, this takes objects of
+        trimesh, PyVista, meshio and Open3D and pairs (vertices, faces). A `Solid` is returned unchanged.
     completion : {"lids", "heat"}
-        What closes meshes: lids, or the zero set of φ where no face is, as in the paper (Feng & Crane 2024).
+        Close meshes by lids, or by the zero set of φ where no face is, as in the paper (Feng & Crane 2024).
     lids : {"bent", "flat"}
-        Whether lids go on as the surface bends towards them, or are flat: for half models, ducts and hulls.
+        Whether lids continue the bend of the surface, or are flat, as for half models, ducts and hulls.
     as_oriented : bool
-        Take faces and normals as they are, whichever way they face.
+        Keep the orientation of faces and normals.
     keep_overlaps : bool
-        Count what lies inside other bodies as surface.
+        Keep surfaces that lie inside other bodies.
     nested : {"given", "cavities", "bodies"}
-        What closed pieces within others are: as they were given, to what they lie in; cavities, and bodies in these, as
-        slicers take them; or bodies all.
+        Meaning of closed pieces within others: by their orientation; cavities, with bodies inside those, as in slicers;
+        or bodies.
     constraint, diffusion : Constraint, float
-        Of the signed heat method, where that completes.
+        Options of the signed heat method, where that completes.
     progress : callable, optional
-        Called as ``progress(fraction, step)``, ten times a second; what it raises cancels.
+        Called as ``progress(fraction, step)``, ten times a second. An exception that it raises cancels.
 
     Returns
     -------
     Solid
-        Its ``diagnostics.notes`` say what was turned, left out and completed.
+        Its ``diagnostics.notes`` say which faces were turned, left out and added.
 
     Raises
     ------
     SourceError
         If no face has an area, or points have no normals and none are to be fitted.
     MemoryLimitError
-        If it cannot fit in memory; nothing has been allocated then.
+        If completing does not fit in memory. Raised before anything is allocated.
 
     Examples
     --------
@@ -174,7 +174,7 @@ def completed(
 
 
 def bytes_to_complete(shape: SurfaceShape, count: int) -> float:
-    """Peak memory of completing a shape that is like this one but has so many faces."""
+    """Estimate the peak memory of completing a shape like this one with `count` faces."""
     if isinstance(shape, PointCloud):
         return BYTES_OF_HEAT + BYTES_PER_FACE * count
     mesh = shape.triangulation
@@ -184,7 +184,7 @@ def bytes_to_complete(shape: SurfaceShape, count: int) -> float:
 
 
 def oriented_points(cloud: PointCloud) -> tuple[PointCloud, tuple[Note, ...]]:
-    """Points whose normals point outwards, and what was done for it."""
+    """Orient the normals of points outwards, and note how many were fitted and turned."""
     points = orient_points(cloud)
     return points.cloud, (OrientedPoints(points.n_fitted, points.n_turned),)
 
@@ -220,7 +220,7 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
 def _made_from(
     places: NDArray[np.float64], faces: NDArray[np.int64], added: NDArray[np.int64], origins: NDArray[np.int64]
 ) -> Surface:
-    """The cycle of faces, the first of which were given, and of what is added to them."""
+    """A closed surface of faces and those added to them; only the first faces have origins."""
     whole = np.concatenate([faces, added])
     return Surface(places[whole], whole, np.append(origins, np.full(len(whole) - len(origins), -1)), True)
 
@@ -233,7 +233,7 @@ def _torn(
     method: Heat,
     completion: str,
 ) -> list[Surface]:
-    """What is left of a body, and the zero set of φ where it is not; that alone where faces are noise around it."""
+    """Complete a torn body by the zero set of φ; return that alone if the faces scatter around it."""
     triangles = vertices[faces]
     given = Surface(triangles, faces, origins, False)
     scatter = scatter_of(triangles, pieces) if completion == "lids" else 0.0
@@ -259,10 +259,7 @@ def _torn(
 
 
 def scatter_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> float:
-    """How far corners that were one have come apart, if pieces are noise around a surface; else 0.
-
-    They are if most of their corners lie near corners of others, but not on them.
-    """
+    """The distance of corners that noise has separated, if it has separated most of them; otherwise 0."""
     points = triangles.reshape(-1, 3)
     owners = np.repeat(labels, 3)
     near, which = scipy.spatial.cKDTree(points).query(points, min(8, len(points)), workers=-1)
@@ -274,7 +271,7 @@ def scatter_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> flo
 
 
 def _from_points(cloud: PointCloud, method: Heat) -> Solid:
-    """The solid that oriented points are samples of; where they bound nothing, each is a small triangle."""
+    """The solid that oriented points sample; if they bound nothing, a small triangle for each."""
     if cloud.normals is None:
         raise SourceError("the point cloud has no normals, which say what is inside", remedy="give it normals")
     gap = mean_gap(np.asarray(cloud.points))

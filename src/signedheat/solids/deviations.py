@@ -32,44 +32,44 @@ from .solid import Solid
 pictures: Any = lazy_module("signedheat.view.deviation_pictures", "pictures")
 
 PERCENTILES = (0.0, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 100.0)
-"""Of deviations, that summaries have."""
+"""Percentiles of deviations in summaries."""
 EXTREME = 99.0
-"""Percentile of absolute deviations at which colours are full and histograms end: few outliers do not wash them out."""
+"""Percentile of absolute deviations at which colour scales and histograms end, so that outliers do not dominate."""
 BINS = 40
-"""Of histograms."""
+"""Default number of bins of histograms."""
 OPEN = 0.25
-"""Share of the whole surface that is completed, from which a nominal is measured as an open surface."""
+"""Completed share of the surface above which a nominal part is measured as an open surface."""
 TIE = 1e-9
 """Relative difference below which distances are equal."""
 STRAIGHT = 1 - 1e-6
-"""Cosine to the normal above which a point is straight above its nearest place, or below."""
+"""Cosine to the normal above which a point is straight above or below its nearest place."""
 
 
 @dataclass(frozen=True, eq=False)
 class Deviation(Frozen):
-    """Signed distances of a scan's points to a nominal part: positive where there is too much material.
+    """Signed distances of a scan's points to a nominal part, positive where there is too much material.
 
-    Statistics leave out vertices that no face uses.
+    Statistics ignore vertices that no face uses.
 
     Attributes
     ----------
     scan : PointCloud, TriangleMesh or PolygonMesh
-        What was scanned.
+        The scan.
     distances : (n,) float
-        Of its points or vertices, in their units.
+        Distances of its points or vertices, in their units.
     nearest : (n, 3) float
         The nearest places of the part.
     completed : (n,) bool
-        Whether these lie on surface that the nominal part did not have, and that closes it.
+        Whether these lie on the completion of the nominal part.
     beyond_rim : (n,) bool
-        Whether points are beyond the rim of an open nominal, such as a panel or a terrain: their side is that of the
-        surface continued.
+        Whether points lie beyond the rim of an open part, such as a panel or a terrain. Their sign is that of the
+        continued surface.
 
     Examples
     --------
     >>> import signedheat as sh
-    >>> found = sh.deviation(np.array([[0.0, 0.0, 1.1], [0.0, 0.9, 0.0]]), sh.samples.sphere(5))
-    >>> found.distances.round(2), round(found.rms, 2), found.within(0.05)
+    >>> off = sh.deviation(np.array([[0.0, 0.0, 1.1], [0.0, 0.9, 0.0]]), sh.samples.sphere(5))
+    >>> off.distances.round(2), round(off.rms, 2), off.within(0.05)
     (array([ 0.1, -0.1]), 0.1, 0.0)
     """
 
@@ -86,7 +86,7 @@ class Deviation(Frozen):
 
     @cached_property
     def of_surface(self) -> NDArray[np.float64]:
-        """(m,) the distances of all points, or of the vertices that faces use."""
+        """(m,) distances of all points, or of the vertices that faces use."""
         if isinstance(self.scan, PointCloud):
             return self.distances
         corners = self.scan.faces if isinstance(self.scan, TriangleMesh) else self.scan.corners
@@ -94,16 +94,16 @@ class Deviation(Frozen):
 
     @property
     def rms(self) -> float:
-        """Root mean square."""
+        """Root mean square of the deviations."""
         return float(np.sqrt(np.mean(self.of_surface**2)))
 
     @property
     def extreme(self) -> float:
-        """What 99 % of the absolute deviations are below."""
+        """The 99th percentile of the absolute deviations."""
         return float(np.percentile(np.abs(self.of_surface), EXTREME))
 
     def within(self, tolerance: float) -> float:
-        """Share of the points that are as near to the part as a tolerance, on either side.
+        """Compute the share of points within a tolerance of the part, on either side.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ class Deviation(Frozen):
         return float((np.abs(self.of_surface) <= tolerance).mean())
 
     def percentiles(self, percents: ArrayLike = PERCENTILES) -> NDArray[np.float64]:
-        """Deviations that so many per cent of the points are below.
+        """Compute percentiles of the deviations.
 
         Parameters
         ----------
@@ -149,19 +149,19 @@ class Deviation(Frozen):
         return np.asarray(np.percentile(self.of_surface, np.asarray(percents, dtype=np.float64)))
 
     def histogram(self, bins: int = BINS) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Numbers of points by deviation; those beyond `extreme` count in the first or last bin.
+        """Count points by deviation; those beyond `extreme` count in the first or last bin.
 
         Parameters
         ----------
         bins : int
-            How many.
+            Number of bins.
 
         Returns
         -------
         counts : (bins,) int
             Numbers of points.
         limits : (bins + 1,) float
-            Between the bins, lengths.
+            Limits between the bins, as lengths.
 
         Examples
         --------
@@ -179,7 +179,7 @@ class Deviation(Frozen):
 
     @property
     def figures(self) -> dict[str, object]:
-        """What sums it up, ready for JSON."""
+        """Summary figures, ready for JSON."""
         return {
             "points": len(self.of_surface),
             "mean": float(self.of_surface.mean()),
@@ -190,19 +190,19 @@ class Deviation(Frozen):
         }
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file, in the format given by its extension.
+        """Write the deviations to a file, in the format given by its extension.
 
         Parameters
         ----------
         path : str or path
-            ``.ply``: the scan in colours, blue below the part and orange above. ``.png``, ``.pdf``, ``.svg``, ``.jpg``:
-            a picture of it with the histogram. ``.csv``: a line for each point with its position, deviation and nearest
-            place.
+            ``.ply`` for the scan in colours, blue below the part and orange above; ``.png``, ``.pdf``, ``.svg`` or
+            ``.jpg`` for a picture of it with a histogram; ``.csv`` for a line for each point with its position,
+            deviation and nearest place.
 
         Raises
         ------
         FileFormatError
-            If the format is another, or the file cannot be written.
+            If the format is unknown, or the file cannot be written.
 
         Examples
         --------
@@ -216,60 +216,60 @@ class Deviation(Frozen):
         pictures.save_deviation(self, path)
 
     def __repr__(self) -> str:
-        low, middle, high = self.percentiles((1, 50, 99))
-        return f"Deviation({len(self.of_surface)} points, {low:.3g} to {high:.3g}, median {middle:.3g})"
+        low, median, high = self.percentiles((1, 50, 99))
+        return f"Deviation({len(self.of_surface)} points, {low:.3g} to {high:.3g}, median {median:.3g})"
 
 
 def deviation(
     scan: ShapeLike | NDArray[np.floating], nominal: ShapeLike, progress: Progress | None = None
 ) -> Deviation:
-    """Signed deviations of a scan from a nominal part, at the scan's points or vertices.
+    """Measure signed deviations of a scan from a nominal part, at the scan's points or vertices.
 
-    Both are in one place already: nothing is aligned. The nominal part may be broken; its faces decide what is outside.
-    The scan's faces are not looked at, so it does not matter how they are turned.
+    The scan must be aligned with the part. The part may be broken; its faces decide what is outside. Only the points or
+    vertices of the scan are used, so the orientation of its faces does not matter.
 
-    Open nominals, such as panels, facades and terrains, are measured as they are: deviations are positive on the side
-    to which most of the area of each of their parts faces as given. A part is open if it bounds nothing, and all of
-    them are if a quarter of the surface would have to be completed.
+    Open parts, such as panels, facades and terrains, are measured without completion: deviations are positive on the
+    side to which most of the area of each component faces. A component is open if it bounds nothing, and all of them
+    are if a quarter of the surface would have to be completed.
 
     Parameters
     ----------
     scan : shape or Solid, or (n, 3) points
         Mesh or points.
     nominal : shape or Solid
-        What it should be; completed here, unless it is a solid already.
+        The part as it should be; completed here unless it is a solid.
     progress : callable, optional
-        Called as ``progress(fraction, step)``; what it raises cancels.
+        Called as ``progress(fraction, step)``. An exception that it raises cancels.
 
     Returns
     -------
     Deviation
-        Positive outside of the part or in front of it, where there is too much.
+        Positive outside the part or in front of it, where there is too much material.
 
     Raises
     ------
     SourceError
-        If the scan has no points, or is no mesh and no points in space.
+        If the scan is neither a mesh nor points in space, or has no points.
 
     Examples
     --------
     >>> import signedheat as sh
     >>> from signedheat import samples
-    >>> found = sh.deviation(samples.sphere(2, 1.1), samples.sphere(5))
-    >>> found.percentiles((0, 50, 100)).round(2).tolist(), found.within(0.2)
+    >>> off = sh.deviation(samples.sphere(2, 1.1), samples.sphere(5))
+    >>> off.percentiles((0, 50, 100)).round(2).tolist(), off.within(0.2)
     ([0.1, 0.1, 0.1], 1.0)
     """
     shape = PointCloud(scan) if isinstance(scan, np.ndarray) and scan.ndim == 2 else as_shape(scan)  # type: ignore[arg-type]
     if isinstance(shape, TetMesh):
         shape = shape.boundary
     if not isinstance(shape, PointCloud | TriangleMesh | PolygonMesh):
-        raise SourceError(f"a {type(shape).__name__} is no scan", remedy="pass a mesh or points", element="scan")
+        raise SourceError(f"a {type(shape).__name__} is not a scan", remedy="pass a mesh or points", element="scan")
     solid = complete(nominal, progress=progress)
     points = shape.points if isinstance(shape, PointCloud) else shape.vertices
     if points.shape[1] != 3:
         raise SourceError("the scan lies in the plane", remedy="pass a shape in space", element="scan")
-    found = solid.closest(points)
-    distances, nearest, completed = found.distances, found.points, found.completed
+    closest = solid.closest(points)
+    distances, nearest, completed = closest.distances, closest.points, closest.completed
     beyond_rim = np.zeros(len(points), dtype=bool)
     part = solid if isinstance(nominal, Solid) else joined_shape(nominal)
     is_open, surface = _open_surface(solid, part)
@@ -284,7 +284,7 @@ def deviation(
 
 
 def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, FaceFeatures | None]:
-    """Whether a nominal is open as a whole; and those of its faces that have sides only, turned to agree."""
+    """Whether a part is open as a whole; and its faces that bound nothing, turned to agree."""
     if isinstance(given, PointCloud):
         return False, None
     areas, was_given = face_areas(solid.triangles), solid.origins >= 0
@@ -303,7 +303,7 @@ def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, Face
 
 
 def _agreeing(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """(m, 3) faces, turned where most of the area of their part faces the other way."""
+    """(m, 3) faces, turned where most of the area of their component faces the other way."""
     heads = np.roll(mesh.faces, -1, axis=1).ravel()
     ids = welded_vertices(mesh.vertices, mesh.faces.ravel(), heads)
     tails, owners = ids[mesh.faces.ravel()], np.repeat(np.arange(mesh.n_faces), 3)
@@ -314,7 +314,7 @@ def _agreeing(mesh: TriangleMesh) -> NDArray[np.int64]:
 
 
 def _beyond_rim(surface: FaceFeatures, front: NearestFaces) -> NDArray[np.bool_]:
-    """(n,) whether points are neither above nor below a surface: the nearest place is on its rim, and not straight."""
+    """(n,) whether the nearest place of a point is on the rim, and the point not straight above or below it."""
     rim_edges = np.bincount(surface.edges.ravel()) == 1
     rim_vertices = np.zeros(len(surface.vertices), dtype=bool)
     on_rim = rim_edges[surface.edges]

@@ -1,4 +1,4 @@
-"""Sets of points with the signed distances to a shape."""
+"""Sample points with signed distances to a shape."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..packages import lazy_module
 files: Any = lazy_module("signedheat.io.solid_files", "files")
 
 Layout = Literal["arrays", "deepsdf"]
-"""How samples are kept in a file: an array for each attribute, or ``pos`` and ``neg`` with x, y, z and distance."""
+"""Layout of files of samples: an array for each attribute, or ``pos`` and ``neg`` with x, y, z and distance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,17 +26,17 @@ class Samples:
     points : (n, 3) float
         Positions: those near the surface first, width by width, then those spread over the cube.
     distances : (n,) float
-        Signed distances to the shape, negative inside: exact where it is there, to the completed surface elsewhere.
+        Signed distances to the shape and its completion, negative inside.
     gradients : (n, 3) float
-        Of the distance; of length 1.
+        Gradients of the distance, of length 1.
     near : (n,) bool
-        Whether a point was taken near the surface.
+        Whether a point was sampled near the surface.
     completed : (n,) bool
-        Whether the nearest place of the surface is one that had to be completed.
+        Whether the nearest place lies on the completion.
     center : (3,) float
         Centre of the box around the surface.
     radius : float
-        Distance of the farthest place of the surface from there.
+        Distance from there to the farthest place of the surface.
 
     Examples
     --------
@@ -57,12 +57,12 @@ class Samples:
     radius: float
 
     def normalized(self) -> Samples:
-        """The same of the shape moved and scaled into the unit sphere; `center` and `radius` stay those it had.
+        """Move and scale the samples into the unit sphere; `center` and `radius` keep the original values.
 
         Returns
         -------
         Samples
-            With points and distances in units of the radius.
+            Points and distances in units of the radius.
 
         Examples
         --------
@@ -87,15 +87,15 @@ class Samples:
         }
 
     def save(self, path: str | PathLike[str], layout: Layout = "arrays") -> None:
-        """Write to an ``.npz`` file.
+        """Write the samples to a ``.npz`` file.
 
         Parameters
         ----------
         path : str or path
-            The file. An existing one survives a failure.
+            The file. An existing file survives a failure.
         layout : "arrays" or "deepsdf"
-            An array for each attribute, with every bit; or ``pos`` and ``neg``, (k, 4) in single precision: x, y, z,
-            distance of the points outside and inside, as DeepSDF reads them.
+            An array for each attribute, in full precision; or, as in DeepSDF, the (k, 4) arrays ``pos`` and ``neg`` in
+            single precision, with x, y, z and distance of the points outside and inside.
 
         Raises
         ------

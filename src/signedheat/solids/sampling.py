@@ -1,4 +1,4 @@
-"""Points with distances and gradients, to learn a signed distance from."""
+"""Sample points with distances and gradients, as training data for signed distances."""
 
 from __future__ import annotations
 
@@ -17,46 +17,45 @@ from .completion import complete
 from .sample_set import Samples
 
 WIDTHS = (0.05, 0.0158)
-"""Widths of the noise by default, over the radius of the shape: variances of .0025 and .00025 (Park et al. 2019)."""
+"""Default widths of the noise, relative to the radius of the shape: variances .0025 and .00025 (Park et al. 2019)."""
 BYTES_PER_SAMPLE = 165
-"""At the most, with what finding its nearest face takes."""
+"""Peak memory per sample, including the search for its nearest face."""
 
 
 def sample(
     shape: GridField | Shapes, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = WIDTHS, seed: int = 0
 ) -> Samples:
-    """Points with distances and gradients, near the surface of a shape and all around it.
+    """Sample points with distances and gradients, near the surface of a shape and around it.
 
-    Near the surface: places on it, evenly by area, moved by normal noise along each axis. All around it: evenly spread
-    over the cube around the sphere that holds the shape. Distances are measured anew (`Solid.closest`), not
-    interpolated between the nodes of the field.
+    Points near the surface are places on it, uniform in area, moved by normal noise along each axis. The others are
+    uniform in the cube around the bounding sphere. Distances are exact (`Solid.closest`), not interpolated.
 
     Parameters
     ----------
     shape : GridField, Solid or shape
-        Distance in space, from `signed_distance` or ``sharpen(field, shape)``; or a solid; or a shape, completed here.
+        A distance in space, from `signed_distance` or ``sharpen(field, shape)``; a solid; or a shape, completed here.
     n : int
         Number of points.
     near : float
-        Share of them that are near the surface.
+        Fraction of the points near the surface.
     widths : sequence of float
-        Standard deviations of the noise, over the radius of the shape; each gets the same share of the points near.
+        Standard deviations of the noise, relative to the radius of the shape, for equal numbers of points.
     seed : int
         The same seed gives the same points.
 
     Returns
     -------
     Samples
-        Points, distances, gradients; with centre and radius of the shape.
+        Points, distances and gradients, with the centre and radius of the shape.
 
     Raises
     ------
     SourceError
-        If the field does not know its solid: it was not sharpened to a shape, or arithmetic has changed it.
+        If the field does not know its solid, because it was not sharpened to a shape or results from arithmetic.
     MemoryLimitError
-        If so many samples do not fit.
+        If the samples do not fit in memory.
     SignedHeatError
-        If n is not positive, the share not from 0 to 1, or a width negative.
+        If n is not positive, the fraction is not from 0 to 1, or a width is negative.
 
     Examples
     --------
@@ -76,7 +75,7 @@ def sample(
     solid = shape.solid if isinstance(shape, GridField) else complete(shape)
     if solid is None or solid.triangles.shape[-1] != 3:
         raise SourceError(
-            "the field does not know the solid that it is the distance to",
+            "the field does not know its solid",
             remedy="take it from signed_distance or Solid.field, or pass the solid",
             element="field",
         )
@@ -93,15 +92,15 @@ def sample(
         places, _ = evenly_on(triangles, stop - start, random)
         points[start:stop] = places + random.normal(scale=width * radius, size=places.shape)
     points[n_near:] = center + radius * random.uniform(-1.0, 1.0, (n - n_near, 3))
-    found = solid.closest(points)
+    closest = solid.closest(points)
     is_near = np.arange(n) < n_near
-    return Samples(points, found.distances, found.gradients, is_near, found.completed, center, radius)
+    return Samples(points, closest.distances, closest.gradients, is_near, closest.completed, center, radius)
 
 
 def evenly_on(
     triangles: NDArray[np.float64], n: int, random: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """(n, 3) points on triangles, evenly by area, one in each nth of it; and the triangle of each."""
+    """(n, 3) points on triangles, stratified by area; and the triangle of each."""
     a, b, c = triangles.transpose(1, 0, 2)
     areas = np.cumsum(face_areas(triangles))
     marks = (np.arange(n) + random.random(n)) / max(n, 1) * areas[-1]

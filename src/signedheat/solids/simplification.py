@@ -1,4 +1,4 @@
-"""Fewer triangles for a closed surface, within a distance of it that is proven."""
+"""Simplify a closed surface within a proven distance."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ ATTEMPTS = 8
 ROUNDS = 60
 """Times that pieces are divided; what is not proven then is barely so, or not. Parts of 14,000 faces took 17."""
 LEAST = 1e-3
-"""Width, over the tolerance, that a cut must leave on both of its sides."""
+"""Least width on both sides of a cut, relative to the tolerance."""
 LARGE = 3.0
-"""Longest side of a piece, over that of the nearest triangle, from which on it is halved; 1.5 and 5 take as long."""
+"""Pieces are halved if their longest side exceeds that of the nearest triangle by this factor."""
 
 
 def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
-    """A surface of few triangles, no point of which is farther than a tolerance from another surface, and the converse.
+    """Simplify a surface, so that no point of either surface is farther than a tolerance from the other.
 
-    Edges are collapsed by manifold3d. Its result is taken if both distances are proven to be within the tolerance, and
-    no triangles of it pass through each other; otherwise edges are collapsed less. If no result can be taken, it is the
-    surface as it was, with an `InexactWarning`.
+    manifold3d collapses edges. Its result is accepted if both distances are proven to be within the tolerance and it
+    does not intersect itself; otherwise fewer edges are collapsed. If no result is accepted, the surface is returned
+    unchanged, with an `InexactWarning`.
 
     Raises
     ------

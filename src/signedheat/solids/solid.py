@@ -1,4 +1,4 @@
-"""Solids: completed shapes, to which distance is exact anywhere."""
+"""Solids: completed shapes, to which distance is exact everywhere."""
 
 from __future__ import annotations
 
@@ -48,40 +48,40 @@ if TYPE_CHECKING:
     import pyvista
 
 MANY = 1 << 18
-"""Points that are put in order together."""
+"""Batch size for sorting points."""
 CLEAR = 1e-9
-"""Distance to a surface, over how far from the origin it is, from which on rounding leaves the side clear."""
+"""Relative distance above which the side of a point is reliable."""
 SLANT = 1e-3
-"""Cosine between normal and direction from the foot, above which the side is clear too."""
+"""Cosine between the normal and the direction from the surface above which the side is reliable."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solid(Displayed, Represented, Frozen):
-    """A shape completed: the faces that were given, and what closes them.
+    """A completed shape: its own faces, and those that close it.
 
-    `complete` makes it. Distance is to the nearest of all triangles; inside is where the winding number is above ½.
-    It is taken wherever a shape is, and nothing is completed again.
+    `complete` returns solids. Distance is to the nearest triangle, and a point is inside if its winding number is above
+    ½. Every function that takes a shape also takes a solid, and does not complete it again.
 
-    ``a | b``, ``a & b`` and ``a - b`` are union, intersection and difference of two solids, as solids: their triangles
-    are cut where they cross, and kept where they bound the result; open sheets take no part. With a `GridField` in
-    place of one solid they are fields on its grid, no longer exact between nodes.
+    ``a | b``, ``a & b`` and ``a - b`` are the union, intersection and difference of two solids. Their triangles are cut
+    where they cross and kept where they bound the result; open sheets are ignored. If one of the two is a `GridField`,
+    the result is a field on its grid, which is not exact between nodes.
 
     Attributes
     ----------
     triangles : (m, 3, 3) float
-        Corners of all that distance is measured to, cut where bodies overlap.
+        All triangles that distance is measured to, cut where bodies overlap.
     origins : (m,) int
-        Face of the shape that each is part of; −1 for the completion.
+        Face of the shape that each triangle is part of; −1 in the completion.
     confidence : (m,) float
-        Of each triangle.
+        Confidence in each triangle.
     bounding : (m,) bool
-        Whether it is inside behind each and outside in front.
+        Whether a triangle has the inside behind it and the outside in front.
     windings : Windings
-        Decides what is inside.
+        Winding numbers, which decide what is inside.
     source : TriangleMesh, optional
-        Triangles of the shape that was given, which barycentric coordinates refer to.
+        Triangles of the input, which barycentric coordinates refer to.
     diagnostics : Diagnostics
-        Notes on what was turned, left out and completed.
+        Notes on faces that were turned, left out and added.
 
     Examples
     --------
@@ -106,36 +106,36 @@ class Solid(Displayed, Represented, Frozen):
 
     @cached_property
     def features(self) -> FaceFeatures:
-        """The triangles, and what lies around each: regular are edges and vertices between those that bound only."""
+        """The triangles with their neighbourhoods; edges and vertices are regular between bounding triangles only."""
         corners = np.arange(3 * len(self.triangles)).reshape(-1, 3)
-        found = FaceFeatures.of(self.triangles.reshape(-1, 3), corners, self.confidence)
-        idle = ~self.bounding[found.ids]
+        features = FaceFeatures.of(self.triangles.reshape(-1, 3), corners, self.confidence)
+        idle = ~self.bounding[features.ids]
         if not idle.any():
-            return found
-        edges, vertices = found.edge_regular.copy(), found.vertex_regular.copy()
-        edges[found.edges[idle]] = False
-        vertices[found.faces[idle]] = False
-        return found._replace(edge_regular=edges, vertex_regular=vertices)
+            return features
+        edges, vertices = features.edge_regular.copy(), features.vertex_regular.copy()
+        edges[features.edges[idle]] = False
+        vertices[features.faces[idle]] = False
+        return features._replace(edge_regular=edges, vertex_regular=vertices)
 
     @cached_property
     def tree(self) -> FaceTree:
-        """Over the triangles."""
+        """Search tree over the triangles."""
         return FaceTree.of(self.features)
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) corners of the box around all triangles."""
+        """(2, 3) lower and upper corner of the box around all triangles."""
         points = self.triangles.reshape(-1, 3)
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
     @cached_property
     def outward(self) -> NDArray[np.float64]:
-        """(k, 3, 3) triangles that bound the inside, each once, corners counter-clockwise as seen from outside."""
+        """(k, 3, 3) triangles that bound the inside, counter-clockwise as seen from outside."""
         return outward(self)[0]
 
     @property
     def volume(self) -> float:
-        """Of the inside, in cubic units; 0 of sheets.
+        """Volume of the inside, in cubic units; 0 for sheets.
 
         Examples
         --------
@@ -149,26 +149,26 @@ class Solid(Displayed, Represented, Frozen):
 
     @property
     def area(self) -> float:
-        """Of the surface around the inside, in square units; sheets do not count."""
+        """Area of the boundary of the inside, in square units; sheets do not count."""
         return float(face_areas(self.outward).sum())
 
     @property
     def faces(self) -> TriangleMesh:
-        """What was given of the surface, cut where bodies overlap."""
+        """The faces of the input, cut where bodies overlap."""
         return _mesh(self.triangles[self.origins >= 0])
 
     @property
     def completion(self) -> TriangleMesh:
-        """What closes it."""
+        """The faces that were added to close the shape."""
         return _mesh(self.triangles[self.origins < 0])
 
     @property
     def boundary(self) -> TriangleMesh:
-        """All that distance is measured to, as one mesh: faces, completion and sheets."""
+        """All faces, including the completion and sheets, as one mesh."""
         return _mesh(self.triangles)
 
     def distance(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Signed distances of points, negative inside: exact, in time O(n log m) on all threads.
+        """Compute exact signed distances of points, negative inside, in time O(n log m) on all threads.
 
         Parameters
         ----------
@@ -178,7 +178,7 @@ class Solid(Displayed, Represented, Frozen):
         Returns
         -------
         (...) float
-            In the shape of the points: one number for one point.
+            One number for each point.
 
         Raises
         ------
@@ -199,7 +199,7 @@ class Solid(Displayed, Represented, Frozen):
         return shaped(result, shape)
 
     def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """(...) whether (..., 3) points are inside.
+        """Find which points are inside.
 
         Parameters
         ----------
@@ -221,7 +221,7 @@ class Solid(Displayed, Represented, Frozen):
         return shaped(self.windings.inside(places), shape)
 
     def closest(self, points: ArrayLike) -> Closest:
-        """The nearest place for each of (..., 3) points.
+        """Find the nearest place of the surface for each point.
 
         Parameters
         ----------
@@ -231,7 +231,7 @@ class Solid(Displayed, Represented, Frozen):
         Returns
         -------
         Closest
-            Places, distances, gradients, faces and confidence, an array of the shape (...) or (..., 3) each.
+            Places, distances, gradients, faces and confidence, in arrays of shape (...) or (..., 3).
 
         Raises
         ------
@@ -266,7 +266,7 @@ class Solid(Displayed, Represented, Frozen):
         scheduler: Scheduler = None,
         progress: Progress | None = None,
     ) -> GridField[Literal[3]]:
-        """Signed distance at the nodes of a grid: that of `distance`, found together.
+        """Compute the signed distance at the nodes of a grid.
 
         Parameters
         ----------
@@ -277,30 +277,29 @@ class Solid(Displayed, Represented, Frozen):
         padding : float, optional
             Room around the solid; by default a fifth of its longest side.
         grid : Grid, optional
-            Another one, wherever it is.
+            A grid of your own, in place of the one around the solid.
         band : float, optional
-            Only the nodes in blocks of 8³ that may be as near to the surface as this, in units of length: for grids
-            that are too fine to be whole.
+            Compute only blocks of 8³ nodes that may be within this distance of the surface, for very fine grids.
         store : str or path, optional
-            Folder for the values of a band, which are mapped into memory as they are used. Run again, what was stopped
-            goes on. Workers must be able to read and write it.
+            Folder for the values of a band, which are mapped into memory as they are used. A second run resumes where
+            the first was stopped. Workers must be able to read and write it.
         scheduler : concurrent.futures.Executor, distributed.Client or str, optional
-            Who computes the tiles of a store: by default threads of this process; a pool, such as a
+            Computes the tiles of a store. By default, threads of this process; or a pool, such as a
             `ProcessPoolExecutor`; or a Dask cluster, by its client or its address, such as ``"tcp://127.0.0.1:8786"``.
         progress : callable, optional
-            Called as ``progress(fraction, step)``; what it raises cancels.
+            Called as ``progress(fraction, step)``. An exception that it raises cancels.
 
         Returns
         -------
         GridField
-            It knows its solid: calls, closest places and contours are exact.
+            Its calls, closest places and contours are exact, since it keeps the solid.
 
         Raises
         ------
         MemoryLimitError
-            If it cannot fit in memory, or on the disk of the store; nothing has been allocated then.
+            If the field does not fit in memory, or on the disk of the store. Raised before anything is allocated.
         FileFormatError
-            If the store holds something else.
+            If the store holds another field.
         SourceError
             If a store is named without a band.
 
@@ -330,49 +329,49 @@ class Solid(Displayed, Represented, Frozen):
         spacing: ArrayLike | None = None,
         progress: Progress | None = None,
     ) -> TriangleMesh:
-        """The surface on which distance has a level: closed, manifold, its normals pointing to greater distance.
+        """Extract the closed, manifold surface at a level of the distance, with normals towards greater distance.
 
-        Sharp surfaces have the edges and corners of the level, and triangles that do not pass through each other. What
-        is thinner than a cell may be missing, with an `InexactWarning` if that is more than edges and tips. Memory
-        grows with the surface, not with the grid.
+        Sharp surfaces have the edges and corners of the level, and do not intersect themselves. Parts thinner than a
+        cell may be missing, with an `InexactWarning` if they are more than edges and tips. Memory grows with the
+        surface, not with the grid.
 
         Parameters
         ----------
         level : float
             Signed distance, in units of length; negative inside.
         sharp : bool
-            Dual contouring with exact distances, nearest places and normals; else marching cubes, which cuts edges off.
+            Use dual contouring with exact distances and normals; otherwise marching cubes, which cut edges off.
         keep_faces : bool
-            At level 0, the faces that were given, cut where bodies overlap, and what completes them: exact, and of few
-            triangles. Edges are divided where those of the completion are finer. Bodies that touch share edges. Where
+            At level 0, return the input's faces, cut where bodies overlap, and their completion. This is exact and has
+            few triangles. Edges are divided where the completion is finer, and bodies that touch share edges. Where
             faces and completion do not join, the surface is contoured, with an `InexactWarning` that says where.
         tolerance : float, optional
-            Simplify the surface, by manifold3d: no point of the result is farther from it than this, nor the converse.
-            Where manifold3d has no such result the surface stays as it was, with an `InexactWarning`.
+            Simplify the surface with manifold3d: no point of either surface is farther than this from the other. If
+            manifold3d finds no such surface, it is not simplified, with an `InexactWarning`.
         resolution : int
             Nodes along the longest side of a grid around the solid, and around the surface.
         spacing : float or (3,) float, optional
             Size of the cells, in place of `resolution`.
         progress : callable, optional
-            Called as ``progress(fraction, step)``; what it raises cancels.
+            Called as ``progress(fraction, step)``. An exception that it raises cancels.
 
         Returns
         -------
         TriangleMesh
-            Corners of the level are in it, and edges: of turned boxes 98 % of their length to a thousandth of a cell,
-            the rest to a tenth.
+            Has the corners and edges of the level: of turned boxes, 98 % of the length of edges to a thousandth of a
+            cell, and the rest to a tenth.
 
         Raises
         ------
         OutsideError
-            If distance has the level nowhere, or only where it is thinner than a cell.
+            If the distance has the level nowhere, or only in parts thinner than a cell.
         GeometryError
-            If faces are to be kept and do not join with a contour either; it says where. Or if a surface whose bodies
+            If faces are to be kept but do not join with a contour either, with the place; or if a surface whose bodies
             touch along edges is to be simplified.
         SignedHeatError
             If faces are to be kept at another level than 0.
         MemoryLimitError
-            If marching cubes cannot fit in memory; nothing has been allocated then.
+            If marching cubes do not fit in memory. Raised before anything is allocated.
 
         Examples
         --------
@@ -392,9 +391,7 @@ class Solid(Displayed, Represented, Frozen):
         height = finite_number(level, "level")
         if keep_faces:
             if height != 0:
-                raise SignedHeatError(
-                    "faces that were given are on level 0", remedy="leave out keep_faces or the level"
-                )
+                raise SignedHeatError("faces can be kept at level 0 only", remedy="leave out keep_faces or the level")
             cell = float(Grid.around(self.bounds, resolution, None, spacing).spacing.max())
             surface, places = given_surface(
                 self, lambda: self.surface(resolution=resolution, spacing=spacing, progress=progress), cell
@@ -419,18 +416,18 @@ class Solid(Displayed, Represented, Frozen):
         spacing: ArrayLike | None = None,
         progress: Progress | None = None,
     ) -> TriangleMesh:
-        """The surface at a distance, which may vary, with round or with mitred edges: `signedheat.offset` of this.
+        """Extract the surface at a distance, with round, mitred or sharp edges: see `signedheat.offset`.
 
         Parameters
         ----------
         distance : float, (n,) float, or callable
             Positive outside, in the units of the shape; as for `signedheat.offset`.
         corners : "round", "mitre" or "sharp"
-            What becomes of edges that the surface moves away from.
+            Shape of edges that the surface moves away from.
         resolution : int
             Nodes along the longest side.
         spacing : float or (3,) float, optional
-            Distance between nodes, instead of a resolution.
+            Distance between nodes, in place of `resolution`.
         progress : callable, optional
             Called as ``progress(fraction, text)``.
 
@@ -442,7 +439,7 @@ class Solid(Displayed, Represented, Frozen):
         Raises
         ------
         GeometryError
-            If nothing of the solid is left at this distance.
+            If nothing is left of the solid at this distance.
 
         Examples
         --------
@@ -458,18 +455,18 @@ class Solid(Displayed, Represented, Frozen):
     def sample(
         self, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = (0.05, 0.0158), seed: int = 0
     ) -> Samples:
-        """Points with distances and gradients, near the surface and all around it: `signedheat.sample` of this.
+        """Sample points with distances and gradients, near the surface and around it: see `signedheat.sample`.
 
         Parameters
         ----------
         n : int
             Number of points.
         near : float
-            Share of them near the surface.
+            Fraction of the points near the surface.
         widths : sequence of float
-            Standard deviations of the noise, over the radius of the shape.
+            Standard deviations of the noise, relative to the radius of the shape.
         seed : int
-            Of the random numbers.
+            Seed of the random numbers.
 
         Returns
         -------
@@ -490,7 +487,7 @@ class Solid(Displayed, Represented, Frozen):
     @overload
     def __or__(self, other: GridField[Literal[3]]) -> GridField[Literal[3]]: ...
     def __or__(self, other: Solid | GridField[Literal[3]]) -> Solid | GridField[Literal[3]]:
-        """Union: what lies in one of the two or in both."""
+        """Union: points in either of the two."""
         if isinstance(other, GridField):
             return self.field_on(other) | other
         return booleans.union(self, other) if isinstance(other, Solid) else NotImplemented
@@ -500,7 +497,7 @@ class Solid(Displayed, Represented, Frozen):
     @overload
     def __and__(self, other: GridField[Literal[3]]) -> GridField[Literal[3]]: ...
     def __and__(self, other: Solid | GridField[Literal[3]]) -> Solid | GridField[Literal[3]]:
-        """Intersection: what lies in both."""
+        """Intersection: points in both."""
         if isinstance(other, GridField):
             return self.field_on(other) & other
         return booleans.intersection(self, other) if isinstance(other, Solid) else NotImplemented
@@ -510,13 +507,13 @@ class Solid(Displayed, Represented, Frozen):
     @overload
     def __sub__(self, other: GridField[Literal[3]]) -> GridField[Literal[3]]: ...
     def __sub__(self, other: Solid | GridField[Literal[3]]) -> Solid | GridField[Literal[3]]:
-        """Difference: what lies in this and not in the other."""
+        """Difference: points in this and not in the other."""
         if isinstance(other, GridField):
             return self.field_on(other) - other
         return booleans.difference(self, other) if isinstance(other, Solid) else NotImplemented
 
     def field_on(self, field: GridField[Literal[3]]) -> GridField[Literal[3]]:
-        """Distance at the nodes that a field has, in a band or everywhere.
+        """Compute the distance at the nodes of a field, in a band or everywhere.
 
         Parameters
         ----------
@@ -526,7 +523,7 @@ class Solid(Displayed, Represented, Frozen):
         Returns
         -------
         GridField
-            With a value at the same nodes.
+            Has values at the same nodes.
 
         Examples
         --------
@@ -570,10 +567,10 @@ class Solid(Displayed, Represented, Frozen):
         )
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file: ``.npz`` has the solid itself, other formats its surface.
+        """Write the solid to a ``.npz`` file, or its surface to another format.
 
-        `signedheat.io.load` reads the first, without notes, and nothing is completed again. Formats of shapes, such as
-        ``.stl``, have ``surface(keep_faces=True)``: the faces that were given and what completes them, closed.
+        `signedheat.io.load` reads a ``.npz`` file, without notes, and does not complete the shape again. Formats of
+        shapes, such as ``.stl``, hold ``surface(keep_faces=True)``.
 
         Parameters
         ----------
@@ -585,7 +582,7 @@ class Solid(Displayed, Represented, Frozen):
         FileFormatError
             If the format is unknown, or the file cannot be written.
         GeometryError
-            If a surface is to be written, and nothing is inside.
+            If a surface is to be written, but nothing is inside.
 
         Examples
         --------
@@ -603,11 +600,7 @@ class Solid(Displayed, Represented, Frozen):
         return (np.where(self._inside(points, found), -found.distances, found.distances),)
 
     def _inside(self, points: NDArray[np.float64], found: NearestFaces) -> NDArray[np.bool_]:
-        """(n,) whether points are inside, whose nearest faces are known.
-
-        No triangle is between a point and the nearest place, and sides change across triangles only: it is inside where
-        it is on that side of this place, by the normal there. Where that is not clear winding numbers are counted.
-        """
+        """(n,) whether points are inside: by the normal at the nearest place, or the winding number if in doubt."""
         clear = found.regular & self.bounding[self.features.ids[found.faces]] & (np.abs(found.cosines) > SLANT)
         clear &= found.distances > CLEAR * float(np.abs(self.tree.tree.bounds[1]).max())
         inside = found.cosines < 0
@@ -634,6 +627,6 @@ class Solid(Displayed, Represented, Frozen):
 
 def _mesh(triangles: NDArray[np.float64]) -> TriangleMesh:
     if not len(triangles):
-        raise SourceError("there is none of it", element="solid")
+        raise SourceError("this part of the solid has no triangles", element="solid")
     points, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     return TriangleMesh(points, corners.reshape(-1, 3))

@@ -1,4 +1,4 @@
-"""Signed distance to shapes in space: complete them, and measure to what was given and to its completion."""
+"""Signed distance to shapes in space: complete them, then measure to their faces and the completion."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ def distance_to_shapes(
     keep_overlaps: bool = False,
     progress: Progress | None = None,
 ) -> GridField | TetField:
-    """Signed distance to shapes in space: see `signed_distance`, which calls this.
+    """Compute the signed distance to shapes in space: see `signed_distance`.
 
-    On tets, distance is along paths around walls, with the signs of φ.
+    On tets, distance is along paths in the domain, with the signs of φ.
     """
     options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
     method = Heat(checked(constraint), positive_number(diffusion, "diffusion"))

@@ -1,4 +1,4 @@
-"""Points on a closed surface and around it, as trainers of 3-D generators read them."""
+"""Training points on a closed surface and around it, in the layout of public 3-D generators."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from .completion import complete
 from .sampling import WIDTHS, evenly_on
 
 SHARP = np.deg2rad(30.0)
-"""Angle between two faces from which on the edge between them is sharp."""
+"""Angle between two faces above which their edge is sharp."""
 
 
 def training_points(
     surface: TriangleMesh, n: int, normalize: bool = False
 ) -> tuple[dict[str, NDArray[np.float32]], dict[str, NDArray[np.float32]]]:
-    """n points of each kind, in single precision: those on a closed surface, and those around it with signed distances.
+    """Sample n points of each kind in single precision: on a closed surface, and around it with signed distances.
 
-    To normalize is to move and scale the shape into the unit sphere.
+    With `normalize`, the shape is first moved and scaled into the unit sphere.
 
     Returns
     -------
     on : dict
-        ``random_surface``, evenly by area, and ``sharp_surface``, evenly along sharp edges: (n, 6) places and normals;
-        along edges these are the means of both sides. (0, 6) where no edge is sharp.
+        ``random_surface``, uniform in area, and ``sharp_surface``, uniform along sharp edges: (n, 6) positions and
+        normals, which are means of both sides along edges. (0, 6) if no edge is sharp.
     around : dict
-        ``vol_points``, evenly in the cube around the sphere around the shape, ``random_near_points`` and
-        ``sharp_near_points``, those on the surface moved by normal noise: (n, 3), with (n,) signed distances, negative
-        inside, as ``vol_label``, ``random_near_label`` and ``sharp_near_label``.
+        (n, 3) ``vol_points``, uniform in the cube around the bounding sphere, ``random_near_points`` and
+        ``sharp_near_points``, which are those on the surface moved by normal noise. Their (n,) signed distances,
+        negative inside, are ``vol_label``, ``random_near_label`` and ``sharp_near_label``.
     """
     random = np.random.default_rng(0)
     lower, upper = surface.bounds
@@ -57,7 +57,7 @@ def training_points(
 def _on_sharp_edges(
     surface: TriangleMesh, normals: NDArray[np.float64], n: int, random: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(n, 3) places evenly along sharp edges, and the means of the normals on both sides."""
+    """(n, 3) places uniform along sharp edges, and means of the normals on both sides."""
     pairs = edge_table(surface.faces).pairs
     pairs = pairs[normals[pairs // 3].prod(axis=1).sum(axis=1) < np.cos(SHARP)]
     if not len(pairs):
