@@ -1,4 +1,4 @@
-"""Constraints on φ at the source (Sec. 7.1): values that determine how step 3 is solved."""
+"""Constraints on φ at the source (Sec. 7.1), which determine how step 3 is solved."""
 
 from __future__ import annotations
 
@@ -17,16 +17,38 @@ from .validation import LARGEST, numbers, positive_number
 
 @runtime_checkable
 class Constraint(Protocol):
-    """The protocol of constraints: they finish step 3."""
+    """Protocol of constraints, which finish step 3."""
 
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
-        """φ at the unknowns, from b, the divergence of Y."""
+        """Solve step 3 for φ under the constraint.
+
+        Parameters
+        ----------
+        integration : Integration
+            Solves Eq. 13 of the paper with constraints, on one domain.
+        divergence : (n,) float
+            Right-hand side b: the integrated divergence of the unit vectors Y.
+        source : SourceTerm
+            Places where φ is constrained, with weights and components.
+
+        Returns
+        -------
+        (n,) float
+            φ, a length.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
+        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.Soft(1.0))([0.5, 0.5]).item(), 2)
+        0.5
+        """
 
 
 @dataclass(frozen=True)
-class Free:
+class Free(Constraint):
     """No constraint: φ solves Eq. 13 and is shifted so that its weighted mean over the source is zero.
 
     Examples
@@ -38,45 +60,20 @@ class Free:
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
-        """Integrate without a constraint; φ is shifted to mean 0 on the source.
-
-        Parameters
-        ----------
-        integration : Integration
-            Solves Eq. 7 of the paper with constraints, on one domain.
-        divergence : (n,) float
-            Right-hand side: the integrated divergence of the unit vectors.
-        source : SourceTerm
-            Where φ is known, with weights and components.
-
-        Returns
-        -------
-        (n,) float
-            φ, a length.
-
-        Examples
-        --------
-        >>> import signedheat as sh
-        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
-        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.Free())([0.5, 0.5]).item(), 2)
-        0.5
-        """
         return integration.solve(divergence, source)
 
 
 @dataclass(frozen=True)
-class ZeroSet:
-    """φ = 0 on the source: the default.
-
-    Imposed as in Eq. 14.
+class ZeroSet(Constraint):
+    """φ = 0 on the source (Eq. 14). This is the default.
 
     Parameters
     ----------
     hard : bool
-        Impose φ = 0 at every point at which the source is sampled. By default φ is zero, up to rounding, on surfaces
-        along curves that follow edges; where a curve crosses faces, a linear function could follow it only by being
-        constant next to it, so that springs hold φ to within some hundredths of h. On grids and tets φ is corrected to
-        zero along the source by a smooth function or by springs, which is cheaper and, on broken input, more accurate.
+        Impose φ = 0 at every sample of the source. By default, φ is zero on surfaces along curves that follow edges;
+        where a curve crosses faces, springs keep φ below some hundredths of h, since a linear function that is zero
+        there would be constant around the curve. On grids and tets, a smooth function or springs correct φ to zero
+        along the source, which is cheaper and, on broken input, more accurate.
 
     Examples
     --------
@@ -89,43 +86,18 @@ class ZeroSet:
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
-        """Integrate with φ constant on the source, and 0 there.
-
-        Parameters
-        ----------
-        integration : Integration
-            Solves Eq. 7 of the paper with constraints, on one domain.
-        divergence : (n,) float
-            Right-hand side: the integrated divergence of the unit vectors.
-        source : SourceTerm
-            Where φ is known, with weights and components.
-
-        Returns
-        -------
-        (n,) float
-            φ, a length.
-
-        Examples
-        --------
-        >>> import signedheat as sh
-        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
-        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.ZeroSet())([0.5, 0.5]).item(), 2)
-        0.5
-        """
         levels = Levels(np.zeros(len(source.weights)))
         return (integration.fit_exactly if self.hard else integration.fit)(divergence, source, levels)
 
 
 @dataclass(frozen=True)
-class EachComponent:
-    """φ is level on every connected component of the source, each at its own unknown level.
-
-    Imposed as in Eq. 14; Fig. 10 shows it.
+class EachComponent(Constraint):
+    """φ is constant on each connected component of the source, at an unknown level (Eq. 14, Fig. 10).
 
     Parameters
     ----------
     hard : bool
-        Exactly so at every sample; by default as exactly as `ZeroSet`.
+        Impose the levels at every sample; by default, as exactly as `ZeroSet`.
 
     Examples
     --------
@@ -138,35 +110,12 @@ class EachComponent:
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
-        """Integrate with φ constant on each connected component of the source.
-
-        Parameters
-        ----------
-        integration : Integration
-            Solves Eq. 7 of the paper with constraints, on one domain.
-        divergence : (n,) float
-            Right-hand side: the integrated divergence of the unit vectors.
-        source : SourceTerm
-            Where φ is known, with weights and components.
-
-        Returns
-        -------
-        (n,) float
-            φ, a length.
-
-        Examples
-        --------
-        >>> import signedheat as sh
-        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
-        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.EachComponent())([0.5, 0.5]).item(), 2)
-        0.5
-        """
         levels = Levels(np.zeros(len(source.weights)), source.components)
         return (integration.fit_exactly if self.hard else integration.fit)(divergence, source, levels)
 
 
 @dataclass(frozen=True, repr=False)
-class LevelValues(ShortRepr):
+class LevelValues(ShortRepr, Constraint):
     """Given levels: φ = ``values[k]`` on the k-th source, as for the contour lines of a map (Eq. 14 with ``A φ = c``).
 
     Parameters
@@ -175,13 +124,13 @@ class LevelValues(ShortRepr):
         One level for each source passed to the solver; or one for each connected component of the sources, components
         of the first source first.
     hard : bool
-        Exactly so at every sample; by default as exactly as `ZeroSet`.
+        Impose the levels at every sample; by default, as exactly as `ZeroSet`.
 
     Raises
     ------
     ConstraintError
-        If a value is not finite, or beyond 1e40; when solving, if their number is neither that of the sources nor
-        of the components.
+        If a value is not finite, or beyond 1e40; when solving, if there are neither as many values as sources nor as
+        many as components.
 
     Examples
     --------
@@ -201,34 +150,6 @@ class LevelValues(ShortRepr):
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
-        """Integrate with the given value of φ on each source or component.
-
-        Parameters
-        ----------
-        integration : Integration
-            Solves Eq. 7 of the paper with constraints, on one domain.
-        divergence : (n,) float
-            Right-hand side: the integrated divergence of the unit vectors.
-        source : SourceTerm
-            Where φ is known, with weights and components.
-
-        Returns
-        -------
-        (n,) float
-            φ, a length.
-
-        Raises
-        ------
-        ConstraintError
-            If there are neither as many levels as sources nor as many as connected components.
-
-        Examples
-        --------
-        >>> import signedheat as sh
-        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
-        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.LevelValues([2.0]))([0.5, 0.5]).item(), 2)
-        2.5
-        """
         n_sources, n_components = int(source.source_ids.max()) + 1, int(source.components.max()) + 1
         if len(self.values) == n_sources:
             index = source.source_ids
@@ -245,14 +166,14 @@ class LevelValues(ShortRepr):
 
 
 @dataclass(frozen=True)
-class Soft:
+class Soft(Constraint):
     """A penalty pulls φ to zero on the source: zero weight is `Free`, infinite weight ``ZeroSet(hard=True)`` (Fig. 11).
 
     Parameters
     ----------
     weight : float, optional
-        λ, in 1/length; by default 10/h on surfaces and grids, h the spacing, and what suits the mesh on tets: φ
-        differs from the free solution up to a distance of about 1/λ from the source.
+        λ, in 1/length; by default 10/h on surfaces and grids with spacing h, and according to the mesh on tets. φ
+        differs from the free solution within a distance of about 1/λ of the source.
 
     Raises
     ------
@@ -274,28 +195,5 @@ class Soft:
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
-        """Integrate with a penalty on φ² along the source.
-
-        Parameters
-        ----------
-        integration : Integration
-            Solves Eq. 7 of the paper with constraints, on one domain.
-        divergence : (n,) float
-            Right-hand side: the integrated divergence of the unit vectors.
-        source : SourceTerm
-            Where φ is known, with weights and components.
-
-        Returns
-        -------
-        (n,) float
-            φ, a length.
-
-        Examples
-        --------
-        >>> import signedheat as sh
-        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
-        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.Soft(1.0))([0.5, 0.5]).item(), 2)
-        0.5
-        """
         weight = integration.soft_weight if self.weight is None else self.weight
         return integration.penalize(divergence, source, weight)

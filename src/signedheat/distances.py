@@ -1,4 +1,4 @@
-"""The one verb: signed distance to broken shapes in space, to curves on surfaces, and to drawings in the plane."""
+"""Signed distance to broken shapes in space, to curves on surfaces, and to drawings in the plane."""
 
 from __future__ import annotations
 
@@ -125,24 +125,23 @@ def signed_distance(
     domain: Domain | ForeignShape | None = None,
     **options: object,
 ) -> Field:
-    """Signed distance to a shape, however broken: exact where the shape is there, completed where it is missing.
+    """Compute the signed distance to a broken shape, which is exact up to the completion of missing parts.
 
-    Shapes in space are completed (`complete`), and distance is measured to what was given and to its completion. Closed
-    outlines in the plane are filled. Of curves on a surface, and of other drawings in the plane, strokes are turned
-    until they bound something together, and those that bound nothing are left out; the zero set of the signed heat
-    method stands where curves are missing, and distance is measured along the surface. The method alone is
-    `SignedHeatSolver`.
+    Shapes in space are completed (`complete`), and distance is measured to the shape and its completion. Closed
+    outlines in the plane are filled. For curves on a surface, and other drawings in the plane, strokes are turned so
+    that they bound something together, and those that bound nothing are left out. The zero set of the signed heat
+    method replaces missing curves, and distance is measured along the surface. `SignedHeatSolver` runs the method
+    alone.
 
     Parameters
     ----------
     source : shape, curves or polylines; or a sequence of them
-        In space `Solid`, `TriangleMesh`, `PolygonMesh`, `TetMesh` or `PointCloud`, with normals or without; objects of
-        trimesh, PyVista, meshio and Open3D and pairs (vertices, faces) are taken wherever a shape is. On a surface
-        `Curve` and `SurfacePoints`, or lists of (element, barycentric coordinates), as potpourri3d has them. In the
-        plane `Polyline`.
+        In space, a `Solid`, `TriangleMesh`, `PolygonMesh`, `TetMesh` or `PointCloud`, with normals or without, an
+        object of trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces). On a surface, `Curve` and
+        `SurfacePoints`, or lists of (element, barycentric coordinates), as in potpourri3d. In the plane, `Polyline`.
     domain : Grid, TetMesh or surface, optional
-        Where to measure: by default a grid of cubic cells around the shape or drawing. Curves need their surface: a
-        `TriangleMesh`, `PolygonMesh`, `PointCloud`, `DigitalSurface` or `IntrinsicTriangulation`.
+        Domain of the distance. By default, a grid of cubic cells around the shape or drawing. Curves need their surface,
+        a `TriangleMesh`, `PolygonMesh`, `PointCloud`, `DigitalSurface` or `IntrinsicTriangulation`.
     resolution : int
         Nodes along the longest side of the default grid; 128 by default.
     spacing : float or (d,) float, optional
@@ -150,49 +149,48 @@ def signed_distance(
     padding : float, optional
         Room around the shape, in its units; by default a fifth of its longest side.
     band : float, optional
-        In space: only the nodes of the grid whose distance is at most this, in units of length: for fine grids.
+        In space: compute only nodes of the grid whose distance is at most this length, for fine grids.
     completion, lids, nested : str
         In space: see `complete`.
     constraint : Free, ZeroSet or Soft, optional
-        Imposed on φ, where it is computed, at the source; `ZeroSet` by default.
+        Constraint on φ at the source, where φ is computed; by default `ZeroSet`.
     diffusion : float
-        τ in ``t = τ h²``, likewise; larger values close gaps along rounder lines.
+        τ in ``t = τ h²``, where φ is computed; larger values close gaps along rounder lines.
     fill : {"nonzero", "evenodd"}
-        In the plane: which places closed outlines fill, as in SVG: those around which they run a number of times that
-        is not zero, or that is odd.
+        In the plane: the filling rule of closed outlines, as in SVG.
     as_oriented : bool
-        Turn nothing, fill nothing; leave no curve out.
+        Turn and fill nothing, and leave no curve out.
     keep_overlaps : bool
-        In space: count what lies inside other bodies as surface.
+        In space: keep surfaces that lie inside other bodies.
     every_piece : bool
         On surfaces and in the plane: leave no curve out.
     intrinsic : "auto", True or False
-        On surfaces: on what triangles the method runs, see `SignedHeatSolver`.
+        On surfaces: whether to use an intrinsic triangulation, see `SignedHeatSolver`.
     progress : callable, optional
-        Called as ``progress(fraction, step)``; an exception that it raises cancels.
+        Called as ``progress(fraction, step)``. An exception that it raises cancels.
 
     Returns
     -------
     GridField, TetField or VertexField
-        Negative inside shapes and filled outlines, and to the right of curves and strokes; around sheets that bound
-        nothing positive on both sides. ``diagnostics.notes`` say what was turned, left out and completed.
+        Negative inside shapes and filled outlines, and to the right of curves and strokes; positive on both sides of
+        sheets that bound nothing. ``diagnostics.notes`` say what was turned, left out and completed.
 
     Raises
     ------
     SourceError
         If there is no source, or it does not fit the domain.
     ConstraintError
-        If the constraint gives curves levels of their own: distance is then not that to all of them.
+        If the constraint gives curves different levels.
     GeometryError
-        If resolution, spacing or padding make no grid.
+        If resolution, spacing and padding do not define a grid.
     MemoryLimitError
-        If the grid cannot fit in memory; nothing has been allocated then.
+        If the grid does not fit in memory. Raised before anything is allocated.
     UnsupportedTypeError
-        If an option is not one of this kind of source.
+        If an option does not apply to this kind of source.
 
     Examples
     --------
-    Two balls that overlap, and are united:
+    Two overlapping balls, which are united:
 
     >>> import numpy as np
     >>> import signedheat as sh
@@ -202,7 +200,7 @@ def signed_distance(
     >>> bool(np.abs(field([[0.5, 0, 0]]) + np.sqrt(0.75)) < 0.05)
     True
 
-    A square of two triangles, and a line across it that is no level set of a function linear on them:
+    A line across a square of two triangles, which is not a level set of a function linear on them:
 
     >>> mesh = sh.TriangleMesh([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]], [[0, 1, 2], [0, 2, 3]])
     >>> sh.signed_distance(mesh.polyline([[1, 0, 0], [1, 4, 0]]), mesh).values.round(6).tolist()
@@ -216,11 +214,12 @@ def signed_distance(
     """
     domain = cast("Domain | None", converted(domain))
     measure = _measure(source, domain)
-    accepted = [name for name, each in inspect.signature(measure).parameters.items() if each.kind is each.KEYWORD_ONLY]
+    parameters = inspect.signature(measure).parameters.values()
+    accepted = [parameter.name for parameter in parameters if parameter.kind is parameter.KEYWORD_ONLY]
     for option in options:
         if option not in accepted:
             raise UnsupportedTypeError(
-                f"{option} is no option here", remedy=f"the options are {', '.join(accepted)}", element=option
+                f"{option} is not an option here", remedy=f"the options are {', '.join(accepted)}", element=option
             )
     return measure(source, domain, **options)
 
@@ -235,7 +234,7 @@ def distance_to_solid(
     band: float | None = None,
     progress: Progress | None = None,
 ) -> GridField | TetField:
-    """Signed distance to a solid: see `signed_distance`. On tets, to its boundary."""
+    """Compute the signed distance to a solid, on tets to its boundary: see `signed_distance`."""
     if domain is None or isinstance(domain, Grid):
         return solid.field(resolution, spacing=spacing, padding=padding, grid=domain, band=band, progress=progress)
     return distance_to_shapes(solid.boundary, domain, band=band, as_oriented=True, progress=progress)
@@ -248,7 +247,7 @@ def plain_distance(
     as_oriented: bool,
     progress: Progress | None = None,
 ) -> Any:
-    """The method's own field of a shape in space: its faces are oriented, and nothing is completed or sharpened."""
+    """Run the method alone on a shape in space, whose faces are oriented but not completed; nothing is sharpened."""
     if isinstance(shape, TriangleMesh | PolygonMesh) and not as_oriented:
         shape = orient(shape)
     return SignedHeatSolver[Any](domain, method.diffusion, progress).distance(shape, method.constraint)
@@ -257,27 +256,27 @@ def plain_distance(
 def grid_around(
     shape: Any, reach: float, resolution: int, padding: float | None, spacing: ArrayLike | None = None
 ) -> Grid:
-    """A grid around a shape or several, by default with room for offsets up to `reach`."""
+    """A grid around one or several shapes, by default with room for offsets up to `reach`."""
     bounds = bounds_around(as_list(shape))
     return Grid.around(bounds, resolution, room_around(bounds, reach) if padding is None else padding, spacing)
 
 
 def _measure(source: object, domain: Domain | None) -> Callable[..., Field]:
-    """How distance is measured to a source on a domain."""
-    listed = as_shapes(source)
+    """Choose the function that measures distance to a source on a domain."""
+    sources = as_shapes(source)
     if isinstance(domain, Grid):
-        _refuse_other_dimension(listed, domain)
+        _refuse_other_dimension(sources, domain)
     if isinstance(source, Solid) and (domain is None or isinstance(domain, Grid | TetMesh)):
         return distance_to_solid
-    in_plane = bool(listed) and all(isinstance(each, Polyline) for each in listed)
+    in_plane = bool(sources) and all(isinstance(part, Polyline) for part in sources)
     if domain is None:
-        if any(isinstance(each, Curve | SurfacePoints) for each in listed):
+        if any(isinstance(part, Curve | SurfacePoints) for part in sources):
             raise SourceError("curves lie on a surface", remedy="pass it: signed_distance(curves, surface)")
         return distance_to_lines if in_plane else distance_to_shapes
     if not isinstance(domain, (Grid, TetMesh, *get_args(SurfaceDomain))):
         raise UnsupportedTypeError(
             f"distance is not measured on a {type(domain).__name__}",
-            remedy="pass what it is measured to first, and then the grid, the tets or the surface",
+            remedy="pass the source first, then the grid, the tets or the surface",
             element="domain",
         )
     if isinstance(domain, Grid):

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 
 def printable(text: str) -> str:
-    """Text with its control characters escaped: what a file holds or is called must not drive a terminal.
+    """Escape control characters, so that names and contents of files cannot control a terminal.
 
     Examples
     --------
@@ -27,11 +27,11 @@ class SignedHeatError(ValueError):
     cause : str
         What is wrong.
     remedy : str, optional
-        What to do about it, where the cause does not say it already.
+        What to do about it, unless the cause says so.
     element : str, optional
-        The part of the input that it is about, such as ``face 3``.
+        The part of the input concerned, such as ``face 3``.
     path : str, optional
-        The file that it is about.
+        The file concerned.
 
     Examples
     --------
@@ -50,7 +50,7 @@ class SignedHeatError(ValueError):
         element: str | None = None,
         path: str | os.PathLike[str] | None = None,
     ) -> None:
-        cause = printable(" ".join(cause.split()))  # one line, whatever was quoted
+        cause = printable(" ".join(cause.split()))  # one line, whatever it quotes
         super().__init__(cause)
         self.cause: str = cause
         self.remedy: str | None = remedy
@@ -61,7 +61,7 @@ class SignedHeatError(ValueError):
         return ": ".join(printable(part) for part in (self.path, self.cause, self.remedy) if part is not None)
 
     def at(self: AnyError, path: str | os.PathLike[str]) -> AnyError:
-        """The same error, about a file.
+        """Copy the error, and name the file it concerns.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class SignedHeatError(ValueError):
         Returns
         -------
         SignedHeatError
-            Of the same class, with this `path`.
+            An error of the same class, with this `path`.
 
         Examples
         --------
@@ -117,11 +117,11 @@ class FileFormatError(SignedHeatError):
 
 
 class UnsupportedTypeError(SignedHeatError, TypeError):
-    """An argument of a type that has no meaning here: no domain, no constraint, no field."""
+    """An argument of an unsupported type, such as an object that is not a domain, a constraint or a field."""
 
 
 class MissingPackageError(SignedHeatError, ImportError):
-    """A package that only some formats or functions need, and that is not installed."""
+    """An optional package that a format or function needs is not installed."""
 
 
 class UnreachedWarning(UserWarning):
@@ -129,12 +129,12 @@ class UnreachedWarning(UserWarning):
 
 
 class InexactWarning(UserWarning):
-    """A result that is farther from exact than it promises to be, and says so in its diagnostics."""
+    """The result misses its stated accuracy; its diagnostics give details."""
 
 
 def warn_user(message: str, category: type[Warning]) -> None:
     """Issue a warning attributed to the line of user code that called this package."""
-    within = {__name__.partition(".")[0], "functools"}  # dispatchers stand between functions of ours
+    within = {__name__.partition(".")[0], "functools"}  # dispatchers lie between functions of this package
     depth, frame = 1, inspect.currentframe()
     while frame and frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in within:
         frame, depth = frame.f_back, depth + 1

@@ -1,4 +1,4 @@
-"""Levels of a field: which leave its domain, and points moved to where the distance to its solid passes them."""
+"""Levels of a field: refuse those that leave its domain, and move points onto exact levels."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from .grids.grid import Grid
 from .grids.marching import CLEARANCE
 
 CLOSE = 1e-3
-"""Cells off a level that a point may be and stay as it is."""
+"""Distance from a level, in cells, below which a point is not moved."""
 ROUNDS = 10
-"""Times a point is moved at most: from 2 on where distance bends, and few need more than 4."""
+"""Upper bound of the number of iterations; few points need more than 4."""
 
 
 class NodeValues(Protocol):
@@ -27,14 +27,14 @@ class NodeValues(Protocol):
 
 
 def refuse_beyond_walls(walls: NDArray[np.float64], distance: float, domain: str, remedy: str) -> None:
-    """Raise `OutsideError` if what lies at a distance leaves a domain although the shape itself does not.
+    """Raise `OutsideError` if the level at a distance leaves a domain although the shape does not.
 
-    `walls` are the values at its boundary, `domain` and `remedy` words of the message.
+    `walls` are the values at the boundary; `domain` and `remedy` appear in the message.
     """
     low, high = float(np.fmin.reduce(walls)), float(np.fmax.reduce(walls))
     if (low > 0 or high < 0) and low < distance < high:
         raise OutsideError(
-            f"what lies at distance {distance:g} leaves the {domain}, which holds distances up to "
+            f"the surface at distance {distance:g} leaves the {domain}, which holds distances up to "
             f"{low if low > 0 else high:g}",
             remedy=remedy,
         )
@@ -47,22 +47,9 @@ def on_level(
     grid: Grid,
     level: float,
 ) -> NDArray[np.float64]:
-    """Points on edges of a grid, where values of the nodes pass a level, moved along to where distance does.
+    """Move (n, 3) points along the edges of a grid from the interpolated level to the exact level of `distance`.
 
-    By regula falsi, halving the weight of an end that stays twice (Dowell & Jarratt 1971). Points inside cells stay.
-
-    Parameters
-    ----------
-    distance : callable
-        The distance at (n, 3) points, which the values are at the nodes.
-    points : (n, 3) float
-        Where linear interpolation passes the level.
-    values : (*shape) float
-        Of the nodes.
-    grid : Grid
-        Where they are.
-    level : float
-        Which.
+    This is regula falsi with halved weights (Dowell & Jarratt 1971). Points inside cells are not moved.
     """
     cells = (points - grid.origin) / grid.spacing
     near = np.rint(cells)

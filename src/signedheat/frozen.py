@@ -1,4 +1,4 @@
-"""Copies and pickles of frozen objects: what they were made of, and none of what was derived from it."""
+"""Copies and pickles of frozen objects, without cached properties."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ Number = TypeVar("Number", bound=np.generic)
 
 
 class Frozen:
-    """A frozen dataclass whose copies and pickles hold its fields alone, with read-only arrays read-only again.
+    """A frozen dataclass whose copies and pickles hold only its fields; read-only arrays stay read-only.
 
-    Cached properties are made anew where they are needed: factors live in the memory of other libraries, and what is
-    derived is often larger than what it is derived from.
+    Cached properties are computed anew, since they are often larger than the fields, or in memory of other libraries.
 
     Examples
     --------
@@ -44,7 +43,7 @@ class Frozen:
 
 
 def read_only(array: NDArray[Number]) -> NDArray[Number]:
-    """A read-only view, as arrays of frozen objects are: for what can be written, kernels would be compiled again."""
+    """A read-only view, since kernels would be compiled again for writable arrays."""
     view: NDArray[Number] = array.view()
     view.flags.writeable = False
     return view

@@ -1,4 +1,4 @@
-"""Defects of a shape: open, nonmanifold and inconsistent edges, degenerate and duplicate elements."""
+"""Count the defects of a shape: open, nonmanifold and inconsistent edges, degenerate and duplicate elements."""
 
 from __future__ import annotations
 
@@ -214,25 +214,25 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
 
 
 def _n_marked(n: int, ids: NDArray[np.int64]) -> int:
-    """How many of the numbers below n are named."""
+    """Count the distinct ids."""
     marked = np.zeros(n, dtype=bool)
     marked[ids] = True
     return int(marked.sum())
 
 
 def _n_components(n: int, tails: NDArray[np.int64], heads: NDArray[np.int64]) -> int:
-    """How many connected sets halfedges make; vertices of none do not count."""
+    """Count the connected sets of halfedges."""
     return _n_marked(n, connected_components(n, tails, heads)[tails])
 
 
 def _n_nonmanifold(n: int, tails: NDArray[np.int64], following: NDArray[np.int32], pairs: HalfedgePairs) -> int:
-    """Vertices at which the faces are no single fan, or that end an edge of more than two faces."""
+    """Count vertices whose faces do not form a single fan, or that lie on an edge of more than two faces."""
     two = pairs.counts == 2
-    one, other = pairs.first[two], pairs.second[two]
-    alike = tails[one] == tails[other]
-    next_one, next_other = following[one], following[other]
-    links = np.where(alike, other, next_other), np.where(alike, next_other, other)
-    fans = connected_components(len(tails), np.concatenate([one, next_one]), np.concatenate(links))
+    first, second = pairs.first[two], pairs.second[two]
+    same_way = tails[first] == tails[second]
+    after_first, after_second = following[first], following[second]
+    links = np.where(same_way, second, after_second), np.where(same_way, after_second, second)
+    fans = connected_components(len(tails), np.concatenate([first, after_first]), np.concatenate(links))
     fan = np.empty(n, dtype=np.int64)
     fan[tails] = fans
     crowded = np.flatnonzero(pairs.around > 2)
@@ -241,7 +241,7 @@ def _n_nonmanifold(n: int, tails: NDArray[np.int64], following: NDArray[np.int32
 
 
 def _n_repeated(points: NDArray[np.float64]) -> int:
-    """How many points are at exactly the place of an earlier one."""
+    """Count points at exactly the position of an earlier one."""
     return int(np.count_nonzero(same_positions(points) != np.arange(len(points))))
 
 

@@ -23,7 +23,7 @@ Body: TypeAlias = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
-    """The shape itself, or one mesh of several; tets are their boundary."""
+    """A single shape unchanged, or several meshes as one; tets are replaced by their boundary."""
     shapes = as_shapes(shape)
     if not shapes:
         raise SourceError("there is no shape", remedy="pass at least one")
@@ -42,24 +42,23 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
         return whole
     refuse_arrays(shapes)
     meshes = []
-    for index, each in enumerate(shapes):
-        if not isinstance(each, TriangleMesh | PolygonMesh):
+    for index, part in enumerate(shapes):
+        if not isinstance(part, TriangleMesh | PolygonMesh):
             raise SourceError(
-                f"several meshes make one solid, and shape {index} is a {type(each).__name__}",
-                element=f"shape {index}",
+                f"only meshes can be joined, and shape {index} is a {type(part).__name__}", element=f"shape {index}"
             )
-        meshes.append(each)
+        meshes.append(part)
     return TriangleMesh(*joined_triangles(meshes))
 
 
 def joined_triangles(parts: Sequence[TriangleMesh | PolygonMesh], origin: NDArray[np.float64] | float = 0.0) -> Body:
-    """(n, 3) vertices, relative to `origin`, and (m, 3) triangles of all meshes together."""
+    """Vertices, relative to `origin`, and triangles of all meshes together."""
     meshes = [part.triangulation for part in parts]
     return concatenated([(mesh.vertices - origin, mesh.faces) for mesh in meshes])
 
 
 def concatenated(bodies: Sequence[Body]) -> Body:
-    """Vertices and faces of several bodies, one after another; nothing is merged.
+    """Concatenate the vertices and faces of several bodies without merging any.
 
     Examples
     --------
@@ -73,7 +72,7 @@ def concatenated(bodies: Sequence[Body]) -> Body:
 
 
 def placed(body: Body, matrix: NDArray[np.float64]) -> Body:
-    """A body moved by a (4, 3) matrix that multiplies rows from the right; what is mirrored keeps its outside.
+    """Move a body by a (4, 3) matrix that multiplies rows from the right; a mirrored body keeps its outside.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The kinds of domains and of sources, as types: what a function takes is said by one of these names."""
+"""Type aliases for domains and sources."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from .tets.tet_mesh import TetMesh
 EmbeddedSurface: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface
 """Surfaces with positions in space, on which curves and points are given."""
 SurfaceDomain: TypeAlias = EmbeddedSurface | IntrinsicTriangulation
-"""What distance along a surface is measured on."""
+"""Domains of distance along a surface."""
 Domain: TypeAlias = SurfaceDomain | TetMesh | Grid[int]
-"""What distance is measured on."""
+"""All domains of distance."""
 AnySurface = TypeVar("AnySurface", bound=SurfaceDomain)
 """A surface of one kind."""
 ShapeLike: TypeAlias = Shape | ForeignShape
-"""What is taken for a shape: also objects of trimesh, PyVista, meshio and Open3D, and pairs (vertices, faces)."""
+"""Shapes, including objects of trimesh, PyVista, meshio and Open3D, and pairs (vertices, faces)."""
 Shapes: TypeAlias = ShapeLike | Sequence[ShapeLike]
 """One shape in space or several."""
 Polylines: TypeAlias = Polyline | Sequence[Polyline]
 """One line in the plane or several."""
 SpaceSource: TypeAlias = ShapeLike | Polyline
-"""What distance on grids is measured to."""
+"""Sources of distance on grids."""
 SpaceSources: TypeAlias = SpaceSource | Sequence[SpaceSource]
 """One of them or several."""
 Source: TypeAlias = SpaceSource | CurveOrPoints
-"""What distance is measured to, on any domain."""
+"""Sources of distance on any domain."""
 Sources: TypeAlias = Source | Sequence[Source | Sequence[CurveOrPoints]]
 """One source or several."""

@@ -1,4 +1,4 @@
-"""Available memory: free memory of the machine, and what limits leave to this process."""
+"""Available memory: what the machine and the limits of this process leave."""
 
 from __future__ import annotations
 
@@ -16,36 +16,29 @@ from .compiled import made
 from .errors import MemoryLimitError
 
 GROUPS = Path("/proc/self/cgroup")
-"""Where the system lists to which groups this process belongs, a line ``id:controllers:path`` for each."""
+"""Lists the control groups of this process, a line ``id:controllers:path`` each."""
 ROOT = Path("/sys/fs/cgroup")
-"""Where the groups of version 2 are, and below ``memory`` those of version 1."""
+"""Folder of the groups of version 2, with those of version 1 in ``memory``."""
 FILES = {"": ("memory.max", "memory.current"), "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes")}
-"""Files with the limit of a group and its present use, by the controllers that its line names: version 2 and 1."""
-
-
+"""Files with the limit and the usage of a group, by the controllers in its line: versions 2 and 1."""
 UNLOADED, IMPORTED, LOADED = 45_000_000, 24_000_000, 7_000_000
-"""Bytes that libraries and compiled kernels still take, whatever is computed: at first; where others have imported
-Numba, which takes as much again when it is first used; and after the first use of a kernel. Their files are not
-counted: the system takes back what it holds of them, which is 75 to 140 MB, as it sees fit."""
-
-
+"""Bytes that libraries will still allocate: before Numba is imported, after that, and after the first kernel. Cached
+files of libraries, 75 to 140 MB, are not counted, since the system can free them."""
 MAPPED = {"VmSize": 685_000_000, "VmData": 165_000_000}
-"""Bytes that libraries map in addition, and hardly touch: they count where a process's own limits do."""
-
-
+"""Bytes that libraries map but hardly touch; they count towards limits on address space and data."""
 ROOM = 1.1
-"""By how much the size that a remedy names is smaller than must be: what is free changes between two calls."""
+"""Safety factor of the size that a remedy names, since free memory changes between calls."""
 
 
 def libraries() -> int:
-    """What libraries still take: most of it is the compiler, which the first kernel loads."""
+    """Bytes that libraries will still allocate, mostly for the compiler that the first kernel loads."""
     if made:
         return LOADED
     return IMPORTED if "numba" in sys.modules else UNLOADED
 
 
 def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float], remedy: Callable[[int], str]) -> None:
-    """Raise `MemoryLimitError` if there is not enough memory for so many elements."""
+    """Raise `MemoryLimitError` if memory does not suffice for `count` elements."""
     available = available_memory()
     needed = estimate(count) + libraries()
     if available is None or needed <= available:
@@ -57,9 +50,9 @@ def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float]
 
 
 def untouched_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """An array of zeros, of which only the pages that are written to take memory.
+    """Allocate zeros whose pages take memory only once they are written.
 
-    NumPy's own asks for pages of 2 MB, of which few stay untouched where a surface runs through a grid.
+    `numpy.zeros` uses pages of 2 MB, most of which a surface through a grid would touch.
 
     Examples
     --------
@@ -74,7 +67,7 @@ def untouched_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
 
 
 def fitting_count(count: int, estimate: Callable[[int], float], available: float) -> int:
-    """The largest number of elements, at most `count`, that takes no more than the memory available.
+    """The largest number of elements, up to `count`, whose estimated memory is available.
 
     Examples
     --------
@@ -89,23 +82,23 @@ def fitting_count(count: int, estimate: Callable[[int], float], available: float
 
 
 def available_memory() -> int | None:
-    """Bytes that this process can still allocate; None if the system does not say.
+    """Bytes that this process can still allocate; None if unknown.
 
-    The least of what is free in the machine, what the container or job leaves (cgroups, those around them too), and
-    what the process's own limits leave on address space (``ulimit -v``) and data (``ulimit -d``).
+    This is the least of free memory, the limits of all enclosing control groups, and the limits of the process on
+    address space (``ulimit -v``) and data (``ulimit -d``).
     """
     limits = [bound for bound in (_free(), *_containers(), *_own_limits()) if bound is not None]
     return max(min(limits), 0) if limits else None
 
 
 def _free() -> int | None:
-    """What the machine can give without swapping."""
+    """Memory of the machine that is free without swapping."""
     kilobytes = _fields("/proc/meminfo").get("MemAvailable")
     return None if kilobytes is None else 1024 * kilobytes
 
 
 def _containers() -> list[int]:
-    """What each group around this process leaves, the machine's whole included: some see only their own there."""
+    """Memory that each control group around this process leaves, up to the root."""
     lines = [line.split(":", 2) for line in _text(GROUPS).splitlines() if line.count(":") > 1]
     own = {controllers: path for _, controllers, path in lines}
     left = []
@@ -120,7 +113,7 @@ def _containers() -> list[int]:
 
 
 def _cached(group: Path) -> int:
-    """Bytes of files that a group holds, which the system takes back before it refuses any."""
+    """Bytes of cached files in a group, which the system can free."""
     words = dict(line.split(maxsplit=1) for line in _text(group / "memory.stat").splitlines() if " " in line)
     total = "total_" if "total_inactive_file" in words else ""
     return sum(int(words.get(f"{total}{name}", 0)) for name in ("inactive_file", "active_file"))
@@ -143,7 +136,7 @@ def _own_limits() -> list[int]:
 
 
 def _text(path: Path | str) -> str:
-    """The text of a file of the system; nothing where there is none."""
+    """The text of a system file; empty if it cannot be read."""
     try:
         return Path(path).read_text()
     except OSError:

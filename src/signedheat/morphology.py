@@ -1,9 +1,7 @@
-"""Morphological operations on broken shapes: successive offsets of their signed distance (Sec. 9.3.1).
+"""Morphological operations on broken shapes, by successive offsets of their signed distance (Sec. 9.3.1).
 
-Also the smooth unions, intersections and differences of fields.
-
-Every step recomputes the distance, since the distance to an offset equals that to the shape, up to a constant, on one
-side only.
+Each step computes the distance anew, since the distance to an offset differs from that to the shape by a constant on
+one side only.
 """
 
 from __future__ import annotations
@@ -69,15 +67,14 @@ __all__ = [
 ]
 
 ROOM_FOR_OFFSETS = 0.15
-"""Share of its longest side by which a shape is padded, in addition to what its offsets take."""
+"""Padding of a shape in addition to its offsets, relative to its longest side."""
 BYTES_PER_NODE = 31.0
-"""Measured: what each node of a grid takes where a sheet is thickened."""
-
+"""Measured memory per node of the grid on which a sheet is thickened."""
 LIMITS = {"round": 1.0, "mitre": 2.0, "sharp": 10.0}
-"""Distances up to which planes are followed around edges. With 2 the edges and corners of boxes are whole, and edges
-between faces less than 60° apart are cut off; with 10 those of less than 12°, whose tips reach ten distances out."""
+"""Length of mitres, relative to the distance. With 2, edges and corners of boxes stay whole, and edges between faces
+less than 60° apart are cut off; with 10, those of less than 12°."""
 SIDES = 64
-"""Of a hole that lets liquids out."""
+"""Number of sides of a drain hole."""
 
 Boundary: TypeAlias = TriangleMesh | list[Polyline] | list[Curve]
 """The boundary of a result, of the same kind as the shape."""
@@ -138,15 +135,15 @@ def dilate(
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh, PointCloud; in the plane Polyline; on a surface Curve; or a sequence of them
-        The shape, which may be broken. Inside is where φ < 0: behind the normals, or to the right of curves.
+        The shape, which may be broken. The inside, where φ < 0, is behind the normals, or to the right of curves.
     distance : float
         The offset, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
-        Where the distance is computed; by default on a grid around the shape with room for the result.
+        Domain of the distance. By default, a grid around the shape with room for the result.
     resolution : int
         Number of nodes along the longest side of that default grid.
     measure : callable, optional
-        Called as ``measure(shape, domain)`` in place of `signed_distance`, to choose its options:
+        Called as ``measure(shape, domain)`` in place of `signed_distance`, for instance to set its options:
         ``partial(signed_distance, keep_overlaps=True)``.
 
     Returns
@@ -208,7 +205,7 @@ def opening(
     Examples
     --------
     >>> bar = Polyline([[0, 0], [0, 1], [1, 1], [1, 0.5], [4, 0.5], [4, 0]], closed=True)
-    >>> [opened] = opening(bar, 0.3)  # what is .5 wide goes
+    >>> [opened] = opening(bar, 0.3)  # removes what is .5 wide
     >>> bool(opened.points[:, 0].max() < 1.1)
     True
     """
@@ -229,7 +226,7 @@ def closing(
     Examples
     --------
     >>> gap = [Polyline([[x, 0], [x, 1], [x + 1, 1], [x + 1, 0]], closed=True) for x in (0, 1.2)]
-    >>> len(gap), len(closing(gap, 0.2))  # what is .2 apart grows together
+    >>> len(gap), len(closing(gap, 0.2))  # joins parts that are .2 apart
     (2, 1)
     """
     return _offsets(shape, distance, (1, -1), domain, resolution, measure)
@@ -244,36 +241,36 @@ def offset(
     spacing: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> TriangleMesh:
-    """The surface at a distance from a shape, which may vary over it, with round or with mitred edges.
+    """Extract the surface at a distance from a shape, which may vary over it, with round or mitred edges.
 
     Parameters
     ----------
     shape : shape, several, or Solid
-        Broken or not; completed here, unless it is a solid already.
+        A shape, broken or not; completed here unless it is a solid.
     distance : float, (n,) float or callable
-        Positive outside, negative inside. Or one for each vertex of a mesh (or point of a cloud), linear between them;
-        or a function that gives one for each of (n, 3) places on the shape.
+        Positive outside, negative inside. An array has a distance for each vertex of a mesh or point of a cloud, and is
+        interpolated linearly; a function maps (n, 3) places on the shape to distances.
     corners : {"round", "mitre", "sharp"}
-        Around convex edges outside, and reflex ones inside: everything at the distance; or the planes of the faces
-        there, moved by it, as far as two distances ("mitre": boxes stay boxes), or ten ("sharp").
+        Shape of edges that the surface moves away from: round at the distance; or the offset planes of the faces,
+        extended up to two distances ("mitre", which keeps boxes) or ten ("sharp").
     resolution : int
         Nodes along the longest side of a grid around the surface.
     spacing : float or (3,) float, optional
         Size of its cells, in place of `resolution`.
     progress : callable, optional
-        Called as ``progress(fraction, step)``; what it raises cancels.
+        Called as ``progress(fraction, step)``. An exception that it raises cancels.
 
     Returns
     -------
     TriangleMesh
-        Closed, manifold, with its edges and corners; triangles do not pass through each other.
+        A closed, manifold surface with sharp edges and corners that does not intersect itself.
 
     Raises
     ------
     OutsideError
         If no cell of the grid has the surface.
     SignedHeatError
-        If a distance is not finite, or there is not one for each vertex.
+        If a distance is not finite, or an array does not have one for each vertex.
 
     Examples
     --------
@@ -313,10 +310,10 @@ def shell(
     keep_outside: bool = False,
     drain: float | None = None,
 ) -> TriangleMesh:
-    """The solid between two offsets of a shape, ``inner ≤ φ ≤ outer``: a wall, in which holes of the shape are closed.
+    """Make a wall: the solid between two offsets of a shape, ``inner ≤ φ ≤ outer``, in which holes are closed.
 
-    Cavities smaller than a ball as wide as the wall is thick are filled. Where no place of the shape is as deep as the
-    wall is thick nothing is hollowed, with an `InexactWarning`.
+    Cavities smaller than a ball whose diameter is the thickness of the wall are filled. If no place of the shape is as
+    deep as the wall, the shape is not hollowed, with an `InexactWarning`.
 
     Parameters
     ----------
@@ -331,7 +328,7 @@ def shell(
     measure : callable, optional
         As in `dilate`.
     keep_outside : bool
-        With ``outer=0``: keep the faces that were given, with what completes them, and make the inner side only.
+        With ``outer=0``, keep the faces of the shape and its completion, and make only the inner side.
     drain : float, optional
         Diameter of a hole straight down (−z) from the bottom of the largest cavity, which lets liquids and powder out.
 
@@ -343,10 +340,10 @@ def shell(
     Raises
     ------
     SignedHeatError
-        If inner is not less than outer, one of them is not finite, the wall is thinner than a grid cell, the outside is
-        to be kept at another distance than 0, or there is no cavity to drain.
+        If inner is not less than outer, one of them is not finite, the wall is thinner than a grid cell, `keep_outside`
+        is used with an outer distance other than 0, or there is no cavity to drain.
     GeometryError
-        If faces are to be kept and do not join with their completion all around.
+        If faces are to be kept but do not join with their completion.
     UnsupportedTypeError
         If the domain is not a grid.
 
@@ -364,7 +361,7 @@ def shell(
             remedy="swap them, or set them apart",
         )
     if keep_outside and outer != 0:
-        raise SignedHeatError("the faces that were given are at distance 0", remedy="leave out keep_outside")
+        raise SignedHeatError("the faces of the shape are at distance 0", remedy="leave out keep_outside")
     hole = None if drain is None else positive_number(drain, "drain")
     grid = _grid(_room(shape, max(abs(inner), abs(outer)), resolution) if domain is None else domain)
     _refuse_thin(grid, outer - inner)
@@ -402,7 +399,7 @@ def thicken(
     *,
     resolution: int = RESOLUTION,
 ) -> TriangleMesh:
-    """A solid around an open surface, with rounded ends at its boundary. Nothing is completed.
+    """Make a solid around an open surface, rounded at its boundary, without completing the surface.
 
     Parameters
     ----------
@@ -438,10 +435,7 @@ def thicken(
     below = above if below is None else finite_number(below, "the reach below", least=0)
     reach = max(above, below)
     if reach == 0:
-        raise SignedHeatError(
-            "a sheet thickened by nothing has no inside",
-            remedy="give a reach above zero",
-        )
+        raise SignedHeatError("a sheet of thickness 0 has no inside", remedy="give a thickness above 0")
     grid = _grid(_room(sheet, reach, resolution) if domain is None else domain)
     _refuse_thin(grid, above + below)
     refuse_large_grid(grid, BYTES_PER_NODE)
@@ -453,11 +447,11 @@ def thicken(
 
 
 def _linear(shape: Shapes, values: NDArray[np.float64]) -> Reach:
-    """The function that has values at the vertices of a mesh, or at the points of a cloud, and is linear on faces."""
+    """The function that interpolates values at the vertices of a mesh linearly, or is nearest to points of a cloud."""
     mesh = shape.source if isinstance(shape, Solid) else as_shape(shape)  # type: ignore[arg-type]
     if not isinstance(mesh, TriangleMesh | PolygonMesh | DigitalSurface | PointCloud):
         raise UnsupportedTypeError(
-            f"a {type(shape).__name__} has no vertices that distances are given at",
+            f"a {type(shape).__name__} has no vertices at which to give distances",
             remedy="pass one mesh, or a function of places",
             element="distance",
         )
@@ -486,14 +480,14 @@ def _linear(shape: Shapes, values: NDArray[np.float64]) -> Reach:
 
 def _warn_not_hollow(inner: float) -> None:
     warn_user(
-        f"nothing is hollowed: no place of the shape is {-inner:g} deep, to a cell of the grid. A wall is thinner than "
-        "half of the part",
+        f"the shape is not hollowed: no place of it is {-inner:g} deep at the resolution of the grid. Use a wall "
+        "thinner than half of the part",
         InexactWarning,
     )
 
 
 def _without_crumbs(wall: TriangleMesh, thickness: float) -> TriangleMesh:
-    """A wall without cavities smaller than a ball as wide as it is thick."""
+    """Remove cavities smaller than a ball whose diameter is the thickness of the wall."""
     parts, volumes = part_volumes(wall.vertices, wall.faces)
     crumbs = (volumes < 0) & (volumes > -np.pi / 6 * thickness**3)
     if not crumbs.any():
@@ -503,7 +497,7 @@ def _without_crumbs(wall: TriangleMesh, thickness: float) -> TriangleMesh:
 
 
 def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
-    """A wall with a hole straight down from the bottom of its largest cavity, where it is the widest."""
+    """Make a hole straight down from the bottom of the largest cavity, at its widest place."""
     parts, volumes = part_volumes(wall.vertices, wall.faces)
     if not volumes.min() < 0:
         raise SignedHeatError("the wall has no cavity to drain", remedy="leave out drain, or make the wall thinner")
@@ -532,14 +526,14 @@ def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
 
 
 def _field(shape: Sources, domain: Domain) -> Field:
-    """The distance whose level sets are the offsets: that to a solid, where the domain is a grid in space."""
+    """The distance whose level sets are the offsets: to a completed solid on grids in space."""
     if isinstance(domain, Grid) and domain.dimension == 3:
         return signed_distance(shape, domain)
     return _sided(domain, shape)
 
 
 def _sided(domain: Domain, shape: Sources) -> Field:
-    """The signed distance to a shape that may have two sides and no inside; on grids sharpened."""
+    """The signed distance to a shape that may have sides but no inside; sharpened on grids."""
     field = SignedHeatSolver(domain).distance(shape)
     return sharpen(field) if isinstance(field, GridField) else field
 
@@ -552,7 +546,7 @@ def _offsets(
     resolution: int,
     measure: Measure | None,
 ) -> Boundary:
-    """Successive offsets, outward for a sign of 1 and inward for −1, each of the distance to the previous one."""
+    """Offset successively, outward for a sign of 1 and inward for −1, and compute the distance anew each time."""
     distance = finite_number(distance, "the distance", least=0)
     if domain is None:
         domain = _room(shape, distance if 1 in signs else 0.0, resolution)
@@ -593,13 +587,13 @@ def _refuse_thin(grid: Grid[Literal[3]], thickness: float) -> None:
     cell = float(grid.spacing.max())
     if thickness < cell:
         raise SignedHeatError(
-            f"a wall of thickness {thickness:g} slips between nodes {cell:g} apart",
+            f"a wall of thickness {thickness:g} is thinner than a cell of {cell:g}",
             remedy=f"raise the resolution to {int(np.ceil(max(grid.shape) * 2 * cell / thickness))}",
         )
 
 
 def _unsigned_distance(sheet: Shapes, grid: Grid[Literal[3]]) -> NDArray[np.float64]:
-    """Exact unsigned distance to a surface itself, at the nodes."""
+    """Exact unsigned distance to a surface, at the nodes."""
     for part in as_list(sheet):
         if area_elements(part).corners.shape[1:] != (3, grid.dimension):
             raise SourceError(

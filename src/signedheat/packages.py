@@ -1,7 +1,6 @@
-"""Other packages, imported when they are first used: at the start they would only cost time, and some may be missing.
+"""Packages that are imported at first use, because they are slow to import or optional.
 
-NumPy and SciPy, which imports its own parts late, are imported as usual. All others are `lazy_module` handles at the
-top of the modules that use them.
+NumPy and SciPy are imported as usual. All other packages are `lazy_module` handles at the top of modules.
 """
 
 from __future__ import annotations
@@ -21,18 +20,18 @@ REMEDIES = {
     "skimage": "pip install scikit-image",
     "sksparse": "conda install -c conda-forge scikit-sparse",
 }
-"""How to get the packages that are not installed by the name by which they are imported."""
+"""Commands to install packages whose name differs from the name of the import."""
 
 
 class LazyModule:
-    """A module that is imported at the first use of something in it: see `lazy_module`."""
+    """A module that is imported at its first use: see `lazy_module`."""
 
     def __init__(self, name: str, purpose: str) -> None:
         self._name = name
         self._purpose = purpose
 
     def __getattr__(self, attribute: str) -> Any:
-        if attribute.startswith("__"):  # doctest, copy and their like look these up, and do not use the module
+        if attribute.startswith("__"):  # looked up by doctest, copy and the like
             raise AttributeError(attribute)
         return getattr(require(self._name, self._purpose), attribute)
 
@@ -41,7 +40,7 @@ class LazyModule:
 
 
 def lazy_module(name: str, purpose: str) -> Any:
-    """A handle that is used like a module, which is imported at the first use of something in it.
+    """A handle that acts as a module, and imports it at the first use of an attribute.
 
     Examples
     --------
@@ -53,7 +52,7 @@ def lazy_module(name: str, purpose: str) -> Any:
 
 
 def require(name: str, purpose: str) -> ModuleType:
-    """Import a module now, as before a long computation whose result it has to write.
+    """Import a module now, for instance before a long computation that needs it at the end.
 
     Examples
     --------
@@ -84,7 +83,7 @@ def ensure_installed(package: str, purpose: str) -> None:
 
 
 def missing_package(package: str, purpose: str, cause: str = "is not installed") -> MissingPackageError:
-    """The error for a package that something needs.
+    """The error for a missing package.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Threads, and how rows are shared among them; Dask clusters."""
+"""Threads that share rows, and connections to Dask clusters."""
 
 from __future__ import annotations
 
@@ -18,16 +18,15 @@ from .packages import lazy_module
 distributed: Any = lazy_module("distributed", "Dask clusters")
 
 CHUNK = 1 << 13
-"""Rows that a thread works on at a time."""
-
+"""Rows per task of a thread."""
 PATIENCE = 30.0
-"""Seconds within which a cluster must answer."""
+"""Seconds to wait for a cluster to answer."""
 GREETING = 1 << 20
-"""Bytes that the first message of a Dask scheduler has at the most."""
+"""Upper bound of the bytes in the first message of a Dask scheduler."""
 
 
 def n_threads() -> int:
-    """Number of processors that this process may use, limited by ``NUMBA_NUM_THREADS``."""
+    """Number of processors available to this process, at most ``NUMBA_NUM_THREADS``."""
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
     wanted = os.environ.get("NUMBA_NUM_THREADS", "")
     return min(available, int(wanted)) if wanted.isdigit() and int(wanted) > 0 else available
@@ -36,10 +35,9 @@ def n_threads() -> int:
 def in_chunks(
     function: Callable[[NDArray[Any]], tuple[NDArray[Any], ...]], rows: NDArray[Any]
 ) -> tuple[NDArray[Any], ...]:
-    """Apply a function to chunks of rows on all threads, and put its arrays together again.
+    """Apply a function to chunks of rows on all threads, and concatenate its results.
 
-    Memory beyond that of the result is that of a chunk for each thread. Chunks do not depend on the number of threads,
-    so neither does the result.
+    The result does not depend on the number of threads. Each thread needs additional memory for one chunk.
 
     Examples
     --------
@@ -65,12 +63,12 @@ def in_chunks(
 
 
 def connected(address: str) -> Any:
-    """A client of a running Dask cluster.
+    """Connect to a running Dask cluster, and return the client.
 
     Raises
     ------
     SignedHeatError
-        If none answers at the address within a minute; whatever else may listen there.
+        If no scheduler answers at the address within a minute.
     MissingPackageError
         If Dask is not installed.
 
@@ -81,12 +79,12 @@ def connected(address: str) -> Any:
         ...
     signedheat.errors.SignedHeatError: no Dask scheduler answers at 'nobody' (missing port number in address 'nobody'): start one with `dask scheduler`, and name its address
     """  # noqa: E501
-    comm = distributed.comm  # a missing package raises its own error
+    comm = distributed.comm  # raises if Dask is missing, before errors are converted
     try:
         if comm.parse_address(address)[0] == "tcp":
             _hear_greeting(*comm.get_address_host_port(address))
         return run_limited(lambda: distributed.Client(address, timeout=PATIENCE), 2 * PATIENCE)
-    except Exception as error:  # Dask's own, and those of what it takes for messages
+    except Exception as error:  # Dask raises exceptions of many types
         reason = " ".join(str(error).split()) or type(error).__name__
         raise SignedHeatError(
             f"no Dask scheduler answers at {address!r} ({reason:.200})",
@@ -96,11 +94,11 @@ def connected(address: str) -> Any:
 
 
 def _hear_greeting(host: str, port: int) -> None:
-    """Refuse a listener that does not greet as a scheduler does: Dask would wait, or allocate what it announces."""
+    """Refuse a listener that is not a scheduler, for which Dask would wait or allocate too much."""
     with socket.create_connection((host, port), PATIENCE) as connection:
         try:
             heard = connection.recv(8, socket.MSG_WAITALL)
         except TimeoutError:
             heard = b""
     if len(heard) < 8 or int.from_bytes(heard, "little") > GREETING:
-        raise ConnectionError("what listens there is no scheduler")
+        raise ConnectionError("the listener there is not a scheduler")

@@ -1,4 +1,4 @@
-"""Timing, logging and progress of the steps of a computation."""
+"""Time, log and report the progress of the steps of a computation."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ Result = TypeVar("Result")
 logger: logging.Logger = logging.getLogger("signedheat")
 
 CLEAR_LINE = "\r\x1b[2K"
-"""What takes a progress bar off a terminal."""
+"""Clears a progress bar from a terminal."""
 
 Progress = Callable[[float, str], None]
 """Called with the fraction done, from 0 to 1, and the name of the step that begins."""
 
 
 class Announcement:
-    """A line that is said once in a process: in the log, and to whoever sits before a terminal or a notebook."""
+    """A message that is logged once per process, and printed in terminals and notebooks."""
 
     are_wanted = True
-    """Whether any are printed; not where nothing but results are to be."""
+    """Whether announcements are printed."""
 
     def __init__(self, text: str) -> None:
         self._text, self._is_made = text, False
@@ -50,12 +50,12 @@ class Stopwatch:
         self._progress, self._steps = progress, steps
 
     def skip(self, steps: int) -> None:
-        """So many steps turn out not to be needed."""
+        """Reduce the number of expected steps."""
         self._steps -= steps
 
     @contextmanager
     def __call__(self, step: str) -> Iterator[Callable[[Callable[[], Result]], Result]]:
-        """Time a step, in which the function given runs jobs: progress is called until they end, and may stop them."""
+        """Time a step; the yielded function runs jobs, during which progress is reported and may raise to cancel."""
         progress, share, report = self._progress, len(self.seconds) / self._steps, None
         if progress is not None:
             progress(share, step)
