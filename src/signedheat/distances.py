@@ -140,8 +140,8 @@ def signed_distance(
         object of trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces). On a surface, `Curve` and
         `SurfacePoints`, or lists of (element, barycentric coordinates), as in potpourri3d. In the plane, `Polyline`.
     domain : Grid, TetMesh or surface, optional
-        Domain of the distance. By default, a grid of cubic cells around the shape or drawing. Curves need their surface,
-        a `TriangleMesh`, `PolygonMesh`, `PointCloud`, `DigitalSurface` or `IntrinsicTriangulation`.
+        Domain of the distance. By default, a grid of cubic cells around the shape or drawing. Curves need their
+        surface: a `TriangleMesh`, `PolygonMesh`, `PointCloud`, `DigitalSurface` or `IntrinsicTriangulation`.
     resolution : int
         Nodes along the longest side of the default grid; 128 by default.
     spacing : float or (d,) float, optional
