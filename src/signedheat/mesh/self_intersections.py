@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..parallel import CHUNK, n_threads
-from .box_tree import BoxTree
+from .box_tree import BoxTree, morton_codes
 from .unit_vectors import unit
 from .welding import same_positions
 
@@ -18,6 +18,10 @@ TOUCHING = 1e-10
 """Depth, over the size of the mesh, up to which triangles only touch."""
 FOLDED = 1e-10
 """One less the cosine between two neighbours as seen along their edge, up to which one covers the other."""
+CROWD = 64
+"""Faces around a vertex above which those that meet there are looked for around it, and not in space."""
+NEAR_ARC = 1e-6
+"""Slack, as an angle, by which the arcs of faces around a vertex may miss each other."""
 UPRIGHT = 1e-13
 """One less the cosine between two directions up to which they are one."""
 
@@ -49,22 +53,68 @@ def overlapping_faces(
     centred = np.ascontiguousarray(vertices - vertices.mean(axis=0), dtype=np.float64)
     ids = np.ascontiguousarray(faces, dtype=np.int64)
     corners = centred[ids]
-    tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
     flat = corners.reshape(-1, 9)
+    hubs = _hubs(ids, len(vertices))
+    fans = np.flatnonzero(hubs >= 0)
+    tree = BoxTree.over(corners, _order(corners, centred, hubs), hubs)
+    arcs = _arcs(centred, ids[fans], hubs[fans]) if len(fans) else corners[:0]
+    around = BoxTree.of(arcs.min(axis=1), arcs.max(axis=1)) if len(fans) else tree
 
-    def part(start: int) -> NDArray[np.int64]:
-        starts, near = tree.meeting(corners[start : start + CHUNK], slack)
-        owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-        one, other = owners[near > owners], near[near > owners]
+    def overlapping(one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
         shared = sum((i == j).astype(np.int8) for i, j in product(ids[one].T.copy(), ids[other].T.copy()))
         meet, few, many = np.empty(len(one), dtype=bool), np.flatnonzero(shared < 2), np.flatnonzero(shared > 1)
         meet[many] = _folded(corners, ids, one[many], other[many])
         meet[few] = _overlapping(flat, one[few], other[few], slack, np.where(shared[few] > 0, slack, depth))
         return np.stack([one, other], axis=1)[meet]
 
+    def of_tree(start: int) -> NDArray[np.int64]:
+        own = hubs[start : start + CHUNK]
+        starts, near = tree.meeting(corners[start : start + CHUNK], slack, own)
+        owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+        asked = (near > owners) & ((hubs[owners] < 0) | (hubs[owners] != hubs[near]))
+        return overlapping(owners[asked], near[asked])
+
+    def of_fans(start: int) -> NDArray[np.int64]:
+        starts, near = around.meeting(arcs[start : start + CHUNK], NEAR_ARC)
+        owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+        asked = (near > owners) & (hubs[fans[owners]] == hubs[fans[near]])
+        return overlapping(fans[owners[asked]], fans[near[asked]])
+
     with ThreadPoolExecutor(n_threads()) as pool:
-        pairs = np.concatenate(list(pool.map(part, range(0, len(ids), CHUNK))))
+        parts = list(pool.map(of_tree, range(0, len(ids), CHUNK)))
+        pairs = np.concatenate(parts + list(pool.map(of_fans, range(0, len(fans), CHUNK))))
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+
+def _hubs(faces: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]:
+    """(m,) the corner of each face that most faces meet at, if these are more than `CROWD`; else −1.
+
+    Faces around one vertex meet elsewhere only where the arcs do that they are seen as from there.
+    """
+    valences = np.bincount(faces.ravel(), minlength=n_vertices)[faces]
+    hubs = np.take_along_axis(faces, valences.argmax(axis=1)[:, None], axis=1)[:, 0]
+    return np.where(valences.max(axis=1) > CROWD, hubs, -1)
+
+
+def _order(corners: NDArray[np.float64], vertices: NDArray[np.float64], hubs: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m,) triangles along a space-filling curve, those around one hub after each other."""
+    middles = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
+    if not (hubs >= 0).any():
+        return np.argsort(morton_codes(middles), kind="stable")
+    places = np.where((hubs >= 0)[:, None], vertices[hubs], middles)
+    return np.lexsort((morton_codes(middles), hubs, morton_codes(places)))
+
+
+def _arcs(vertices: NDArray[np.float64], faces: NDArray[np.int64], hubs: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(k, 3, 3) triangles around the arcs that faces are seen as from their hubs, each hub in a place of its own."""
+    at = np.argmax(faces == hubs[:, None], axis=1)
+    ends = [faces[np.arange(len(faces)), (at + k) % 3] for k in (1, 2)]
+    first, second = (unit(vertices[end] - vertices[hubs]) for end in ends)
+    tip = (first + second) / np.maximum(1.0 + (first * second).sum(axis=1), 1e-3)[:, None]
+    names = np.unique(hubs, return_inverse=True)[1]
+    arcs = np.stack([first, second, tip], axis=1)
+    arcs[..., 0] += 4.0 * names[:, None]
+    return arcs
 
 
 def _folded(

@@ -1,0 +1,44 @@
+"""Pairs of faces that pass through each other."""
+
+import numpy as np
+import pytest
+
+from signedheat.mesh import self_intersections as crossings
+
+
+def double_cone(n, depth):
+    """Two fans around the ends of an axis."""
+    angle, i = 2 * np.pi * np.arange(n) / n, np.arange(n)
+    rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    j = (i + 1) % n
+    faces = np.concatenate([np.stack([i, j, 0 * i + n], axis=1), np.stack([j, i, 0 * i + n + 1], axis=1)])
+    return np.concatenate([rim, [[0, 0, 1], [0, 0, -depth]]]), faces
+
+
+def shaken_cone():
+    points, faces = double_cone(200, 1.0)
+    return points + np.random.default_rng(0).normal(scale=0.05, size=points.shape), faces
+
+
+def faces_at_random(height):
+    rng = np.random.default_rng(1)
+    faces = np.array([rng.permutation(40)[:3] for _ in range(250)])
+    points = rng.normal(size=(40, 3)) * [1, 1, height]
+    return points, faces[np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]]
+
+
+@pytest.mark.parametrize("shape", [double_cone(200, 0.0), shaken_cone(), faces_at_random(1.0), faces_at_random(0.0)])
+def test_faces_around_a_vertex_are_found_around_it_as_they_are_in_space(shape, monkeypatch):
+    around = []
+    for crowd in (8, 10**9):
+        monkeypatch.setattr(crossings, "CROWD", crowd)
+        around.append(crossings.self_intersections(*shape))
+    np.testing.assert_array_equal(*around)
+
+
+def test_few_faces_of_a_fan_are_near_each_other():
+    points, faces = double_cone(2000, 0.0)
+    corners = points[faces]
+    hubs = crossings._hubs(faces, len(points))
+    tree = crossings.BoxTree.over(corners, crossings._order(corners, points, hubs), hubs)
+    assert len(tree.meeting(corners, 1e-8, hubs)[1]) < 20 * len(faces)
