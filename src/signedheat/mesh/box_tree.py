@@ -99,7 +99,7 @@ class BoxTree:
     def over(
         cls, triangles: NDArray[np.float64], order: NDArray[np.int64], groups: NDArray[np.int64] | None = None
     ) -> BoxTree:
-        """The same over (n, 3, 3) triangles, bounded along the mean normal of each node as well, as they often are flat."""
+        """Build the tree over (n, 3, 3) triangles, bounded along the mean normal of each node as well."""
         tree = cls.in_order(triangles.min(axis=1), triangles.max(axis=1), order, groups)
         _fit_slabs(np.ascontiguousarray(triangles), tree.items, tree.slabs)
         return replace(tree, triangles=np.ascontiguousarray(triangles).reshape(-1, 9))

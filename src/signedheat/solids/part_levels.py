@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from ..search.winding_tree import WindingTree, mean_angle
 
-FEW = 256
-"""Triangles up to which those of a group are summed one by one."""
+FEW = 16
+"""Triangles of a group whose level is wanted up to which all of the group are summed one by one."""
 
 
 def levels_within(
@@ -37,8 +37,10 @@ def levels_within(
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
     corners = np.ascontiguousarray(triangles[order]).reshape(-1, 9)
-    levels = _among_few(corners, starts, counts[order], rank[faces], labels[faces])
-    for group in np.unique(labels[faces][sizes[labels[faces]] > FEW]):
+    wanted = np.bincount(labels[faces], minlength=len(sizes))[labels[faces]]
+    levels, few = np.zeros(len(faces)), np.flatnonzero(wanted <= FEW)
+    levels[few] = _among_few(corners, starts, counts[order], rank[faces[few]], labels[faces[few]])
+    for group in np.unique(labels[faces][wanted > FEW]):
         chosen = np.flatnonzero(labels[faces] == group)
         members = order[starts[group] : starts[group + 1]]
         there = np.repeat(members, np.abs(counts[members]))
@@ -63,8 +65,6 @@ def _among_few(
     levels = np.zeros(len(faces))
     for row in range(len(faces)):
         i, group = faces[row], groups[row]
-        if starts[group + 1] - starts[group] > FEW:
-            continue
         x = (corners[i, 0] + corners[i, 3] + corners[i, 6]) / 3
         y = (corners[i, 1] + corners[i, 4] + corners[i, 7]) / 3
         z = (corners[i, 2] + corners[i, 5] + corners[i, 8]) / 3
