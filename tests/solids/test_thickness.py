@@ -54,6 +54,16 @@ def test_a_ball_has_no_gaps_and_a_cavity_no_body():
     assert shell.typical_gap == pytest.approx(1.8, rel=0.05)
 
 
+def test_folds_copies_and_rounding_are_no_gaps():
+    """Faces that share a vertex, and doubled ones that single precision has moved apart."""
+    crumpled = thickness(samples.with_noise(samples.sphere(4), 0.05, seed=1))
+    assert min(crumpled.wall, crumpled.gap) > 0.02
+    slabs = samples.union(slab((0, 0, 0), (2, 2, 0.1), 3), slab((0, 0, 0.3), (2, 2, 0.35), 3))
+    noise = np.random.default_rng(0).normal(0, 1e-7, slabs.vertices.shape)
+    found = thickness(samples.union(slabs, sh.TriangleMesh(slabs.vertices + noise, slabs.faces)))
+    assert (found.wall, found.gap) == pytest.approx((0.05, 0.2), rel=1e-4)
+
+
 def test_sheets_have_neither():
     flat = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     assert thickness(flat).spacing is None

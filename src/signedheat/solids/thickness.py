@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..mesh.triangles import area_vectors
 from ..mesh.unit_vectors import unit
+from ..mesh.welding import same_positions
 from ..search.stabbing_lines import LineCrossings, stabbing_lines
 from .mesh_orientation import Mesh
 
@@ -20,6 +21,8 @@ SHARE = 0.01
 """Share of the lines' ways through walls, or through gaps, that may be shorter than the width reported."""
 OPPOSITE = -0.9
 """Cosine between the normals of faces below which they are opposite each other, and no wedge."""
+COINCIDENT = 1e-6
+"""Width, over the largest coordinate, up to which faces coincide but for the rounding of single precision."""
 STEEP = 0.7
 """Cosine between line and normals from which on a line measures a width; others reach quite another place."""
 
@@ -54,7 +57,7 @@ def thickness(shape: Mesh) -> Thickness:
 
     Lines are laid through the shape. Between a face that a line enters by and the next, by which it leaves, there is a
     wall; between leaving and entering, a gap. Its width is the way along the line times the mean of the cosines at both
-    ends. Takes O(n) time.
+    ends. Faces that share a vertex are a fold, and have no width between them. Takes O(n) time.
 
     Parameters
     ----------
@@ -72,8 +75,8 @@ def thickness(shape: Mesh) -> Thickness:
     corners = np.ldexp(mesh.vertices, -exponent)  # so that no product leaves the range of numbers
     bounds = np.ldexp(shape.bounds, -exponent)
     lines = stabbing_lines(corners, mesh.faces, bounds, N_LINES, N_DIRECTIONS)
-    size = float(np.abs(bounds).max())
-    (walls, n_walls), (gaps, n_gaps) = (_widths(corners[mesh.faces], lines, wall, size) for wall in (True, False))
+    names = same_positions(mesh.vertices)[mesh.faces]
+    (walls, n_walls), (gaps, n_gaps) = (_widths(corners[mesh.faces], names, lines, wall) for wall in (True, False))
     unit = float(np.ldexp(1.0, exponent))
     return Thickness(
         wall=_quantile(walls * unit, SHARE * n_walls),
@@ -84,17 +87,20 @@ def thickness(shape: Mesh) -> Thickness:
 
 
 def _widths(
-    triangles: NDArray[np.float64], lines: LineCrossings, wall: bool, size: float
+    triangles: NDArray[np.float64], names: NDArray[np.int64], lines: LineCrossings, wall: bool
 ) -> tuple[NDArray[np.float64], int]:
     """Widths along lines of walls, else of gaps, between opposite faces; and how many of either sort are crossed."""
     last = np.zeros(len(lines.crossed), dtype=bool)
     last[lines.starts[1:][np.diff(lines.starts) > 0] - 1] = True
     here = np.flatnonzero(~last[:-1] & (lines.entering[:-1] == wall) & (lines.entering[1:] != wall))
-    one, other = (unit(area_vectors(triangles[lines.crossed[here + k]])) for k in (0, 1))
-    opposite = np.einsum("ij,ij->i", one, other) < OPPOSITE
+    one, other = lines.crossed[here], lines.crossed[here + 1]
+    normals = unit(area_vectors(triangles[one])), unit(area_vectors(triangles[other]))
+    opposite = np.einsum("ij,ij->i", *normals) < OPPOSITE
     opposite &= np.minimum(lines.cosines[here], lines.cosines[here + 1]) > STEEP
     widths = (lines.depths[here + 1] - lines.depths[here]) * 0.5 * (lines.cosines[here] + lines.cosines[here + 1])
-    return widths[opposite & (widths > 1e-9 * size)], len(here)
+    apart = ~(names[one, :, None] == names[other, None, :]).any(axis=(1, 2))
+    apart &= widths > COINCIDENT * np.abs(triangles).max()
+    return widths[opposite & apart], int(apart.sum())
 
 
 def _quantile(widths: NDArray[np.float64], rank: float) -> float | None:
