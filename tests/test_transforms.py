@@ -20,6 +20,21 @@ def matrix(kind):
     return whole
 
 
+@pytest.mark.parametrize("kind", ["turned", "mirrored"])
+def test_solids_stay_what_they_are(kind):
+    """Distances of moved points to the moved solid are those before, holes closed as they were; places know faces."""
+    solid = sh.complete(samples.without_patches(samples.sphere(3), 3, 0.4))
+    moved = sh.transform(solid, matrix(kind))
+    points = np.random.default_rng(1).normal(size=(50, 3))
+    places = points @ MAPS[kind].T + [1, 2, 3]
+    np.testing.assert_allclose(moved.distance(places), solid.distance(points), atol=1e-12)
+    found = moved.closest(places)
+    given = found.faces >= 0
+    corners = moved.source.vertices[moved.source.faces[found.faces[given]]]
+    rebuilt = (found.barycentric[given, :, None] * corners).sum(axis=1)
+    np.testing.assert_allclose(rebuilt, found.points[given], atol=1e-12)
+
+
 @pytest.mark.parametrize("kind", MAPS)
 def test_volumes_grow_by_the_determinant_and_stay_positive(kind):
     ball = samples.sphere(2)

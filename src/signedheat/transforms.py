@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import GeometryError, UnsupportedTypeError
-from .foreign import ForeignShape, converted
+from .foreign import ForeignShape, Represented, converted
 from .surfaces.digital_surface import DigitalSurface
 from .surfaces.point_cloud import PointCloud
 from .surfaces.polygon_mesh import PolygonMesh
@@ -19,19 +19,21 @@ from .validation import LARGEST, SMALLEST, numbers
 
 def transform(
     shape: TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh | ForeignShape, matrix: ArrayLike
-) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh:
+) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh | Represented:
     """A shape under an affine map. Insides stay insides: faces of what is mirrored are turned over.
+
+    A solid stays one: nothing is completed again.
 
     Parameters
     ----------
-    shape : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or TetMesh
+    shape : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Solid
         The shape; the boundary of voxels becomes a polygon mesh.
     matrix : (4, 4) or (3, 4) float
         ``x → M[:3, :3] x + M[:3, 3]``; the last row, if it is there, is 0 0 0 1.
 
     Returns
     -------
-    TriangleMesh, PolygonMesh, PointCloud or TetMesh
+    TriangleMesh, PolygonMesh, PointCloud, TetMesh or Solid
         Of the same kind.
 
     Raises
@@ -58,23 +60,24 @@ def transform(
     linear = whole[:, :3] / max(float(np.abs(whole[:, :3]).max()), SMALLEST)
     if abs(np.linalg.det(linear)) <= 1e-12 * np.linalg.norm(linear) ** 3:
         raise GeometryError("the transform flattens the shape", remedy="check the matrix", element="matrix")
-    return _transformed(converted(shape), whole[:, :3], whole[:, 3])
+    stays = transformed.dispatch(type(shape)) is not transformed.dispatch(object)
+    return transformed(shape if stays else converted(shape), whole[:, :3], whole[:, 3])
 
 
 @singledispatch
-def _transformed(
+def transformed(
     shape: object, linear: NDArray[np.float64], move: NDArray[np.float64]
-) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh:
+) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh | Represented:
     raise UnsupportedTypeError(f"a {type(shape).__name__} cannot be transformed", remedy="transform what it is made of")
 
 
-@_transformed.register
+@transformed.register
 def _(shape: TriangleMesh, linear: NDArray[np.float64], move: NDArray[np.float64]) -> TriangleMesh:
     faces = shape.faces if np.linalg.det(linear) > 0 else shape.faces[:, ::-1]
     return TriangleMesh(shape.vertices @ linear.T + move, faces)
 
 
-@_transformed.register
+@transformed.register
 def _(shape: PolygonMesh, linear: NDArray[np.float64], move: NDArray[np.float64]) -> PolygonMesh:
     polygons = [list(polygon) for polygon in shape.polygons]
     if np.linalg.det(linear) < 0:
@@ -82,12 +85,12 @@ def _(shape: PolygonMesh, linear: NDArray[np.float64], move: NDArray[np.float64]
     return PolygonMesh(shape.vertices @ linear.T + move, polygons)
 
 
-@_transformed.register
+@transformed.register
 def _(shape: DigitalSurface, linear: NDArray[np.float64], move: NDArray[np.float64]) -> PolygonMesh:
     return transform(shape.squares, np.column_stack([linear, move]))  # type: ignore[return-value]
 
 
-@_transformed.register
+@transformed.register
 def _(shape: PointCloud, linear: NDArray[np.float64], move: NDArray[np.float64]) -> PointCloud:
     """Normals become those of the transformed planes, areas those of pieces of them."""
     normals, areas = shape.normals, shape.areas
@@ -100,7 +103,7 @@ def _(shape: PointCloud, linear: NDArray[np.float64], move: NDArray[np.float64])
     return PointCloud(shape.points @ linear.T + move, normals, areas, shape.n_neighbors)
 
 
-@_transformed.register
+@transformed.register
 def _(shape: TetMesh, linear: NDArray[np.float64], move: NDArray[np.float64]) -> TetMesh:
     tets = shape.tets if np.linalg.det(linear) > 0 else shape.tets[:, [1, 0, 2, 3]]
     return TetMesh(shape.vertices @ linear.T + move, tets)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -29,6 +29,7 @@ from ..search.face_features import FaceFeatures
 from ..search.face_tree import FaceTree, NearestFaces
 from ..search.nearest_triangles import weights_in
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..transforms import transformed
 from ..validation import finite_number, flag, positive_number, query_points, shaped
 from .contouring import announce_lost, sharp_surface
 from .kept_faces import given_surface, outward, unjoined
@@ -630,3 +631,17 @@ def _mesh(triangles: NDArray[np.float64]) -> TriangleMesh:
         raise SourceError("this part of the solid has no triangles", element="solid")
     points, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     return TriangleMesh(points, corners.reshape(-1, 3))
+
+
+@transformed.register
+def _(shape: Solid, linear: NDArray[np.float64], move: NDArray[np.float64]) -> Solid:
+    corners = slice(None, None, 1 if np.linalg.det(linear) > 0 else -1)
+
+    def moved(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Each corner by itself, so that corners at the same place stay at the same one to the last bit."""
+        places = sum((triangles[..., k, None] * linear[:, k] for k in range(3)), start=np.zeros(3)) + move
+        return np.ascontiguousarray(places[:, corners])
+
+    triangles, closing = moved(shape.triangles), moved(shape.windings.triangles)
+    source = None if shape.source is None else transformed(shape.source, linear, move)
+    return replace(shape, triangles=triangles, windings=Windings(closing), source=source)
