@@ -28,6 +28,15 @@ AXES = {
 ORIGIN = np.array([10.0, -20.0, 5.0])
 
 
+def test_an_image_is_taken_for_a_shape_in_the_world():
+    image = sh.io.LabelImage(np.pad(np.full((6, 6, 6), 7), 3), AXES["turned"], ORIGIN)
+    middle = ORIGIN + AXES["turned"] @ [5.5, 5.5, 5.5]
+    solid = sh.complete(image)
+    assert solid.inside(middle) and not solid.inside(ORIGIN)
+    assert sh.signed_distance(image, resolution=16)(middle) == solid.distance(middle)
+    assert repr(image) == "LabelImage(12 × 12 × 12 voxels of [0.5, 0.7, 0.6], the labels 0, 7)"
+
+
 @pytest.fixture(scope="module")
 def labels():
     """A ball of label 3 in a sea of 7 with an island of 1."""

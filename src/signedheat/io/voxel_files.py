@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 
 from ..errors import FileFormatError, GeometryError
 from ..exchange import NAME
+from ..foreign import Represented
+from ..frozen import Frozen
 from ..grids.grid import Grid
 from ..grids.grid_field import GridField
 from ..packages import require
+from ..reprs import short
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -36,12 +39,13 @@ SPACES = {
 """Signs that turn the axes of a space, as NRRD files name it, into those of NIfTI files."""
 
 
-@dataclass(frozen=True, eq=False)
-class LabelImage:
+@dataclass(frozen=True, eq=False, repr=False)
+class LabelImage(Represented, Frozen):
     """Labels of voxels, and where these are.
 
-    Distance is measured along the axes of the image (`grid`, `surface`), and written back into its place (`save`,
-    `to_world`): that does not change it, as the axes are at right angles.
+    It is taken wherever a shape is, as its `boundary` in the world, if it has zeros and one other label. Else distance
+    is measured along the axes of the image (`grid`, `surface`), and written back into its place (`save`, `to_world`):
+    that does not change it, as the axes are at right angles.
 
     Attributes
     ----------
@@ -59,6 +63,8 @@ class LabelImage:
     >>> image = LabelImage(np.full((3, 4, 5), 7), axes=2.0 * np.eye(3), origin=np.zeros(3))
     >>> image.grid.upper.tolist(), image.surface(7).bounds.round()[1].tolist()
     ([4.0, 6.0, 8.0], [5.0, 7.0, 9.0])
+    >>> image
+    LabelImage(3 × 4 × 5 voxels of [2, 2, 2], the label 7)
     """
 
     labels: NDArray[np.generic]
@@ -82,6 +88,11 @@ class LabelImage:
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = self.axes / self.spacing, self.origin
         return matrix
+
+    @property
+    def boundary(self) -> TriangleMesh:
+        """The smooth surface around the voxels with the only label but 0, in the world: closed and manifold."""
+        return self.to_world(self.surface())
 
     def surface(self, label: float | None = None) -> TriangleMesh:
         """The smooth surface around the voxels with a label, along the axes of the image: closed and manifold.
@@ -215,6 +226,10 @@ class LabelImage:
                 path=path,
             )
 
+    def __repr__(self) -> str:
+        voxels = " × ".join(map(str, self.labels.shape))
+        return f"LabelImage({voxels} voxels of {short(self.spacing)}, {_listed(np.unique(self.labels))})"
+
     def _nifti(self, field: GridField, axes: NDArray[np.float64], first: NDArray[np.float64], path: PathLike) -> bytes:
         affine = np.eye(4)
         affine[:3, :3], affine[:3, 3] = axes, first
@@ -311,5 +326,5 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
 
 
 def _listed(labels: NDArray[Any]) -> str:
-    some = ", ".join(f"{label:g}" for label in labels[:12].tolist())
-    return f"the labels {some}{', …' if len(labels) > 12 else ''}"
+    values = ", ".join(f"{label:g}" for label in labels[:12].tolist())
+    return f"the label{'s' if len(labels) > 1 else ''} {values}{', …' if len(labels) > 12 else ''}"
