@@ -280,3 +280,21 @@ def test_tiles_go_on_where_they_were_and_give_what_the_band_gives(tmp_path, ball
     fail(capsys, "volume", ball, "-o", output, "--tiles", store, code=2)
     fail(capsys, "volume", ball, "-o", output, *options, "--workers", "2", code=2)
     fail(capsys, "volume", ball, "-o", output, *options, "--tiles", store, "--workers", "2", "--scheduler", "x", code=2)
+
+
+def test_archives_of_solids_and_fields_are_taken_for_shapes(tmp_path, ball, capsys):
+    """Nothing is completed again, so that there is nothing to say of them."""
+    solid = sh.complete(sh.read(ball))
+    names = [str(tmp_path / name) for name in ("solid.npz", "field.npz")]
+    solid.save(names[0])
+    solid.field(24).save(names[1])
+    for name in names:
+        assert isinstance(sh.read(name), sh.Solid)
+        output = str(tmp_path / "larger.stl")
+        assert main(["offset", name, "0.2", "-o", output, "--resolution", "24"]) == 0
+        assert "turned" not in capsys.readouterr().err
+        assert np.abs(np.linalg.norm(sh.read(output).vertices, axis=1) - 1.2).max() < 0.05
+    moved = str(tmp_path / "moved.npz")
+    assert main(["sample", names[0], "-n", "50", "-o", moved, "--resolution", "12", "--units", "m:cm"]) == 0
+    assert np.load(moved)["radius"] > 100
+    assert "Solid" in succeed(capsys, "info", names[0])

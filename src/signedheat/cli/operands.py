@@ -37,6 +37,7 @@ from ..io.files import contents, distinct_names, extension
 from ..io.image_files import CONFIDENCE, NIFTI
 from ..io.key_figures import describe as describe
 from ..io.scenes import METRES, unit_of
+from ..io.solid_arrays import holds_solid
 from ..io.voxel_files import LabelImage, read_labels
 from ..memory import refuse_beyond_memory
 from ..progress import Progress, within
@@ -254,9 +255,11 @@ def on_tets(arguments: Namespace) -> tuple[Any, TetField]:
 
 
 def field_or_image(path: str) -> Any:
-    """The field in a file; the image in it, if its axes are not x, y, z; None if the format holds neither."""
+    """The field in a file; the image in it, if its axes are not x, y, z; None if the file holds neither."""
     if extension(path) in NIFTI:
         return read_labels(path)
+    if extension(path) == ".npz" and holds_solid(path):
+        return None
     if extension(path) not in FIELD_FORMATS or (
         extension(path) == ".npy" and not Path(path).with_suffix(".json").is_file()
     ):

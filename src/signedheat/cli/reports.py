@@ -11,6 +11,7 @@ import numpy as np
 
 from ..area_elements import bounds_around
 from ..errors import SourceError, printable
+from ..foreign import as_shape
 from ..geodesics.shortest_paths import gaps
 from ..grids.grid import Grid
 from ..grids.grid_discretization import fitting_spacing, memory_estimate
@@ -51,10 +52,11 @@ def report(file: str, arguments: Namespace) -> Summary:
         return summary, _table(summary)
     if is_planar(file):
         return lines_report(file)
-    shape = read(file)
+    held = read(file)
+    shape = as_shape(held)
     counts = inspect(shape)
     found = orientation(shape) if isinstance(shape, TriangleMesh | PolygonMesh) else None
-    summary = {"verdict": verdict(counts, found), "file": file, "kind": type(shape).__name__, **asdict(counts)}
+    summary = {"verdict": verdict(counts, found), "file": file, "kind": type(held).__name__, **asdict(counts)}
     if (unit := unit_of(file)) is not None:
         summary["units"] = unit
     if extension(file) == ".obj":

@@ -4,23 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ..errors import FileFormatError
 from ..exchange import Elements
 from ..foreign import ForeignShape, as_shape, elements, shape_of
+from ..grids.grid_field import GridField
 from ..kinds import Shape
 from ..memory import refuse_beyond_memory
 from ..solids.solid import Solid
 from ..surfaces.digital_surface import DigitalSurface
+from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
+from .field_files import load_field
 from .files import PathLike, format_for, reading, replacing
 from .mesh_files import read_obj, read_off, read_stl, write_obj, write_off, write_pc, write_stl
 from .ply import read_ply, write_ply
 from .point_files import read_e57, read_las, read_pcd, read_xyz, write_xyz
 from .scenes import read_3mf, read_dae, read_glb, step_mesh
+from .solid_arrays import holds_solid, load
 from .tet_files import TET_FORMATS, read_tets, store_cells
 from .voxel_files import read_volume
 from .vtk_xml import read_vtp, write_vtp
 
-READERS: dict[str, Callable[[PathLike], Elements | Shape]] = {
+
+def read_archive(path: PathLike) -> Solid | TriangleMesh:
+    """The solid in a NumPy archive, or that of a field in space; of one without a solid the surface at 0."""
+    if holds_solid(path):
+        return load(path)
+    field = load_field(path)
+    if not isinstance(field, GridField) or field.grid.dimension != 3:
+        raise FileFormatError("it has no solid, and no field on a grid in space", remedy="load it by `load_field`")
+    return field.solid if isinstance(field.solid, Solid) else field.offset(0.0)
+
+
+READERS: dict[str, Callable[[PathLike], Elements | Shape | Solid]] = {
     ".3mf": read_3mf,
     ".dae": read_dae,
     ".e57": read_e57,
@@ -29,6 +45,7 @@ READERS: dict[str, Callable[[PathLike], Elements | Shape]] = {
     ".las": read_las,
     ".laz": read_las,
     ".npy": read_volume,
+    ".npz": read_archive,
     ".nrrd": read_volume,
     ".obj": read_obj,
     ".off": read_off,
@@ -60,14 +77,14 @@ MANY, BYTES_PER_FACE = 100_000, 250
 """Faces from which on their memory is looked at; and measured: what each takes at least, whatever is done with it."""
 
 
-def read(path: PathLike) -> Shape:
+def read(path: PathLike) -> Shape | Solid:
     """Read a shape, in the format given by the extension.
 
     STL, OBJ, PLY, OFF, VTP, GLB, DAE, 3MF and STEP files have surfaces; XYZ, PCD, LAS, LAZ, E57 and PC files have
     points, and so have PLY, OBJ, OFF and VTP files without faces. Vertices and faces keep their number and order,
     whatever their defects: nothing is merged, dropped, split or turned. STL has no vertices; corners with exactly the
     same coordinates become one. NPY, NRRD and VTI files have volumes of voxels, booleans or zeros and ones. MESH, MSH,
-    VTU, VTK and TetGen's NODE with ELE have tets.
+    VTU, VTK and TetGen's NODE with ELE have tets. NPZ files have solids, or fields that hold them.
 
     Parameters
     ----------
@@ -76,9 +93,9 @@ def read(path: PathLike) -> Shape:
 
     Returns
     -------
-    TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or TetMesh
+    TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Solid
         A triangle mesh if all faces are triangles, otherwise a polygon mesh; a point cloud if there is no face; the
-        boundary of a volume of voxels; or a tet mesh.
+        boundary of a volume of voxels; a tet mesh; or a solid.
 
     Raises
     ------

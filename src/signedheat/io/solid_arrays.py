@@ -15,9 +15,13 @@ from ..solids.solid import Solid
 from ..solids.winding import Windings
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import refuse_extreme
+from .files import PathLike, reading
+from .numpy_files import names_in_npz, read_npz
 
 NEEDED = ("triangles", "origins", "confidence", "bounding", "closing", "key")
 SOURCE = ("source_vertices", "source_faces")
+VERSION = 2
+"""Of the archive: what another one has written is refused."""
 
 
 def arrays_of(solid: Solid) -> dict[str, NDArray[Any]]:
@@ -74,6 +78,50 @@ def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
         windings,
         source,
     )
+
+
+def holds_solid(path: PathLike) -> bool:
+    """Whether an archive is that of a solid."""
+    return "solid_version" in names_in_npz(path)
+
+
+def load(path: PathLike) -> Solid:
+    """Read a solid that `Solid.save` has written: distances are the same to the last bit.
+
+    Parameters
+    ----------
+    path : str or path
+        A ``.npz`` file.
+
+    Returns
+    -------
+    Solid
+        Its diagnostics are empty.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, truncated or damaged, has no solid, was changed, or was written by another version.
+
+    Examples
+    --------
+    >>> import tempfile, signedheat as sh
+    >>> from signedheat import samples
+    >>> solid = sh.complete(samples.broken_duck())
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     solid.save(f"{folder}/duck.npz")
+    ...     again = sh.io.load(f"{folder}/duck.npz")
+    >>> bool(again.distance([[0.1, 0.2, 0.3]]) == solid.distance([[0.1, 0.2, 0.3]]))
+    True
+    """
+    version = read_npz(path, ("solid_version",)).get("solid_version", np.zeros(1))
+    if version.shape or version.dtype.kind not in "iuf" or not 0 < version < np.inf:
+        raise FileFormatError("it has no solid", remedy="read fields by `load_field`, shapes by `read`", path=path)
+    if int(version) != VERSION:
+        remedy = "install a later version of signedheat" if int(version) > VERSION else "complete the shape again"
+        raise FileFormatError(f"another version wrote it ({int(version)}, not {VERSION})", remedy=remedy, path=path)
+    with reading(path):
+        return solid_of(read_npz(path, SOURCE, NEEDED))
 
 
 def _key(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:

@@ -144,7 +144,9 @@ def complete(
 def completed(
     shape: ShapeLike | Sequence[ShapeLike], options: Completion, method: Heat, progress: Progress | None = None
 ) -> Solid:
-    """The solid of a shape that is not a solid yet: see `complete`."""
+    """The solid of a shape, or a solid as it is: see `complete`."""
+    if isinstance(shape, Solid):
+        return shape
     joined = joined_shape(shape)
     count = joined.n_points if isinstance(joined, PointCloud) else joined.triangulation.n_faces
     refuse_beyond_memory(

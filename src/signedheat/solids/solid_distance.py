@@ -23,6 +23,7 @@ from ..validation import positive_number
 from .bounding import Nesting
 from .completion import Completing, Completion, Lids, completed
 from .heat_surfaces import Heat
+from .solid import Solid
 
 
 def distance_to_shapes(
@@ -73,7 +74,7 @@ def completed_distance(
         raise UnsupportedTypeError(
             "a band is computed around solids, on a grid in space without walls", remedy="leave out the band"
         )
-    joined = joined_shape(shape)
+    joined = shape if isinstance(shape, Solid) else joined_shape(shape)
     solid = completed(joined, options, method, within(progress, 0.0, 0.5))
     progress = within(progress, 0.5, 1.0)
     if isinstance(domain, Grid) and in_space:
