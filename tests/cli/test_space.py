@@ -298,3 +298,20 @@ def test_archives_of_solids_and_fields_are_taken_for_shapes(tmp_path, ball, caps
     assert main(["sample", names[0], "-n", "50", "-o", moved, "--resolution", "12", "--units", "m:cm"]) == 0
     assert np.load(moved)["radius"] > 100
     assert "Solid" in succeed(capsys, "info", names[0])
+
+
+@pytest.mark.parametrize(("name", "volume"), [("union", 12.0), ("intersect", 4.0), ("subtract", 4.0)])
+def test_boxes_are_combined(tmp_path, capsys, name, volume):
+    """Of a box of which a face is missing and one beside it: volumes in closed form, corners kept to the last bit."""
+    first, second = (trimesh.creation.box([2, 2, 2]) for _ in range(2))
+    second.apply_translation([1, 0, 0])
+    first.update_faces(np.arange(12) > 0)
+    files = [str(tmp_path / "first.ply"), str(tmp_path / "second.ply")]
+    for mesh, file in zip((first, second), files, strict=True):
+        mesh.export(file)
+    output = str(tmp_path / "out.ply")
+    assert json.loads(succeed(capsys, name, *files, "-o", output, "--json"))["volume"] == pytest.approx(volume)
+    result = sh.read(output)
+    assert inspect(result).is_closed
+    assert set(np.abs(result.vertices[:, 1:]).ravel()) == {1.0}
+    fail(capsys, name, files[0], "-o", output, code=2)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..curves.drawings import distance_to_lines
-from ..diagnostics import SampledSource
+from ..diagnostics import Diagnostics, SampledSource
 from ..distances import grid_around, plain_distance
 from ..errors import FileFormatError, GeometryError, SignedHeatError, SourceError, printable
 from ..grids.grid import RESOLUTION, Grid
@@ -74,9 +74,9 @@ def prefix_errors(path: Any) -> Iterator[None]:
         raise error.at(path) from error
 
 
-def read_source(arguments: Namespace) -> Any:
-    """The source: a shape in space, placed, or a list of polylines in the plane."""
-    path = arguments.shape
+def read_source(arguments: Namespace, path: str | None = None) -> Any:
+    """The source, of another file or that of the command: a shape in space, placed, or polylines in the plane."""
+    path = arguments.shape if path is None else path
     if is_planar(path):
         if arguments.transform is not None:
             raise SourceError("a matrix moves shapes in space, and not drawings", element="--transform", path=path)
@@ -199,10 +199,14 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
             field = distance_to_lines(shape, domain, **vars(method), as_oriented=as_oriented, progress=progress)
         else:
             field = completed_distance(shape, domain, options, method, progress=progress)
-    if not arguments.quiet:
-        for note in field.diagnostics.important:
-            say(printable(f"signedheat: {note}"))
+    say_important(arguments, field.diagnostics)
     return field
+
+
+def say_important(arguments: Namespace, diagnostics: Diagnostics, path: str | None = None) -> None:
+    """Say on standard error what must be known of a result, and of which file if there are several."""
+    for note in () if arguments.quiet else diagnostics.important:
+        say(printable(f"signedheat: {note}" if path is None else f"signedheat: {path}: {note}"))
 
 
 def in_band(solid: Any, grid: Grid, arguments: Namespace, progress: Progress | None) -> GridField:

@@ -1,8 +1,11 @@
-"""Commands about shapes in space, and drawings in the plane: `volume`, `offset`, `morph`, `sample`, `contour`."""
+"""Commands about shapes in space, and drawings in the plane."""
 
 from __future__ import annotations
 
+import operator
 from argparse import Namespace
+from collections.abc import Callable
+from functools import partial, reduce
 from typing import Any
 
 import signedheat as sh
@@ -23,6 +26,7 @@ from .options import (
     STEPS,
     SURFACES,
     TILES,
+    Command,
     Summary,
     check_grid,
     check_tiles,
@@ -31,6 +35,7 @@ from .options import (
     format_option,
     group,
     is_planar,
+    is_quiet,
     option,
     output,
     positive,
@@ -38,6 +43,7 @@ from .options import (
     shape_option,
     whole_number,
 )
+from .terminal import ProgressBar
 
 DISTANCES = {
     "dilate": (1, 1),
@@ -225,6 +231,56 @@ def morph(arguments: Namespace) -> Summary:
     summary |= {"output": arguments.output, **shapes.counts(surface)}
     summary |= {"field": shapes.describe(fields[0])} if fields else {}
     return summary, f"{printable(arguments.output)}: {arguments.operation}, closed surface of {surface.n_faces} faces"
+
+
+COMBINED = {
+    "union": (operator.or_, "what lies in any of the shapes"),
+    "intersect": (operator.and_, "what lies in all of the shapes"),
+    "subtract": (operator.sub, "the first shape without the others"),
+}
+"""Commands that combine solids, with the operator of `Solid` and a line of help."""
+
+
+def check_combined(arguments: Namespace) -> None:
+    """Reject a single shape."""
+    if len(arguments.files) < 2:
+        arguments.parser.error("two shapes or more are combined, not one")
+
+
+def combined(combine: Callable[[sh.Solid, sh.Solid], sh.Solid], arguments: Namespace) -> Summary:
+    """Check that the result can be written, read and complete each shape, combine, write."""
+    path = arguments.output
+    sh.io.ensure_writable(path, (sh.io.SHAPE_FORMATS | {".npz"}) - {".xyz", ".pc"}, "a surface or a solid")
+    repair = {name: getattr(arguments, name) for name in ("as_oriented", "keep_overlaps", "lids", "nested")}
+    solids = []
+    for file in arguments.files:
+        with shapes.prefix_errors(file), ProgressBar(is_quiet(arguments)) as progress:
+            solids.append(sh.complete(shapes.read_source(arguments, file), **repair, progress=progress))
+        shapes.say_important(arguments, solids[-1].diagnostics, file)
+    result = reduce(combine, solids)
+    result.save(path)
+    figures = {"volume": result.volume, "area": result.area}
+    text = f"{printable(path)}: volume {figures['volume']:.6g}, area {figures['area']:.6g}"
+    return {"inputs": arguments.files, "output": path, **figures}, text
+
+
+def combining(name: str) -> Command:
+    """The command of this name."""
+    combine, help = COMBINED[name]
+    return command(
+        name,
+        help,
+        f"A closed surface around {help}, broken or not. Faces are kept, and cut where they cross.",
+        option("files", metavar="SHAPE", nargs="+", help="surfaces or oriented points, in one place and units; .npz"),
+        output(f"{SURFACES}; solid: .npz"),
+        REPAIR,
+        format_option("stl"),
+        check=check_combined,
+        usage="SHAPE SHAPE [...] -o OUT [options]",
+    )(partial(combined, combine))
+
+
+union, intersect, subtract = map(combining, COMBINED)
 
 
 @command(
