@@ -94,3 +94,14 @@ def test_three_lines_say_what_it_is():
 def test_notebooks_show_it():
     page = SOLID._repr_html_()
     assert "<img" in page and "triangles" in page
+
+
+def test_unsigned_distances_are_those_without_a_sign():
+    """To the same surface, inside too; and to sheets, which have no inside."""
+    solid = sh.complete(samples.without_patches(samples.sphere(3), 3, 0.4))
+    points = np.random.default_rng(0).normal(size=(2, 30, 3))
+    found = solid.distance(points, signed=False)
+    np.testing.assert_allclose(found, np.abs(solid.distance(points)), rtol=1e-12)
+    assert found.shape == (2, 30) and solid.distance([0.0, 0.0, 0.0], signed=False) > 0.9
+    flat = sh.complete(sheet([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]))
+    assert flat.distance([0.5, 0.5, -0.25], signed=False) == pytest.approx(0.25)

@@ -168,13 +168,18 @@ class Solid(Displayed, Represented, Frozen):
         """All faces, including the completion and sheets, as one mesh."""
         return _mesh(self.triangles)
 
-    def distance(self, points: ArrayLike) -> NDArray[np.float64]:
+    def distance(self, points: ArrayLike, *, signed: bool = True) -> NDArray[np.float64]:
         """Compute exact signed distances of points, negative inside, in time O(n log m) on all threads.
+
+        Unsigned ones are to the same surface, and positive inside, too: for sheets, for clearances, and for networks
+        that learn surfaces with a boundary.
 
         Parameters
         ----------
         points : (..., 3) float
             Positions, in the units of the shape.
+        signed : bool
+            Whether distances inside are negative.
 
         Returns
         -------
@@ -192,11 +197,12 @@ class Solid(Displayed, Represented, Frozen):
         >>> complete(samples.sphere(3)).distance([[0.0, 0.0, 0.5], [0.0, 0.0, 2.0]]).round(2)
         array([-0.5,  1. ])
         """
+        measure = self._distances if flag(signed, "signed") else self._lengths
         places, shape = query_points(points, 3)
         result = np.empty(len(places))
         for begin in range(0, len(places), MANY):
             order = begin + order_in_space(places[begin : begin + MANY])
-            (result[order],) = in_chunks(self._distances, places[order])
+            (result[order],) = in_chunks(measure, places[order])
         return shaped(result, shape)
 
     def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
@@ -595,6 +601,9 @@ class Solid(Displayed, Represented, Frozen):
         array([ True])
         """
         files.save_solid(self, path)
+
+    def _lengths(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
+        return (self.tree.search(points).distances,)
 
     def _distances(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
         found = self.tree.search(points)
