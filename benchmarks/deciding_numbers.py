@@ -1,0 +1,183 @@
+"""The numbers that decide what bounds a solid: each halved and doubled, over shapes of its own.
+
+    python benchmarks/deciding_numbers.py [seeds]
+
+A scene is made of parts of which it is known whether they bound a solid, and of which half are turned. A face is wrong
+if it is taken for a sheet though it bounds, the other way round, or if it faces inwards. Printed are the share of the
+area that is wrong in each scene, and, for each number, the scenes where that changes by more than a hundredth. Of
+shares above a half, twice is half of the way to one.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from signedheat import TriangleMesh, orientation, samples
+from signedheat.mesh.components import element_components
+from signedheat.mesh.triangles import area_vectors
+from signedheat.solids import bounding, gauss
+
+NUMBERS: list[tuple[ModuleType, str]] = [
+    (bounding, "SHEET"),
+    (bounding, "COHERENT"),
+    (bounding, "CHANCE"),
+    (bounding, "ALONG"),
+    (bounding, "FEW"),
+    (bounding, "CLOSING"),
+    (bounding, "ISLANDS"),
+    (bounding, "REACH"),
+    (bounding, "HINT"),
+    (gauss, "HELD"),
+    (gauss, "AGREEMENT"),
+    (gauss, "MANY"),
+]
+CHANGED = 0.01
+"""Share of the area by which a scene must change to be printed."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Triangles that face outwards, and which of them bound a solid."""
+
+    mesh: TriangleMesh
+    bounds: NDArray[np.bool_]
+
+    def __add__(self, other: Scene) -> Scene:
+        return Scene(samples.union(self.mesh, other.mesh), np.concatenate([self.bounds, other.bounds]))
+
+
+Random = np.random.Generator
+
+
+def body(mesh: TriangleMesh) -> Scene:
+    return Scene(mesh, np.ones(mesh.n_faces, dtype=bool))
+
+
+def sheet(mesh: TriangleMesh) -> Scene:
+    return Scene(mesh, np.zeros(mesh.n_faces, dtype=bool))
+
+
+def rectangle(
+    corner: NDArray[np.float64], first: NDArray[np.float64], second: NDArray[np.float64], n: int = 8
+) -> TriangleMesh:
+    """A rectangle of n × n cells."""
+    steps = np.linspace(0, 1, n + 1)
+    u, v = np.meshgrid(steps, steps, indexing="ij")
+    points = corner + u[..., None] * first + v[..., None] * second
+    i = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    a, b, c, d = (rows.ravel() for rows in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]))
+    return TriangleMesh(points.reshape(-1, 3), np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
+
+
+def sides(
+    size: tuple[float, float, float], left_out: tuple[int, ...] = (), at: tuple[float, float, float] = (0, 0, 0)
+) -> TriangleMesh:
+    """Separate sides of a box, numbered −x, +x, −y, +y, −z, +z."""
+    made = []
+    for side in set(range(6)) - set(left_out):
+        axis, end = divmod(side, 2)
+        first, second = (np.eye(3)[(axis + k) % 3] * size[(axis + k) % 3] for k in (1, 2))
+        corner = np.array(at) + end * size[axis] * np.eye(3)[axis]
+        made.append(rectangle(corner, first, second) if end else rectangle(corner, second, first))
+    return samples.union(*made)
+
+
+def cards(rng: Random, n: int, width: float, height: float) -> TriangleMesh:
+    """Flat cards at random in a box of 2."""
+    made = []
+    for _ in range(n):
+        frame = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        made.append(rectangle(rng.uniform(-1, 1, 3), width * frame[0], height * frame[1], 2))
+    return samples.union(*made)
+
+
+def wavy() -> TriangleMesh:
+    flat = rectangle(np.zeros(3), np.array([2.0, 0, 0]), np.array([0, 2.0, 0]), 30)
+    heights = 0.15 * np.sin(5 * flat.vertices[:, 0]) * np.cos(4 * flat.vertices[:, 1])
+    return TriangleMesh(flat.vertices + np.c_[np.zeros((len(heights), 2)), heights], flat.faces)
+
+
+def part_of(mesh: TriangleMesh, kept: Callable[[NDArray[np.float64]], NDArray[np.bool_]]) -> TriangleMesh:
+    return TriangleMesh(mesh.vertices, mesh.faces[kept(mesh.vertices[mesh.faces].mean(axis=1))])
+
+
+def litter(rng: Random, n: int) -> TriangleMesh:
+    corners = rng.uniform(-1.5, 1.5, (n, 1, 3)) + 0.05 * rng.normal(size=(n, 3, 3))
+    return TriangleMesh(corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3))
+
+
+SCENES: dict[str, Callable[[Random], Scene]] = {
+    "ball, 30 % of the triangles gone": lambda rng: body(samples.without_faces(samples.sphere(3), 0.3)),
+    "ball, 75 % gone": lambda rng: body(samples.without_faces(samples.sphere(3), 0.75)),
+    "ball, 85 % gone": lambda rng: body(samples.without_faces(samples.sphere(3), 0.85)),
+    "loose noisy triangles of a torus": lambda rng: body(samples.soup(samples.torus(n_around=48, n_across=24), 0.01)),
+    "half a ball": lambda rng: body(part_of(samples.sphere(4), lambda at: at[:, 2] > 0)),
+    "torus with holes": lambda rng: body(samples.without_patches(samples.torus(), 4, 0.25)),
+    "six sides": lambda rng: body(sides((1, 0.8, 0.6))),
+    "five sides": lambda rng: body(sides((1, 0.8, 0.6), (5,))),
+    "four sides": lambda rng: body(sides((1, 0.8, 0.6), (1, 5))),
+    "thin plate of six sides": lambda rng: body(sides((1, 1, 0.04))),
+    "boxes without tops on a ground": lambda rng: (
+        body(samples.union(*(sides((0.5, 0.5, 0.4), (5,), (x, y, 0.05)) for x in range(4) for y in range(3))))
+        + sheet(rectangle(np.array([-1.0, -1, 0]), np.array([6.0, 0, 0]), np.array([0, 5.0, 0])))
+    ),
+    "ball among litter": lambda rng: body(samples.without_patches(samples.sphere(3), 2, 0.3)) + sheet(litter(rng, 60)),
+    "open box with cards in it": lambda rng: (
+        body(sides((2.4, 2.4, 2.4), (5,), (-1.2, -1.2, -1.2))) + sheet(cards(rng, 6, 0.3, 0.3))
+    ),
+    "14 cards": lambda rng: sheet(cards(rng, 14, 0.6, 0.6)),
+    "40 cards": lambda rng: sheet(cards(rng, 40, 0.5, 0.5)),
+    "150 cards": lambda rng: sheet(cards(rng, 150, 0.3, 0.3)),
+    "200 strips": lambda rng: sheet(cards(rng, 200, 0.6, 0.1)),
+    "wavy sheet": lambda rng: sheet(wavy()),
+    "two sheets, half a width apart": lambda rng: sheet(sides((1, 1, 0.5), (0, 1, 2, 3))),
+}
+
+
+def wrong(scene: Scene, rng: Random) -> float:
+    """Share of the area that is decided wrongly, half of the parts turned."""
+    parts = element_components(scene.mesh.faces)
+    turned = (rng.random(parts.max() + 1) < 0.5)[parts]
+    faces = np.where(turned[:, None], scene.mesh.faces[:, ::-1], scene.mesh.faces)
+    found = orientation(TriangleMesh(scene.mesh.vertices, faces))
+    outwards = found.turned == turned[found.faces]
+    right = np.where(scene.bounds[found.faces], outwards & ~found.undecided, found.undecided)
+    areas = np.linalg.norm(area_vectors(scene.mesh.vertices[scene.mesh.faces]), axis=1)[found.faces]
+    return float(areas[~right].sum() / areas.sum())
+
+
+def table(seeds: int) -> dict[str, float]:
+    """Mean share of the area that is wrong, of each scene."""
+    return {
+        name: float(
+            np.mean([wrong(make(np.random.default_rng(k)), np.random.default_rng(100 + k)) for k in range(seeds)])
+        )
+        for name, make in SCENES.items()
+    }
+
+
+def main(seeds: int = 2) -> None:
+    usual = table(seeds)
+    for name, share in usual.items():
+        print(f"{name:36s} {share:6.3f}")
+    for module, number in NUMBERS:
+        value = getattr(module, number)
+        for changed in (value / 2, (1 + value) / 2 if 0.5 < value < 1 else 2 * value):
+            setattr(module, number, type(value)(changed))
+            other = table(seeds)
+            setattr(module, number, value)
+            moved = [f"{name} {other[name]:.3f}" for name in usual if abs(other[name] - usual[name]) > CHANGED]
+            print(
+                f"{module.__name__.rpartition('.')[2]}.{number} {value:g} → {changed:g}: {'; '.join(moved) or 'nothing'}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
