@@ -440,3 +440,14 @@ def test_the_note_tells_what_was_done():
     assert str(found.turned_faces) in str(found.note) and str(found.merged_faces) in str(found.note)
     assert found.note.as_dict()["turned_area"] == found.turned_area
     assert str(sh.orientation(samples.sphere(2)).note) != str(found.note)
+
+
+@pytest.mark.parametrize("thickness", [0.05, 0.035, 0.01])
+def test_walls_of_thin_shells_with_a_hole_face_away_from_each_other(thickness):
+    """Also where the walls are nearer to each other than the places at which levels are asked for."""
+    ball = samples.sphere(4)
+    outer = sh.TriangleMesh(ball.vertices, ball.faces[ball.vertices[ball.faces].mean(axis=1)[:, 2] < 0.9])
+    inner = sh.TriangleMesh((1 - thickness) * outer.vertices, outer.faces)
+    found = sh.orientation(samples.union(outer, inner))
+    np.testing.assert_array_equal(found.turned, np.arange(2 * outer.n_faces) >= outer.n_faces)
+    assert found.undecided_parts == 0

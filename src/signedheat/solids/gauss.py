@@ -344,7 +344,8 @@ def agreement(
 ) -> sparse.csr_array:
     """(k, k) Laplacian with signs, times μ, of pieces of which neighbours lie in one plane, more or less.
 
-    Places have normals, and a share of the area; those off each other's plane count less.
+    Places have normals, and a share of the area; those off each other's plane count less, and so do those of two
+    pieces that have many: these know for themselves.
     """
     n, k = len(places), min(NEIGHBORS, len(places) - 1)
     near = scipy.spatial.cKDTree(places).query(places, k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
@@ -357,7 +358,8 @@ def agreement(
     strength = np.maximum(0.0, 1.0 - 2.0 * np.maximum(*rises)) * cosines * np.abs(cosines)
     total = np.bincount(tails, np.abs(strength), n) + np.bincount(heads, np.abs(strength), n)
     scale = np.sqrt(shares / np.maximum(total, 1e-12))
-    strength *= AGREEMENT * scale[tails] * scale[heads]
+    counts = np.bincount(owners)[owners]  # places of two large pieces may be farther apart than the pieces are
+    strength *= AGREEMENT * scale[tails] * scale[heads] / np.minimum(counts[tails], counts[heads])
     size = int(owners.max()) + 1
     links = sparse.coo_array((strength, (owners[tails], owners[heads])), shape=(size, size)).tocsr()
     links = links + links.T
