@@ -12,7 +12,7 @@ from ..mesh.components import connected_components, sums_of
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import unit
-from ..mesh.welding import distinct_rows
+from ..mesh.welding import coincident_faces, distinct_rows
 from .winding import DEPTH, Windings
 
 SAMPLES = 3
@@ -32,7 +32,7 @@ class Regions:
     behind, ahead : (m,) bool
         Whether it is inside behind the face, and in front of it.
     doubled : (m,) bool
-        Whether a region before covers the same place and faces the same way.
+        Whether a face or a region before covers the same place and faces the same way.
     """
 
     behind: NDArray[np.bool_]
@@ -51,7 +51,13 @@ class Regions:
         triangles = pieces.points[pieces.faces]
         vectors = area_vectors(triangles)
         behind, ahead = _sides(triangles, vectors, labels, windings)
-        return cls(behind, ahead, _doubled(table, pieces.cells, triangles, vectors))
+        doubled = _doubled(table, pieces.cells, triangles, vectors)
+        # cells may overlap in part: of copies with the inside on the same side of them the first stays
+        first, backwards = coincident_faces(pieces.faces.ravel(), np.arange(0, pieces.faces.size + 1, 3))
+        walls = np.flatnonzero((behind != ahead) & ~doubled & (first >= 0))
+        stays = np.unique(2 * first[walls] + (backwards != ahead)[walls], return_index=True)[1]
+        doubled[np.delete(walls, stays)] = True
+        return cls(behind, ahead, doubled)
 
 
 def _sides(
