@@ -172,11 +172,9 @@ def main(seeds: int = 2) -> None:
             setattr(module, number, type(value)(changed))
             other = table(seeds)
             setattr(module, number, value)
-            moved = [f"{name} {other[name]:.3f}" for name in usual if abs(other[name] - usual[name]) > CHANGED]
-            print(
-                f"{module.__name__.rpartition('.')[2]}.{number} {value:g} → {changed:g}: {'; '.join(moved) or 'nothing'}",
-                flush=True,
-            )
+            moved = [f"{scene} {other[scene]:.3f}" for scene in usual if abs(other[scene] - usual[scene]) > CHANGED]
+            name = f"{module.__name__.rpartition('.')[2]}.{number}"
+            print(f"{name} {value:g} → {changed:g}: {'; '.join(moved) or 'nothing'}", flush=True)
 
 
 if __name__ == "__main__":

@@ -111,25 +111,25 @@ def _lost(offset: Offset, grid: Grid, vertices: NDArray[np.float64]) -> tuple[ND
     Places are taken on the faces of the solid, and moved along their normals, either way, if that leads to the surface.
     """
     features = offset.solid.tree.features
-    faces = (
-        np.arange(len(features.faces)) if np.any(offset.reach) else np.flatnonzero(offset.solid.bounding[features.ids])
-    )
+    moved = callable(offset.reach) or offset.reach != 0
+    faces = np.arange(len(features.faces)) if moved else np.flatnonzero(offset.solid.bounding[features.ids])
     if not len(faces):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool)
-    parts = element_components(features.faces[faces])
+    parts = element_components(features.faces[faces].astype(np.int64))
     chosen, bases = sampled(Pieces(features.corners[faces].reshape(-1, 3, 3), parts), SAMPLED)
     reach = offset.reach(bases) if callable(offset.reach) else np.full(len(bases), offset.reach)
     moves = reach[:, None] * features.face_normals[faces[chosen]]
     places, parts = np.concatenate([bases + moves, bases - moves]), np.tile(parts[chosen], 2)
     cells = np.floor((places - grid.origin) / grid.spacing).astype(np.int64)
     on_surface = ((cells >= 0) & (cells < np.array(grid.shape) - 1)).all(axis=1)
-    if np.any(reach):
+    if moved:
         on_surface &= np.abs(offset.distance(places)) < 1e-3 * float(grid.spacing.min())
     size = np.array(grid.shape) + 2
     filled = np.floor((vertices - grid.origin) / grid.spacing).astype(np.int64) + 1
     around = (cells[on_surface, None] + AROUND + 1).reshape(-1, 3)
     near = np.isin(*(np.ravel_multi_index(tuple(places.T), size, "clip") for places in (around, filled)))
-    return parts[on_surface], ~near.reshape(-1, len(AROUND)).any(axis=1)
+    lost: NDArray[np.bool_] = ~near.reshape(-1, len(AROUND)).any(axis=1)
+    return parts[on_surface], lost
 
 
 def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCells]:
