@@ -298,6 +298,7 @@ def test_archives_of_solids_and_fields_are_taken_for_shapes(tmp_path, ball, caps
     assert main(["sample", names[0], "-n", "50", "-o", moved, "--resolution", "12", "--units", "m:cm"]) == 0
     assert np.load(moved)["radius"] > 100
     assert "Solid" in succeed(capsys, "info", names[0])
+    assert main(["batch", *names, "-o", str(tmp_path / "out"), "--info", "--workers", "1"]) == 0
 
 
 @pytest.mark.parametrize(("name", "volume"), [("union", 12.0), ("intersect", 4.0), ("subtract", 4.0)])

@@ -11,6 +11,7 @@ from typing import Literal, cast
 from ..constraints import Constraint, ZeroSet
 from ..distances import grid_around, plain_distance
 from ..errors import FileFormatError, InexactWarning, SignedHeatError
+from ..foreign import as_shape
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_field import GridField
 from ..io.field_files import BAND_FORMATS
@@ -183,7 +184,7 @@ class Job:
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
         """Write the results of one shape to files that begin with `stem`; return figures and important notes."""
         shape = read(path)
-        figures: dict[str, object] = {"info": shape_figures(shape)} if self.info else {}
+        figures: dict[str, object] = {"info": shape_figures(as_shape(shape))} if self.info else {}
         if not self._measures:
             return figures
         if isinstance(shape, DigitalSurface):

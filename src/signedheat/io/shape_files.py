@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import cast
 
 from ..errors import FileFormatError
 from ..exchange import Elements
@@ -33,7 +34,7 @@ def read_archive(path: PathLike) -> Solid | TriangleMesh:
     field = load_field(path)
     if not isinstance(field, GridField) or field.grid.dimension != 3:
         raise FileFormatError("it has no solid, and no field on a grid in space", remedy="load it by `load_field`")
-    return field.solid if isinstance(field.solid, Solid) else field.offset(0.0)
+    return field.solid if isinstance(field.solid, Solid) else cast("TriangleMesh", field.offset(0.0))
 
 
 READERS: dict[str, Callable[[PathLike], Elements | Shape | Solid]] = {

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -652,5 +652,5 @@ def _(shape: Solid, linear: NDArray[np.float64], move: NDArray[np.float64]) -> S
         return np.ascontiguousarray(places[:, corners])
 
     triangles, closing = moved(shape.triangles), moved(shape.windings.triangles)
-    source = None if shape.source is None else transformed(shape.source, linear, move)
+    source = None if shape.source is None else cast("TriangleMesh", transformed(shape.source, linear, move))
     return replace(shape, triangles=triangles, windings=Windings(closing), source=source)
