@@ -231,7 +231,7 @@ def _with_segments(
 ) -> tuple[Lines, Records]:
     """Add the segments along which pairs of faces meet, from the points that they have in common."""
     members = _members(faces, table, lines, np.unique(pairs))
-    found, sides, within, on = _segments(
+    found, sides = _segments(
         points,
         members.starts(len(faces)),
         members.points,
@@ -239,20 +239,13 @@ def _with_segments(
         lines.ends,
         lines.on.starts(len(lines.ends)),
         lines.on.points,
-        lines.on.along(points, lines.ends).points,
         pairs,
         STRAIGHT * slack,
     )
     own = found[:, 1] >= len(lines.ends)
     ends = np.zeros((len(sides), 2), dtype=np.int64)
     ends[found[own, 1] - len(lines.ends)] = found[own, 2:]
-    lines = Lines(
-        np.concatenate([lines.ends, ends]),
-        Incidence.of(lines.on, tuple(on.T)),
-        Incidence.of(lines.within, tuple(within.T)),
-        sides,
-    )
-    return lines, Records(*found.T)
+    return lines._replace(ends=np.concatenate([lines.ends, ends]), sides=sides), Records(*found.T)
 
 
 def _with_crossings(
@@ -575,13 +568,11 @@ def _segments(
     ends: NDArray[np.int64],
     line_starts: NDArray[np.int64],
     on: NDArray[np.int64],
-    along: NDArray[np.int64],
     pairs: NDArray[np.int64],
     straight: float,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Parts of lines in faces, as rows of face, line and ends; faces of new lines; and points in faces and on edges."""
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Parts of lines in faces, as rows of face, line and ends; and the faces of new lines."""
     records, sides = [(0, 0, 0, 0)], [(0, 0)]
-    within, extra = [(0, 0)], [(0, 0)]
     n_lines = len(ends)
     for r in range(len(pairs)):
         f, g = pairs[r, 0], pairs[r, 1]
@@ -650,12 +641,7 @@ def _segments(
                 if first == last or _shared_edge(face_edges, ends, line_starts, on, outer, first, last) >= 0:
                     continue
                 records.append((outer, e, first, last))
-    return (
-        np.array(records)[1:],
-        np.array(sides)[1:],
-        np.array(within)[1:],
-        np.array(extra)[1:],
-    )
+    return np.array(records)[1:], np.array(sides)[1:]
 
 
 @compiled
