@@ -78,7 +78,7 @@ def test_blocks_of_shapes_that_are_far_larger_than_the_grid(reach):
     rng = np.random.default_rng(0)
     positions = rng.uniform(-reach, reach, (40, 3))
     vectors = rng.normal(size=(40, 3))
-    means, sums = blocks_of_dipoles(np.repeat(positions, 2, axis=0), np.repeat(vectors, 2, axis=0), 3)
+    means, sums = blocks_of_dipoles(np.repeat(positions, 2, axis=0), np.repeat(vectors, 2, axis=0))
     order, wanted = np.lexsort(means.T[::-1]), np.lexsort(positions.T[::-1])
     np.testing.assert_allclose(means[order], positions[wanted], rtol=1e-12)
     np.testing.assert_allclose(sums[order], 2 * vectors[wanted], rtol=1e-12)

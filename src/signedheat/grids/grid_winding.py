@@ -42,7 +42,7 @@ def winding_numbers(
     shape = tuple(n + below + above for n, (below, above) in zip(shape, room, strict=True))
     positions = positions + [below for below, _ in room]
     right = _sources(nodes, shape, [below for below, _ in room], spacing)
-    dipoles, strengths = blocks_of_dipoles(positions, vectors, dimension)
+    dipoles, strengths = blocks_of_dipoles(positions, vectors)
     walls = [_wall(axis, end, shape) for axis in range(dimension) for end in (0, 1)]
     core = CORE * float(spacing.max())
     with ThreadPoolExecutor(n_threads()) as pool:
@@ -74,7 +74,7 @@ def _room(nodes: NodeSources, dimension: int) -> list[tuple[int, int]]:
 
 
 def blocks_of_dipoles(
-    positions: NDArray[np.float64], vectors: NDArray[np.float64], dimension: int
+    positions: NDArray[np.float64], vectors: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Mean positions and sums of the area vectors in each block of `BLOCK` cells."""
     blocks = np.floor(positions / BLOCK).astype(np.int64)

@@ -120,7 +120,7 @@ def arranged(
     )
     lines = lines.renamed(_welded(points, np.concatenate([busy, np.unique(ids)]), slack))
     lines, records = _with_segments(points, faces, table, pairs, lines, slack)
-    points, lines, records = _with_crossings(points, faces, lines, records, slack, busy)
+    points, lines, records = _with_crossings(points, lines, records, slack, busy)
     return _divided(points, faces, proper, table, lines, records)
 
 
@@ -250,7 +250,6 @@ def _with_segments(
 
 def _with_crossings(
     points: NDArray[np.float64],
-    faces: NDArray[np.int64],
     lines: Lines,
     records: Records,
     slack: float,

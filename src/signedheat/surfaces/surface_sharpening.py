@@ -187,7 +187,7 @@ def nearest_curve(
     side = np.where(bounded, sides.regions, np.where(is_near, sides.nearby, 0))
     turned = (side != 0) & (np.sign(values) != side) & ~np.isnan(values)
     values = np.where(turned, np.copysign(distance, side), values)
-    missing, more = missing_parts(triangles, values, parts, there, spacing, tolerance, report)
+    missing, more = missing_parts(triangles, values, parts, there, spacing, report)
     counts += more
     completed = float(missing.lengths.sum())
     if completed > 0:
@@ -214,7 +214,6 @@ def missing_parts(
     parts: Sequence[CurveSegments],
     there: CurvesThere,
     spacing: float,
-    tolerance: float,
     report: Report | None,
 ) -> tuple[PlacedSegments, list[int]]:
     """The parts of the zero set of φ that complete the curves; and the number of windows of each search."""
