@@ -14,8 +14,7 @@ from ..errors import SignedHeatError
 from ..progress import Announcement
 from . import cholmod, pardiso
 from .cholmod import CholmodFactor
-from .matrices import upper_triangle, whole
-from .ordering import elimination_order
+from .ordering import elimination_order, upper_triangle, whole
 from .pardiso import PardisoFactor
 from .superlu import SuperLUFactor
 

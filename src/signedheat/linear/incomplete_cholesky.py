@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from ..compiled import compiled
 from .conjugate_gradients import conjugate_gradients
-from .matrices import whole
+from .ordering import whole
 
 SMALLEST = 1e-290
 """Unknowns below this have lost bits to underflow, and are left out of the stopping criterion."""

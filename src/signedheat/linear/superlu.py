@@ -15,8 +15,7 @@ from scipy.sparse.linalg import splu
 from threadpoolctl import threadpool_limits
 
 from ..errors import FactorizationError
-from .matrices import whole
-from .ordering import elimination_order
+from .ordering import elimination_order, whole
 
 
 class SuperLUFactor:
