@@ -47,34 +47,13 @@ class _Line:
 
 @dataclass(frozen=True, eq=False)
 class Triangulation:
-    """Triangles on points of a triangle, whose corners are the first three points, counter-clockwise.
+    """Triangles on points of a triangle, whose corners are the first three points, counter-clockwise."""
 
-    Attributes
-    ----------
-    points : list of (float, float)
-        Positions.
-    apex : dict from directed edges to int
-        The corner opposite each directed edge, in the triangle that runs along it.
-    leaving : dict from points to int
-        The end of one of the directed edges that leave each point.
-    parts : dict from directed edges to lists of int
-        The points along edges that are part of a segment, after the first: more than one where others cross them.
-
-    Examples
-    --------
-    Two segments that cross:
-
-    >>> cut = Triangulation.of([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], [[], [], []])
-    >>> cut.insert((0.2, 0.2)), cut.insert((0.6, 0.2))
-    (3, 4)
-    >>> ways = [cut.connect(0, 4), cut.connect(1, 3)]
-    >>> [cut.along(way) for way in ways]
-    [[0, 5, 4], [1, 5, 3]]
-    """
-
-    points: list[Point]
+    points: list[Point]  # positions
+    # the corner opposite each directed edge, in the triangle that runs along it
     apex: dict[Edge, int] = field(default_factory=dict)
-    leaving: dict[int, int] = field(default_factory=dict)
+    leaving: dict[int, int] = field(default_factory=dict)  # the end of one of the directed edges that leave each point
+    # the points along edges that are part of a segment, after the first: more than one where others cross them
     parts: dict[Edge, list[int]] = field(default_factory=dict)
 
     @classmethod
