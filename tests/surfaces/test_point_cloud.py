@@ -365,6 +365,19 @@ def test_of_points_in_a_plane_the_upper_side_is_out_in_any_order():
         assert cloud.surface_normals[:, 2] == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("sides", [(1, 1, 1), (1, 0.6, 0.3)])
+def test_points_on_the_lattices_of_a_box_face_outwards_in_any_order(sides):
+    """Tets behind the faces of the hull are flat there, and on which side of them is in must not hang on rounding."""
+    side = np.linspace(-1, 1, 7)
+    lattice = np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3)
+    points = lattice[np.abs(lattice).max(axis=1) == 1] * sides
+    first = sh.PointCloud(points).surface_normals
+    assert (first * points).sum(axis=1).min() > 0
+    for seed in range(5):
+        order = np.random.default_rng(seed).permutation(len(points))
+        assert np.array_equal(sh.PointCloud(points[order]).surface_normals, first[order])
+
+
 def test_outliers_do_not_turn_normals():
     points = cases.sphere_points(1500)
     far = np.array([[3.0, 0, 0], [0, 2.5, 0], [0.1, 0, 0.1]])

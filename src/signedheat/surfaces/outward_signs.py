@@ -239,12 +239,12 @@ def _ball_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: ND
 
 
 def _hull_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: scipy.spatial.Delaunay) -> Links:
+    """Links with the outside, from the faces of the hull: flat tets behind them do not tell the inner side."""
     tet, opposite = np.nonzero(tets.neighbors < 0)
     faces = tets.simplices[tet[:, None], (opposite[:, None] + [1, 2, 3]) % 4].astype(np.int64)
     a, b, c = places[faces].transpose(1, 0, 2)
     outward = np.cross(b - a, c - a)
-    inner = places[tets.simplices[tet, opposite]] - a
-    length = np.linalg.norm(outward, axis=1) * -np.sign((outward * inner).sum(axis=1))
+    length = np.linalg.norm(outward, axis=1) * np.sign((outward * (a - places.mean(axis=0))).sum(axis=1))
     outward /= np.where(length != 0, length, np.inf)[:, None]
     weights = _confidence(np.einsum("fj,fkj->fk", outward, axes[faces]))
     return Links(faces.ravel(), np.full(faces.size, len(places)), weights.ravel())

@@ -138,13 +138,14 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @cached_property
     def _distinct(self) -> tuple[NDArray[np.int64], LocalTriangulations]:
-        """Ids of the distinct points, and their local triangulations."""
+        """Ids of the distinct points, sorted by coordinates, and their local triangulations."""
         if self.points.shape[1] != 3:
             raise GeometryError(
                 f"distance is measured on point clouds in space: points need 3 coordinates, not {self.points.shape[1]}",
                 element="points",
             )
         ids = np.unique(self.representatives)
+        ids = ids[np.lexsort(self.points[ids].T)]  # so that the order in which points are given decides nothing
         points, given = self.points[ids], None if self.normals is None else self.normals[ids]
         if len(ids) < 3:
             raise GeometryError(
