@@ -40,6 +40,12 @@ def test_solids_on_tets_are_measured_to_the_shape(tets):
     assert field.diagnostics.note(FacesRestored).restored_faces == 1
 
 
+def test_one_call_on_tets_gives_what_the_solid_says(tets):
+    holed = samples.without_patches(sphere(3), 2, 0.4, seed=1)
+    field = sh.signed_distance(holed, tets)
+    assert np.abs(field.values - sh.complete(holed).distance(tets.vertices)).max() < 1e-12
+
+
 def test_where_surface_is_missing_its_zero_set_stands_in(tets):
     ball = sphere(4)
     holed = sh.TriangleMesh(ball.vertices, ball.faces[(ball.vertices[ball.faces].mean(axis=1) @ [1, 2, 2]) < 3 * 0.8])

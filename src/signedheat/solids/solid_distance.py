@@ -45,7 +45,8 @@ def distance_to_shapes(
 ) -> GridField | TetField:
     """Compute the signed distance to shapes in space: see `signed_distance`.
 
-    On tets, distance is along paths in the domain, with the signs of φ.
+    On tets, distance is along paths around walls, with the signs of the solid: where none is in between, it is the
+    solid's.
     """
     options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
     method = Heat(checked(constraint), positive_number(diffusion, "diffusion"))
@@ -79,9 +80,9 @@ def completed_distance(
     progress = within(progress, 0.5, 1.0)
     if isinstance(domain, Grid) and in_space:
         return solid.field(grid=domain, band=band, progress=progress)
-    source = joined if isinstance(joined, PointCloud) else solid.boundary
-    solver = SignedHeatSolver(domain, method.diffusion, progress)
-    phi: GridField | TetField = solver.distance(source, method.constraint)  # type: ignore[assignment]
-    if isinstance(phi, TetField):
-        phi = sharpen(phi, solid.boundary)
+    if isinstance(domain, TetMesh):
+        phi: GridField | TetField = sharpen(TetField(domain, solid.distance(domain.vertices)), solid.boundary)
+    else:
+        source = joined if isinstance(joined, PointCloud) else solid.boundary
+        phi = SignedHeatSolver(domain, method.diffusion, progress).distance(source, method.constraint)  # type: ignore[assignment]
     return replace(phi, diagnostics=phi.diagnostics.noting(*solid.diagnostics.notes))
