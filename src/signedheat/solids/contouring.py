@@ -128,7 +128,7 @@ def _lost(offset: Offset, grid: Grid, vertices: NDArray[np.float64]) -> tuple[ND
     filled = np.floor((vertices - grid.origin) / grid.spacing).astype(np.int64) + 1
     around = (cells[on_surface, None] + AROUND + 1).reshape(-1, 3)
     near = np.isin(*(np.ravel_multi_index(tuple(places.T), size, "clip") for places in (around, filled)))
-    lost: NDArray[np.bool_] = ~near.reshape(-1, len(AROUND)).any(axis=1)
+    lost = np.asarray(~near.reshape(-1, len(AROUND)).any(axis=1))
     return parts[on_surface], lost
 
 
