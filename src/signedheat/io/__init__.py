@@ -1,4 +1,4 @@
-"""Reading and writing of shapes, curves and fields."""
+"""Read and write shapes, curves and fields."""
 
 from .curve_files import CURVE_FORMATS, read_curves, write_curves
 from .drawing_files import POLYLINE_FORMATS, read_polylines, write_polylines

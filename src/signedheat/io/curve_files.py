@@ -1,4 +1,4 @@
-"""Reading and writing of curves on surfaces: JSON with vertex ids and weights, OBJ line elements, tables of points."""
+"""Read and write curves on surfaces: JSON with vertex ids and weights, OBJ line elements, tables of points."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ KINDS = SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_p
 
 
 class Node(NamedTuple):
-    """A point in a file: up to three vertices and their weights."""
+    """A point in a file, given by up to three vertices and their weights."""
 
     vertices: tuple[int, ...]
     weights: tuple[float, ...]
@@ -87,7 +87,9 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
         if strict:
             refuse_gaps(sources, domain.triangulation)
     if not sources:
-        raise FileFormatError("there is no curve and no point", remedy="check that it is a file of curves", path=path)
+        raise FileFormatError(
+            "the file has neither curves nor points", remedy="check that it is a file of curves", path=path
+        )
     return sources
 
 
@@ -146,7 +148,7 @@ def write_curves(
 
 
 def surface_in_space(domain: EmbeddedSurface | ForeignShape) -> EmbeddedSurface:
-    """The surface that an object of another package describes; a surface as it is."""
+    """Convert an object of another package to a surface; a surface is returned unchanged."""
     shape = converted(domain)
     if not isinstance(shape, TriangleMesh | PolygonMesh | PointCloud | DigitalSurface):
         raise UnsupportedTypeError(f"curves lie on surfaces, not on a {type(shape).__name__}", element="domain")
@@ -195,7 +197,7 @@ def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[NDArray[np
 
 
 def polylines_of_segments(kind: str, nodes: list[Node], segments: Sequence[tuple[int, int]]) -> list[Group]:
-    """Segments between nodes, joined to curves; nodes at the same position count as one."""
+    """Join segments between nodes to curves; nodes at the same position are identified."""
     bad = [s for s in segments if not all(0 <= i < len(nodes) for i in s)]
     if bad:
         raise FileFormatError(
@@ -221,7 +223,7 @@ def polylines_of_segments(kind: str, nodes: list[Node], segments: Sequence[tuple
 
 
 def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Curve]:
-    """Vertex ids and weights, independent of any order of edges; or polylines in space."""
+    """Read vertex ids and weights, or polylines in space, from JSON."""
     try:
         content = json.loads(text(path))
         if "polylines" not in content:
@@ -233,7 +235,7 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         if isinstance(error, SignedHeatError):
             raise
-        raise FileFormatError(f"these are no curves with vertex ids and weights ({error!r})") from error
+        raise FileFormatError(f"these are not curves with vertex ids and weights ({error!r})") from error
     return [domain.polyline(points, closed=closed) for points, closed in lines]
 
 

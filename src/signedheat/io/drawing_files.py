@@ -1,4 +1,4 @@
-"""Reading and writing of polylines in the plane: drawings (SVG) and tables of points (CSV)."""
+"""Read and write polylines in the plane: drawings (SVG) and tables of points (CSV)."""
 
 from __future__ import annotations
 

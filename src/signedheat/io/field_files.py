@@ -1,4 +1,4 @@
-"""Fields to files and back, exact to the last bit: on grids, in bands, on surfaces and on tets."""
+"""Read and write fields on grids, in bands, on surfaces and on tets, without loss."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from .vdb import write_vdb
 from .vtk_xml import read_vtp, write_vti, write_vtp
 
 PREFIX = "solid_"
-"""Of the names of the arrays of a solid, in the archive of a field that holds it."""
+"""Prefix of the arrays of a solid in the archive of its field."""
 CONVENTION = (
     "signed distance, positive on the side that the normals point to (negative inside an outward-oriented shape); "
     "values[i, j, k] at origin + (i, j, k) * spacing, axes x, y, z, in the units of the shape"
@@ -48,7 +48,7 @@ OF_BANDS = (
 )
 CLIPPED = "signed distance, negative inside, in the units of the shape; beyond the band plus or minus its half width"
 BYTES_PER_NODE = 20.0
-"""Of bands written whole: values, their copy in the order of the file, and what is written."""
+"""Memory per node to write a band as a whole grid."""
 _DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}
 """Numbers of axes that a format supports; the others support any number."""
 
@@ -76,10 +76,12 @@ def save_field(field: GridField, path: PathLike) -> None:
     same name next to it, ``.vdb`` (OpenVDB; single precision; not read back).
     """
     if not isinstance(field, GridField):
-        raise FileFormatError(f"a {type(field).__name__} is no field on a grid: it has formats of its own", path=path)
+        raise FileFormatError(f"a {type(field).__name__} is not a field on a grid: it has other formats", path=path)
     if field.grid.dimension not in _DIMENSIONS.get(extension(path), (field.grid.dimension,)):
         raise FileFormatError(
-            f"the field has {field.grid.dimension} axes, too many or few", remedy="save it as .npz", path=path
+            f"the field has {field.grid.dimension} axes, which the format does not support",
+            remedy="save it as .npz",
+            path=path,
         )
     ensure_field_writable(path, in_band=field.blocks is not None)
     write = (_GRID_WRITERS if field.blocks is None else _BAND_WRITERS)[extension(path)]
@@ -94,12 +96,12 @@ def save_field(field: GridField, path: PathLike) -> None:
 
 
 def ensure_field_writable(path: PathLike, in_band: bool = False) -> None:
-    """Check before a long computation that a field can be written, in a band or whole."""
+    """Check that a field can be written, in a band or whole, before a long computation."""
     ensure_writable(path, BAND_FORMATS if in_band else FIELD_FORMATS, "a field in a band" if in_band else "a field")
 
 
 def load_field(path: PathLike) -> Field:
-    """Read a field, exactly as it was written: values and transform.
+    """Read a field exactly as it was written, with values and transform.
 
     Parameters
     ----------
@@ -144,17 +146,17 @@ def load_field(path: PathLike) -> Field:
         )
     image = read_image(path, FIELD_FORMATS - {".vdb"}, "a field")
     if extension(path) == ".npy":
-        contents(Path(path).with_suffix(".json"))  # which says where the values are
+        contents(Path(path).with_suffix(".json"))  # the grid of the values
     with reading(path):
         if image.values.dtype == bool:
-            raise FileFormatError("the values are no real numbers but bool: it holds no field")
+            raise FileFormatError("the values are booleans, not real numbers: this is not a field")
         grid = _made(Grid, image.origin, image.spacing, image.values.shape)
         solid = _held_solid(path) if extension(path) == ".npz" else None
         return _made(GridField, grid, np.ascontiguousarray(image.values), confidence=image.confidence, solid=solid)
 
 
 def _made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
-    """A grid or a field of what a file holds; what is wrong with it is wrong with the file."""
+    """Construct a grid or field from a file, and convert errors to errors of the file."""
     try:
         return kind(*parts, **options)
     except GeometryError as error:
@@ -167,7 +169,7 @@ def load_vertex_field(path: PathLike) -> VertexField:
         if extension(path) in _VALUES:
             found = _VALUES[extension(path)](path, (NAME,))
             if NAME not in found.values:
-                raise FileFormatError(f"its vertices have no {NAME}: it holds a shape, and no field")
+                raise FileFormatError(f"its vertices have no {NAME}: it holds a shape, not a field")
             return VertexField(cast("SurfaceShape", shape_of(found)), np.asarray(found.values[NAME], np.float64))
         arrays = read_npz(path, ("faces", "offsets", "normals"), needed=("vertices", "values"))
         vertices, values = arrays["vertices"], arrays["values"]

@@ -1,7 +1,7 @@
-"""The one place where files are opened, sized and replaced.
+"""Open, check and replace files, for all readers and writers.
 
-Whatever is read is a regular file that fits into memory, and whatever goes wrong in a parser is an error that names the
-file. Whatever is written is written next to it, with the permissions that it will have, and renamed when it is whole.
+Only regular files that fit in memory are read, and any exception of a parser becomes an error that names the file.
+Files are written atomically: to a temporary file with the final permissions, which is then renamed.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ PathLike = str | os.PathLike[str]
 T = TypeVar("T")
 PACKAGE = f"{__package__.partition('.')[0]}."
 TAKEN = {".off": 14, ".stl": 5, ".xyz": 4, ".ply": 2}
-"""Bytes that a shape takes while it is read for each byte of its file, measured with some hundred thousand faces; less
-where files may hold more than positions and faces. Of other formats the parts that are read first say more."""
+"""Measured memory to read a shape per byte of its file, reduced for formats that hold more than positions and faces.
+For other formats, readers estimate memory from the first parts of the file."""
 READING_MODULES = f"{__package__}.", f"{PACKAGE}packages"
-"""Modules that read, and that by which they call other packages."""
+"""Prefixes of the modules that read files or call other packages to do so."""
 
 
 def extension(path: PathLike) -> str:
-    """The extension of a file name in lower case, with the dot: ``".stl"``; of packed files both, ``".nii.gz"``."""
+    """The extension of a file name in lower case, such as ``".stl"`` or ``".nii.gz"``."""
     suffixes = [suffix.lower() for suffix in Path(path).suffixes[-2:]]
     return "".join(suffixes if suffixes[-1:] == [".gz"] else suffixes[-1:])
 
 
 def format_for(path: PathLike, formats: Mapping[str, T], purpose: str) -> T:
-    """What a table of formats has for the extension of a file; `FileFormatError` if that is not in it."""
+    """Look up the extension of a file in a table of formats; raise `FileFormatError` if it is missing."""
     ending = extension(path)
     if ending not in formats:
         cause = f"'{ending}' is not a known format" if ending else "the name has no extension"
@@ -50,7 +50,7 @@ def format_for(path: PathLike, formats: Mapping[str, T], purpose: str) -> T:
 
 
 def distinct_names(numbers: Sequence[float]) -> list[str]:
-    """Numbers with their signs, for names of files: in six digits, or in as many as make them distinct.
+    """Format numbers with signs for names of files, with at least six digits and enough to be distinct.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def distinct_names(numbers: Sequence[float]) -> list[str]:
 
 
 def damaged(cause: str, element: str | None = None) -> FileFormatError:
-    """The error for a file that is truncated or damaged; `reading` says which file it is."""
+    """The error for a truncated or damaged file; `reading` adds the name of the file."""
     return FileFormatError(cause, remedy="write or download it again", element=element)
 
 
@@ -77,9 +77,9 @@ def refuse_kind(kind: str, path: PathLike, holds: str, instead: str) -> FileForm
 
 @contextmanager
 def reading(path: PathLike) -> Iterator[None]:
-    """A context in which every exception of a parser, though none of our other code, becomes an error of the file."""
+    """Convert exceptions of parsers, but not of other code of this package, to errors that name the file."""
     try:
-        with np.errstate(all="ignore"):  # values are looked at by the shapes and fields that are made of them
+        with np.errstate(all="ignore"):  # shapes and fields check their values
             yield
     except SignedHeatError as error:
         if error.path is not None:
@@ -87,19 +87,19 @@ def reading(path: PathLike) -> Iterator[None]:
         raise error.at(path) from error
     except MemoryError as error:
         raise MemoryLimitError(
-            "what it announces does not fit into memory", remedy="check that it is not damaged", path=path
+            "its announced contents do not fit in memory", remedy="check that it is not damaged", path=path
         ) from error
-    except Exception as error:  # parsers, ours and those of others, meet damage with exceptions of any type
+    except Exception as error:  # damaged files make parsers raise exceptions of any type
         if _is_ours(error):
             raise
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileFormatError(
-            f"it is damaged, or of another kind ({reason:.200})", remedy="write or download it again", path=path
+            f"it is damaged or of another kind ({reason:.200})", remedy="write or download it again", path=path
         ) from error
 
 
 def _is_ours(error: BaseException) -> bool:
-    """Whether an exception comes from our code beyond the readers, or from what that calls."""
+    """Whether the last frame of this package in the traceback lies outside the readers."""
     names = [str(frame.f_globals.get("__name__")) for frame, _ in walk_tb(error.__traceback__)]
     ours = [name for name in names if name.startswith(PACKAGE)]
     return bool(ours) and not ours[-1].startswith(READING_MODULES)
@@ -116,16 +116,16 @@ def contents(path: PathLike) -> bytes:
 
 
 def size_of(path: PathLike) -> int:
-    """Bytes of a file that another package reads; what is missing, or no regular file, is refused as by `contents`."""
+    """Size in bytes of a file that another package reads; refuses the same files as `contents`."""
     with _opened(path) as (_, size):
         return size
 
 
 @contextmanager
 def _opened(path: PathLike) -> Iterator[tuple[BinaryIO, int]]:
-    """A regular file, and its size."""
+    """Open a regular file, and yield it with its size."""
     try:
-        # without waiting, as for the writer of a pipe, until it is known what it is
+        # O_NONBLOCK, so that opening a pipe does not wait for its writer
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))) as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
@@ -139,14 +139,14 @@ def _opened(path: PathLike) -> Iterator[tuple[BinaryIO, int]]:
         raise FileFormatError(
             f"cannot be read ({error.strerror})", remedy="check its permissions", path=path
         ) from error
-    except ValueError as error:  # a name with a null character
+    except ValueError as error:  # the name holds a null character
         if isinstance(error, SignedHeatError):
             raise
-        raise FileFormatError(f"this is no name of a file ({error})", remedy="check the name", path=path) from error
+        raise FileFormatError(f"this is not a valid file name ({error})", remedy="check the name", path=path) from error
 
 
 def companion_contents(path: PathLike, name: str) -> bytes:
-    """The bytes of a file that another one names, which must lie in the same folder or below it."""
+    """The bytes of a file that another file names, which must lie in the same folder or below it."""
     folder = os.path.realpath(Path(path).parent)
     named = os.path.realpath(os.path.join(folder, name))
     if os.path.isabs(name) or os.path.commonpath([folder, named]) != folder:
@@ -157,18 +157,18 @@ def companion_contents(path: PathLike, name: str) -> bytes:
 
 
 def ensure_fits(size: int, path: PathLike, remedy: str = "check that it is not damaged, or free some memory") -> None:
-    """Check before anything is allocated that so many bytes, which a file has or announces, are free."""
+    """Raise `MemoryLimitError` if less than `size` bytes of memory are free, before they are allocated."""
     free = available_memory()
     if free is not None and size > free:
         raise MemoryLimitError(
-            f"what it holds takes about {size / 1e9:.3g} GB, and {free / 1e9:.3g} GB of memory are free",
+            f"reading it takes about {size / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are free",
             remedy=remedy,
             path=path,
         )
 
 
 def unpacked(data: bytes | memoryview, machine: Any, size: int) -> bytes:
-    """At most `size` bytes of what packed data become.
+    """Unpack at most `size` bytes of data.
 
     Examples
     --------
@@ -186,10 +186,9 @@ def _no_file(path: PathLike, mode: int) -> FileFormatError:
 
 
 def text(path: PathLike) -> str:
-    """A file as text in lines that end in ``\\n``, without a byte order mark.
+    """Read a file as UTF-8, or UTF-16 with a byte order mark, with lines that end in ``\\n``.
 
-    Bytes that are not UTF-8, for instance in material names, become replacement characters; with its mark, UTF-16 is
-    read, too. Other characters that end lines elsewhere, such as form feeds, do not end any.
+    Invalid bytes become replacement characters. Form feeds and the like do not end lines.
     """
     data = contents(path)
     encoding = "utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
@@ -197,7 +196,7 @@ def text(path: PathLike) -> str:
 
 
 def ensure_writable(path: PathLike, formats: Collection[str], purpose: str) -> None:
-    """Check before a long computation that its result can be written."""
+    """Check that a result can be written, before a long computation."""
     format_for(path, dict.fromkeys(formats), purpose)
     with writing(path):
         os.unlink(_new_file(path))
@@ -205,9 +204,9 @@ def ensure_writable(path: PathLike, formats: Collection[str], purpose: str) -> N
 
 @contextmanager
 def replacing(path: PathLike) -> Iterator[Path]:
-    """A temporary file to write to, which is renamed to `path` on success and removed otherwise.
+    """Yield a temporary file, which is renamed to `path` on success and removed otherwise.
 
-    It lies in the folder that `path` leads to, and has the permissions of the file there, or those that new files have.
+    It lies in the same folder after links are resolved, and has the permissions of the file it replaces.
     """
     with writing(path):
         temporary = _new_file(path)
@@ -220,7 +219,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
 
 
 def move_into_place(source: Path, path: PathLike) -> None:
-    """Give a whole file its place: that of the file that `path` leads to, whose permissions stay, or a new one."""
+    """Move a complete file to `path`, keeping the permissions of a file that it replaces."""
     with replacing(path) as temporary:
         try:
             _permit(source, os.stat(temporary))
@@ -228,11 +227,11 @@ def move_into_place(source: Path, path: PathLike) -> None:
         except OSError as error:
             if error.errno != errno.EXDEV:
                 raise
-            shutil.copyfile(source, temporary)  # the link leads to another disk
+            shutil.copyfile(source, temporary)  # `path` is a link to another disk
 
 
 def replaceable(path: PathLike) -> os.stat_result | None:
-    """Status of the file that would be replaced; None if there is none."""
+    """Status of the file that would be replaced, or None; raises if it cannot be replaced."""
     real = Path(os.path.realpath(path))
     status = os.stat(real) if real.exists() else None
     if status is not None and not stat.S_ISREG(status.st_mode):
@@ -243,10 +242,10 @@ def replaceable(path: PathLike) -> os.stat_result | None:
 
 
 def _new_file(path: PathLike) -> Path:
-    """An empty file of a name that is not used, in the folder of what `path` leads to and with the same permissions."""
+    """Make an empty file with a new name, and the folder and permissions of the file that `path` leads to."""
     status, real = replaceable(path), Path(os.path.realpath(path))
     new = real.with_name(f".signedheat-{secrets.token_hex(8)}{real.suffix}")
-    # created for its owner alone, so that what is secret is so from the start
+    # readable by its owner only, until the permissions are copied
     os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600 if status is not None else 0o666))
     if status is not None:
         _permit(new, status)
@@ -254,7 +253,7 @@ def _new_file(path: PathLike) -> Path:
 
 
 def _permit(new: Path, status: os.stat_result) -> None:
-    """Give a file the owner and the permissions of another one, as far as may be."""
+    """Copy the owner and permissions of another file, as far as the system permits."""
     with suppress(OSError):
         os.chown(new, status.st_uid, status.st_gid)
     with suppress(OSError):
@@ -263,18 +262,20 @@ def _permit(new: Path, status: os.stat_result) -> None:
 
 @contextmanager
 def writing(path: PathLike) -> Iterator[None]:
-    """A context in which refusals of the system become errors that name the file: full disks, permissions, names."""
+    """Convert errors of the system, such as full disks, to errors that name the file."""
     try:
         yield
     except OSError as error:
         reason = error.strerror or str(error)
         raise FileFormatError(
-            f"cannot be written ({reason})", remedy="choose a folder that exists, is yours and has room", path=path
+            f"cannot be written ({reason})",
+            remedy="choose an existing folder that is writable and has free space",
+            path=path,
         ) from error
 
 
 def parsed_numbers(tokens: list[Any], what: str, kind: type = float) -> NDArray[Any]:
-    """Words of a text file as an array of numbers."""
+    """Convert words of a text file to an array of numbers."""
     try:
         return np.array(tokens, dtype=np.float64 if kind is float else np.int64)
     except (ValueError, OverflowError) as error:

@@ -1,4 +1,4 @@
-"""glTF 2.0 scenes, as text with buffers of their own (``.gltf``) and binary (``.glb``)."""
+"""glTF 2.0 scenes, as text with separate buffers (``.gltf``) or binary (``.glb``)."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126
 """Types of the components of accessors."""
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 SUPPORTED = ("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp", "EXT_texture_")
-"""What the names of extensions begin with that are read, or do not matter to shapes."""
+"""Prefixes of extensions that are supported or do not affect shapes."""
 INSTANCES = "EXT_mesh_gpu_instancing"
 TRIANGLES, STRIP, FAN = 4, 5, 6
-"""Modes of primitives that have faces; smaller numbers are points and lines."""
+"""Modes of primitives with faces; smaller numbers are points and lines."""
 BYTES = 200
-"""Measured: memory that a triangle of a scene takes while it is read, with its vertices."""
+"""Measured memory to read a triangle of a scene with its vertices."""
 
 
 def read_bodies(path: PathLike) -> list[Body]:
-    """Vertices and triangles of all primitives of the default scene, placed by their nodes.
+    """Read vertices and triangles of all primitives of the default scene, placed by their nodes.
 
     Buffers that the file names must lie in the same folder or below it. Materials, skins and morph targets are ignored.
 
@@ -38,7 +38,7 @@ def read_bodies(path: PathLike) -> list[Body]:
     FileFormatError
         If the file is damaged, or needs an extension that is not supported.
     MemoryLimitError
-        If the scene does not fit into memory: a mesh may stand in many places.
+        If the scene does not fit in memory, since a mesh may occur in many places.
     """
     scene = _opened(path)
     missing = [name for name in scene.tree.get("extensionsRequired", []) if not name.startswith(SUPPORTED)]
@@ -66,10 +66,10 @@ class _Scene:
     buffers: list[bytes]
 
     def body(self, primitive: dict[str, Any]) -> Body:
-        """Vertices and triangles of a primitive; vertices that no triangle has are left out."""
+        """Vertices and triangles of a primitive, without unused vertices."""
         mode = primitive.get("mode", TRIANGLES)
         if mode not in range(FAN + 1):
-            raise damaged(f"primitives have the mode {mode}, which glTF does not know")
+            raise damaged(f"primitives have the mode {mode}, which is not defined in glTF")
         if mode < TRIANGLES or "POSITION" not in primitive["attributes"]:
             return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
         points = self.numbers(primitive["attributes"]["POSITION"]).astype(np.float64)
@@ -84,7 +84,7 @@ class _Scene:
         return points[used], np.searchsorted(used, faces)
 
     def numbers(self, index: int) -> NDArray[Any]:
-        """(count, width) what an accessor holds; integers that stand for fractions become these."""
+        """(count, width) numbers of an accessor; normalized integers become fractions."""
         accessor = self.tree["accessors"][index]
         count, width = int(accessor["count"]), WIDTHS[accessor["type"]]
         dtype = np.dtype(NUMBERS[accessor["componentType"]])
@@ -143,7 +143,7 @@ def _triangles(corners: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     """(m, 3) triangles of a list, strip or fan of corners."""
     if mode == TRIANGLES:
         if len(corners) % 3:
-            raise damaged(f"{len(corners)} corners make no triangles")
+            raise damaged(f"{len(corners)} corners do not form triangles")
         return corners.reshape(-1, 3)
     second, third = corners[1:-1], corners[2:]
     if mode == FAN:
@@ -151,7 +151,7 @@ def _triangles(corners: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     faces = np.stack([corners[:-2], second, third], axis=1)
     faces[1::2] = faces[1::2, [1, 0, 2]]
     distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return faces[distinct]  # others join strips
+    return faces[distinct]  # flat triangles join strips
 
 
 def _corner_count(tree: dict[str, Any], mesh: dict[str, Any]) -> int:
@@ -160,7 +160,7 @@ def _corner_count(tree: dict[str, Any], mesh: dict[str, Any]) -> int:
 
 
 def _places(tree: dict[str, Any]) -> Iterator[tuple[int, NDArray[np.float64]]]:
-    """Meshes and the (4, 3) transforms of rows by which nodes place them: each node once, as glTF demands."""
+    """Yield meshes with the (4, 3) transforms of rows that place them; a node occurs once, as glTF demands."""
     nodes, scenes = tree.get("nodes", []), tree.get("scenes", [])
     if not nodes:
         yield from ((mesh, np.eye(4, 3)) for mesh in range(len(tree.get("meshes", []))))
@@ -181,7 +181,7 @@ def _places(tree: dict[str, Any]) -> Iterator[tuple[int, NDArray[np.float64]]]:
 
 
 def _matrix(node: dict[str, Any]) -> NDArray[np.float64]:
-    """(4, 4) from positions in a node to those around it."""
+    """(4, 4) transform from a node to its parent."""
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     matrix = np.eye(4)

@@ -1,4 +1,4 @@
-"""Images: values on a lattice, and where that lies; all formats of fields on grids, voxels and labels.
+"""Images, which are values on a lattice in space, in all formats of fields on grids, voxels and labels.
 
 No more is read or unpacked than a header announces. NIfTI is read by nibabel.
 """
@@ -44,9 +44,9 @@ NIFTI = (".nii", ".nii.gz")
 SHORT = {"RAS": "right-anterior-superior", "LPS": "left-posterior-superior", "LAS": "left-anterior-superior"}
 """Spaces by their short names in NRRD files."""
 JOINED = {"datafile": "data file", "lineskip": "line skip", "byteskip": "byte skip", "centerings": "centers"}
-"""Other names of fields of NRRD files."""
+"""Synonyms of fields of NRRD files."""
 PACKED = 4000
-"""Memory that a NIfTI file may take for each of its bytes: gzip packs a thousand into one."""
+"""Memory limit for a NIfTI file per byte, since gzip may pack a thousand bytes into one."""
 _CODES = {
     name: code
     for names, code in (
@@ -67,20 +67,20 @@ _CODES = {
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """Values on a lattice of d axes, and where it lies.
+    """Values on a lattice of d axes in space.
 
     Attributes
     ----------
     values : (n₁, …, n_d) number
-        One for each place, indexed [x, y, z].
+        One value for each place, indexed [x, y, z].
     axes : (d, d) float
-        The step from one place to the next along each axis of the image, in columns.
+        Steps between places along each axis of the image, in columns.
     origin : (d,) float
         The first place.
     space : str, optional
-        What the axes of the world are, as in NRRD files: ``"left-posterior-superior"``.
+        Meaning of the axes of the world, as in NRRD files: ``"left-posterior-superior"``.
     confidence : (n₁, …, n_d), optional
-        What a field has in addition to its values.
+        Confidence of a field in its values.
     """
 
     values: NDArray[Any]
@@ -91,7 +91,7 @@ class Image:
 
     @property
     def spacing(self) -> NDArray[np.float64]:
-        """(d,) distance between places, of an image along x, y, z; raises `FileFormatError` where it is turned."""
+        """(d,) distances between places along x, y, z; raises `FileFormatError` if the image is rotated."""
         spacing = np.diag(self.axes) if self.axes.ndim == 2 else np.zeros(self.values.ndim)
         if not np.array_equal(self.axes, np.diag(spacing)):
             raise FileFormatError("its axes are not x, y, z", remedy="resample the image along them")
@@ -99,12 +99,12 @@ class Image:
 
 
 def read_image(path: PathLike, formats: Collection[str], purpose: str) -> Image:
-    """An image of real numbers, in one of some formats."""
+    """Read an image of real numbers in one of some formats."""
     read = format_for(path, {ending: READERS[ending] for ending in formats}, purpose)
     with reading(path):
         image = read(path)
         if image.values.dtype.kind not in "biuf":
-            raise FileFormatError(f"the values are no real numbers but {image.values.dtype}: it holds no image")
+            raise FileFormatError(f"the values are not real numbers but {image.values.dtype}: this is not an image")
         return image
 
 
@@ -116,7 +116,7 @@ def _aligned(values: NDArray[Any], origin: Any, spacing: Any, **others: Any) -> 
 
 
 def _read_npy(path: PathLike) -> Image:
-    """An array; origin and spacing from the ``.json`` of the same name, if there is one."""
+    """Read an array, with origin and spacing from the ``.json`` file of the same name, if it exists."""
     values, companion = read_npy(path), Path(path).with_suffix(".json")
     if not companion.exists():
         return _aligned(values, np.zeros(values.ndim), np.ones(values.ndim))

@@ -56,7 +56,7 @@ def snake(name: str) -> str:
 
 
 def shape_figures(shape: Shape) -> dict[str, object]:
-    """Counts and defects of a shape; of meshes also which way their parts face, and how thin walls and gaps are."""
+    """Counts and defects of a shape; for meshes also their orientation, walls and gaps."""
     counted = shape.squares if isinstance(shape, DigitalSurface) else shape
     figures: dict[str, object] = {"kind": type(shape).__name__, **asdict(inspect(counted))}
     if isinstance(shape, TriangleMesh | PolygonMesh):

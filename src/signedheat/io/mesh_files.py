@@ -20,23 +20,23 @@ from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers, rea
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 FACET_WORDS = 15
-"""Words from the beginning of a facet to its end, at least: a loop of three vertices with three numbers each."""
+"""Least number of words in a facet: a loop of three vertices with three numbers each."""
 KEYWORDS = frozenset(
     "v vt vn vp f fo l p o g s mg lod mtllib usemtl maplib usemap cstype deg bmat step curv curv2 surf parm trim hole "
     "scrv sp end con bevel c_interp d_interp shadow_obj trace_obj ctech stech call csh bsp bzp cdc cdp res".split()
 )
-"""What lines of OBJ files begin with."""
+"""Keywords of lines of OBJ files."""
 NUMBERS = re.compile(r"[-+.eE\d/ ]+")
-"""What data look like, whatever their keyword."""
+"""Matches lines of numbers with any keyword."""
 BYTES = 400
-"""Measured: what each line of an OBJ file takes while it is read."""
+"""Measured memory to read a line of an OBJ file."""
 MOVED = 1e-4
-"""Share of the size of a shape by which rounding may move vertices without a warning."""
+"""Rounding error, relative to the size of a shape, above which a warning is issued."""
 _HEADER = 84  # of STL, in bytes: 80 of comment, 4 that count the facets
 
 
 def read_stl(path: PathLike) -> TriangleMesh:
-    """All facets of an STL file, of all its solids; stored normals are ignored.
+    """Read all facets of all solids in an STL file; stored normals are ignored.
 
     Corners with exactly the same coordinates become one vertex: STL has no other way to express that facets meet.
     """
@@ -56,7 +56,7 @@ def read_stl(path: PathLike) -> TriangleMesh:
 
 
 def write_stl(shape: Elements, path: PathLike) -> bytes:
-    """Binary STL, in single precision; a warning if that is too little for the shape."""
+    """Write binary STL in single precision, with a warning if that is inaccurate for the shape."""
     if shape.kind != "TriangleMesh":
         kinds = ".obj, .ply, .off or .vtp" if len(shape.counts) else ".ply or .xyz"
         raise refuse_kind(shape.kind, path, "triangles", kinds)
@@ -73,7 +73,7 @@ def write_stl(shape: Elements, path: PathLike) -> bytes:
 
 
 def warn_of_rounding(points: NDArray[np.float64], rounded: NDArray[np.float64]) -> None:
-    """Warn if rounding joins vertices of a shape, or moves them far for its size."""
+    """Warn if rounding joins vertices of a shape, or moves them far relative to its size."""
     largest_move = float(np.abs(points - rounded).max())
     places, rounded_places = (np.count_nonzero(same_positions(p) == np.arange(len(p))) for p in (points, rounded))
     if places > rounded_places or largest_move > MOVED * float(np.ptp(points, axis=0).max()):
@@ -86,9 +86,9 @@ def warn_of_rounding(points: NDArray[np.float64], rounded: NDArray[np.float64]) 
 
 
 def _text_corners(data: bytes) -> NDArray[np.float64]:
-    """(3 m, 3) corners of the facets of all solids, each of which must have three."""
+    """(3 m, 3) corners of the facets of all solids; each facet must have three."""
     ends = len(re.findall(rb"(?mi)^[ \t]*endsolid\b", data))
-    words = re.sub(rb"(?mi)^[ \t]*(end)?solid\b[^\r\n]*", b"", data).lower().split()  # names may be any words
+    words = re.sub(rb"(?mi)^[ \t]*(end)?solid\b[^\r\n]*", b"", data).lower().split()  # names may hold keywords
     places: dict[bytes, list[int]] = {b"facet": [], b"endfacet": [], b"vertex": []}
     for place, word in enumerate(words):
         if word in places:
@@ -111,7 +111,7 @@ def _text_corners(data: bytes) -> NDArray[np.float64]:
 def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:
     if not len(corners):
         return TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
-    corners = corners + corners.dtype.type(0)  # adding zero turns −0 into 0
+    corners = corners + corners.dtype.type(0)  # turns −0 into 0
     ids, firsts = distinct_rows(corners.view(f"u{corners.itemsize}"))
     return TriangleMesh(corners[firsts].astype(np.float64), ids.reshape(-1, 3))
 
@@ -122,7 +122,7 @@ def _rows_of_words(words: list[str], counts: NDArray[np.int64]) -> Iterator[str]
 
 
 def read_obj(path: PathLike) -> Elements:
-    """The faces of an OBJ file, or its points if it has none; texture coordinates and normals of faces are ignored."""
+    """Read the faces of an OBJ file, or its points if there are none; texture and face normals are ignored."""
     lines = _lines_by_keyword(path)
     vertices = _coordinates(lines.get("v", []), "vertices")
     if "f" in lines:
@@ -170,7 +170,7 @@ def write_pc(shape: Elements, path: PathLike) -> bytes:
 
 
 def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
-    """The words on the lines of each keyword, in place of which is the number of vertices so far."""
+    """Words of the lines of each keyword; the keyword is replaced by the number of vertices so far."""
     lines: dict[str, list[list[Any]]] = {"v": [], "vn": [], "f": [], "l": [], "p": []}
     content = text(path)
     ensure_fits(BYTES * sum(content.count(f"\n{keyword} ") for keyword in lines), path)
@@ -181,17 +181,17 @@ def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
             words[0] = len(lines["v"])
         elif words and words[0] not in KEYWORDS and NUMBERS.fullmatch(" ".join(words[1:])):
             raise FileFormatError(
-                f"line {number} begins with '{words[0]:.20}', which OBJ does not know: later lines may count it",
-                remedy="mend or remove it",
+                f"line {number} begins with '{words[0]:.20}', which is not an OBJ keyword",
+                remedy="correct or remove it",
                 element=f"line {number}",
             )
     if not lines["v"]:
-        raise FileFormatError("there is no line 'v x y z': this holds no shape in OBJ format")
+        raise FileFormatError("there is no line 'v x y z', so it holds no shape in OBJ format")
     return {keyword: rest for keyword, rest in lines.items() if rest}
 
 
 def _coordinates(rows: list[list[Any]], what: str) -> NDArray[np.float64]:
-    """(n, 3) numbers, three from each line; further ones (weights, colours) are ignored."""
+    """(n, 3) numbers, the first three of each line; weights and colours are ignored."""
     short = next((k for k, row in enumerate(rows) if len(row) < 4), None)
     if short is not None:
         cause = f"number {short} of the {what} has {len(rows[short]) - 1} coordinates instead of 3: it may be truncated"
@@ -200,7 +200,7 @@ def _coordinates(rows: list[list[Any]], what: str) -> NDArray[np.float64]:
 
 
 def _elements(words: list[list[Any]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Vertex ids from 0 of all elements, and their number in each; ``v/vt/vn`` means v, and −1 the vertex before."""
+    """Vertex ids, from 0, of all elements, and their number in each; −1 is the vertex before."""
     counts = np.array([len(element) - 1 for element in words], dtype=np.int64)
     flat = [word for element in words for word in element[1:]]
     if any("/" in word for word in flat):
@@ -213,11 +213,11 @@ def _elements(words: list[list[Any]]) -> tuple[NDArray[np.int64], NDArray[np.int
 
 
 def read_off(path: PathLike) -> Elements:
-    """The faces of an OFF file (also COFF, NOFF, STOFF, …), or its points if it has none."""
+    """Read the faces of an OFF file (also COFF, NOFF, STOFF, …), or its points if there are none."""
     rows = [row for line in text(path).split("\n") if (row := line.partition("#")[0].split())]
     kind = rows[0][0].upper() if rows else ""
     if not kind.endswith("OFF") or "BINARY" in [word.upper() for word in rows[0]]:
-        raise FileFormatError("it does not begin with OFF as text: this is no file that can be read as OFF")
+        raise FileFormatError("it does not begin with OFF, so it is not an OFF file in text form")
     rows[0] = rows[0][1:]
     rows = rows if rows[0] else rows[1:]
     if not rows or len(rows[0]) < 2:
@@ -242,13 +242,13 @@ def read_off(path: PathLike) -> Elements:
         return Elements(vertices, normals=normals)
     counts = parsed_numbers([row[0] for row in face_rows], "numbers of corners", int)
     if any(len(row) <= count for row, count in zip(face_rows, counts.tolist(), strict=True)):
-        raise damaged("a face has fewer corners than it says: it may be truncated")
+        raise damaged("a face has fewer corners than announced: it may be truncated")
     corners = [word for row, count in zip(face_rows, counts.tolist(), strict=True) for word in row[1 : 1 + count]]
     return Elements(vertices, parsed_numbers(corners, "vertex ids", int), counts)
 
 
 def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> Iterator[list[str]]:
-    """Lines joined until each holds as many words as its beginning says; more words on its last line stay."""
+    """Join lines until each holds as many words as it announces; more words on the last line stay."""
     for row in lines:
         wanted = length(row)
         while len(row) < wanted and (more := next(lines, None)) is not None:
@@ -257,7 +257,7 @@ def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> 
 
 
 def _corner_count(word: str) -> int:
-    """Number of corners of a face; 0 for what is no number, which is refused later."""
+    """Number of corners of a face; 0 if it is not a number, which is refused later."""
     return int(word) if word.isdecimal() and len(word) < 19 else 0
 
 

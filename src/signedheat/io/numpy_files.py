@@ -41,7 +41,7 @@ def read_npz(path: PathLike, wanted: Collection[str], needed: Collection[str] = 
 
 
 def write_npz(path: PathLike, **arrays: Any) -> None:
-    """Write arrays, but for those that are None; an existing file survives a failure."""
+    """Write the arrays that are not None; an existing file survives a failure."""
     with replacing(path) as temporary, temporary.open("wb") as file:
         kept: dict[str, Any] = {name: np.asarray(values) for name, values in arrays.items() if values is not None}
         np.savez(file, **kept)
@@ -58,10 +58,10 @@ def _array(file: IO[bytes], size: int, path: PathLike) -> NDArray[Any]:
     """An array of numbers, from a file of `size` bytes."""
     version = npy.read_magic(file)
     if version not in _HEADERS:
-        raise FileFormatError(f"its version {version} of NumPy's format is not known")
+        raise FileFormatError(f"its version {version} of NumPy's format is unknown")
     shape, is_fortran, dtype = _HEADERS[version](file)
     if dtype.kind not in "biufc":
-        raise FileFormatError(f"the values are no numbers but {dtype}", remedy="save numbers")
+        raise FileFormatError(f"the values are not numbers but {dtype}", remedy="save numbers")
     announced, there = math.prod(shape) * dtype.itemsize, size - file.tell()
     if not 0 <= announced <= there or min(shape, default=0) < 0:
         raise damaged(
@@ -70,11 +70,11 @@ def _array(file: IO[bytes], size: int, path: PathLike) -> NDArray[Any]:
     ensure_fits(announced, path)
     values = np.empty(shape, dtype, order="F" if is_fortran else "C")
     flat = values.ravel(order="K").view(np.uint8).data if announced else memoryview(b"")
-    at = 0
-    while at < announced:
-        part = file.read(min(announced - at, 1 << 24))
+    position = 0
+    while position < announced:
+        part = file.read(min(announced - position, 1 << 24))
         if not part:
             raise damaged("the data end early")
-        flat[at : at + len(part)] = part
-        at += len(part)
+        flat[position : position + len(part)] = part
+        position += len(part)
     return values

@@ -1,7 +1,7 @@
-"""Parsers of other packages, run as a program of its own by `sandbox`: they read files of strangers, and may crash.
+"""Parsers of other packages, which `sandbox` runs in a separate process because untrusted files may crash them.
 
-This file is run by itself, and imports nothing of this package: a process starts sooner without it. Each function
-takes the path of a file, and returns arrays of numbers and other values that JSON can hold.
+This file is run as a program that does not import this package, to start quickly. Each function takes the path of a
+file, and returns arrays of numbers and other values that JSON can hold.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from typing import Any
 import numpy as np
 
 NEW_NETWORK, NEW_USER = 0x40000000, 0x10000000
-"""Flags of Linux for a network without any interface, and for the right to have one."""
+"""Linux flags for a network namespace without interfaces, and for the user namespace that permits it."""
 FORBIDDEN = ("socket.", "subprocess.", "os.exec", "os.fork", "os.posix_spawn", "os.spawn", "os.system", "urllib.")
-"""Events of Python that end a parser."""
+"""Audit events of Python that are refused."""
 MOST_WRITTEN = 1 << 20
-"""Bytes that it may write to a file; what it prints goes to one."""
+"""Bytes that a parser may write to a file, such as its messages."""
 
 
 class Refused(Exception):
-    """A file that a parser reads, and that holds nothing of use: the cause, and a remedy."""
+    """Raised with a cause and a remedy for a file without usable contents."""
 
 
 def las(path: str) -> dict[str, Any]:
@@ -125,10 +125,10 @@ def nifti(path: str) -> dict[str, Any]:
 
 
 def confine(memory: int, seconds: int) -> None:
-    """Take memory beyond a limit, processor time beyond a limit, network and further programs from this process.
+    """Limit memory and processor time of this process, and deny it network and other programs.
 
-    Where a system has no such limit, it is not set: there are none on Windows, and a network can be taken away on
-    Linux alone, unless it forbids that. Python's own sockets are refused everywhere.
+    Limits that a system does not support are not set: Windows has none, and only Linux can remove the network. Python's
+    own sockets are refused everywhere.
     """
     with contextlib.suppress(ImportError):
         import resource
@@ -141,19 +141,19 @@ def confine(memory: int, seconds: int) -> None:
                 resource.setrlimit(kind, (least, least if kind != resource.RLIMIT_CPU else bound))
     if sys.platform == "linux":
         unshare = ctypes.CDLL(None).unshare
-        if unshare(NEW_NETWORK):  # which only root may have at once
+        if unshare(NEW_NETWORK):  # without a user namespace, only root may do this
             unshare(NEW_USER | NEW_NETWORK)
     sys.addaudithook(refuse)
 
 
 def refuse(event: str, _: object) -> None:
-    """End whatever is forbidden."""
+    """Raise an exception at forbidden audit events."""
     if event.startswith(FORBIDDEN):
         raise PermissionError(f"{event} is not for parsers")
 
 
 def answer(found: dict[str, Any], file: Any) -> None:
-    """Write values, a line of JSON with what is no array, and behind it the bytes of those in turn."""
+    """Write a line of JSON with all values that are not arrays, then the bytes of the arrays."""
     arrays = {name: np.ascontiguousarray(each) for name, each in found.items() if isinstance(each, np.ndarray)}
     values = {name: each for name, each in found.items() if name not in arrays}
     about = [[name, array.dtype.newbyteorder("=").str, array.shape] for name, array in arrays.items()]
@@ -164,9 +164,9 @@ def answer(found: dict[str, Any], file: Any) -> None:
 
 
 def main(function: str, path: str, options: str, memory: str, seconds: str) -> None:
-    """Parse a file, and answer on standard output."""
+    """Parse a file, and write the result to standard output."""
     file = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what anybody prints must not come between
+    os.dup2(2, 1)  # printed text must not mix with the answer
     warnings.simplefilter("ignore")
     confine(int(memory), int(seconds))
     try:
@@ -177,7 +177,7 @@ def main(function: str, path: str, options: str, memory: str, seconds: str) -> N
     except BaseException as error:
         found = {"error": type(error).__name__, "message": f"{error}"[:400], "package": getattr(error, "name", None)}
     answer(found, file)
-    os._exit(0)  # without what packages may do at the end
+    os._exit(0)  # skip exit handlers of packages
 
 
 if __name__ == "__main__":

@@ -1,8 +1,7 @@
-"""Parsers of other packages, each in a process of its own.
+"""Run parsers of other packages in separate processes.
 
-What reads the files of strangers may be led to crash, to run for ever, to take all memory, or to fetch something. So
-it has limits of memory and of processor time, no network where the system can take that away, and it answers with
-numbers, which are not run.
+A malicious file may make a parser crash, hang, use all memory or access the network. Therefore the process has limits
+on memory and processor time, no network where the system permits that, and returns only numbers.
 """
 
 from __future__ import annotations
@@ -30,16 +29,16 @@ RUN = (
     "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); file = sys.argv.pop(1); "
     "exec(compile(open(file, encoding='utf-8').read(), file, 'exec'))"
 )
-"""What the process runs: isolated, so that nothing comes from the current folder; then with the path of this one."""
+"""Program of the process: it starts isolated from the current folder, then takes over the import path."""
 LEAST_MEMORY, MEMORY_PER_BYTE = 1 << 29, 100
-"""Bytes that a parser may take with its package, and further ones for each byte of a file."""
+"""Memory limit of a parser: a constant, and a factor for the size of the file."""
 LEAST_SECONDS, BYTES_PER_SECOND = 10, 20_000
-"""Processor time that a parser may take, and bytes of a file for which it has another second."""
+"""Limit of processor time: a constant, and the bytes of a file for each further second."""
 NUMBERS = re.compile(r"[<>|][biuf][1248]")
 MOST_SAID = 1 << 24
-"""Bytes of an answer apart from its arrays."""
+"""Upper bound of the bytes of an answer without its arrays."""
 ALONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
-"""Variables for one thread: each takes memory before it does anything."""
+"""Environment variables that limit threads to one, since idle threads take memory."""
 
 
 def parsed(
@@ -52,24 +51,24 @@ def parsed(
     least_seconds: int | None = None,
     **options: object,
 ) -> dict[str, Any]:
-    """What a function of `parsers` finds in a file.
+    """Parse a file with a function of `parsers`.
 
     Parameters
     ----------
     function : str
-        Its name.
+        Name of the function.
     path : str or path
         The file.
     package : str
-        The package that it calls, which must be installed, as it is imported.
+        Import name of the package that it needs.
     purpose : str
-        What needs the package, in the plural.
+        Plural name of what needs the package, for messages.
     bytes_per_byte : int
-        Memory that it may take for each byte of the file, in addition to `LEAST_MEMORY`.
+        Memory limit per byte of the file, in addition to `LEAST_MEMORY`.
     least_seconds : int, optional
-        Processor time that it may take for any file; `LEAST_SECONDS` by default.
+        Constant part of the limit of processor time; by default `LEAST_SECONDS`.
     options : any
-        Further arguments, which JSON can hold.
+        Further arguments that JSON can hold.
 
     Returns
     -------
@@ -81,9 +80,9 @@ def parsed(
     FileFormatError
         If the package cannot read the file, crashes, or takes too long.
     MemoryLimitError
-        If it needs more memory than a file of this size may.
+        If it exceeds its memory limit.
     MissingPackageError
-        If it is not installed.
+        If the package is not installed.
     """
     size = size_of(path)
     ensure_installed(package, purpose)
@@ -122,7 +121,7 @@ def parsed(
 
 
 def _answer(stream: BinaryIO, path: PathLike) -> dict[str, Any] | None:
-    """What a parser has written, if that is whole: numbers alone, and no more of them than there is memory for."""
+    """Read the answer of a parser, arrays of numbers that fit in memory; None if it is incomplete."""
     try:
         about = json.loads(stream.readline(MOST_SAID))
         if "values" not in about:
@@ -150,20 +149,20 @@ def _died(package: str, status: int, said: str, seconds: int) -> SignedHeatError
     number = -status if status < 0 else 0
     name = Signals(number).name if number else f"status {status}"
     if name == "SIGKILL":
-        cause = f"{package} was killed while it read it, as where memory ends"
+        cause = f"{package} was killed while reading it, probably because memory ran out"
         return MemoryLimitError(cause, remedy="check that it is not damaged, or free some memory")
     if name == "SIGXCPU":
-        cause = f"{package} takes more than {seconds} s of processor time for it"
+        cause = f"{package} needs more than {seconds} s of processor time for it"
     else:
         cause = f"{package} crashed on it ({name}{': ' if said else ''}{said:.200})"
     return FileFormatError(cause, remedy="write it again, or in another format")
 
 
 def _failed(package: str, purpose: str, found: dict[str, Any], memory: int) -> SignedHeatError:
-    """The error for a parser that gave up."""
+    """The error for a parser that raised an exception."""
     kind, message = found["error"], " ".join(str(found["message"]).split())
     if kind == "MemoryError":
-        cause = f"{package} takes more than {memory / 1e9:.2g} GB for it"
+        cause = f"{package} needs more than {memory / 1e9:.2g} GB for it"
         return MemoryLimitError(cause, remedy="check that it is not damaged, or free some memory")
     if kind == "ModuleNotFoundError":
         return missing_package(found["package"] or package, purpose)

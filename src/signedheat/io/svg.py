@@ -24,23 +24,23 @@ NUMBER = re.compile(r"[\s,]*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 FLAG = re.compile(r"[\s,]*([01])")
 COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])")
 ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
-"""Numbers that each command of a path takes."""
+"""Number of arguments of each command of a path."""
 FLAGS = (3, 4)
-"""Which of the numbers of an arc are flags: they may stand together without a space."""
+"""Arguments of an arc that are flags, which need no space after them."""
 UNITS = {"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "q": 96 / 101.6, "in": 96.0}
-"""User units in each unit of length; ems are those of the default font."""
+"""User units per unit of length; ems are those of the default font."""
 UNITS |= {"em": 16.0, "ex": 8.0}
 CONTAINERS = ("svg", "g", "a", "switch")
 AXES = {"x": 0, "x1": 0, "x2": 0, "cx": 0, "rx": 0, "width": 0, "y": 1, "y1": 1, "y2": 1, "cy": 1, "ry": 1, "height": 1}
-"""The axes that lengths run along; others have none."""
+"""Axes of attributes that are lengths along an axis."""
 DEPTH, MOST_USES = 100, 10**5
-"""Groups within groups; and elements that are drawn where others use them, which may be the same many times."""
+"""Limits on nested groups, and on elements drawn, including repeated uses."""
 FILL_RULE = re.compile(r"fill-rule\s*:\s*(\w+)")
 TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
 
 
 def read_svg(path: PathLike) -> list[tuple[NDArray[np.float64], bool]]:
-    """Points of each subpath, and whether it is closed, in the order in which they are drawn, with y upwards."""
+    """Points of each subpath in drawing order, with y upwards, and whether it is closed."""
     data = contents(path)
     try:
         root = ElementTree.fromstring(data)
@@ -55,7 +55,7 @@ def read_svg(path: PathLike) -> list[tuple[NDArray[np.float64], bool]]:
 
 @dataclass
 class _Drawing:
-    """What elements of a drawing refer to, and its size in user units."""
+    """Elements of a drawing by id, and its size in user units."""
 
     named: dict[str, ElementTree.Element]
     size: tuple[float, float]
@@ -69,10 +69,10 @@ class _Drawing:
         is_used: bool = False,
         rule: str = "nonzero",
     ) -> Iterator[list[tuple[NDArray[np.float64], bool]]]:
-        """Subpaths of an element and of those in it; those filled by even and odd as outlines of what they fill."""
+        """Subpaths of an element and its children; those with the evenodd rule as outlines of their fill."""
         self.n_used += is_used
         if depth > DEPTH or self.n_used > MOST_USES:
-            raise damaged("its elements contain themselves, or too many others")
+            raise damaged("its elements contain themselves or too many others")
         kind = str(element.tag).rpartition("}")[2]
         if element.get("display") == "none" or "display:none" in element.get("style", "").replace(" ", ""):
             return
@@ -96,7 +96,7 @@ class _Drawing:
             yield [(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in parts]
 
     def _path(self, element: ElementTree.Element, kind: str) -> str:
-        """What an element draws, as the data of a path; circles and ellipses run clockwise in the drawing."""
+        """The path data of an element; circles and ellipses run clockwise in the drawing."""
         if kind == "path":
             return element.get("d", "")
         if kind == "line":
@@ -123,7 +123,7 @@ class _Drawing:
         return ""
 
     def _length(self, element: ElementTree.Element, name: str) -> float:
-        """A length in user units; shares of the drawing's width, height or diagonal are such."""
+        """An attribute in user units, including percentages of the width, height or diagonal."""
         whole = self.size[AXES[name]] if name in AXES else math.hypot(*self.size) / math.sqrt(2)
         return length(element.get(name, "0"), whole, name)
 
@@ -141,7 +141,7 @@ def length(word: str, whole: float = math.nan, name: str = "length") -> float:
     if word.strip() == "auto":
         return 0.0
     if match is None or (unit != "%" and unit not in UNITS):
-        raise damaged(f"{name} is '{word:.40}', which is no length", element=name)
+        raise damaged(f"{name} is '{word:.40}', which is not a length", element=name)
     value = float(match[1]) * (whole / 100 if unit == "%" else UNITS[unit])
     if not math.isfinite(value):
         raise FileFormatError(f"{name} is '{word:.40}' of a drawing without a size", remedy="give it a viewBox")
@@ -149,7 +149,7 @@ def length(word: str, whole: float = math.nan, name: str = "length") -> float:
 
 
 def _size(root: ElementTree.Element) -> tuple[float, float]:
-    """Width and height in user units; NaN where a drawing does not say."""
+    """Width and height in user units; NaN if not given."""
     box = [float(word) for word in NUMBER.findall(root.get("viewBox", ""))]
     if len(box) == 4:
         return box[2], box[3]
@@ -178,21 +178,21 @@ def _transform(text: str) -> NDArray[np.float64]:
         elif kind.startswith("skew") and numbers:
             step[(0, 1) if kind == "skewX" else (1, 0)] = math.tan(math.radians(numbers[0]))
         else:
-            raise damaged(f"'{kind}({inside[:40]})' is no transform")
+            raise damaged(f"'{kind}({inside[:40]})' is not a transform")
         matrix = matrix @ step
     return matrix
 
 
 def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
-    """Commands of a path, each with its numbers; those that are repeated are named again."""
+    """Commands of a path with their arguments; repeated commands are expanded."""
     at, command = 0, ""
     end = len(data.rstrip())
     while at < end:
         word = COMMAND.match(data, at)
         if word:
             at, command = word.end(), word[1]
-        elif command in "Zz":  # also at the beginning
-            raise damaged(f"a path goes on with '{data[at : at + 20].strip()}', which is no command")
+        elif command in "Zz":  # valid even at the beginning
+            raise damaged(f"a path goes on with '{data[at : at + 20].strip()}', which is not a command")
         numbers = []
         for place in range(ARGUMENTS[command.upper()]):
             pattern = FLAG if command in "Aa" and place in FLAGS else NUMBER
@@ -206,7 +206,7 @@ def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
 
 
 def _subpaths(data: str) -> Iterator[tuple[NDArray[np.float64], bool]]:
-    """Points of each subpath of a path that has a length, and whether it is closed."""
+    """Points of each subpath with a length, and whether it is closed."""
     points: list[NDArray[np.complex128]] = []
     place = start = control = 0j
     before, closed = "", False

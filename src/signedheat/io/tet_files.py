@@ -44,9 +44,9 @@ MODULES = {
     ".ele": "tetgen",
     ".node": "tetgen",
 }
-"""meshio's module for each extension."""
+"""Module of meshio for each extension."""
 TETGEN = (".node", ".ele")
-"""Extensions of the files of TetGen, which are read and written as a pair."""
+"""Extensions of TetGen files, which come in pairs."""
 TET_FORMATS = frozenset(MODULES)
 
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
@@ -61,9 +61,9 @@ COUNTED = {
     "NodeData": 1,
     "ElementData": 1,
 }
-"""Sections, and how many numbers at the beginning of each count what is in it (in version 2 there is but one)."""
+"""Sections of Gmsh files, and the number of counts at the beginning of each (one in version 2)."""
 IN_TEXT = ("PhysicalNames", "NodeData", "ElementData")
-"""Sections that begin with text in binary files, too."""
+"""Sections that begin with text even in binary files."""
 
 
 def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
@@ -83,8 +83,8 @@ def load_cells(path: PathLike) -> Any:
     if extension(path) == ".vtu":
         return read_vtu(path, (NAME,))
     for file in _files(path):
-        if all(line.startswith(b"#") for line in contents(file).split(b"\n") if line.strip()):  # meshio would look on
-            raise FileFormatError("there is nothing in it", remedy="write it again", path=file)
+        if all(line.startswith(b"#") for line in contents(file).split(b"\n") if line.strip()):  # meshio would read on
+            raise FileFormatError("the file is empty", remedy="write it again", path=file)
     if extension(path) == ".msh":
         _refuse_announcements(path)
     found = parsed("cells", path, "meshio", "tet meshes", module=MODULES[extension(path)])
@@ -106,7 +106,7 @@ def store_cells(mesh: Any, path: PathLike) -> None:
 
 
 def _files(path: PathLike) -> list[Path]:
-    """The file that is named, after the other one of a pair."""
+    """The named file, preceded by the other file of a pair."""
     named = Path(path)
     return [*(named.with_suffix(end) for end in TETGEN if extension(path) in TETGEN and end != extension(path)), named]
 
@@ -116,11 +116,11 @@ def _module(path: PathLike) -> Any:
 
 
 def _refuse_announcements(path: PathLike) -> None:
-    """Raise `FileFormatError` if a Gmsh file announces more things than it has bytes: meshio would count to them."""
+    """Raise `FileFormatError` if a Gmsh file announces more items than it has bytes, which would stall meshio."""
     data = contents(path)
     form = re.search(rb"\$MeshFormat\s+(\S+)\s+([01])\s+([48])\s", data)
     if form is None:
-        return  # meshio says so
+        return  # meshio reports it
     is_raw, kind = form[2] == b"1" and form[1].startswith(b"4"), np.dtype(f"<u{form[3].decode()}")
     for section in re.finditer(rb"^\$(\w+)[ \t]*\r?\n", data, re.MULTILINE):
         name, begin = section[1].decode(), section.end()

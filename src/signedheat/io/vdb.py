@@ -24,7 +24,7 @@ from ..grids.grid_field import GridField
 from .files import PathLike, format_for, replacing
 
 MAGIC, FILE_VERSION, LIBRARY = 0x56444220, 224, (10, 0)
-"""First number of every file, the format's version, and that of a library that writes it so."""
+"""Magic number, version of the format, and version of a library that writes it."""
 ZIP, ALL_VALUES = 1, 6
 """The flag of values packed by zlib; the byte before values that says that all are there."""
 SIDES, SIZES = (32, 16), (128, SIDE)
@@ -105,7 +105,7 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
 
 
 def _band(field: GridField) -> _Tree:
-    """The blocks of a band; what is not there is plus or minus the background, as in the coarse field."""
+    """The blocks of a band; elsewhere, the value is plus or minus the background, as in the coarse field."""
     assert field.blocks is not None
     grid, background = field.grid, np.float32(field.width)
     finite = ~np.isnan(field.values)

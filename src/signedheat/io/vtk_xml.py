@@ -38,7 +38,7 @@ KINDS = {
     14: "pyramid",
     24: "tetra10",
 }
-"""Names of VTK's types of cells, as meshio has them."""
+"""Names of VTK's types of cells in meshio."""
 
 
 def write_vti(
@@ -65,7 +65,7 @@ def write_vti(
 def read_vti(
     path: PathLike, other: str = ""
 ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64], NDArray[Any] | None]:
-    """Values (first scalar array), origin and spacing of image data; the array named `other`, if there is one."""
+    """Read the first scalar array, origin and spacing of image data, and the array named `other`, if present."""
     root, arrays = parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
     extent = parsed_numbers(image.get("WholeExtent", "").split() if image is not None else [], "extent", int)
@@ -124,7 +124,7 @@ def write_vtp(shape: Elements, path: PathLike) -> bytes:
 
 
 def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
-    """The polygons of all pieces, or the points if there is no polygon.
+    """Read the polygons of all pieces, or the points if there are no polygons.
 
     `names` are further values at the points that are wanted, where all pieces have them.
     """
@@ -146,7 +146,7 @@ def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
         n_corners = int(offsets[-1]) if n_faces else 0
         corners.append(arrays.of(table.get(("Polys", "connectivity")), n_corners).astype(np.int64) + n_points)
         counts.append(steps)
-        for name, parts in found.items():  # normals and areas matter to points alone
+        for name, parts in found.items():  # normals and areas belong to points only
             element = None if n_faces and name not in names else table.get(("PointData", name))
             if element is not None:
                 parts.append(arrays.of(element, (3 if name == "Normals" else 1) * n_own))
@@ -173,7 +173,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Cells:
-    """Points, cells and values at the points, under the names that they have in a `meshio.Mesh`."""
+    """Read points, cells and values at the points, named as in a `meshio.Mesh`."""
 
     points: NDArray[np.float64]
     cells: list[Block]
@@ -260,14 +260,14 @@ class _Arrays:
     appended: bytes
 
     def count(self, piece: ElementTree.Element, name: str) -> int:
-        """A number that a piece announces, 0 by default."""
+        """A count that a piece announces, 0 by default."""
         word = piece.get(name, "0").strip()
         if not word.isdecimal() or len(word) > 18:
             raise damaged(f"{name} is {word!r}: it is damaged", element=name)
         return int(word)
 
     def of(self, element: ElementTree.Element | None, count: int) -> NDArray[Any]:
-        """The `count` numbers of a DataArray element; no more than these are unpacked."""
+        """The `count` numbers of a DataArray element; no more are unpacked."""
         if element is None:
             return self._counted(np.empty(0), count)
         code = _TYPES.get(element.get("type", ""))
@@ -338,7 +338,7 @@ class _Arrays:
 
 
 def parse(path: PathLike, kind: str) -> tuple[ElementTree.Element, _Arrays]:
-    """The root element of a file of some kind, and what decodes the arrays in it."""
+    """Parse a file; return its root element and a decoder of its arrays."""
     data = contents(path)
     mark = data.find(b"<AppendedData")
     appended, encoding = b"", "raw"
@@ -350,12 +350,12 @@ def parse(path: PathLike, kind: str) -> tuple[ElementTree.Element, _Arrays]:
     try:
         root = ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
-        raise damaged(f"it is no XML ({error}): the file is truncated or damaged") from error
+        raise damaged(f"it is not XML ({error}): the file is truncated or damaged") from error
     if root.tag != "VTKFile" or root.get("type") != kind:
         raise FileFormatError(f"it holds {root.get('type', root.tag)}, not {kind}", remedy="check the extension")
     order = "<" if root.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
     width = {"UInt32": "u4", "UInt64": "u8"}.get(root.get("header_type", "UInt32"))
     if width is None:
-        raise damaged(f"its header_type '{root.get('header_type')}' is none that VTK has: it is damaged")
+        raise damaged(f"its header_type '{root.get('header_type')}' is unknown: it is damaged")
     header = np.dtype(order + width)
     return root, _Arrays(path, order, header, root.get("compressor"), encoding, appended)

@@ -1,4 +1,4 @@
-"""Lids of flat faces that meet in creases: what closes a rim whose surface does not bend."""
+"""Lids of flat faces that meet in creases, for rims of surfaces that do not bend."""
 
 from __future__ import annotations
 
@@ -13,49 +13,31 @@ from .rims import corners_of
 from .spanning import area_vector, frame_of, points_inside, spanned
 
 FLAT = 0.01
-"""Distance from a plane, over their size, up to which points lie in it."""
+"""Distance from a plane, relative to their size, below which points lie in it."""
 FOLDED = -0.8
-"""Cosine between the normals of a lid and of the surface at its rim up to which it is folded back over the surface."""
+"""Cosine between the normals of a lid and of the surface at its rim below which the lid is folded back."""
 MANY = 256
-"""Corners of a flat lid from which on points inside keep its triangles from being many slivers, slow to find."""
+"""Number of corners above which a flat lid gets inner points, to avoid slivers."""
 MOST_RUNS = 16
-"""Stretches of a rim in one plane each from which on it has no flat lid."""
+"""Number of planar runs above which a rim has no creased lid."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """A straight part of a rim, or a crease.
+    """A straight part of a rim, or a crease."""
 
-    Attributes
-    ----------
-    points : (k,) int
-        Its points, without its end.
-    normal : (3,) float
-        Sum over its edges of length times unit normal of the surface there.
-    """
-
-    points: NDArray[np.int64]
-    normal: NDArray[np.float64]
+    points: NDArray[np.int64]  # (k,) without its end
+    normal: NDArray[np.float64]  # (3,) sum over its edges of length times unit normal of the surface
 
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """Sides one after another that lie in a plane.
+    """Consecutive sides that lie in a plane."""
 
-    Attributes
-    ----------
-    first, count : int
-        The first side, and how many there are.
-    points : (k,) int
-        Their points, with the end.
-    opening : (3,) float
-        Area vector of a lid in that plane.
-    """
-
-    first: int
+    first: int  # index of the first side
     count: int
-    points: NDArray[np.int64]
-    opening: NDArray[np.float64]
+    points: NDArray[np.int64]  # (k,) with the end
+    opening: NDArray[np.float64]  # (3,) area vector of a lid in the plane
 
 
 def is_flat(points: NDArray[np.float64]) -> bool:
@@ -72,19 +54,19 @@ def is_flat(points: NDArray[np.float64]) -> bool:
 
 
 def flat_lid(loop: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
-    """The lid of a loop in a plane: the points that it adds to the loop's, and triangles; None if it crosses itself."""
+    """The lid of a planar loop, as added points and triangles; None if it crosses itself."""
     return _filled(loop, len(loop), [np.arange(len(loop))])
 
 
 def creased(
     loop: NDArray[np.float64], normals: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
-    """The lid of flat faces that closes a rim, if there is one: the points that it adds to the rim's, and triangles.
+    """The lid of flat faces that closes a rim, as added points and triangles; None if there is none.
 
-    Sides of the rim that lie in a plane are closed in that plane: by a straight crease, if what comes before them and
-    after them lies in one plane with their ends; three such runs by creases to the place where their planes meet. So
-    sides of a box come back with the edge or the corner where they met. No face is folded back over the surface. The
-    (n, 3) unit normals are those of the surface at the edges that begin at each point; 0 where they are not clear.
+    Consecutive sides in a plane are closed in that plane by a straight crease, if the sides before and after them lie
+    in a plane with their ends; three such runs, by creases to the point where their planes meet. This restores edges
+    and corners of boxes. No face is folded back over the surface. `normals` are the (n, 3) unit normals of the surface
+    at the edges that begin at each point, or 0 if unknown.
     """
     points, sides = loop, _sides(loop, normals)
     polygons: list[NDArray[np.int64]] = []
@@ -118,7 +100,7 @@ def _sides(loop: NDArray[np.float64], normals: NDArray[np.float64]) -> list[_Sid
 
 
 def _runs(points: NDArray[np.float64], sides: list[_Side]) -> list[_Run]:
-    """The longest runs of two or more sides that lie in a plane, the largest first; none if there are too many.
+    """The longest runs of two or more sides in a plane, the largest first; none if there are too many.
 
     Those whose lid would be folded back over the surface are left out.
     """
@@ -126,7 +108,7 @@ def _runs(points: NDArray[np.float64], sides: list[_Side]) -> list[_Run]:
     starts = points[[side.points[0] for side in sides]]
     ways = unit(np.roll(starts, -1, axis=0) - starts)
     across = unit(np.cross(np.roll(ways, 1, axis=0), ways))
-    goes_on = np.abs((across * np.roll(ways, -1, axis=0)).sum(axis=1)) <= FLAT  # the side after next is in that plane
+    goes_on = np.abs((across * np.roll(ways, -1, axis=0)).sum(axis=1)) <= FLAT  # the side after next is coplanar
     begins = np.flatnonzero(~np.roll(goes_on, 1))
     if not 0 < len(begins) <= MOST_RUNS:
         return []
@@ -146,7 +128,7 @@ def _runs(points: NDArray[np.float64], sides: list[_Side]) -> list[_Run]:
 def _peak(
     points: NDArray[np.float64], runs: list[_Run], n_sides: int
 ) -> tuple[NDArray[np.float64], tuple[_Run, _Run, _Run]] | None:
-    """Where the planes of three runs that make up a loop meet, near it, and the runs."""
+    """The point near a loop of three runs where their planes meet, and the runs."""
     following = {run.first: run for run in runs}
     for one in runs:
         two = following.get((one.first + one.count) % n_sides)
@@ -182,7 +164,7 @@ def _closed_by_a_crease(points: NDArray[np.float64], sides: list[_Side], runs: l
 def _filled(
     points: NDArray[np.float64], n_rim: int, polygons: list[NDArray[np.int64]]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
-    """Points after those of a rim, and the triangles of plane polygons; None if one crosses itself."""
+    """Points after those of a rim, and triangles of planar polygons; None if one crosses itself."""
     vertices, faces, count = [points], [], len(points)
     for polygon in polygons:
         corners = points[polygon]
@@ -192,11 +174,11 @@ def _filled(
         plane, inner = (corners - frame[0]) @ frame[1], np.empty((0, 2))
         if len(corners) > MANY:
             inner = points_inside((SmoothRim.of(corners).points - frame[0]) @ frame[1])
-        found = spanned(plane, inner)
-        if found is None:
+        lid = spanned(plane, inner)
+        if lid is None:
             return None
-        added = np.concatenate([found.rim(corners)[found.shares > 0], frame[0] + inner[found.inner] @ frame[1].T])
+        added = np.concatenate([lid.rim(corners)[lid.shares > 0], frame[0] + inner[lid.inner] @ frame[1].T])
         vertices.append(added)
-        faces.append(np.concatenate([polygon, count + np.arange(len(added))])[found.balanced()])
+        faces.append(np.concatenate([polygon, count + np.arange(len(added))])[lid.balanced()])
         count += len(added)
     return np.concatenate(vertices)[n_rim:], np.concatenate(faces)

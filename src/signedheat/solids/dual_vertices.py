@@ -1,4 +1,4 @@
-"""Vertices of dual contouring: places in cells where the planes that touch a surface meet."""
+"""Vertices of dual contouring, where tangent planes of the surface meet in a cell."""
 
 from __future__ import annotations
 
@@ -19,34 +19,33 @@ from .offsets import Offset
 from .quadrics import Quadrics, minimizers
 
 MANY = 1 << 17
-"""Pieces of the level whose vertices are found together."""
+"""Batch size for pieces of the level."""
 ASIDE = 0.05
-"""Cells off a crease at which its ends are looked for."""
+"""Distance from a crease, in cells, of probes for its ends."""
 ON = 1e-3
-"""Cells off the level from which on a vertex is moved onto it."""
+"""Distance from the level, in cells, above which a vertex is moved onto it."""
 BEYOND = 0.6
-"""Cells beyond its own up to which a vertex may go."""
+"""Distance, in cells, by which a vertex may leave its cell."""
 APART = 0.2
-"""Cells between vertices that have left their own."""
+"""Least distance, in cells, between vertices that have left their cells."""
 BENT = np.deg2rad(5.0)
-"""Angle between two faces from which on the edge between them is looked at; where a corner is missing it is small."""
+"""Angle between two faces above which their edge is checked; it is small where a corner is missing."""
 CHORD = 0.02
-"""Cells off the level from which on an edge along a crease is divided."""
+"""Distance from the level, in cells, above which an edge along a crease is divided."""
 DIVISIONS = 6
-"""Times that edges are divided; with three the largest distance of a bracket is .08 cells, with six .05."""
+"""Rounds of division; the largest error on a bracket is .08 cells with three rounds, and .05 with six."""
 NEAR = 4.0
-"""Cells between a new vertex and others of what its triangles may meet: vertices leave their cells by less than one."""
+"""Distance, in cells, within which triangles of a new vertex may intersect others."""
 BETWEEN = 0.1, 0.3, 0.6
-"""Shares of the way from the middle of an edge to the corner across at which planes are looked for."""
+"""Positions of probes, as shares of the way from the middle of an edge to the opposite corner."""
 AHEAD = 0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5
-"""Cells along a crease at which its ends are looked for."""
+"""Distances along a crease, in cells, of probes for its ends."""
 
 
 def placed(offset: Offset, grid: Grid, cells: DualCells, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3, v, 3) where the vertex of each piece of a level may be, in cells: at best; within its cell; at its middle.
+    """(3, v, 3) candidates for the vertex of each piece of a level, in cells: the best, in its cell, in its middle.
 
-    At best it is on a crease or corner, even where the level goes beyond the cell without crossing its edges. The (e,
-    3) points are where the level crosses edges of the grid.
+    The best is on a crease or corner, even outside the cell. `points` are the (e, 3) crossings of edges of the grid.
     """
     count = len(cells.owners)
     vertices, middles, wider = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
@@ -73,7 +72,7 @@ def placed(offset: Offset, grid: Grid, cells: DualCells, points: NDArray[np.floa
 
 
 def _apart(cells: DualCells, vertices: NDArray[np.float64], wider: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(v,) which vertices are taken from another list: of those near each other the one that moves the least."""
+    """(v,) whether to take the wider candidate: of those near each other, the one that moves the least."""
     away = np.where(np.isnan(wider[:, 0]), np.inf, np.linalg.norm(wider - vertices, axis=1))
     taken: NDArray[np.bool_] = (np.floor(wider) == cells.places[cells.owners]).all(axis=1)
     rows = np.flatnonzero(np.isfinite(away) & ~taken)
@@ -95,11 +94,7 @@ def _vertices(
     owners: NDArray[np.int64],
     points: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Those of some pieces, of which each point where an edge is crossed has one; their middles; and others.
-
-    The others are corners and creases that lie up to `BEYOND` outside of the cell, or were not found within it; NaN
-    where there are none.
-    """
+    """Vertices of some pieces in their cells, their middles, and wider candidates up to `BEYOND` outside, or NaN."""
     count = len(places)
     step = float(grid.spacing.max())
     corners = grid.origin + places * grid.spacing
@@ -114,7 +109,7 @@ def _vertices(
     wider = np.full((count, 3), np.nan)
     creased = np.flatnonzero((ranks > 1) & alone)
     if len(creased):
-        # planes that pass through a cell with a crease without crossing its edges there
+        # find planes in a cell with a crease that do not cross its edges
         low, high = lower[creased] - BEYOND * grid.spacing, upper[creased] + BEYOND * grid.spacing
         probes = found[creased][:, None] + _probes(along[creased], quadrics.sides[creased], grid.spacing)
         on, normals = offset.planes((middles[creased][:, None] + probes).reshape(-1, 3))
@@ -136,11 +131,7 @@ def _vertices(
 def _probes(
     along: NDArray[np.float64], across: NDArray[np.float64], spacing: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(n, p, 3) moves from vertices on creases to places near which there may be other planes.
-
-    These are all around, and ahead and back along the crease, somewhat to both of its sides: beyond the end of a crease
-    the nearest place on the surface is on what ends it.
-    """
+    """(n, p, 3) offsets of probes from vertices on creases: around them, and on both sides along the crease."""
     around = np.broadcast_to(0.5 * spacing * (2 * np.array(list(np.ndindex(2, 2, 2))) - 1), (len(along), 8, 3))
     length = np.linalg.norm(across, axis=1)[:, None]
     aside = ASIDE * spacing * across / np.where(length > 0, length, 1.0)
@@ -151,17 +142,16 @@ def _probes(
 def divided_along_creases(
     offset: Offset, spacing: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """A surface whose edges are divided where it bends and they are off the level, with vertices on the level.
+    """Divide bent edges that are off the level, with new vertices on the level, unless triangles would intersect.
 
-    A crease may pass through a cell none of whose edges the level crosses: there is no vertex in it. No edge is divided
-    where that makes triangles pass through each other.
+    This restores creases through cells whose edges the level does not cross, and which thus have no vertex.
     """
     for _ in range(DIVISIONS if len(faces) <= MOST else 0):
         edges, points = _creases_off(offset, spacing, vertices, faces)
         while len(edges):
             found, made = _divided(vertices, faces, edges, points)
             away, _ = scipy.spatial.cKDTree(points).query(found, distance_upper_bound=NEAR * float(spacing.max()))
-            near = made[np.isfinite(away)[made].any(axis=1)]  # all else is as it was
+            near = made[np.isfinite(away)[made].any(axis=1)]  # the other triangles are unchanged
             meeting = near[self_intersections(found, near)]
             if not len(meeting):
                 break
@@ -177,10 +167,7 @@ def divided_along_creases(
 def _creases_off(
     offset: Offset, spacing: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """(k, 2) halfedges of bent edges off the level, no two of a face, and (k, 3) places on it for their middles.
-
-    The places are on creases, or else the nearest ones.
-    """
+    """(k, 2) halfedges of bent edges off the level, one per face, and (k, 3) places on creases or the level."""
     step = float(spacing.max())
     normals, edges = unit(area_vectors(vertices[faces])), edge_table(faces).pairs
     edges = edges[normals[edges // 3].prod(axis=1).sum(axis=1) < np.cos(BENT)]
@@ -208,7 +195,7 @@ def _creases_off(
 def _divided(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: NDArray[np.int64], points: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """With a point on each of some edges, (k, 2) halfedges, and the faces on both of their sides divided."""
+    """Insert a point on each of (k, 2) halfedges, and divide the faces on both sides."""
     rows, corners = edges.ravel() // 3, edges.ravel() % 3
     new = np.repeat(len(vertices) + np.arange(len(edges)), 2)
     return np.concatenate([vertices, points]), divided_at(faces, rows, corners, new)

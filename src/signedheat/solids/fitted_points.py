@@ -7,17 +7,17 @@ import scipy
 from numpy.typing import NDArray
 
 NEIGHBOURS = 30
-"""Points that are looked at around each node."""
+"""Number of nearest points of each node."""
 FITTED = 12
-"""Of those that face as φ grows, so many carry weight."""
+"""Number of those with weight, among those that face along ∇φ."""
 ALIKE = 0.3
-"""Cosine between normal and ∇φ from which on a point faces as φ grows."""
+"""Cosine between normal and ∇φ above which a point faces along ∇φ."""
 WIDTH = 2.0
-"""Cells on either side of the zero set in which the function is fitted: what a cubic interpolant there needs."""
+"""Width of the fit on both sides of the zero set, in cells, as a cubic interpolant needs."""
 REACH = 1.5
-"""Mean gaps between points: within this of a point the fit counts in full, and not at all one gap farther."""
+"""Distance from points, in mean gaps, within which the fit has full weight, which vanishes one gap farther."""
 CHUNK = 50_000
-"""Nodes at a time."""
+"""Batch size for nodes."""
 
 
 def fitted_to_points(
@@ -96,6 +96,6 @@ def _fit(
     planes = 0.5 * (normals + mean[:, None])
     heights = np.einsum("pk,pki,pki->p", weights, planes, places[:, None] - points)
     heights /= np.where(total > 0, total, 1.0)
-    gap = gap if gap > 0 else float(reach.max()) or 1.0  # most points lie in one place
+    gap = gap if gap > 0 else float(reach.max()) or 1.0  # most points coincide
     enough = np.clip(((weights > 0).sum(axis=1) - 2) / 4, 0.0, 1.0)
     return heights, enough * np.where(total > 0, np.clip(1.0 + REACH - ranked[:, 0] / gap, 0.0, 1.0), 0.0)

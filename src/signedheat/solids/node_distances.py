@@ -1,8 +1,8 @@
-"""Exact distance to faces at the nodes of blocks of a grid, which neighbours find together.
+"""Exact distance to faces at the nodes of blocks of a grid, with one search for each block.
 
 For any place q of the surface and nodes x of a box, ``|x − y|² − |x − q|²`` is linear in x: where it is positive at the
 corner of the box that favours y, no node of the box has y as its nearest place. Few faces remain for a block, and fewer
-for each half of it; those of single nodes are looked at all.
+for each eighth of it, down to single nodes.
 """
 
 from __future__ import annotations
@@ -20,12 +20,11 @@ from ..search.nearest_triangles import away_from_triangle, foot_on_triangle
 from .winding import Windings
 
 SLACK = 1e-12
-"""Of squares, by which rounding may be off."""
+"""Relative rounding error of squares."""
 EIGHTHS = np.stack([np.arange(8) >> 2, np.arange(8) >> 1 & 1, np.arange(8) & 1])
 """(3, 8) the eighths of a cube."""
 CROWDED = 1500
-"""Leaves that may be nearest to some node of a block, above which its nodes are searched for one by one. On meshes of
-82,000 and 1.3 million faces at 128 nodes, twice of it takes up to a sixth less, a quarter up to twice as long."""
+"""Number of candidate leaves above which the nodes of a block are searched one by one."""
 ALONG_A_CURVE = np.stack(
     [sum((np.arange(SIDE**3) >> (3 * bit + 2 - axis) & 1) << bit for bit in range(3)) for axis in range(3)], axis=1
 )
@@ -73,10 +72,7 @@ def solved(
 
 
 def _inside(windings: Windings, grid: Grid, first: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Where nodes are inside, computed for one of all those between which there is no surface.
-
-    Of two neighbours that are both farther than half a step no surface is between.
-    """
+    """Which nodes are inside, computed once for nodes that no surface separates: those farther than half a step."""
     origin, steps = grid.origin + first * grid.spacing, grid.spacing
     inside = np.zeros(values.shape, dtype=bool)
     far = values > 0.5 * (1.0 + SLACK) * float(steps.max())
@@ -84,8 +80,8 @@ def _inside(windings: Windings, grid: Grid, first: NDArray[np.int64], values: ND
     if count:
         farthest = _farthest(values, groups, count)
         where = np.stack(np.unravel_index(farthest, values.shape), axis=1)
-        found = np.concatenate([[False], windings.inside(origin + where * steps)])
-        inside = found[groups]
+        group_is_inside = np.concatenate([[False], windings.inside(origin + where * steps)])
+        inside = group_is_inside[groups]
     nodes = np.argwhere(~np.isnan(values) & ~far)
     if len(nodes):
         inside[tuple(nodes.T)] = windings.inside(origin + nodes * steps)
@@ -124,27 +120,10 @@ def _fill(
     out_squares: NDArray[np.float64],
     out_faces: NDArray[np.int32],
 ) -> NDArray[np.bool_]:
-    """Squares of the distances of the nodes of blocks to the nearest faces, and these; returns which are left out.
+    """Write the nearest faces of all nodes of blocks, and squared distances; return which blocks are too crowded.
 
-    Leaves of the tree are chosen for a block, of their faces some for each of its eighths, of these some for each of
-    theirs, which are eight nodes.
-
-    Parameters
-    ----------
-    rows, bounds, discs, items : arrays
-        Of a `FaceTree`.
-    origin, steps, limits : (3,)
-        Origin, spacing and shape of the grid.
-    firsts : (n, 3) int
-        First nodes of the blocks.
-    start : (n,) int
-        The face that is nearest to the centre of each.
-    window : (3,) int
-        The node whose values come first in the results.
-    eighths : (3, 8) int
-        `EIGHTHS`, as `away_from_triangle` wants it: of a length unknown to the compiler.
-    out_squares, out_faces : (a, b, c)
-        What is found.
+    `start` has the nearest face to the centre of each block, and `window` the first node of the results. `eighths` is
+    `EIGHTHS`, an argument because its length must be unknown to the compiler.
     """
     leaves, parts = len(bounds) // 2, eighths.shape[1]
     most = LEAF * min(CROWDED, leaves) + 1
@@ -227,11 +206,10 @@ def _divide(
     out: NDArray[np.int32],
     counts: NDArray[np.int64],
 ) -> None:
-    """The faces that can be nearest to a node of each of eight boxes, from the ways of all faces to their centres.
+    """The faces that can be nearest to a node of each of eight boxes, by a bound on squared distance.
 
-    Squared distance is convex, so that a plane through its value at the centre is below it. Its slope there is twice
-    the way from the foot. So it is known how far below the square of the distance to the foot that is nearest to the
-    centre it may be in the box.
+    Squared distance is convex, so it lies above its tangent plane at the centre, whose slope is twice the way from the
+    foot.
     """
     ways, can = np.empty((4, len(best))), np.empty(len(best), dtype=np.int64)
     for e in range(len(best)):

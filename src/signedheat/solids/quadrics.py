@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from ..mesh.components import sums_of
 
 FLAT = 0.05
-"""Tangent of half the angle between planes up to which they are one: a crease of 5.7° is cut off by a hundredth of a
-cell at most. At .2, creases of 20° are lost; at .01, the facets of smooth surfaces are creases."""
+"""Tangent of half the angle below which planes count as one. This cuts creases of 5.7° off by a hundredth of a cell at
+most; .2 loses creases of 20°, and .01 makes facets of smooth surfaces creases."""
 
 
 @dataclass(frozen=True, eq=False)
 class Quadrics:
-    """Sums over planes, for each of n points that are wanted.
+    """Sums over planes, for each of n points.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ def minimizers(
 def _way_into(
     points: NDArray[np.float64], along: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The shortest ways along directions into boxes; 0 where a line through a point misses its box."""
+    """The shortest moves along directions into boxes; 0 where a line misses its box."""
     slow = np.where(np.abs(along) > 1e-12, along, 1e-12)
     first, second = (lower - points) / slow, (upper - points) / slow
     enter, leave = np.minimum(first, second).max(axis=1), np.maximum(first, second).min(axis=1)
@@ -111,6 +111,6 @@ def _way_into(
 def _solved(
     values: NDArray[np.float64], vectors: NDArray[np.float64], sides: NDArray[np.float64], least: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """A⁻¹ b without what is less than the least eigenvalue."""
+    """A⁻¹ b without eigenvalues below `least`."""
     inverse = np.where(values > least[:, None], 1.0 / np.where(values > least[:, None], values, 1.0), 0.0)
     return np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, sides, optimize=True)

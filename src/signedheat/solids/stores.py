@@ -1,7 +1,7 @@
 """Bands on disk: computed tile by tile by threads, processes or a Dask cluster, so that stopped runs can be resumed.
 
-A folder holds what tiles are computed from, values and confidence of all blocks in files that are mapped, and for each
-tile whether it is done. Workers write rows of their own: a tile needs nothing of its neighbours.
+A folder holds the input of the tiles, values and confidence of all blocks in memory-mapped files, and a mark for each
+finished tile. Tiles are independent, and workers write to different rows.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ from .winding import Windings
 distributed: Any = lazy_module("distributed", "Dask clusters")
 
 RETRIES = 3
-"""How often a tile is given to another worker of a cluster after one has died."""
+"""Number of times a cluster retries a tile after its worker has died."""
 
 
 class ClusterClient(Protocol):
-    """What is used of a `distributed.Client`."""
+    """The part of `distributed.Client` that is used."""
 
     def submit(self, function: Callable[..., object], /, *args: object, **options: object) -> Future[int]: ...
 
 
 Scheduler: TypeAlias = Executor | ClusterClient | str | None
-"""A pool, a cluster's client or its address; or threads of this process."""
+"""A pool, or the client or address of a cluster; None means threads of this process."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class TilesComputed(Note):
     Attributes
     ----------
     tiles, reused : int
-        How many there are, and how many were there already.
+        Number of all tiles, and of those that existed already.
     """
 
     tiles: int
@@ -123,7 +123,7 @@ def _begin(folder: Path, key: str, plan: dict[str, NDArray[Any]], n_blocks: int,
         np.savez(folder / "plan.npz", allow_pickle=False, **plan)
         for file, (dtype, size) in files.items():
             _reserve(folder / f"{file}.npy", dtype, size)
-        name.write_text(key)  # last: a folder without it is begun anew
+        name.write_text(key)  # written last; a folder without it is started again
     except OSError as error:
         for file in (*(f"{file}.npy" for file in files), "plan.npz", "key.txt"):
             with suppress(OSError):
@@ -133,7 +133,7 @@ def _begin(folder: Path, key: str, plan: dict[str, NDArray[Any]], n_blocks: int,
 
 
 def _reserve(path: Path, dtype: type, shape: tuple[int, ...]) -> None:
-    """Make a file of zeros that has its room on disk: a mapped page without any would end the process."""
+    """Make a file of zeros with allocated space, since writing to a mapped page without space kills the process."""
     open_memmap(path, mode="w+", dtype=dtype, shape=shape).flush()
     size = path.stat().st_size
     with open(path, "r+b") as file:
@@ -146,7 +146,7 @@ def _reserve(path: Path, dtype: type, shape: tuple[int, ...]) -> None:
 
 
 def blocks_held(folder: Path) -> int:
-    """Number of blocks that a folder has room for already; none if it was not begun."""
+    """Number of blocks for which a folder has allocated space."""
     if not (folder / "key.txt").exists():
         return 0
     return int(np.load(folder / "values.npy", mmap_mode="r").shape[0])
@@ -154,7 +154,7 @@ def blocks_held(folder: Path) -> int:
 
 @lru_cache(maxsize=1)
 def _plan(folder: str, key: str) -> tuple[FaceTree, Windings, Grid, dict[str, NDArray[np.int64]]]:
-    """What the tiles of a folder are computed from; once in each process."""
+    """The input of the tiles of a folder, read once per process."""
     with np.load(Path(folder) / "plan.npz", allow_pickle=False) as file:
         plan = dict(file)
     tree = FaceTree.of_triangles(plan["corners"], plan["trusted"])
@@ -162,7 +162,7 @@ def _plan(folder: str, key: str) -> tuple[FaceTree, Windings, Grid, dict[str, ND
 
 
 def solve_into(folder: str, key: str, number: int) -> int:
-    """Compute a tile of a folder, write it and note that it is done; returns its number."""
+    """Compute and write a tile of a folder, mark it as done, and return its number."""
     tree, windings, grid, plan = _plan(folder, key)
     rows = plan["rows"][plan["starts"][number] : plan["starts"][number + 1]]
     arrays = solved(tree, windings, grid, plan["places"][rows].astype(np.int64))
@@ -177,11 +177,11 @@ def solve_into(folder: str, key: str, number: int) -> int:
 
 
 def _computed(folder: str, key: str, missing: list[int], scheduler: Scheduler) -> Iterator[int]:
-    """Numbers of tiles, as they are done."""
+    """Yield numbers of tiles as they are done."""
     if not missing:
         return
     if isinstance(scheduler, ThreadPoolExecutor):
-        _plan(folder, key)  # once, before all threads need it
+        _plan(folder, key)  # read it once, before the threads need it
     if scheduler is None:
         with ThreadPoolExecutor(n_threads()) as pool:
             yield from _computed(folder, key, missing, pool)
@@ -191,14 +191,14 @@ def _computed(folder: str, key: str, missing: list[int], scheduler: Scheduler) -
     elif isinstance(scheduler, Executor):
         jobs = [scheduler.submit(solve_into, folder, key, number) for number in missing]
         yield from _finished(jobs, as_completed(jobs), folder)
-    else:  # they are not `pure`: their input is the same, but not what they write
+    else:  # not `pure`, because tasks have side effects
         options = {"pure": False, "retries": RETRIES}
         jobs = [scheduler.submit(solve_into, folder, key, number, **options) for number in missing]
         yield from _finished(jobs, distributed.as_completed(jobs), folder)
 
 
 def _finished(jobs: list[Future[int]], in_order: Iterable[Future[int]], folder: str) -> Iterator[int]:
-    """Results of jobs in the order in which they end; where one fails, or nobody wants more, the others are dropped."""
+    """Yield results of jobs as they end; cancel the others if one fails or the caller stops."""
     try:
         for job in in_order:
             yield job.result()

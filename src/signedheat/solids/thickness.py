@@ -1,4 +1,4 @@
-"""How thin the walls of a shape are, and how narrow the gaps between them."""
+"""Measure the thickness of walls and the width of gaps of a shape."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from ..search.stabbing_lines import LineCrossings, stabbing_lines
 from .mesh_orientation import Mesh
 
 N_LINES = 30_000
-"""Lines laid through a shape to measure it."""
+"""Number of lines through a shape."""
 N_DIRECTIONS = 8
-"""Directions of these lines."""
+"""Number of directions of these lines."""
 SHARE = 0.01
-"""Share of the lines' ways through walls, or through gaps, that may be shorter than the width reported."""
+"""Quantile of the widths of walls, or gaps, that is reported."""
 OPPOSITE = -0.9
-"""Cosine between the normals of faces below which they are opposite each other, and no wedge."""
+"""Cosine between the normals of faces below which they are opposite, rather than a wedge."""
 COINCIDENT = 1e-6
 """Width, over the largest coordinate, up to which faces coincide but for the rounding of single precision."""
 STEEP = 0.7
-"""Cosine between line and normals from which on a line measures a width; others reach quite another place."""
+"""Least cosine between a line and the normals at which it measures a width."""
 
 
 @dataclass(frozen=True)
 class Thickness:
-    """Walls and gaps of a shape, measured on lines through it: what is found on less than 1 % of them is not counted.
+    """Walls and gaps of a shape, measured on lines through it, without the least 1 %.
 
     Attributes
     ----------
     wall, gap : float or None
-        Thickness that 1 % of the walls fall below, and width that 1 % of the gaps fall below; None where there are none
-        between faces opposite each other, as in a wedge.
+        First percentile of the thickness of walls and of the width of gaps; None if no faces are opposite, as in a
+        wedge.
     typical_wall, typical_gap : float or None
         Medians.
     """
@@ -89,7 +89,7 @@ def thickness(shape: Mesh) -> Thickness:
 def _widths(
     triangles: NDArray[np.float64], names: NDArray[np.int64], lines: LineCrossings, wall: bool
 ) -> tuple[NDArray[np.float64], int]:
-    """Widths along lines of walls, else of gaps, between opposite faces; and how many of either sort are crossed."""
+    """Widths of walls, or gaps, between opposite faces along lines; and how many are crossed in all."""
     last = np.zeros(len(lines.crossed), dtype=bool)
     last[lines.starts[1:][np.diff(lines.starts) > 0] - 1] = True
     here = np.flatnonzero(~last[:-1] & (lines.entering[:-1] == wall) & (lines.entering[1:] != wall))
@@ -104,5 +104,5 @@ def _widths(
 
 
 def _quantile(widths: NDArray[np.float64], rank: float) -> float | None:
-    """The width of some rank; None if there are not that many."""
+    """The width of a rank; None if there are fewer."""
     return float(np.partition(widths, int(rank))[int(rank)]) if int(rank) < len(widths) else None

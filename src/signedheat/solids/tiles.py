@@ -1,4 +1,4 @@
-"""Distance to solids at the nodes of grids: tile by tile, each of which is computed alone."""
+"""Distance to solids at the nodes of grids, computed in independent tiles."""
 
 from __future__ import annotations
 
@@ -32,32 +32,32 @@ from .stores import Scheduler, blocks_held, in_store
 from .winding import Windings
 
 EDGE = 8
-"""Blocks along each edge of the tiles of dense grids: small, lest threads wait for the last."""
+"""Blocks along each edge of the tiles of dense grids; small, so that threads finish together."""
 BYTES_PER_NODE = 12.0
-"""Of a value and a confidence."""
+"""Memory per node for a value and a confidence."""
 BYTES_AT_WORK = 40e6
-"""Of the tiles that are computed at a time, measured; and of what is compiled."""
+"""Measured memory of tiles that are computed at once, and of compiled kernels."""
 BYTES_IN_BAND = 6.5
-"""Of a node of a band: a value, a confidence, and its share of the tables of blocks."""
+"""Memory per node of a band, including its share of the tables of blocks."""
 COARSE = 65
-"""Nodes along the longest side of the coarse grid of a band at most."""
+"""Upper bound of the nodes along the longest side of the coarse grid of a band."""
 Result = TypeVar("Result")
 
 
 class Evaluated(SolidQueries, Protocol):
-    """A `Solid`, as those see it that it calls."""
+    """The part of `Solid` that is used here; importing the class would be circular."""
 
     @property
     def origins(self) -> NDArray[np.int64]:
-        """(m,) face of the source that each triangle is part of; −1 for the completion."""
+        """(m,) face of the source of each triangle; −1 in the completion."""
 
     @property
     def bounding(self) -> NDArray[np.bool_]:
-        """(m,) triangles that have the inside behind them only."""
+        """(m,) whether a triangle has the inside behind it only."""
 
     @property
     def source(self) -> TriangleMesh | None:
-        """The shape that was given."""
+        """The input."""
 
     @property
     def tree(self) -> FaceTree:
@@ -73,7 +73,7 @@ class Evaluated(SolidQueries, Protocol):
 
 
 def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> GridField[Literal[3]]:
-    """Signed distance to a solid at all nodes of a grid.
+    """Compute the signed distance to a solid at all nodes of a grid.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def band_field(
     scheduler: Scheduler,
     progress: Progress | None,
 ) -> GridField[Literal[3]]:
-    """Signed distance to a solid at the nodes in blocks near its surface; and on a coarse grid everywhere.
+    """Compute the signed distance to a solid in blocks near its surface, and on a coarse grid everywhere.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def band_field(
     width = positive_number(width, "band")
     tree, windings = prepared(solid)
     coarse = dense_field(solid, coarser(grid, 1 << max(0, math.ceil(math.log2(max(grid.shape) / COARSE)))), None)
-    reach = width + float(np.linalg.norm(grid.spacing))  # so that cells around the ends of the band are whole
+    reach = width + float(np.linalg.norm(grid.spacing))  # complete the cells at the ends of the band
     limit = blocks_that_fit(store)
     places = blocks_near(tree, grid, reach, limit)
     if places is None:
@@ -164,7 +164,7 @@ def tiles_of(blocks: Blocks) -> list[NDArray[np.int64]]:
 
 
 def coarser(grid: Grid, factor: int) -> Grid:
-    """A grid with fewer nodes, that many times as far apart."""
+    """A grid with nodes farther apart by a factor."""
     return Grid(grid.origin, factor * grid.spacing, [max(2, 1 - (-(n - 1) // factor)) for n in grid.shape])
 
 
@@ -196,7 +196,7 @@ def blocks_where(
 
 
 def blocks_that_fit(store: str | PathLike[str] | None) -> int:
-    """How many blocks fit in memory, or on the disk of a store with those that it holds already."""
+    """Number of blocks that fit in memory, or on the disk of a store."""
     if store is not None:
         folder = Path(store).absolute()
         there = next(place for place in (folder, *folder.parents) if place.exists())
@@ -207,7 +207,7 @@ def blocks_that_fit(store: str | PathLike[str] | None) -> int:
 
 
 def refuse_walls(grid: Grid) -> None:
-    """Raise if a grid is not one in space."""
+    """Raise if a grid is not in space."""
     if grid.dimension != 3:
         raise UnsupportedTypeError(
             "distance to a solid is measured on grids in space", remedy="give it three axes", element="grid"
@@ -215,7 +215,7 @@ def refuse_walls(grid: Grid) -> None:
 
 
 def prepared(solid: Evaluated) -> tuple[FaceTree, Windings]:
-    """What tiles need of a solid, made before threads would make it twice."""
+    """Compute what tiles need of a solid, before threads would do so twice."""
     tree, windings = solid.tree, solid.windings
     _ = tree.discs
     windings.inside(np.zeros((1, 3)))
@@ -223,7 +223,7 @@ def prepared(solid: Evaluated) -> tuple[FaceTree, Windings]:
 
 
 def in_threads(solve: Callable[[NDArray[np.int64]], Result], places: Iterable[NDArray[np.int64]]) -> Iterator[Result]:
-    """Results, in order, few of which are held at a time."""
+    """Yield results in order, and hold few at a time."""
     with ThreadPoolExecutor(n_threads()) as pool:
         jobs: deque[Future[Result]] = deque()
         try:

@@ -1,4 +1,4 @@
-"""Inside: where the winding number of all that bounds a solid is above a half."""
+"""Winding numbers of the boundary of a solid, which are above ½ inside."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from ..mesh.welding import same_positions
 from ..search.winding_tree import WindingTree
 
 INSIDE = 0.5
-"""Winding number above which a point is inside; it is an integer, but for the error of the tree."""
+"""Winding number above which a point is inside; exact winding numbers are integers."""
 DEPTH = 1e-6
-"""Size of a face by which places in front of it and behind it are off it."""
+"""Offset of places in front of a face and behind it, relative to its size."""
 
 
 @dataclass(frozen=True, eq=False)
 class Windings(Frozen):
-    """Winding numbers of a cycle: oriented triangles, each edge of which is run along as often one way as the other.
+    """Winding numbers of a cycle of triangles, whose edges are balanced: used equally often in both directions.
 
-    So they are integers off the triangles, and sides change across these only.
+    Therefore they are integers away from the triangles, and change only across them.
 
     Attributes
     ----------
     triangles : (m, 3, 3) float
-        Corners, the same numbers wherever they are the same place.
+        Corners; equal places have equal numbers.
 
     Raises
     ------
@@ -45,7 +45,7 @@ class Windings(Frozen):
         if len(ends):
             x, y, z = ends[0].mean(axis=0)
             raise GeometryError(
-                f"what bounds the solid is not closed: {len(ends)} edges lack a face, the first around "
+                f"the boundary of the solid is not closed: {len(ends)} edges lack a face, the first around "
                 f"({x:.4g}, {y:.4g}, {z:.4g})",
                 remedy="make solids with complete",
                 element="triangles",
@@ -53,7 +53,7 @@ class Windings(Frozen):
 
     @cached_property
     def tree(self) -> WindingTree:
-        """Over the triangles, of which there is at least one."""
+        """Search tree over the triangles, of which there is at least one."""
         return WindingTree.of(self.triangles)
 
     def numbers(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -75,7 +75,7 @@ class Windings(Frozen):
 
 
 def open_edges_of(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 2, 3) ends of edges along which more triangles run in one direction than in the other."""
+    """(n, 2, 3) ends of unbalanced edges."""
     corners = triangles.reshape(-1, 3)
     faces = same_positions(corners)[np.arange(len(corners)).reshape(-1, 3)]
     a, b, c = faces.T

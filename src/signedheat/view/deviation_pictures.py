@@ -16,7 +16,7 @@ from .rasterizer import oblique
 from .surface_pictures import draw_points, draw_surface
 
 VIEW = (22, -58)
-"""Elevation and azimuth, in degrees, from which points are seen."""
+"""Elevation and azimuth of the view, in degrees."""
 DEVIATION_FORMATS = frozenset({".csv", ".ply"}) | PICTURE_FORMATS
 
 
@@ -43,7 +43,7 @@ def colors(values: NDArray[np.float64], found: Deviation) -> NDArray[np.uint8]:
 
 
 def _draw(found: Deviation, path: PathLike) -> None:
-    """The scan in colours, and the histogram in the same, with the percentiles; no isolines, since scans are noisy."""
+    """Draw the scan in colours, and a histogram with percentiles; without isolines, since scans are noisy."""
     scale = even_colors(found.extreme or 1.0)
     with picture(path, 12, 5) as figure:
         scan, histogram = figure.subplots(1, 2)

@@ -1,4 +1,4 @@
-"""Drawing of anything: rows of pictures in one style, and what notebooks show: a line of text and a small picture."""
+"""Draw any shape or field: rows of pictures in one style, and representations in notebooks."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from .surface_pictures import draw_shape, draw_surface
 pillow: Any = lazy_module("PIL.Image", "pictures")
 
 SIDE = 3.4
-"""Of the picture, in inches."""
+"""Size of the picture in inches."""
 DPI = 90
 N_COLORS = 96
 PANEL = 4.3
@@ -67,7 +67,7 @@ def save_row(path: PathLike, *panels: tuple[Any, ...]) -> None:
 
 
 def html_of(thing: object) -> str:
-    """A line of text and, where there is something to see and matplotlib is installed, a picture of it."""
+    """A line of text and, if Matplotlib is installed, a picture as HTML."""
     text = f"<code>{html.escape(repr(thing))}</code>".replace("\n", "<br>")
     try:
         figure = new_figure(SIDE * 1.25, SIDE)
@@ -81,7 +81,7 @@ def html_of(thing: object) -> str:
 
 
 def _small_png(figure: Any) -> bytes:
-    """The picture in few colours, which a notebook keeps with every output."""
+    """The picture with few colours, since notebooks store it with every output."""
     whole, small = io.BytesIO(), io.BytesIO()
     figure.savefig(whole, dpi=DPI, format="png")
     pillow.open(whole).convert("RGB").quantize(N_COLORS).save(small, format="png", optimize=True)
@@ -90,7 +90,7 @@ def _small_png(figure: Any) -> bytes:
 
 @singledispatch
 def draw(thing: Any, axes: Any, **options: Any) -> bool:
-    """Draw something into axes, with the options of `save_row`; whether there was anything to draw."""
+    """Draw something into axes, with the options of `save_row`; return whether there was anything to draw."""
     shape = converted(thing)
     return shape is not thing and draw(shape, axes, **options)
 
@@ -150,7 +150,7 @@ def _(field: PiecewiseField, axes: Any, **options: Any) -> bool:
 
 
 def _best_axis(field: GridField) -> int:
-    """The axis across which a slice shows most of the inside; of equal ones y, then z."""
+    """The axis across which a slice shows most of the inside; y, then z, if equal."""
     field = field.whole
     inside = field.values < 0
     counts = [int(inside.take(clearest_layer(field, axis), axis).sum()) for axis in range(3)]

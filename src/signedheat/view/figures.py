@@ -1,4 +1,4 @@
-"""Figures without display or global state, their files, and the colours and isolines of distance in all of them.
+"""Figures without display or global state, their files, and the colours and isolines of distance.
 
 Blue is inside, orange outside; both sides have one scale.
 """
@@ -27,15 +27,15 @@ mpl_figure: Any = lazy_module("matplotlib.figure", "pictures")
 
 PICTURE_FORMATS = frozenset({".png", ".pdf", ".svg", ".jpg"})
 INSIDE_TO_OUTSIDE = ["#0b3c5d", "#3f7fae", "#a9cce3", "#fbfaf5", "#f6c9a0", "#d9793a", "#8c2d04"]
-"""From far inside to far outside: blue inside, light at the surface, orange outside."""
+"""Colours from far inside to far outside: blue, light at the surface, orange."""
 TICKS = 7
 """Approximate number of labels of a colour bar."""
 CLOSEST = 0.07
-"""How near to each other they may be, over the length of the bar."""
+"""Least distance between labels, relative to the length of the bar."""
 
 
 def ensure_picture_writable(path: PathLike) -> None:
-    """Find out before a long computation whether a picture of its result can be written."""
+    """Check that a picture can be written, before a long computation."""
     ensure_writable(path, PICTURE_FORMATS, "a picture")
     require("matplotlib", "pictures")
 
@@ -49,7 +49,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 @contextmanager
 def picture(path: PathLike, width: float, height: float, dpi: int = 130) -> Iterator[Figure]:
-    """A figure to draw into, which is then written in the format given by the extension."""
+    """Yield a figure, which is then written in the format given by the extension."""
     ensure_picture_writable(path)
     figure = new_figure(width, height)
     yield figure
@@ -68,7 +68,7 @@ def distance_colors(low: float, high: float) -> ScalarMappable:
 
 
 def even_colors(reach: float) -> ScalarMappable:
-    """The same colours, evenly from −reach to reach; what is beyond has the last ones."""
+    """The same colours, linear from −reach to reach, and constant beyond."""
     return scale_of(mpl_colors.Normalize(-reach, reach))
 
 
@@ -111,7 +111,7 @@ def round_step(width: float) -> float:
 
 
 def legible(ticks: NDArray[np.float64], low: float, high: float) -> list[float]:
-    """Zero, and those of some ticks that are far enough from the one before, in the root of distance.
+    """Zero, and ticks that are far enough from the previous one in the root of distance.
 
     Examples
     --------
@@ -142,7 +142,7 @@ def add_color_bar(
         ticks = apart * np.arange(np.ceil(isolines[0] / apart), np.floor(isolines[-1] / apart) + 1)
         reach = float(np.max(colors.norm.vmax or 0.0))
         first, last = isolines[0], isolines[-1]
-        low = 0.0 if abs(first) < 1e-9 * reach else max(min(first - step, 0.0), -reach)  # no colour that is nowhere
+        low = 0.0 if abs(first) < 1e-9 * reach else max(min(first - step, 0.0), -reach)  # no colours beyond the values
         high = 0.0 if abs(last) < 1e-9 * reach else min(max(last + step, 0.0), reach)
         bar.ax.set_ylim(low, high)
         bar.set_ticks(legible(ticks, low, high))

@@ -38,7 +38,7 @@ TET_NODES = 64
 def save_slices(
     field: GridField | TetField, path: PathLike, shape: SpaceSources | None = None, levels: Sequence[float] = ()
 ) -> None:
-    """Write three orthogonal slices through a field, each where it cuts most of the inside, with the shape.
+    """Write a picture of three orthogonal slices through a field, each through most of the inside, with the shape.
 
     Blue is inside, orange outside; the black line is φ = 0, dashed where surface was completed; the shape is red; solid
     nodes are grey. A field in the plane is drawn whole.
@@ -84,7 +84,7 @@ def draw_slices(
     levels: Sequence[float] = (),
     across: Sequence[int] = (2, 1, 0),
 ) -> None:
-    """Draw one slice into each of some axes of a figure; `across` has the coordinate that is constant on each."""
+    """Draw a slice into each of some axes of a figure; `across` lists their constant coordinates."""
     field = field.whole
     colors, isolines, step = _look(field)
     for panel, normal in zip(axes, across, strict=True):
@@ -142,7 +142,7 @@ def draw_plane(field: GridField, axes: Axes, shape: SpaceSources | None = None, 
 
 
 def draw_line(line: Polyline, axes: Axes) -> None:
-    """Draw a polyline in red, above what there is."""
+    """Draw a polyline in red on top."""
     points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
     axes.plot(*points.T, color="#d4145a", linewidth=2.0, zorder=3)
 
@@ -191,7 +191,7 @@ def level_pieces(
     level: float,
     trusted: NDArray[np.float32] | None = None,
 ) -> dict[str, list[NDArray[np.float64]]]:
-    """Lines of a level on a plane: solid where the surface was there, dashed where it was completed."""
+    """Lines of a level on a plane: solid on the shape, dashed on its completion."""
     spacing = np.array([u[1] - u[0], v[1] - v[0]])
     pieces: dict[str, list[NDArray[np.float64]]] = {"solid": [], "dashed": []}
     for line, _ in level_lines(values, np.zeros(2), np.ones(2), level):

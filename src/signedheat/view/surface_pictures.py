@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 OUTER_COLOR, INNER_COLOR = np.array([0.96, 0.86, 0.55]), np.array([0.80, 0.25, 0.20])
 MOST_POINTS = 200_000
-"""Of larger clouds an even subset is drawn."""
+"""Largest number of points to draw; of larger clouds, an even subset is drawn."""
 
 
 def save_scene(shape: Shape | ForeignShape, path: PathLike, up: int = 2) -> None:
@@ -70,7 +70,7 @@ def draw_points(
     up: int = 2,
     colors: NDArray[np.float64] | None = None,
 ) -> None:
-    """Draw points into axes, from far to near; without (n, 4) colours, in darker blue the nearer they are."""
+    """Draw points into axes from far to near, in (n, 4) colours or in a blue that darkens with nearness."""
     some = slice(None, None, max(1, len(points) // MOST_POINTS))
     pixels = Camera.around(points[some], direction, up).pixels(points[some])
     order = np.argsort(pixels[:, 2])
@@ -84,7 +84,7 @@ def draw_points(
 
 
 def outside_of(shape: Shape | ForeignShape) -> TriangleMesh | PolygonMesh | PointCloud:
-    """What is seen of a shape of any kind: of voxels and tets, the boundary."""
+    """The visible surface of a shape, which is the boundary of voxels and tets."""
     own = as_shape(shape)
     if isinstance(own, DigitalSurface):
         return own.squares
@@ -136,7 +136,7 @@ def save_surface(
 
 
 def add_legend(axes: Axes, with_sources: bool) -> None:
-    """Say what the heavy lines are."""
+    """Add a legend for the heavy lines."""
     axes.plot([], [], color="0.1", linewidth=1.6, label="φ = 0")
     if with_sources:
         axes.plot([], [], color="#ffd83b", linewidth=2.5, label="source")
@@ -177,7 +177,7 @@ def draw_surface(
         draw_source(axes, item, own, camera, depth)
     axes.set_axis_off()
     if colors is None:
-        spanned = np.array([low, *isolines, high]) if high > low else isolines  # both signs, however little of one
+        spanned = np.array([low, *isolines, high]) if high > low else isolines  # span both signs
         add_color_bar(axes.figure, [axes], scale, spanned, step)
 
 

@@ -37,7 +37,7 @@ def plotter_of(thing: object) -> Any:
 
 @singledispatch
 def add(thing: Any, plotter: Any) -> None:
-    """Draw something; by default a shape, with its inner sides in another colour."""
+    """Draw a shape, with its inner sides in another colour; other kinds are registered below."""
     if isinstance(thing, TetMesh):
         thing = thing.boundary
     mesh = thing.to_pyvista()
@@ -109,12 +109,12 @@ def _add_isolines(plotter: Any, mesh: Any, look: dict[str, Any]) -> None:
         lines = mesh.contour(list(levels), scalars=NAME) if len(levels) else None
         if lines is not None and lines.n_points:
             mapper = plotter.add_mesh(lines, color=LINE, line_width=width, show_scalar_bar=False).mapper
-            mapper.SetResolveCoincidentTopologyToPolygonOffset()  # lines win over the surface that they lie on
+            mapper.SetResolveCoincidentTopologyToPolygonOffset()  # draw lines above the surface they lie on
             mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-2.0, -2.0)
 
 
 def _add_zero_set(plotter: Any, field: Any) -> None:
-    with suppress(OutsideError, GeometryError):  # there may be no surface
+    with suppress(OutsideError, GeometryError):  # the zero set may be empty
         plotter.add_mesh(field.contour(0.0).to_pyvista(), color=BODY, opacity=0.6)
 
 
