@@ -11,7 +11,7 @@ import signedheat as sh
 
 # --- shapes from files and from other packages
 shape = sh.read("broken.stl")
-assert_type(shape, sh.TriangleMesh | sh.PolygonMesh | sh.PointCloud | sh.DigitalSurface | sh.TetMesh)
+assert_type(shape, sh.TriangleMesh | sh.PolygonMesh | sh.PointCloud | sh.DigitalSurface | sh.TetMesh | sh.Solid)
 mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.array([[0, 1, 2]]))
 assert_type(sh.TriangleMesh.from_trimesh(trimesh.Trimesh()), sh.TriangleMesh)
 assert_type(mesh.to_trimesh(), trimesh.Trimesh)

@@ -84,5 +84,5 @@ def completed_distance(
         phi: GridField | TetField = sharpen(TetField(domain, solid.distance(domain.vertices)), solid.boundary)
     else:
         source = joined if isinstance(joined, PointCloud) else solid.boundary
-        phi = SignedHeatSolver(domain, method.diffusion, progress).distance(source, method.constraint)  # type: ignore[assignment]
+        phi = SignedHeatSolver(domain, method.diffusion, progress).distance(source, method.constraint)
     return replace(phi, diagnostics=phi.diagnostics.noting(*solid.diagnostics.notes))
