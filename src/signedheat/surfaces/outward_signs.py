@@ -4,6 +4,9 @@ The ball around a Delaunay tet touches four points and holds none. Where it touc
 lies on one side of the surface near both: inside or outside, but the same. So tets link the signs of normals, across
 edges, gaps and thin walls alike, without any triangulated surface. Faces of the convex hull link them with the outside.
 (Poles of Voronoi cells: Amenta & Bern 1999; labels from balls that overlap: Kolluri, Shewchuk & O'Brien 2004.)
+
+Gauss's formula (`signedheat.solids.gauss`) asks for an inside, which clouds need not have: on points of open sheets
+(waves, terrains, saddles) it turns half of them round, where these links turn none.
 """
 
 from __future__ import annotations
