@@ -273,8 +273,8 @@ MORPH = [
     ("dilate ball.ply 0.1 -o nowhere/out.stl", 1, "cannot be written"),
     ("dilate ball.ply 0.1 -o out.xyz", 1, "not a known format"),
     ("dilate ball.ply -0.1 -o out.stl", 1, "not negative"),
-    ("dilate ball.ply nan -o out.stl", 2, "no finite number"),
-    ("dilate ball.ply inf -o out.stl", 2, "no finite number"),
+    ("dilate ball.ply nan -o out.stl", 2, "not a finite number"),
+    ("dilate ball.ply inf -o out.stl", 2, "not a finite number"),
     ("dilate ball.ply -o out.stl", 2, "DISTANCE"),
     ("dilate ball.ply 0.1 0.2 -o out.stl", 2, "takes 1, not 2"),
     ("grow ball.ply 0.1 -o out.stl", 2, "invalid choice"),
@@ -282,7 +282,7 @@ MORPH = [
     ("dilate ball.ply 0.1 -o out.stl --resolution 1", 2, "whole number"),
     ("erode ball.ply 3 -o out.stl --resolution 16", 1, "ball.ply: "),
     ("shell ball.ply 0.3 0.1 -o out.stl", 1, "inner < outer"),
-    ("thicken ball.ply 0 -o out.stl", 1, "by nothing"),
+    ("thicken ball.ply 0 -o out.stl", 1, "thickness"),
     ("thicken ball.ply 0.1 -0.2 -o out.stl", 1, "not negative"),
 ]
 CLOSE = [
@@ -298,8 +298,8 @@ CLOSE = [
     ("ball.ply ring.json -o out.obj --preview out.docx", 1, "not a known format"),
     ("ball.ply ring.json", 2, "--output"),
     ("ball.ply ring.json -o out.obj --diffusion -1", 2, "not positive"),
-    ("ball.ply ring.json -o out.obj --diffusion nan", 2, "no finite number"),
-    ("ball.ply ring.json -o out.obj --constraint hopeful", 2, "none of"),
+    ("ball.ply ring.json -o out.obj --diffusion nan", 2, "not a finite number"),
+    ("ball.ply ring.json -o out.obj --constraint hopeful", 2, "not one of"),
     ("ball.ply ring.json -o out.obj --constraint levels:1,2,3", 1, "ring.json: 3 level values"),
 ]
 
@@ -309,7 +309,7 @@ SURFACE = [
     ("box.mesh ring.json -o out.ply", 1, "this is a TetMesh"),
     ("ball.ply ring.json -o out.docx", 1, "use one of"),
     ("ball.ply ring.json -o out.ply --diffusion=-1", 2, "not positive"),
-    ("ball.ply ring.json -o out.ply --constraint levels:a", 2, "no finite number"),
+    ("ball.ply ring.json -o out.ply --constraint levels:a", 2, "not a finite number"),
     ("ball.ply ring.json -o out.ply --constraint soft:-1", 2, "argument --constraint: -1 is not positive ("),
     (
         "ball.ply ring.json -o out.ply --constraint zero",
@@ -326,7 +326,7 @@ VOLUME = [
     ("ball.ply -o out.npz --resolution 16 --spacing 0.1", 2, "do not go together"),
     ("ball.ply -o out.npz --origin 0 0 0", 2, "--origin, --spacing and --shape"),
     ("ball.ply -o out.npz --diffusion 0", 2, "not positive"),
-    ("ball.ply -o out.npz --constraint loose", 2, "none of"),
+    ("ball.ply -o out.npz --constraint loose", 2, "not one of"),
     ("ball.ply -o out.npz --constraint soft:-1", 2, "not positive"),
     ("arc.csv -o out.npz --spacing 0.1 0.1 0.1", 2, "--spacing: 1 or 2"),
     ("arc.csv -o out.npz --origin 0 --spacing 1 --shape 5 5", 2, "--origin: 2"),
@@ -346,7 +346,7 @@ OTHERS = [
     ("sample ball.ply -o out.npz -n 0", 2, "whole number"),
     ("sample ball.ply -o out.npz --mask a.npy", 2, "unrecognized"),
     ("sample ball.ply -o out.txt", 1, "not a known format"),
-    ("batch ball.ply -o made", 2, "nothing to make"),
+    ("batch ball.ply -o made", 2, "no results"),
     ("batch ball.ply -o made --sample --plain", 2, "plain"),
     ("batch ball.ply -o made --info --workers 2 --scheduler tcp://localhost:1", 2, "do not go together"),
     ("batch ball.ply -o made --volume --spacing 0.1 --resolution 16", 2, "do not go together"),

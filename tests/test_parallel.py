@@ -33,7 +33,7 @@ def test_what_the_report_raises_ends_the_wait():
 def test_completion_is_reported_on_and_not_waited_for(monkeypatch):
     """However long one of its steps takes."""
     ended = threading.Event()
-    monkeypatch.setattr("signedheat.solids.completion.completed", lambda *_: ended.wait(60))
+    monkeypatch.setattr("signedheat.solids.completion._from_mesh", lambda *_: ended.wait(60))
     calls = []
 
     def progress(fraction, step):

@@ -62,17 +62,15 @@ def test_closed_and_apart(solid, level):
 
 
 WIRE = box((-1.0, -0.012, -0.012), (1.0, 0.012, 0.012))
-GRAIN = samples.sphere(2, radius=0.01, center=(0.3, 1.2, 0.1))
+BALL_AND_GRAIN = samples.union(samples.sphere(3, 0.25), samples.sphere(2, 0.01, (0.1, 0.35, 0.05)))
 
 
 @pytest.mark.parametrize("sharp", [True, False])
-@pytest.mark.parametrize(
-    ("shape", "level"), [(WIRE, 0.0), (WIRE, 0.005), (samples.union(samples.sphere(4), GRAIN), 0.0)]
-)
+@pytest.mark.parametrize(("shape", "level"), [(WIRE, 0.0), (WIRE, 0.005), (BALL_AND_GRAIN, 0.0)])
 def test_what_is_thinner_than_a_cell_is_announced(shape, level, sharp):
     solid = complete(turned(shape))
     with pytest.warns(InexactWarning, match="smaller"):
-        solid.surface(level, sharp=sharp, resolution=30)
+        solid.surface(level, sharp=sharp, spacing=0.07)
     solid.surface(level, sharp=sharp, spacing=0.007)
 
 
