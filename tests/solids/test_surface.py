@@ -62,7 +62,7 @@ def test_closed_and_apart(solid, level):
 
 
 WIRE = box((-1.0, -0.012, -0.012), (1.0, 0.012, 0.012))
-BALL_AND_GRAIN = samples.union(samples.sphere(3, 0.25), samples.sphere(2, 0.01, (0.1, 0.35, 0.05)))
+BALL_AND_GRAIN = samples.union(samples.sphere(3, 0.25), samples.sphere(2, 0.01, (0.1, 0.6, 0.05)))
 
 
 @pytest.mark.parametrize("sharp", [True, False])
