@@ -17,7 +17,7 @@ from ..mesh.edges import edge_keys, edge_table
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import unit
 from . import bending, creases, lids, lost_faces, walls
-from .rims import boundary, corners_of, loops
+from .rims import boundary, corners_of, loops, open_edges
 from .spanning import Frame, frame_of
 
 
@@ -122,13 +122,20 @@ class _Surface(Frozen):
 
     @cached_property
     def _sides(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Sorted keys of the directed sides of faces, and the sides: of several, that of the largest face first."""
+        """Sorted keys of the directed sides of faces, and the sides: of several, that which `behind` takes first."""
         keys = (self.faces * len(self.vertices) + np.roll(self.faces, -1, axis=1)).ravel()
-        order = np.lexsort((-np.repeat(self.areas, 3), keys))
+        table = edge_table(self.faces)
+        alone = len(table.vertices) + np.arange(self.faces.size).reshape(-1, 3)
+        pieces = element_components(np.where(table.face_counts[table.face_edges] == 2, table.face_edges, alone))
+        closed = ~np.isin(pieces, open_edges(self.faces, pieces)[1])
+        order = np.lexsort((-np.repeat(self.areas, 3), np.repeat(closed, 3), keys))
         return keys[order], order
 
     def behind(self, loop: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(n,) the face behind each edge of a loop, the largest of several, and its third vertex."""
+        """(n,) the face behind each edge of a loop, and its third vertex.
+
+        Of several it is one of a piece that does not close by itself, and of these the largest.
+        """
         keys, order = self._sides
         face, side = np.divmod(order[np.searchsorted(keys, np.roll(loop, -1) * len(self.vertices) + loop)], 3)
         return face, self.faces[face, (side + 2) % 3]

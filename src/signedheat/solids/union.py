@@ -66,12 +66,16 @@ def united(
     windings = Windings(whole.triangles[closing])
     pieces = _cut(whole, closing)
     regions = Regions.of(pieces, windings)
-    triangles, behind, ahead = pieces.points[pieces.faces], regions.behind, regions.ahead
+    triangles, behind, ahead = pieces.points[pieces.faces], regions.behind.copy(), regions.ahead.copy()
+    closes = closing[pieces.origins]
+    # sheets share no edges with what closes, so that their regions do not end where they leave a wall
+    behind[~closes], ahead[~closes] = windings.sides(triangles[~closes])
     origins = whole.origins[pieces.origins]
     given = origins >= 0
     buried = behind & ahead
-    bounds = (behind != ahead) & ~regions.doubled
-    kept = np.where(given, (~buried & ~regions.doubled) | keep_overlaps, bounds | ~closing[pieces.origins])
+    doubled = regions.doubled | (~closes & given & (behind != ahead))  # sheets that lie on walls
+    bounds = (behind != ahead) & ~doubled
+    kept = np.where(given, (~buried & ~doubled) | keep_overlaps, bounds | ~closes)
     if not kept.any():
         kept[:] = True
     confidence = _confidence(triangles[kept], given[kept], whole, points)
