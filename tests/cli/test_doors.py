@@ -168,3 +168,13 @@ def test_several_outputs_of_deviation(tmp_path, ball, capsys, order):
     assert json.loads(capsys.readouterr().out)["output"] == outputs
     assert all((tmp_path / name).stat().st_size for name in ("table.csv", "coloured.ply"))
     assert main(["deviation", ball]) == 2
+
+
+def test_info_of_a_solid_says_that_nothing_is_left_to_mend(tmp_path, ball, capsys):
+    """Its completion has edges of three faces, and lies anywhere: neither is a defect of a solid."""
+    solid = sh.complete(sh.read(ball)) | sh.complete(samples.sphere(2, center=(1.0, 0.0, 0.0)))
+    solid.save(tmp_path / "solid.npz")
+    assert main(["info", str(tmp_path / "solid.npz"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"].startswith("a solid: closed") and "orientation" not in found
+    assert found["thickness"]["wall"] > 0.1
