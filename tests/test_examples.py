@@ -30,6 +30,7 @@ EXPECTED = {
     "distance_round_corners": (3.297, 0.08),
     "distance_that_jumps": (2 * np.pi * 0.4, 0.08),
     "files_in_and_out": (25.4 * 1.1, 0.1),
+    "filled_holes": (1.0, 0.01),
     "fine_band": (0.0, 0.15),
     "fit_to_distances": (0.01, 0.01),
     "floor_plan": (8.64341649025257, 0.001),

@@ -34,6 +34,7 @@ from .sharpening_methods import Convex, Geodesic
 from .solids.completion import complete
 from .solids.deviations import deviation
 from .solids.facing import orient
+from .solids.holes import fill_holes
 from .solids.mesh_orientation import orientation
 from .solids.sampling import sample
 from .solids.solid import Solid
@@ -99,6 +100,7 @@ __all__ = [
     "complete",
     "curve_orientation",
     "deviation",
+    "fill_holes",
     "intrinsic_delaunay",
     "load_field",
     "offset",

@@ -4,7 +4,17 @@ from .curves.piece_orientation import CurveOrientation
 from .diagnostics import Diagnostics
 from .grids.solid_queries import Closest
 from .solids.deviations import Deviation
+from .solids.holes import FilledMesh, FilledPolygonMesh
 from .solids.mesh_orientation import Orientation
 from .solids.sample_set import Samples
 
-__all__ = ["Closest", "CurveOrientation", "Deviation", "Diagnostics", "Orientation", "Samples"]
+__all__ = [
+    "Closest",
+    "CurveOrientation",
+    "Deviation",
+    "Diagnostics",
+    "FilledMesh",
+    "FilledPolygonMesh",
+    "Orientation",
+    "Samples",
+]

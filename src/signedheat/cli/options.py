@@ -344,16 +344,17 @@ GRID = group(
         help="number of its nodes: NX NY NZ, or NX NY",
     ),
 )
+LIDS = option(
+    "--lids",
+    choices=("bent", "flat"),
+    default="bent",
+    help="lids continue the bend of the surface, or are flat, as for half models and hulls",
+)
 REPAIR = group(
     "steps (all taken by default)",
     option("--as-oriented", action="store_true", help="turn no face, normal or line, and restore no face"),
     option("--keep-overlaps", action="store_true", help="keep surfaces that lie inside other bodies"),
-    option(
-        "--lids",
-        choices=("bent", "flat"),
-        default="bent",
-        help="lids continue the bend of the surface, or are flat, as for half models and hulls",
-    ),
+    LIDS,
     option(
         "--nested",
         choices=("given", "cavities", "bodies"),

@@ -16,7 +16,7 @@ from .batch_commands import batch, watertight
 from .curve_commands import close, surface
 from .late_imports import compiled, kernel_runs, parallel
 from .options import Command, Summary, command, is_quiet
-from .solid_commands import contour, intersect, morph, offset, sample, subtract, union, volume
+from .solid_commands import contour, fill, intersect, morph, offset, sample, subtract, union, volume
 from .terminal import ProgressBar, say
 from .view_commands import demo, deviation, info, view
 
@@ -77,6 +77,21 @@ def run_job(name: str) -> None:
 
 
 COMMANDS: tuple[Command, ...] = (
-    *(volume, surface, close, offset, watertight, contour, morph, union, intersect, subtract, sample, deviation, batch),
+    *(
+        volume,
+        surface,
+        close,
+        offset,
+        watertight,
+        fill,
+        contour,
+        morph,
+        union,
+        intersect,
+        subtract,
+        sample,
+        deviation,
+        batch,
+    ),
     *(info, view, demo, warmup),
 )

@@ -17,6 +17,7 @@ from .options import (
     FLAT_SHAPE,
     GRID,
     LABEL,
+    LIDS,
     METHOD,
     PLACE,
     REPAIR,
@@ -231,6 +232,37 @@ def morph(arguments: Namespace) -> Summary:
     summary |= {"output": arguments.output, **shapes.counts(surface)}
     summary |= {"field": shapes.describe(fields[0])} if fields else {}
     return summary, f"{printable(arguments.output)}: {arguments.operation}, closed surface of {surface.n_faces} faces"
+
+
+@command(
+    "fill",
+    "holes of a mesh closed, the mesh as it is",
+    "Close holes of a mesh and leave everything else as it is: vertices and faces keep their order, new ones follow. "
+    "Sheets stay sheets, with their outlines. `watertight` makes solids of broken shapes.",
+    option("mesh", metavar="MESH", help="surface: .stl .obj .ply .off .vtp .glb .3mf"),
+    output(SURFACES),
+    option("--largest", type=positive, metavar="L", help="length of the longest rim that is closed"),
+    option(
+        "--rims",
+        type=whole_number(0),
+        nargs="+",
+        metavar="V",
+        help="close rims through these vertices only, outlines of sheets among them; counted from 0",
+    ),
+    *(LIDS, format_option("stl")),
+    usage="MESH -o OUT [options]",
+)
+def fill(arguments: Namespace) -> Summary:
+    """Check that the result can be written, read, close, write."""
+    shapes.ensure_surface_writable(arguments.output)
+    mesh: Any = sh.read(arguments.mesh)
+    with shapes.prefix_errors(arguments.mesh):
+        filled = sh.fill_holes(mesh, largest=arguments.largest, rims=arguments.rims, lids=arguments.lids)
+    sh.save(filled, arguments.output)
+    counts = {"filled": len(filled.filled), "left": len(filled.left), "new_faces": int((filled.origins < 0).sum())}
+    text = "holes closed: {filled}, by {new_faces} faces; rims left open: {left}".format(**counts)
+    summary = {"input": arguments.mesh, "output": arguments.output, **counts}
+    return summary, f"{printable(arguments.output)}: {text}"
 
 
 COMBINED = {

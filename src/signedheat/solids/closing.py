@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -20,9 +20,12 @@ from . import bending, creases, lids, lost_faces, walls
 from .rims import boundary, corners_of, loops, open_edges
 from .spanning import Frame, frame_of
 
+NONE = np.empty((0, 2), dtype=np.int64)
+"""No edges."""
+
 
 def closed_by(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], *, bent: bool = True
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], *, bent: bool = True, outlines: NDArray[np.int64] = NONE
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Close the boundary of a chain of directed triangles, whatever the parts that they belong to.
 
@@ -39,6 +42,8 @@ def closed_by(
     bent : bool
         Whether lids bend as the surface does towards their rims. The less the surface there bends as it must to come
         round, the flatter they are.
+    outlines : (k, 2) int
+        Edges of the boundary, in whole loops, that stay open.
 
     Returns
     -------
@@ -57,13 +62,13 @@ def closed_by(
     True
     """
     faces = np.asarray(faces, dtype=np.int64)
-    if not len(boundary(faces)):
+    if len(boundary(faces)) == len(outlines):
         return vertices, np.empty((0, 3), dtype=np.int64)
     centre = vertices[np.unique(faces)].mean(axis=0)
     positions = vertices - centre
-    chain = np.concatenate([faces, small_lids(positions, faces)])
-    chain = np.concatenate([chain, strips(positions, chain)])
-    surface = _Surface(positions, chain)
+    chain = np.concatenate([faces, small_lids(positions, faces, outlines)])
+    chain = np.concatenate([chain, strips(positions, chain, outlines)])
+    surface = _Surface(positions, chain, outlines)
     with threadpool_limits(1, "blas"):  # systems of a few hundred unknowns: threads would only wait
         new, count = [vertices], len(vertices)
         triangles = [chain]
@@ -74,7 +79,7 @@ def closed_by(
             new.append(points + centre)
             count += len(points)
     closed = np.concatenate(triangles)
-    assert not edge_table(closed).balance.any(), "lids balance each directed edge"
+    assert len(boundary(closed)) == len(outlines), "lids balance each directed edge"
     return np.concatenate(new), closed[len(faces) :]
 
 
@@ -84,11 +89,16 @@ class _Surface(Frozen):
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
+    outlines: NDArray[np.int64] = field(default_factory=lambda: NONE)
 
     @cached_property
     def loops(self) -> list[NDArray[np.int64]]:
-        """Closed loops around the gaps."""
-        return loops(self.vertices, self.faces, boundary(self.faces))
+        """Closed loops around the gaps that are to be closed."""
+        edges, n = boundary(self.faces), len(self.vertices)
+        keys, left = edges @ [n, 1], np.sort(self.outlines @ [n, 1])
+        order, copies = np.argsort(keys, kind="stable"), np.arange(len(left)) - np.searchsorted(left, left)
+        edges = np.delete(edges, order[np.searchsorted(keys[order], left) + copies], axis=0)
+        return loops(self.vertices, self.faces, edges)
 
     @cached_property
     def triangles(self) -> NDArray[np.float64]:
@@ -141,9 +151,11 @@ class _Surface(Frozen):
         return face, self.faces[face, (side + 2) % 3]
 
 
-def small_lids(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def small_lids(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], outlines: NDArray[np.int64] = NONE
+) -> NDArray[np.int64]:
     """(k, 3) triangles that close the small holes of a surface, and its gaps without area, between their vertices."""
-    surface = _Surface(vertices, faces)
+    surface = _Surface(vertices, faces, outlines)
     triangles, chosen, corners = [np.empty((0, 3), dtype=np.int64)], [], []
     for loop in surface.loops:
         places = corners_of(surface.vertices[loop])
@@ -173,9 +185,14 @@ def small_lids(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArr
 
 
 def _with_sides(loop: NDArray[np.int64], places: NDArray[np.int64], lid: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles between the corners of a loop, at these places, and those without area along its straight sides."""
-    along = [np.arange(a, b + 1) for a, b in zip(places, [*places[1:], places[0] + len(loop)], strict=True)]
-    return np.concatenate([lid, *(_fan(loop[side % len(loop)]) for side in along if len(side) > 2)])
+    """Triangles between the corners of a loop, at these places, divided at the points of its straight sides."""
+    for begin, end in zip(places, [*places[1:], places[0] + len(loop)], strict=True):
+        side = loop[np.arange(begin, end + 1) % len(loop)]
+        if len(side) > 2:
+            at, corner = np.argwhere((lid == side[0]) & (np.roll(lid, -1, axis=1) == side[-1]))[0]
+            apex = np.full(len(side) - 1, lid[at, corner - 1])
+            lid = np.concatenate([np.delete(lid, at, axis=0), np.stack([side[:-1], side[1:], apex], axis=1)])
+    return lid
 
 
 def _fan(points: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -183,11 +200,13 @@ def _fan(points: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.stack([np.full(len(points) - 2, points[0]), points[1:-1], points[2:]], axis=1)
 
 
-def strips(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def strips(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], outlines: NDArray[np.int64] = NONE
+) -> NDArray[np.int64]:
     """(k, 3) triangles between vertices of rims that run along each other, along stretches or all around."""
-    surface = _Surface(vertices, faces)
+    surface = _Surface(vertices, faces, outlines)
     chain = np.concatenate([faces, *walls.seams(_rims(surface))])
-    surface = _Surface(vertices, chain)
+    surface = _Surface(vertices, chain, outlines)
     rims = _rims(surface)
     areas = np.bincount(surface.parts, surface.areas).astype(np.float64) if rims else np.zeros(0)
     return np.concatenate([chain, *walls.wall_ends(rims, areas)])[len(faces) :]

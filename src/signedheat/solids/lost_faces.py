@@ -99,6 +99,8 @@ def _least_bent(
                     before, behind = _angle(normal, across[i, k]), _angle(normal, across[k, j])
                     one, other = _length(points[i], points[k]), _length(points[k], points[j])
                     total = cost[i, k] + cost[k, j] + one * before + other * behind
+                    if not normal.any():  # without area, which others have if there are any
+                        total += np.pi * (one + other)
                     if total < cost[i, j]:
                         cost[i, j], split[i, j], across[i, j] = total, k, normal
                         rims[i, j] = rims[i, k] + rims[k, j]

@@ -1,0 +1,209 @@
+"""Holes of a mesh, closed one by one: the mesh stays as it is, and sheets keep their outlines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import GeometryError, SignedHeatError, SourceError
+from ..foreign import ForeignShape, converted
+from ..mesh.components import element_components
+from ..mesh.edges import edge_table
+from ..mesh.welding import same_positions
+from ..surfaces.polygon_mesh import PolygonMesh, Polygons
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import element_ids, positive_number
+from .bounding import Bounding, bounding
+from .chain import Chain
+from .closing import NONE, closed_by
+from .completion import Lids
+from .rims import boundary, loops
+
+Rims = Sequence[NDArray[np.int64]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FilledMesh(TriangleMesh):
+    """Triangles whose holes were closed by `fill_holes`: those that were given, then new ones.
+
+    Attributes
+    ----------
+    origins : (m,) int
+        The face that was given of each face, −1 of new ones: ``values[origins]`` carries values of faces over.
+    filled : sequence of (k,) int
+        Vertices around each hole that was closed.
+    left : sequence of (k,) int
+        Vertices around each rim that is open still: holes that are larger, outlines of sheets.
+    """
+
+    origins: NDArray[np.int64]
+    filled: Rims
+    left: Rims
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike, origins: NDArray[np.int64], filled: Rims, left: Rims):
+        super().__init__(vertices, faces)
+        vars(self).update(origins=origins, filled=filled, left=left)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FilledPolygonMesh(PolygonMesh):
+    """Polygons whose holes were closed, like `FilledMesh`: those that were given, then triangles."""
+
+    origins: NDArray[np.int64]
+    filled: Rims
+    left: Rims
+
+    def __init__(self, vertices: ArrayLike, polygons: Polygons, origins: NDArray[np.int64], filled: Rims, left: Rims):
+        super().__init__(vertices, polygons)
+        vars(self).update(origins=origins, filled=filled, left=left)
+
+
+@overload
+def fill_holes(
+    mesh: PolygonMesh, *, largest: float | None = None, rims: ArrayLike | None = None, lids: Lids = "bent"
+) -> FilledPolygonMesh: ...
+@overload
+def fill_holes(
+    mesh: TriangleMesh | ForeignShape,
+    *,
+    largest: float | None = None,
+    rims: ArrayLike | None = None,
+    lids: Lids = "bent",
+) -> FilledMesh: ...
+def fill_holes(
+    mesh: TriangleMesh | PolygonMesh | ForeignShape,
+    *,
+    largest: float | None = None,
+    rims: ArrayLike | None = None,
+    lids: Lids = "bent",
+) -> FilledMesh | FilledPolygonMesh:
+    """Close holes of a mesh, and leave everything else as it is.
+
+    Vertices and faces stay, in their order, whichever way they face, broken or not; new ones follow, and face as their
+    neighbours do. Every rim of a part that bounds something is a hole. Sheets stay sheets: the longest rim of each is
+    its outline. To make a solid of a broken shape, use `complete`.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh or PolygonMesh
+        Any mesh.
+    largest : float, optional
+        Length of the longest rim that is closed, in the units of the mesh.
+    rims : int or sequence of int, optional
+        Close rims through these vertices only, outlines of sheets among them.
+    lids : {"bent", "flat"}
+        Whether lids continue the bend of the surface, or are flat, as in `complete`.
+
+    Returns
+    -------
+    FilledMesh or FilledPolygonMesh
+        A `TriangleMesh`, or a `PolygonMesh` of a mesh of polygons, with three more attributes: ``origins``, (m,) int,
+        the face that was given of each face, −1 of new ones; ``filled`` and ``left``, the vertices around each rim that
+        was closed, and that is open still. Where a lid is finer than the edges around it, triangles without area lie
+        between.
+
+    Raises
+    ------
+    GeometryError
+        If the shape is no mesh.
+    SourceError
+        If no rim passes through one of the vertices.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> ball = samples.without_patches(samples.sphere(4), 3, 0.3)
+    >>> whole = fill_holes(ball)
+    >>> len(whole.filled), len(whole.left), bool((whole.faces[: ball.n_faces] == ball.faces).all())
+    (3, 0, True)
+    >>> areas = ball.face_areas[whole.origins]  # a value for each face
+    >>> areas[whole.origins < 0] = 0.0  # new faces have none
+    """
+    given = converted(mesh)
+    if not isinstance(given, TriangleMesh | PolygonMesh):
+        raise GeometryError(f"a {type(given).__name__} has no holes that faces could close", remedy="pass a mesh")
+    if lids not in ("bent", "flat"):
+        raise SignedHeatError(f'lids must be "bent" or "flat", not {lids!r}', element="lids")
+    most = np.inf if largest is None else positive_number(largest, "largest")
+    triangles = given.triangulation
+    vertices, chain = triangles.vertices, Chain.of(triangles)
+    decided = bounding(chain)
+    used = np.flatnonzero(decided.orientable[decided.pieces] & ~decided.inner & ~decided.closed)
+    turned = decided.turned[used]
+    faces = np.where(turned[:, None], chain.faces[used][:, ::-1], chain.faces[used])
+    around = loops(vertices, faces, boundary(faces))
+    lengths = np.array([_length(vertices[loop]) for loop in around])
+    if rims is None:
+        chosen = _holes(around, lengths, faces, decided, used)
+    else:
+        chosen = _through(around, vertices, element_ids(np.reshape(rims, (-1, 1)), "rims", 1, given.n_vertices)[:, 0])
+    chosen &= lengths <= most
+    filled, left = ([loop for loop, yes in zip(around, chosen, strict=True) if yes == kind] for kind in (True, False))
+    outlines = [np.stack([loop, np.roll(loop, -1)], axis=1) for loop in left]
+    points, added = closed_by(vertices, faces, bent=lids == "bent", outlines=np.concatenate([NONE, *outlines]))
+    virtual = len(vertices) - given.n_vertices  # within polygons, which no lid touches
+    added = _as_neighbours(faces, turned, added)
+    added = np.where(added < given.n_vertices, added, added - virtual)
+    points = np.concatenate([given.vertices, points[len(vertices) :]])
+    if isinstance(given, PolygonMesh):
+        origins = np.append(np.arange(given.n_polygons), np.full(len(added), -1))
+        return FilledPolygonMesh(points, [*given.polygons, *added], origins, filled, left)
+    origins = np.append(np.arange(given.n_faces), np.full(len(added), -1))
+    return FilledMesh(points, np.concatenate([given.faces, added]), origins, filled, left)
+
+
+def _length(corners: NDArray[np.float64]) -> float:
+    """Length of a closed loop."""
+    return float(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1).sum())
+
+
+def _holes(
+    around: Rims, lengths: NDArray[np.float64], faces: NDArray[np.int64], decided: Bounding, used: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """(l,) which loops are holes: all along what bounds; of sheets, all along a single one but its longest."""
+    n = int(faces.max(initial=-1)) + 1
+    keys = (faces * n + np.roll(faces, -1, axis=1)).ravel()
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    bounds = (decided.counts != 0) & (decided.torn < 0)
+    longest: dict[int, int] = {}
+    chosen, single = np.zeros(len(around), dtype=bool), np.full(len(around), -1)
+    for k, loop in enumerate(around):
+        behind = used[order[np.searchsorted(keys, np.roll(loop, -1) * n + loop)] // 3]
+        pieces = np.unique(decided.pieces[behind]).tolist()
+        chosen[k] = bounds[behind].all()
+        single[k] = pieces[0] if len(pieces) == 1 else -1
+        for piece in pieces:
+            if piece not in longest or lengths[k] > lengths[longest[piece]]:
+                longest[piece] = k
+    outlines = np.isin(np.arange(len(around)), list(longest.values()))
+    result: NDArray[np.bool_] = chosen | ((single >= 0) & ~outlines)
+    return result
+
+
+def _through(around: Rims, vertices: NDArray[np.float64], named: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(l,) which loops pass through a vertex of those named, or another one at its place."""
+    places = same_positions(vertices)
+    there = [np.isin(places[named], places[loop]) for loop in around]
+    missed = ~np.any(np.array(there, dtype=bool).reshape(-1, len(named)), axis=0)
+    if missed.any():
+        vertex = f"vertex {named[np.argmax(missed)]}"
+        raise SourceError(f"no rim passes through {vertex}", element=vertex, remedy="name vertices of open edges")
+    return np.array([hits.any() for hits in there], dtype=bool)
+
+
+def _as_neighbours(faces: NDArray[np.int64], turned: NDArray[np.bool_], added: NDArray[np.int64]) -> NDArray[np.int64]:
+    """New faces, turned where most of the faces along their edges were turned from the way that they were given."""
+    if not len(added):
+        return added
+    table = edge_table(np.concatenate([faces, added]))
+    ways = np.where(turned, -1, 1)
+    votes = np.bincount(table.face_edges[: len(faces)].ravel(), np.repeat(ways, 3), len(table.vertices))
+    own = table.face_edges[len(faces) :]
+    parts = element_components(own)
+    flipped = np.bincount(np.repeat(parts, 3), votes[own.ravel()])[parts] < 0
+    return np.where(flipped[:, None], added[:, ::-1], added)
