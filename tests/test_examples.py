@@ -47,6 +47,7 @@ EXPECTED = {
     "robot_clearance": (0.0, 0.01),
     "rounding_a_drawing": (1.0, 0.02),
     "shapes_of_other_packages": (0.0, 1e-12),
+    "sharp_contours": (0.0, 1e-9),
     "sharpened_distance": (0.0, 0.05),
     "smooth_blends": (0.125, 0.01),
     "surface_from_points": (2 * np.pi**2 * 1.0 * 0.4**2, 0.06),

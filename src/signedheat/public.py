@@ -35,6 +35,7 @@ from .solids.completion import complete
 from .solids.deviations import deviation
 from .solids.facing import orient
 from .solids.holes import fill_holes
+from .solids.implicit_surfaces import contour
 from .solids.mesh_orientation import orientation
 from .solids.sampling import sample
 from .solids.solid import Solid
@@ -98,6 +99,7 @@ __all__ = [
     "close_curves",
     "common_subdivision",
     "complete",
+    "contour",
     "curve_orientation",
     "deviation",
     "fill_holes",

@@ -137,8 +137,8 @@ UNEVEN = 0.05
 radius, distances are .04 cells off at the most, with .1 by .01; of clipped ones .07 and .12."""
 
 FLAT = 0.25
-"""Radius around a crossing, relative to a cell's diagonal, within which the zero set of signs with four axes is flat. Of
-balls and half spaces, 13 to 17 nodes wide, distances come out best with .125 to .25, of boxes with more."""
+"""Radius around a crossing, relative to a cell's diagonal, within which the zero set of signs with four axes is flat.
+Of balls and half spaces, 13 to 17 nodes wide, distances come out best with .125 to .25, of boxes with more."""
 
 
 class Contour(NamedTuple):

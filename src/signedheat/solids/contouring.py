@@ -7,13 +7,14 @@ each other (Ju & Udeshi 2006). Only blocks of the grid through which the level p
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InexactWarning, OutsideError, warn_user
-from ..field_levels import on_level
+from ..field_levels import NodeValues, on_level
 from ..grids.blocks import SIDE, Blocks, BlockValues
 from ..grids.grid import Grid
 from ..grids.marching import CLEARANCE
@@ -21,7 +22,7 @@ from ..mesh.components import element_components
 from ..mesh.dual_cells import Crossings, DualCells, cells_around, dual_cells, open_cells, separate_triangles
 from ..progress import Progress
 from ..surfaces.triangle_mesh import TriangleMesh
-from .dual_vertices import divided_along_creases, placed
+from .dual_vertices import ImplicitSurface, divided_along_creases, placed
 from .gauss import Pieces, sampled
 from .node_distances import solved
 from .offsets import Offset
@@ -76,6 +77,21 @@ def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) 
     """
     report = progress or (lambda fraction, step: None)
     values, crossings, cells = _crossed(offset, grid)
+    vertices, faces = traced(offset, grid, values, crossings, cells, report)
+    announce_lost(offset, grid, vertices)
+    report(1.0, "faces")
+    return TriangleMesh(vertices, faces)
+
+
+def traced(
+    offset: ImplicitSurface,
+    grid: Grid,
+    values: NodeValues,
+    crossings: Crossings,
+    cells: DualCells,
+    report: Progress,
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices and faces of a surface, from the edges of a grid that it crosses and its pieces in cells."""
     report(0.4, "edges")
     nodes, axes = crossings.nodes, crossings.axes
     guesses = nodes.astype(np.float64)
@@ -87,10 +103,7 @@ def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) 
     report(0.9, "faces")
     crossings = replace(crossings, shares=np.clip(shares, CLEARANCE, 1 - CLEARANCE))
     vertices, faces = separate_triangles(cells, crossings, choices)
-    vertices, faces = divided_along_creases(offset, grid.spacing, grid.origin + vertices * grid.spacing, faces)
-    announce_lost(offset, grid, vertices)
-    report(1.0, "faces")
-    return TriangleMesh(vertices, faces)
+    return divided_along_creases(offset, grid.spacing, grid.origin + vertices * grid.spacing, faces)
 
 
 def announce_lost(offset: Offset, grid: Grid, vertices: NDArray[np.float64]) -> None:
@@ -182,23 +195,37 @@ def crossed_edges(band: BlockValues) -> Crossings:
     OutsideError
         If there are none.
     """
-    nodes, axes, rising, shares = [], [], [], []
+    parts = []
     for window in np.unique(band.blocks.places // WINDOW, axis=0).astype(np.int64):
         first, size = window * WINDOW * SIDE, WINDOW * SIDE
-        height = band.window(first, (size + 1,) * 3).astype(np.float64)
-        below, held = height < 0, ~np.isnan(height)
-        for axis in range(3):
-            ahead = tuple(slice(1, None) if k == axis else slice(0, size) for k in range(3))
-            here = (slice(0, size),) * 3
-            found = np.argwhere((below[here] != below[ahead]) & held[here] & held[ahead])
-            low, high = height[here][tuple(found.T)], height[ahead][tuple(found.T)]
-            nodes.append(first + found)
-            axes.append(np.full(len(found), axis))
-            rising.append(low < 0)
-            shares.append(low / (low - high))
-    if not sum(map(len, nodes)):
+        parts += crossings_in(band.window(first, (size + 1,) * 3).astype(np.float64), first)
+    return joined_crossings(parts)
+
+
+def crossings_in(heights: NDArray[np.float64], first: NDArray[np.int64]) -> list[Crossings]:
+    """Crossed edges between the nodes of a window of a grid that begins at a node, along each axis."""
+    below, held, found = heights < 0, ~np.isnan(heights), []
+    for axis in range(3):
+        ahead = tuple(slice(1, None) if k == axis else slice(0, -1) for k in range(3))
+        here = (slice(0, -1),) * 3
+        nodes = np.argwhere((below[here] != below[ahead]) & held[here] & held[ahead])
+        low, high = heights[here][tuple(nodes.T)], heights[ahead][tuple(nodes.T)]
+        found.append(Crossings(first + nodes, np.full(len(nodes), axis), low < 0, low / (low - high)))
+    return found
+
+
+def joined_crossings(parts: Sequence[Crossings]) -> Crossings:
+    """Those of several windows and axes.
+
+    Raises
+    ------
+    OutsideError
+        If there are none.
+    """
+    if not any(len(part.axes) for part in parts):
         raise OutsideError(
             "the distance takes the level nowhere between the nodes of the grid",
             remedy="choose another level, or smaller cells if the shape is thinner than they are",
         )
-    return Crossings(np.concatenate(nodes), np.concatenate(axes), np.concatenate(rising), np.concatenate(shares))
+    names = ("nodes", "axes", "rising", "shares")
+    return Crossings(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

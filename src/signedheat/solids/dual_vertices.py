@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -15,7 +17,6 @@ from ..mesh.edges import edge_table
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import area_vectors, divided_at
 from ..mesh.unit_vectors import unit
-from .offsets import Offset
 from .quadrics import Quadrics, minimizers
 
 MANY = 1 << 17
@@ -42,7 +43,20 @@ AHEAD = 0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5
 """Distances along a crease, in cells, of probes for its ends."""
 
 
-def placed(offset: Offset, grid: Grid, cells: DualCells, points: NDArray[np.float64]) -> NDArray[np.float64]:
+class ImplicitSurface(Protocol):
+    """The zero set of a function of (n, 3) points that grows outwards."""
+
+    def distance(self, points: NDArray[np.float64], /) -> NDArray[np.float64]:
+        """(n,) values, negative inside."""
+
+    def slopes(self, points: NDArray[np.float64], /) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n,) distances from the surface, negative inside, and (n, 3) unit vectors along which they grow."""
+
+    def planes(self, points: NDArray[np.float64], /) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n, 3) places on the surface near points, and its normals there."""
+
+
+def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3, v, 3) candidates for the vertex of each piece of a level, in cells: the best, in its cell, in its middle.
 
     The best is on a crease or corner, even outside the cell. `points` are the (e, 3) crossings of edges of the grid.
@@ -87,7 +101,7 @@ def _apart(cells: DualCells, vertices: NDArray[np.float64], wider: NDArray[np.fl
 
 
 def _vertices(
-    offset: Offset,
+    offset: ImplicitSurface,
     grid: Grid,
     places: NDArray[np.int64],
     alone: NDArray[np.bool_],
@@ -140,7 +154,7 @@ def _probes(
 
 
 def divided_along_creases(
-    offset: Offset, spacing: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int64]
+    offset: ImplicitSurface, spacing: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Divide bent edges that are off the level, with new vertices on the level, unless triangles would intersect.
 
@@ -165,7 +179,7 @@ def divided_along_creases(
 
 
 def _creases_off(
-    offset: Offset, spacing: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int64]
+    offset: ImplicitSurface, spacing: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """(k, 2) halfedges of bent edges off the level, one per face, and (k, 3) places on creases or the level."""
     step = float(spacing.max())

@@ -1,0 +1,330 @@
+"""Level sets of functions of points, and of values at the nodes of a grid, as closed surfaces with sharp edges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import GeometryError, OutsideError, SignedHeatError
+from ..field_levels import on_level
+from ..grids.grid import RESOLUTION, Grid
+from ..grids.grid_discretization import refuse_large_grid
+from ..grids.marching import CAP, closed_surface
+from ..mesh.dual_cells import dual_cells
+from ..mesh.unit_vectors import unit
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import array_of, finite_number, flag, positive_steps, whole_number
+from .contouring import crossings_in, joined_crossings, traced
+
+Function: TypeAlias = Callable[[NDArray[np.float64]], ArrayLike]
+"""One number for each of (n, 3) points; of gradients, three."""
+TOGETHER = 1 << 17
+"""Points at which a function is asked for at once."""
+BYTES_PER_NODE = 40.0
+"""Measured memory per node."""
+APART = 1e-9
+"""Least weight of a node with which it counts for a point: on an edge of the grid only its ends do."""
+EDGE = np.cos(np.deg2rad(15.0))
+"""Cosine between the slope at a node and the mean of those around it below which there is an edge between nodes."""
+ROUND = 0.1
+"""Change of the slope from node to node, over the slope, above which this is not known well."""
+CLEAR = 0.25
+"""Ratio of the errors at nodes of the maximum and the minimum of planes from which one of them counts."""
+CORNERS = np.array(list(np.ndindex(2, 2, 2)))
+"""Corners of a cell."""
+
+
+@dataclass(frozen=True, eq=False)
+class Implicit:
+    """The level set of a function within a box, the walls of which close it.
+
+    Attributes
+    ----------
+    function, gradient : callable
+        Of (n, 3) points in the box: values, (n,), and their gradients, (n, 3).
+    box : (2, 3) float
+        Lower and upper corner.
+    """
+
+    function: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    gradient: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    box: NDArray[np.float64]
+
+    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) values, or distances from the walls where these are greater."""
+        return np.maximum(self.function(np.clip(points, *self.box)), self._beyond(points).max(axis=1))
+
+    def slopes(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n,) distances from the surface, by the slope of the function, and (n, 3) unit vectors of its growth."""
+        places = np.clip(points, *self.box)
+        gradients = self.gradient(places)
+        steepness = np.maximum(np.linalg.norm(gradients, axis=1), np.finfo(float).tiny)
+        away, ways = self.function(places) / steepness, gradients / steepness[:, None]
+        walls = self._beyond(points)
+        at, nearest = np.arange(len(points)), walls.argmax(axis=1)
+        outside = walls[at, nearest] > away
+        normals = np.concatenate([-np.eye(3), np.eye(3)])[nearest]
+        return np.where(outside, walls[at, nearest], away), np.where(outside[:, None], normals, ways)
+
+    def planes(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n, 3) places on the surface near points, and its normals there."""
+        away, ways = self.slopes(points)
+        return points - away[:, None] * ways, ways
+
+    def _beyond(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 6) how far points lie beyond each wall."""
+        return np.concatenate([self.box[0] - points, points - self.box[1]], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class NodePlanes:
+    """Values between the nodes of a grid, by the planes through values and slopes at nodes.
+
+    Around each point planes are mixed linearly. Where they differ as at an edge, their maximum counts if it gives back
+    the values at the nodes, as it does of what is convex; or their minimum, which does so of what is concave.
+    """
+
+    origin: NDArray[np.float64]
+    spacing: NDArray[np.float64]
+    values: NDArray[np.float64]
+    gradients: NDArray[np.float64]
+    known: NDArray[np.bool_]  # nodes whose slopes are known well; others take those of their neighbours that are
+
+    def function(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) values."""
+        return self._values_and_slopes(points)[0]
+
+    def gradient(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 3) slopes of the plane that counts, or of a mixture."""
+        return self._values_and_slopes(points)[1]
+
+    def _values_and_slopes(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        cells = (points - self.origin) / self.spacing
+        base = np.clip(np.floor(cells).astype(np.int64), 0, np.array(self.values.shape) - 2)
+        shares = (cells - base)[:, None]
+        weights = np.where(CORNERS == 1, shares, 1 - shares).prod(axis=2)
+        weights[weights < APART] = 0.0
+        at = tuple((base[:, None] + CORNERS).transpose(2, 0, 1))
+        values, slopes = self.values[at], self.gradients[at]
+        known = (weights > 0) & self.known[at]
+        shared = np.where(known, weights, 0.0)
+        total = shared.sum(axis=1, keepdims=True)
+        middle = (shared[..., None] * slopes).sum(axis=1) / np.maximum(total, APART)
+        slopes = np.where((known | (total < APART))[..., None], slopes, middle[:, None])
+        heights = values + np.einsum("nkd,nkd->nk", slopes, (shares - CORNERS) * self.spacing)
+        mixed, mean = (weights * heights).sum(axis=1), (weights[..., None] * slopes).sum(axis=1)
+        ways = unit(slopes)
+        together = unit(np.where(known[..., None], ways, 0.0).sum(axis=1))
+        agreement = np.where(known, np.einsum("nkd,nd->nk", ways, together), 1.0).min(axis=1)
+        rows = np.flatnonzero(agreement < EDGE)
+        values, slopes, heights, counts = values[rows], slopes[rows], heights[rows], known[rows]
+        between = (CORNERS[None, :] - CORNERS[:, None]) * self.spacing  # from each corner to the others
+        planes = values[:, :, None] + np.einsum("nkd,kjd->nkj", slopes, between)
+        errors, places = [], []
+        for sign in (1.0, -1.0):
+            hidden = np.where(counts, 0.0, -np.inf)
+            highest = (sign * planes + hidden[:, :, None]).max(axis=1)
+            errors.append(np.where(counts, np.abs(sign * highest - values), 0.0).sum(axis=1))
+            places.append((sign * heights + hidden).argmax(axis=1))
+        for own, other, place in zip(errors, errors[::-1], places, strict=True):
+            clear = np.flatnonzero(own < CLEAR * other)
+            mixed[rows[clear]] = heights[clear, place[clear]]
+            mean[rows[clear]] = slopes[clear, place[clear]]
+        return mixed, mean
+
+
+def contour(
+    f: Function | ArrayLike,
+    bounds: ArrayLike,
+    spacing: ArrayLike | None = None,
+    level: float = 0.0,
+    *,
+    sharp: bool = True,
+    gradient: Function | ArrayLike | None = None,
+    resolution: int = RESOLUTION,
+) -> TriangleMesh:
+    """Extract the closed, manifold surface on which a function, or an array, takes a level.
+
+    Normals point to greater values. Sharp surfaces have the edges and corners of the function, as those of
+    `Solid.surface` do, and do not intersect themselves. Where less than the level is left at the walls of the box, they
+    close it.
+
+    Parameters
+    ----------
+    f : callable, or (nx, ny, nz) float
+        A function that returns one number for each of (n, 3) points; or values at the nodes of a grid.
+    bounds : (2, 3) float
+        Lower and upper corner of the box; of an array, the places of its first and of its last node.
+    spacing : float or (3,) float, optional
+        Size of the cells in which a function is looked at. Arrays have their own.
+    level : float
+        The level.
+    sharp : bool
+        Use dual contouring; otherwise marching cubes, which cut edges off.
+    gradient : callable, or (nx, ny, nz, 3) float, optional
+        Gradients of the function: (n, 3) at (n, 3) points, or at the nodes. Differences by default.
+    resolution : int
+        Cells along the longest side, in place of `spacing`.
+
+    Returns
+    -------
+    TriangleMesh
+        Of functions with flat sides, edges and corners are exact to rounding where cells see them; surfaces that bend
+        are off by the square of the cells. Edges of arrays are exact where gradients are given; with differences they
+        are off by up to a fifth of a cell, and rims of holes by more.
+
+    Raises
+    ------
+    OutsideError
+        If the level is nowhere between the nodes.
+    SignedHeatError
+        If a function does not return a finite number for each point.
+    GeometryError
+        If the box or the array has another shape, or the array holds NaN or infinity.
+    MemoryLimitError
+        If the grid does not fit in memory. Raised before anything is computed.
+
+    Examples
+    --------
+    >>> def box(points):
+    ...     return np.abs(points).max(axis=1) - 0.7
+    >>> surface = contour(box, [[-1, -1, -1], [1, 1, 1]], 0.1)
+    >>> surface.bounds.round(9).tolist()
+    [[-0.7, -0.7, -0.7], [0.7, 0.7, 0.7]]
+    """
+    box = array_of(bounds, "bounds").astype(np.float64)
+    if box.shape != (2, 3) or not np.isfinite(box).all() or not (box[0] < box[1]).all():
+        raise GeometryError("bounds must be the lower and the upper corner of a box, (2, 3)", element="bounds")
+    height, is_sharp = finite_number(level, "level"), flag(sharp, "sharp")
+    if callable(f):
+        cells = whole_number(resolution, "resolution", 1)
+        steps = positive_steps(np.ptp(box, axis=0).max() / cells if spacing is None else spacing, 3)
+        counts = np.ceil(np.ptp(box, axis=0) / steps - 1e-9).astype(np.int64) + 2
+        grid = Grid(box[0] - 0.5 * steps, steps, counts)
+        surface = _of_function(f, gradient, box, grid, height)
+    else:
+        if spacing is not None:
+            raise SignedHeatError("an array has its own spacing", element="spacing", remedy="leave it out")
+        surface, grid = _of_array(f, gradient, box, height)
+    refuse_large_grid(grid, BYTES_PER_NODE)
+    parts = []
+    for begin in range(0, grid.n_nodes, TOGETHER):
+        nodes = np.unravel_index(np.arange(begin, min(begin + TOGETHER, grid.n_nodes)), grid.shape)
+        parts.append(surface.distance(grid.origin + np.stack(nodes, axis=1) * grid.spacing))
+    values = np.concatenate(parts).reshape(grid.shape)
+    within = [(box[0, k] <= x) & (x <= box[1, k]) for k, x in enumerate(grid.axes)]
+    if (values[np.ix_(*within)] < 0).all():
+        raise OutsideError(f"the function is below level {height:g} everywhere", remedy="choose another level")
+    if not is_sharp:
+        vertices, faces = closed_surface(
+            values, grid.origin, grid.spacing, 0.0, lambda at: on_level(surface.distance, at, values, grid, 0.0)
+        )
+        return TriangleMesh(vertices, faces)
+    crossings = joined_crossings(crossings_in(values, np.zeros(3, dtype=np.int64)))
+    pieces = dual_cells(crossings, grid.shape, lambda at: surface.distance(grid.origin + at * grid.spacing) < 0)
+    return TriangleMesh(*traced(surface, grid, values, crossings, pieces, lambda fraction, step: None))
+
+
+def _of_function(
+    f: Function, gradient: Function | ArrayLike | None, box: NDArray[np.float64], grid: Grid, level: float
+) -> Implicit:
+    """The level set of a function; of its differences, steps balance rounding and curvature."""
+
+    def values(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return _called(f, points, ())[..., 0] - level
+
+    precision = np.asarray(f(box.mean(axis=0, keepdims=True))).dtype
+    rounding = np.finfo(precision if precision.kind == "f" else float).eps
+    steps = float(rounding) ** 0.25 * grid.spacing
+
+    def differences(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        ways = steps * np.eye(3)
+        around = np.stack([points[:, None] + ways, points[:, None] - ways])
+        ahead, back = values(np.clip(around, *box).reshape(-1, 3)).reshape(2, len(points), 3)
+        return (ahead - back) / np.einsum("nkk->nk", np.clip(around[0], *box) - np.clip(around[1], *box))
+
+    if gradient is None:
+        return Implicit(values, differences, box)
+    if not callable(gradient):
+        raise SignedHeatError("the gradient of a function is a function", element="gradient")
+    return Implicit(values, lambda points: _called(gradient, points, (3,)), box)
+
+
+def _called(f: Function, points: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """(n, 1) or (n, 3) finite numbers that a function returns for points."""
+    parts = [np.empty((0, *(shape or (1,))))]
+    for begin in range(0, len(points), TOGETHER):
+        asked = points[begin : begin + TOGETHER]
+        found = np.asarray(f(asked), dtype=np.float64)
+        if found.shape not in ((len(asked), *shape), (len(asked), *(shape or (1,)))):
+            raise SignedHeatError(
+                f"the function returns shape {found.shape} for {len(asked)} points",
+                element="f",
+                remedy="return one number for each of (n, 3) points, or three of a gradient",
+            )
+        found = found.reshape(len(asked), -1)
+        lost = ~np.isfinite(found).all(axis=1)
+        if lost.any():
+            place = ", ".join(f"{x:.4g}" for x in asked[np.argmax(lost)])
+            raise SignedHeatError(f"the function is not finite at ({place})", element="f")
+        parts.append(found)
+    return np.concatenate(parts)
+
+
+def _of_array(
+    f: ArrayLike, gradient: Function | ArrayLike | None, box: NDArray[np.float64], level: float
+) -> tuple[Implicit, Grid]:
+    """The level set of values at nodes, and the grid with one more node on each side."""
+    values = array_of(f, "f").astype(np.float64)
+    if values.ndim != 3 or min(values.shape) < 2 or not np.isfinite(values).all():
+        raise GeometryError(
+            f"an array must hold finite numbers at 2 nodes or more along each of 3 axes, not {values.shape}",
+            element="f",
+            remedy="fill in what is not known",
+        )
+    steps = np.ptp(box, axis=0) / (np.array(values.shape) - 1)
+    if gradient is None:
+        along = [_slopes(values, axis) for axis in range(3)]
+        slopes, bends = (np.stack(parts, axis=-1) / steps for parts in zip(*along, strict=True))
+        known = np.linalg.norm(bends, axis=-1) <= ROUND * np.linalg.norm(slopes, axis=-1)
+    else:
+        known = np.ones(values.shape, dtype=bool)
+        slopes = cast("NDArray[np.float64]", array_of(cast("ArrayLike", gradient), "gradient").astype(np.float64))
+        if slopes.shape != (*values.shape, 3) or not np.isfinite(slopes).all():
+            raise GeometryError(f"gradients must be finite, of shape {(*values.shape, 3)}", element="gradient")
+    planes = NodePlanes(box[0], steps, values - level, slopes, known)
+    grid = Grid(box[0] - steps, steps, np.array(values.shape) + 2)
+    walls = box + CAP * steps * np.array([[-1.0], [1.0]])
+    return Implicit(
+        lambda points: planes.function(np.clip(points, *box)),
+        lambda points: planes.gradient(np.clip(points, *box)),
+        walls,
+    ), grid
+
+
+def _slopes(values: NDArray[np.float64], axis: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Differences from node to node along an axis, of the second order, and by how much these change.
+
+    Of the three parabolas through a node and its neighbours that bends least counts (Harten et al. 1987), so that
+    slopes on one side of an edge know nothing of the other side.
+    """
+    v = np.moveaxis(values, axis, 0)
+    if len(v) < 3:
+        return np.broadcast_to(np.moveaxis(v[1:] - v[:1], 0, axis), values.shape), np.zeros(values.shape)
+    bends, middle = v[2:] - 2 * v[1:-1] + v[:-2], 0.5 * (v[2:] - v[:-2])
+    least, sides, slopes = np.full(v.shape, np.inf), np.zeros(v.shape), np.empty_like(v)
+    for shift in (0, -1, 1):  # of the middle of the parabola; the one around the node if none bends less
+        nodes = slice(1 - shift, len(v) - 1 - shift)
+        bent = np.abs(bends) * (1.0 if shift else 0.5)
+        better = bent < least[nodes]
+        slopes[nodes] = np.where(better, middle - shift * bends, slopes[nodes])
+        least[nodes] = np.where(better, bent, least[nodes])
+        if shift:
+            sides[nodes] = np.fmax(sides[nodes], bent)
+    through = sides[1:-1] < CLEAR * np.abs(bends)  # both sides bend less by far: an edge runs through the node
+    least[1:-1] = np.where(through, np.abs(bends), least[1:-1])
+    return np.moveaxis(slopes, 0, axis), np.moveaxis(least, 0, axis)
