@@ -484,3 +484,10 @@ def test_flat_lids_close_half_models_flat():
     flat, bent = (sh.complete(half, lids=lids).volume / sh.complete(ball).volume for lids in ("flat", "bent"))
     assert flat == pytest.approx(0.5, abs=0.01)
     assert bent > 0.9
+
+
+@pytest.mark.parametrize("share", [0.25, 0.35])
+def test_a_torus_without_many_of_its_slender_triangles_is_a_torus(share):
+    torus = samples.torus(n_around=48, n_across=24)  # corners of down to 30°: rims that only meet there are no seam
+    solid = sh.complete(samples.without_faces(torus, share))
+    assert solid.volume == pytest.approx(sh.complete(torus).volume, rel=0.01)

@@ -17,6 +17,8 @@ PLACES = 8
 ALONG = 0.1
 """Distance over the length of the longer edge up to which two edges run along each other: chords of the same arc are
 less than .05 apart where it has 16 or more."""
+SHARED = 3
+"""Places of one of two edges that lie along the other: edges that only meet at a corner share fewer, beyond 20°."""
 OPPOSITE = -0.7
 """Cosine of their directions up to which they run in opposite directions; with 0, leaves that cross are one part."""
 STRAIGHT = 1e-5
@@ -200,9 +202,13 @@ def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray
     counts = tree.query_ball_point(places, reach, return_length=True)
     crowded = np.flatnonzero(counts > 1)  # each place finds itself
     near = tree.query_ball_point(places[crowded], reach[crowded]) if len(crowded) else []
-    one = np.repeat(owners[crowded], counts[crowded])
-    other = owners[np.concatenate([np.asarray(numbers, dtype=np.int64) for numbers in near])] if len(one) else one
-    pairs = np.unique(np.sort(np.stack([one, other], axis=1)), axis=0)
+    one = np.repeat(crowded, counts[crowded])
+    other = np.concatenate([np.asarray(numbers, dtype=np.int64) for numbers in near]) if len(one) else one
+    # each place with the edges that it lies along, whichever of the two is the longer
+    beside = np.unique(np.concatenate([one, other]) * len(ends) + owners[np.concatenate([other, one])])
+    pairs, shared = np.unique(owners[beside // len(ends)] * len(ends) + beside % len(ends), return_counts=True)
+    pairs = np.stack([pairs // len(ends), pairs % len(ends)], axis=1)[shared >= SHARED]
+    pairs = np.unique(np.sort(pairs, axis=1), axis=0)
     one, other = pairs[(ways[pairs[:, 0]] * ways[pairs[:, 1]]).sum(axis=1) < OPPOSITE].T
     same = (ends[one] == ends[other, ::-1]).all(axis=(1, 2))
     return one[~same], other[~same]
