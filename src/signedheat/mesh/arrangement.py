@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from .box_tree import BoxTree
+from .components import grouped, members_of, sums_of
 from .edges import EdgeTable, edge_table
 from .planar_triangulation import triangulate_faces
 from .self_intersections import overlapping_faces
@@ -26,6 +27,8 @@ STRAIGHT = 4.0
 """Distance, over that up to which points are one, up to which points that two faces have in common are on a line."""
 PARALLEL = 1e-9
 """Sine of the angle between edges below which they are parallel."""
+ALIKE = 1e-4
+"""Difference in area and middle, over their size, up to which cells with one outline cover each other."""
 ON_EDGE, IN_FACE, EDGES, EDGE_AND_FACE = range(4)
 """What is met: a vertex is on an edge or in a face, two edges touch, or an edge passes through a face."""
 
@@ -121,7 +124,7 @@ def arranged(
     lines = lines.renamed(_welded(points, np.concatenate([busy, np.unique(ids)]), slack))
     lines, records = _with_segments(points, faces, table, pairs, lines, slack)
     points, lines, records = _with_crossings(points, lines, records, slack, busy)
-    return _divided(points, faces, proper, table, lines, records)
+    return _with_copies_alike(_divided(points, faces, proper, table, lines, records))
 
 
 class Lines(NamedTuple):
@@ -364,6 +367,47 @@ def _divided(
     order = np.argsort(all_origins, kind="stable")
     all_cells = np.concatenate([np.arange(len(kept)), len(kept) + cells])
     return Arrangement(points, all_faces[order], origins[all_origins[order]], all_cells[order])
+
+
+def _with_copies_alike(pieces: Arrangement) -> Arrangement:
+    """Give cells that cover each other the triangles of the first, reversed where they face the other way."""
+    points, faces, origins, cells = pieces
+    table = edge_table(faces)
+    n = int(cells.max(initial=-1)) + 1
+    edges, owners = table.face_edges.ravel(), np.repeat(cells, 3)
+    order = np.lexsort((edges, owners))
+    twice = np.zeros(len(order), dtype=bool)
+    same = (edges[order][1:] == edges[order][:-1]) & (owners[order][1:] == owners[order][:-1])
+    twice[1:] |= same
+    twice[:-1] |= same
+    outline = order[~twice]
+    edges, owners = edges[outline], owners[outline]
+    codes = np.random.default_rng(0).integers(0, 2**63, len(table.vertices), dtype=np.int64).astype(np.uint64)
+    sums, counts = np.zeros(n, dtype=np.uint64), np.bincount(owners, minlength=n)
+    np.add.at(sums, owners, codes[edges])
+    forward = np.zeros(n, dtype=bool)
+    some = np.flatnonzero(counts)
+    forward[some] = table.forward.ravel()[outline[np.searchsorted(owners, some)]]
+    alone = np.where(counts > 0, -1, np.arange(n))
+    kinds, first = distinct_rows(np.stack([sums.view(np.int64), counts, alone], axis=1))
+    models = first[kinds]
+    if (models == np.arange(n)).all():
+        return pieces
+    areas, middles = face_areas(points[faces]), points[faces].mean(axis=1)
+    totals = np.bincount(cells, areas, n)
+    middles = sums_of(areas[:, None] * middles, cells, n) / np.maximum(totals, 1e-300)[:, None]
+    covers = (models != np.arange(n)) & (np.abs(totals - totals[models]) <= ALIKE * totals)
+    covers &= np.linalg.norm(middles - middles[models], axis=1) <= ALIKE * np.sqrt(totals)
+    copies = np.flatnonzero(covers)
+    own = np.empty(n, dtype=np.int64)
+    own[cells] = origins
+    which, members = members_of(*grouped(cells, n), models[copies])
+    reverse = (forward[copies] != forward[models[copies]])[which]
+    kept = ~covers[cells]
+    faces = np.concatenate([faces[kept], np.where(reverse[:, None], faces[members, ::-1], faces[members])])
+    cells = np.concatenate([cells[kept], copies[which]])
+    order = np.argsort(own[cells], kind="stable")
+    return Arrangement(points, faces[order], own[cells[order]], cells[order])
 
 
 @compiled

@@ -129,10 +129,11 @@ def _conforming(whole: Joined, windings: Windings) -> Joined:
 
 
 def _without_doubles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Faces without pairs on the same vertices that face opposite ways."""
+    """Faces without pairs on the same vertices that face opposite ways, and without those on fewer than three."""
     first, reverse = coincident_faces(faces.ravel(), np.arange(0, faces.size + 1, 3))
-    forth, back = (np.bincount(first[reverse == way], minlength=len(faces)) for way in (False, True))
-    return faces[~((forth == 1) & (back == 1))[first]]
+    proper = first >= 0
+    forth, back = (np.bincount(first[proper & (reverse == way)], minlength=len(faces)) for way in (False, True))
+    return faces[proper & ~((forth == 1) & (back == 1))[first]]
 
 
 def outward(solid: Evaluated) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -1,4 +1,9 @@
-"""Regions of faces within which the sides do not change, and on which side of each the inside is."""
+"""On which side of each face of a solid's boundary the inside is.
+
+The winding number differs on the two sides of a face by how often the face is there, and between two faces that follow
+each other around an edge it is the same. These steps give it on both sides of all faces that hang together, but for a
+number, of which samples tell. So the inside does not depend on places between faces that nearly coincide.
+"""
 
 from __future__ import annotations
 
@@ -7,32 +12,31 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled import compiled
 from ..mesh.arrangement import TOUCHING, Arrangement
-from ..mesh.components import connected_components, sums_of
-from ..mesh.edges import EdgeTable, edge_table
+from ..mesh.components import sums_of
+from ..mesh.edges import edge_table
 from ..mesh.triangles import area_vectors, face_areas
-from ..mesh.unit_vectors import unit
-from ..mesh.welding import coincident_faces, distinct_rows
-from .winding import DEPTH, Windings
+from ..mesh.unit_vectors import axes_across, unit
+from ..mesh.welding import coincident_faces
+from .winding import DEPTH, INSIDE, Windings
 
 SAMPLES = 3
-"""Faces of a region that are looked at. If they do not agree, all are."""
-ALIKE = 1e-4
-"""Difference in area and middle, over their size, up to which regions with one outline are one."""
+"""Faces of what hangs together on both sides of which winding numbers are computed; their median counts."""
 NEAR = 4.0
 """Distance from a face at which its sides are looked at, over that up to which faces that coincide may be apart."""
 
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """What is known of each face from the region that it is in.
+    """What is known of each face from the regions beside it.
 
     Attributes
     ----------
     behind, ahead : (m,) bool
         Whether it is inside behind the face, and in front of it.
     doubled : (m,) bool
-        Whether a face or a region before covers the same place and faces the same way.
+        Whether another face on the same corners stands for it.
     """
 
     behind: NDArray[np.bool_]
@@ -41,86 +45,131 @@ class Regions:
 
     @classmethod
     def of(cls, pieces: Arrangement, windings: Windings) -> Regions:
-        """Of pieces that meet in whole edges: a region goes on across edges of two faces that run along it both ways.
-
-        Where surfaces cross or cover each other, edges have more.
-        """
-        table = edge_table(pieces.faces)
-        across = table.pairs[table.balance[table.face_edges.ravel()[table.pairs[:, 0]]] == 0]
-        labels = connected_components(len(pieces.faces), *(across // 3).T)
-        triangles = pieces.points[pieces.faces]
-        vectors = area_vectors(triangles)
-        behind, ahead = _sides(triangles, vectors, labels, windings)
-        doubled = _doubled(table, pieces.cells, triangles, vectors)
-        # cells may overlap in part: of copies with the inside on the same side of them the first stays
-        first, backwards = coincident_faces(pieces.faces.ravel(), np.arange(0, pieces.faces.size + 1, 3))
-        walls = np.flatnonzero((behind != ahead) & ~doubled & (first >= 0))
-        stays = np.unique(2 * first[walls] + (backwards != ahead)[walls], return_index=True)[1]
-        doubled[np.delete(walls, stays)] = True
+        """Of pieces that meet in whole edges, among them all of the cycle that has these winding numbers."""
+        first, reverse = coincident_faces(pieces.faces.ravel(), np.arange(0, pieces.faces.size + 1, 3))
+        first = np.where(first < 0, np.arange(len(first)), first)  # triangles on fewer than three points
+        distinct, which = np.unique(first, return_inverse=True)
+        times = np.bincount(which, np.where(reverse, -1, 1), len(distinct)).astype(np.int64)
+        vectors = area_vectors(pieces.points[pieces.faces])
+        parents = unit(sums_of(vectors, pieces.origins, int(pieces.origins.max(initial=-1)) + 1))
+        normals = parents[pieces.origins[distinct]]
+        inside = _windings(pieces.points, pieces.faces[distinct], normals, times, windings) > INSIDE
+        behind, ahead = inside.T
+        behind, ahead = (
+            np.where(reverse, *pair) for pair in ((ahead[which], behind[which]), (behind[which], ahead[which]))
+        )
+        # of copies the first stays that has the inside behind it, if there is one
+        order = np.lexsort((~behind | ahead, which))
+        doubled = np.ones(len(which), dtype=bool)
+        doubled[order[np.unique(which[order], return_index=True)[1]]] = False
         return cls(behind, ahead, doubled)
 
 
-def _sides(
-    triangles: NDArray[np.float64], vectors: NDArray[np.float64], labels: NDArray[np.int64], windings: Windings
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(m,) whether places behind and in front of each triangle are inside, from the widest ones of each region."""
-    areas = np.linalg.norm(vectors, axis=1)
-    widths = _widths(triangles)
-    slack = TOUCHING * float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
-    order = np.lexsort((-widths, labels))
-    starts = np.searchsorted(labels[order], np.arange(labels.max() + 1))
-    rank = np.arange(len(order)) - starts[labels[order]]
-    chosen = order[rank < SAMPLES]
+def _windings(
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    normals: NDArray[np.float64],
+    times: NDArray[np.int64],
+    windings: Windings,
+) -> NDArray[np.float64]:
+    """(m, 2) winding numbers behind each face and in front of it; faces of different corners, each there so often."""
+    n = len(faces)
+    one, other = _around_edges(points, faces, normals, times)
+    steps = np.concatenate([times, np.zeros(len(one), dtype=np.int64)])
+    one, other = np.concatenate([2 * np.arange(n), one]), np.concatenate([2 * np.arange(n) + 1, other])
+    levels, labels = (values.reshape(-1, 2) for values in _levels(2 * n, one, other, steps))
+    labels = labels[:, 0]
+    triangles = points[faces]
+    # the widest faces of each part
+    order = np.lexsort((-_widths(triangles), labels))
+    starts = np.searchsorted(labels[order], np.arange(int(labels.max(initial=-1)) + 1))
+    chosen = order[np.arange(n) - starts[labels[order]] < SAMPLES]
+    some = triangles[chosen]
+    away = np.minimum(np.maximum(DEPTH * np.sqrt(face_areas(some)), _slack(points)), 0.1 * _widths(some))
+    away, centres = away[:, None] * normals[chosen], some.mean(axis=1)
+    there = np.concatenate([windings.numbers(centres - away), windings.numbers(centres + away)])
+    offsets, owners = there - levels[chosen].T.ravel(), np.tile(labels[chosen], 2)
+    order = np.lexsort((offsets, owners))
+    counts = np.bincount(owners)
+    medians = offsets[order[np.cumsum(counts) - counts + counts // 2]]
+    return levels + np.round(medians)[labels, None]
 
-    def sides(faces: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        steps = np.minimum(np.maximum(DEPTH * np.sqrt(areas[faces]), NEAR * slack), 0.1 * widths[faces])
-        steps = steps[:, None] * unit(vectors[faces])
-        centres = triangles[faces].mean(axis=1)
-        return windings.inside(centres - steps), windings.inside(centres + steps)
 
-    behind, ahead = np.empty(len(triangles), dtype=bool), np.empty(len(triangles), dtype=bool)
-    behind[chosen], ahead[chosen] = sides(chosen)
-    first = order[starts]
-    agree = np.ones(len(starts), dtype=bool)
-    agree[labels[chosen[behind[chosen] != behind[first][labels[chosen]]]]] = False
-    agree[labels[chosen[ahead[chosen] != ahead[first][labels[chosen]]]]] = False
-    behind[:], ahead[:] = behind[first][labels], ahead[first][labels]
-    apart = np.flatnonzero(~agree[labels])
-    behind[apart], ahead[apart] = sides(apart)
-    return behind, ahead
+def _around_edges(
+    points: NDArray[np.float64], faces: NDArray[np.int64], normals: NDArray[np.float64], times: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of sides, 2 f behind face f and 2 f + 1 in front of it, that face each other around edges.
+
+    First those around edges of two faces, then the others, the clearer the order of their faces is the earlier. Where
+    faces do not balance at an edge, rims of what is open are, and nothing is known. Directions across edges come from
+    the planes that faces are pieces of, so that slivers have them, too.
+    """
+    table = edge_table(faces)
+    edges, forward, counts = table.face_edges.ravel(), table.forward.ravel(), table.face_counts
+    owners = np.repeat(np.arange(len(faces)), 3)
+    along = points[table.vertices[:, 1]] - points[table.vertices[:, 0]]
+    lengths, along = np.linalg.norm(along, axis=1), unit(along)
+    first, second = axes_across(along)
+    angles = np.zeros(len(edges))  # of two faces the order does not matter
+    several = np.flatnonzero((counts > 2)[edges])
+    edge = edges[several]
+    across = np.cross(normals[owners[several]], np.where(forward[several, None], along[edge], -along[edge]))
+    angles[several] = np.arctan2((across * second[edge]).sum(axis=1), (across * first[edge]).sum(axis=1))
+    order = np.lexsort((angles, edges))
+    edge, starts, place = edges[order], np.cumsum(counts) - counts, np.arange(len(order))
+    last = place + 1 == (starts + counts)[edge]
+    following = order[np.where(last, starts[edge], place + 1)]
+    heights = face_areas(points[faces])[owners] / np.maximum(lengths[edges], 1e-300)
+    apart = angles[following] - angles[order] + np.where(last, 2 * np.pi, 0.0)
+    apart *= np.minimum(lengths[edge], np.minimum(heights[order], heights[following]))
+    apart[(counts <= 2)[edge]] = np.inf
+    balanced = np.bincount(edges, np.where(forward, 1, -1) * times[owners], len(counts)) == 0
+    clear = np.flatnonzero(balanced[edge] & (apart > 0))
+    clear = clear[np.argsort(-apart[clear], kind="stable")]
+    turning, reached = order[clear], following[clear]
+    # counterclockwise around an edge, faces that run along it are left at their front, and reached at their back
+    return 2 * owners[turning] + forward[turning], 2 * owners[reached] + ~forward[reached]
 
 
-def _doubled(
-    table: EdgeTable, cells: NDArray[np.int64], triangles: NDArray[np.float64], vectors: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """(m,) which triangles are in cells that have the outline of one before, its area and its middle."""
-    n = int(cells.max()) + 1
-    edges, owners = table.face_edges.ravel(), np.repeat(cells, 3)
-    order = np.lexsort((edges, owners))
-    twice = np.zeros(len(order), dtype=bool)
-    same = (edges[order][1:] == edges[order][:-1]) & (owners[order][1:] == owners[order][:-1])
-    twice[1:] |= same
-    twice[:-1] |= same
-    sides = order[~twice]
-    edges, regions, labels = edges[sides], owners[sides], cells
-    rng = np.random.default_rng(0)
-    codes = rng.integers(0, 2**63, len(table.vertices), dtype=np.int64).astype(np.uint64)
-    sums, counts = np.zeros(n, dtype=np.uint64), np.bincount(regions, minlength=n)
-    np.add.at(sums, regions, codes[edges])
-    least = np.searchsorted(regions, np.flatnonzero(counts))
-    ahead = np.zeros(n, dtype=np.int64)
-    ahead[regions[least]] = table.forward.ravel()[sides[least]]
-    alone = np.where(counts > 0, -1, np.arange(n))
-    kinds, first = distinct_rows(np.stack([sums.view(np.int64), counts, ahead, alone], axis=1))
-    areas = np.linalg.norm(vectors, axis=1)
-    totals = np.bincount(labels, areas, n)
-    middles = sums_of(areas[:, None] * triangles.mean(axis=1), labels, n) / np.maximum(totals, 1e-300)[:, None]
-    model = first[kinds]
-    size = np.sqrt(totals)
-    same = (model != np.arange(n)) & (np.abs(totals - totals[model]) <= ALIKE * totals)
-    same &= np.linalg.norm(middles - middles[model], axis=1) <= ALIKE * size
-    result: NDArray[np.bool_] = same[labels]
-    return result
+@compiled
+def _levels(
+    n: int, one: NDArray[np.int64], other: NDArray[np.int64], steps: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Levels of n nodes that fall by a step from the first to the second of each pair; and what hangs together.
+
+    A pair that contradicts those before it does not count. Trees have their least node as root.
+    """
+    parents, rises = np.arange(n), np.zeros(n, dtype=np.int64)  # from the parent of each
+    for k in range(len(one)):
+        a, b, rise = one[k], other[k], steps[k]
+        while parents[a] != a:
+            rises[a] += rises[parents[a]]
+            parents[a] = parents[parents[a]]
+            rise -= rises[a]
+            a = parents[a]
+        while parents[b] != b:
+            rises[b] += rises[parents[b]]
+            parents[b] = parents[parents[b]]
+            rise += rises[b]
+            b = parents[b]
+        if a < b:
+            parents[b], rises[b] = a, -rise
+        elif b < a:
+            parents[a], rises[a] = b, rise
+    labels, count = np.empty(n, dtype=np.int64), 0
+    for node in range(n):  # those above it have their levels already
+        if parents[node] == node:
+            labels[node] = count
+            count += 1
+        else:
+            rises[node] += rises[parents[node]]
+            labels[node] = labels[parents[node]]
+    return rises, labels
+
+
+def _slack(points: NDArray[np.float64]) -> float:
+    """Distance from faces at which their sides are looked at, at least."""
+    return NEAR * TOUCHING * float(np.ptp(points, axis=0).max())
 
 
 def widest(pieces: Arrangement) -> NDArray[np.float64]:
