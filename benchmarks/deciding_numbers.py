@@ -21,16 +21,14 @@ from numpy.typing import NDArray
 from signedheat import TriangleMesh, orientation, samples
 from signedheat.mesh.components import element_components
 from signedheat.mesh.triangles import area_vectors
-from signedheat.solids import bounding, gauss
+from signedheat.solids import bounding, completion, gauss
 
 NUMBERS: list[tuple[ModuleType, str]] = [
     (bounding, "SHEET"),
     (bounding, "COHERENT"),
     (bounding, "CHANCE"),
     (bounding, "ALONG"),
-    (bounding, "FEW"),
-    (bounding, "CLOSING"),
-    (bounding, "ISLANDS"),
+    (completion, "TORN"),
     (bounding, "REACH"),
     (bounding, "HINT"),
     (gauss, "HELD"),

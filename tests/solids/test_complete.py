@@ -9,6 +9,7 @@ import signedheat as sh
 from signedheat import samples
 from signedheat.diagnostics import BoundsNothing, LeftOut
 from signedheat.mesh.edges import edge_table
+from signedheat.solids.winding import open_edges_of
 
 
 def grid_sheet(origin, one, other, n=8):
@@ -491,3 +492,36 @@ def test_a_torus_without_many_of_its_slender_triangles_is_a_torus(share):
     torus = samples.torus(n_around=48, n_across=24)  # corners of down to 30°: rims that only meet there are no seam
     solid = sh.complete(samples.without_faces(torus, share))
     assert solid.volume == pytest.approx(sh.complete(torus).volume, rel=0.01)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_what_bounds_is_balanced_where_a_surface_crosses_itself_everywhere(seed):
+    ball = samples.with_noise(samples.sphere(2), 0.4, seed)
+    doubled = sh.TriangleMesh(ball.vertices, np.concatenate([ball.faces, ball.faces]))
+    for mesh in (ball, doubled):
+        solid = sh.complete(mesh)
+        bounding = solid.triangles[solid.bounding]
+        assert not len(open_edges_of(bounding))
+        places = np.random.default_rng(seed).uniform(*solid.bounds, (20000, 3))
+        share = float(np.mean(solid.inside(places)))
+        assert solid.volume == pytest.approx(share * np.prod(np.ptp(solid.bounds, axis=0)), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        samples.without_faces(samples.torus(n_around=48, n_across=24), 0.3, 1),
+        samples.without_faces(samples.sphere(3), 0.75),
+    ],
+    ids=["lids", "heat"],
+)
+def test_what_bounds_is_balanced_where_what_completes_crosses_faces(mesh):
+    solid = sh.complete(mesh)
+    assert not len(open_edges_of(solid.triangles[solid.bounding]))
+
+
+@pytest.mark.parametrize("share", [0.3, 0.45])
+def test_lids_keep_to_the_faces_of_a_ball_of_which_less_than_half_is_gone(share):
+    ball = samples.sphere(3)
+    solid = sh.complete(samples.without_faces(ball, share))
+    assert solid.volume == pytest.approx(sh.complete(ball).volume, rel=1e-3)

@@ -37,13 +37,6 @@ a quarter of their width apart have .38, three sides of a box .2, one that four 
 gone .95."""
 ALONG = 0.25
 """Share of loose pieces inside closed ones, less whole numbers, from which on they lie along their surface."""
-FEW = 8
-"""Loose pieces, if all were alike, up to which lids close what is between them; more are completed by heat."""
-CLOSING = 0.4
-"""Rise of the level of a body by loose pieces, over that if all were faces of one body, from which on they are: what is
-left at random of balls, boxes and parts has .43 to .95, sheets in an open box .37, litter in and around it .16."""
-ISLANDS = 0.003
-"""Area of loose pieces over that of a body up to which they may be islands in its holes, and do not count."""
 REACH = 1.5
 """Distance of faces of two pieces, over the size of the smaller, up to which these belong together."""
 NEAREST = 9
@@ -70,8 +63,10 @@ class Bounding(Frozen):
         How often each bounds, negative if reversed; 0 of sheets, walls between cells, and what cancels.
     closed : (m,) bool
         Which are of pieces that close.
-    torn : (m,) int
-        Group of pieces, each by itself a sheet, or torn from these, that bound together only; −1 of all others.
+    loose : (m,) int
+        Cluster of pieces most of which are sheets by themselves and bound together only; −1 of all others.
+    levels : (m,) float
+        Mean level of these pieces of a cluster: half of the share of the body that is left. ½ of all others.
     as_given : (m,) bool
         Which are of complexes that close as they were given, copies and all.
     inner : (m,) bool
@@ -88,7 +83,8 @@ class Bounding(Frozen):
     turned: NDArray[np.bool_]
     counts: NDArray[np.int64]
     closed: NDArray[np.bool_]
-    torn: NDArray[np.int64]
+    loose: NDArray[np.int64]
+    levels: NDArray[np.float64]
     as_given: NDArray[np.bool_]
     inner: NDArray[np.bool_]
     orientable: NDArray[np.bool_]
@@ -118,21 +114,23 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     open_pieces[pieces[inner]] = True
     n = len(open_pieces)
     closed = ~open_pieces & orientable
-    flips, torn, bounds = np.ones(n), np.full(n, -1), closed.copy()
+    flips, levels, loose, bounds = np.ones(n), np.full(n, 0.5), np.full(n, -1), closed.copy()
     rest = np.flatnonzero((open_pieces & orientable)[pieces] & ~inner)
     if len(rest):
         names, labels = np.unique(pieces[rest], return_inverse=True)
         triangles = np.where((counts[rest] < 0)[:, None, None], chain.triangles[rest, ::-1], chain.triangles[rest])
         groups = connected_pieces(chain, rest, labels)
-        signs, bounds[names], torn[names] = open_bounding(Pieces(triangles, labels), groups, as_oriented)
+        signs, bounds[names], loose[names], levels[names] = open_bounding(
+            Pieces(triangles, labels), groups, as_oriented
+        )
         flips[names] = np.where(bounds[names], signs, 1.0)
     bodies = cavities = 0
     if closed.any() and not as_oriented:
         flips, bodies, cavities = _nested(chain, pieces, counts * bounds[pieces], closed, flips, nested)
-    if (torn >= 0).any() and closed.any():
-        along = _along(chain, pieces, torn, counts * flips[pieces] * closed[pieces])
+    if (loose >= 0).any() and closed.any():
+        along = _along(chain, pieces, loose, counts * flips[pieces] * closed[pieces])
         bounds &= ~along
-        torn[along] = -1
+        loose[along] = -1
     turned = np.where(whole, False, turned) != (flips[pieces] < 0)
     as_given = whole & (np.abs(counts) == np.abs(chain.multiplicities))
     counts = (counts * flips[pieces] * bounds[pieces]).astype(np.int64)
@@ -141,7 +139,8 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
         turned=turned & ~inner,
         counts=counts,
         closed=closed[pieces],
-        torn=torn[pieces],
+        loose=loose[pieces],
+        levels=levels[pieces],
         as_given=as_given,
         inner=inner,
         orientable=orientable,
@@ -225,8 +224,8 @@ def _nested(
 
 def open_bounding(
     pieces: Pieces, groups: NDArray[np.int64], as_oriented: bool = False
-) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.int64]]:
-    """(p,) signs of open pieces; which bound something, and the clusters of those that do so torn apart, or −1.
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.int64], NDArray[np.float64]]:
+    """(p,) signs of open pieces; which bound something; clusters of which most is loose, or −1, and their levels.
 
     Pieces of one group, (p,), hang together, which chance does not make them do.
 
@@ -262,15 +261,9 @@ def open_bounding(
         if not wrong.any():
             break
         alive &= ~(wrong & (unexplained >= 0.5 * unexplained.max()))
-    if not (alive & ~own).any():
-        return signs, alive, np.full(n, -1)
-    # bodies among whose faces loose pieces lie, facing as they do
-    loose = alive & ~own & (_counted(areas * (alive & ~own), groups, clusters) >= FEW)[clusters]
-    raised = np.zeros(n)
-    raised[names] = means(system.levels((signs * loose)[names]), system.owners, system.areas, len(names))
-    share = np.bincount(clusters, areas * loose, n)[clusters] / np.maximum(areas, np.finfo(float).tiny)
-    joined = alive & own & (raised > CLOSING * alone * np.minimum(1.0, share)) & (share > ISLANDS)
-    return signs, alive, np.where(loose | joined, clusters, -1)
+    loose, bodies = (np.bincount(clusters, areas * (alive & mask), n) for mask in (~own, own))
+    mostly = alive & (loose > bodies)[clusters]
+    return signs, alive, np.where(mostly, clusters, -1), np.where(mostly, mean[clusters], 0.5)
 
 
 def _counted(areas: NDArray[np.float64], groups: NDArray[np.int64], clusters: NDArray[np.int64]) -> NDArray[np.float64]:

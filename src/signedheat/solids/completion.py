@@ -47,6 +47,10 @@ CELLS = 2.0
 """Cells between neighbouring points of a cloud."""
 MATCH = (1e-6, 0.75)
 """Range of distances, relative to the size of pieces, between corners that noise has separated."""
+TORN = 0.2
+"""Level of loose pieces up to which heat completes what they are left of, a fifth to two fifths of it; else lids do,
+which keep to the faces. Of balls, tori and a cow without 45 % of their triangles lids enclose .1 % too little and heat
+.3 % too much; without 65 %, 1 to 12 % and 1 %."""
 SEAM = 0.75
 """Distance in cells within which the zero set of φ stands for the faces."""
 
@@ -198,14 +202,16 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
     vertices = mesh.vertices
     counts = np.abs(decided.counts)
     faces = np.where((decided.counts < 0)[:, None], chain.faces[:, ::-1], chain.faces)
-    torn = np.where(counts > 0, 0, -1) if options.completion == "heat" else decided.torn
-    surfaces, notes = [], []
-    for group in np.unique(torn[torn >= 0]):
-        chosen = np.flatnonzero((torn == group) & (counts > 0))
-        surfaces += _torn(
-            vertices, faces[chosen], chain.firsts[chosen], decided.pieces[chosen], method, options.completion
-        )
-    bounds = np.repeat(np.arange(len(faces)), np.where(torn < 0, counts, 0))
+    torn, surfaces, notes = np.zeros(len(faces), dtype=bool), [], []
+    by_heat = options.completion == "heat"
+    clusters = np.zeros(len(faces), dtype=np.int64) if by_heat else decided.loose
+    for cluster in np.unique(clusters[(clusters >= 0) & (counts > 0)]):
+        chosen = np.flatnonzero((clusters == cluster) & (counts > 0))
+        scatter = 0.0 if by_heat else scatter_of(vertices[faces[chosen]], decided.pieces[chosen])
+        if by_heat or scatter or decided.levels[chosen[0]] < TORN:
+            torn[chosen] = True
+            surfaces += _torn(vertices, faces[chosen], chain.firsts[chosen], scatter, method)
+    bounds = np.repeat(np.arange(len(faces)), np.where(torn, 0, counts))
     if len(bounds):
         lost = small_lids(vertices, faces[bounds])
         whole = np.concatenate([faces[bounds], lost])
@@ -231,14 +237,12 @@ def _torn(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int64],
     origins: NDArray[np.int64],
-    pieces: NDArray[np.int64],
+    scatter: float,
     method: Heat,
-    completion: str,
 ) -> list[Surface]:
     """Complete a torn body by the zero set of φ; return that alone if the faces scatter around it."""
     triangles = vertices[faces]
     given = Surface(triangles, faces, origins, False)
-    scatter = scatter_of(triangles, pieces) if completion == "lids" else 0.0
     names, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     made = heat_surface(TriangleMesh(names, corners.reshape(-1, 3)), method, scatter)
     if made is None:
