@@ -5,7 +5,8 @@
 A scene is made of parts of which it is known whether they bound a solid, and of which half are turned. A face is wrong
 if it is taken for a sheet though it bounds, the other way round, or if it faces inwards. Printed are the share of the
 area that is wrong in each scene, and, for each number, the scenes where that changes by more than a hundredth. Of
-shares above a half, twice is half of the way to one.
+shares above a half, twice is half of the way to one. The number that decides between lids and heat is swept over the
+volume that shapes enclose.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from signedheat import TriangleMesh, orientation, samples
+from signedheat import TriangleMesh, complete, orientation, samples
 from signedheat.mesh.components import element_components
 from signedheat.mesh.triangles import area_vectors
 from signedheat.solids import bounding, completion, gauss
@@ -28,7 +29,6 @@ NUMBERS: list[tuple[ModuleType, str]] = [
     (bounding, "COHERENT"),
     (bounding, "CHANCE"),
     (bounding, "ALONG"),
-    (completion, "TORN"),
     (bounding, "REACH"),
     (bounding, "HINT"),
     (gauss, "HELD"),
@@ -41,10 +41,11 @@ CHANGED = 0.01
 
 @dataclass(frozen=True)
 class Scene:
-    """Triangles that face outwards, and which of them bound a solid."""
+    """Triangles that face outwards, which of them bound a solid, and which are turned; half of the parts if None."""
 
     mesh: TriangleMesh
     bounds: NDArray[np.bool_]
+    turned: NDArray[np.bool_] | None = None
 
     def __add__(self, other: Scene) -> Scene:
         return Scene(samples.union(self.mesh, other.mesh), np.concatenate([self.bounds, other.bounds]))
@@ -110,6 +111,21 @@ def litter(rng: Random, n: int) -> TriangleMesh:
     return TriangleMesh(corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3))
 
 
+def noisy_copies(rng: Random, mesh: TriangleMesh, share: float) -> TriangleMesh:
+    """Loose copies of some triangles, each of their corners moved by a tenth of its size."""
+    corners = mesh.vertices[mesh.faces[rng.random(mesh.n_faces) < share]]
+    noise = 0.1 * np.sqrt(np.linalg.norm(area_vectors(corners), axis=1))[:, None, None]
+    return TriangleMesh(
+        (corners + noise * rng.normal(size=corners.shape)).reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+    )
+
+
+def nested(rng: Random, share: float) -> Scene:
+    """A ball within a ball, both given outwards but for some of their faces."""
+    mesh = samples.union(samples.sphere(3), samples.sphere(2, radius=0.5))
+    return Scene(mesh, np.ones(mesh.n_faces, dtype=bool), rng.random(mesh.n_faces) < share)
+
+
 SCENES: dict[str, Callable[[Random], Scene]] = {
     "ball, 30 % of the triangles gone": lambda rng: body(samples.without_faces(samples.sphere(3), 0.3)),
     "ball, 75 % gone": lambda rng: body(samples.without_faces(samples.sphere(3), 0.75)),
@@ -126,6 +142,10 @@ SCENES: dict[str, Callable[[Random], Scene]] = {
         + sheet(rectangle(np.array([-1.0, -1, 0]), np.array([6.0, 0, 0]), np.array([0, 5.0, 0])))
     ),
     "ball among litter": lambda rng: body(samples.without_patches(samples.sphere(3), 2, 0.3)) + sheet(litter(rng, 60)),
+    "ball and noisy copies of its faces": lambda rng: (
+        body(samples.sphere(3)) + sheet(noisy_copies(rng, samples.sphere(3), 0.5))
+    ),
+    "ball in a ball, a fifth of the faces turned": lambda rng: nested(rng, 0.2),
     "open box with cards in it": lambda rng: (
         body(sides((2.4, 2.4, 2.4), (5,), (-1.2, -1.2, -1.2))) + sheet(cards(rng, 6, 0.3, 0.3))
     ),
@@ -140,8 +160,10 @@ SCENES: dict[str, Callable[[Random], Scene]] = {
 
 def wrong(scene: Scene, rng: Random) -> float:
     """Share of the area that is decided wrongly, half of the parts turned."""
-    parts = element_components(scene.mesh.faces)
-    turned = (rng.random(parts.max() + 1) < 0.5)[parts]
+    turned = scene.turned
+    if turned is None:
+        parts = element_components(scene.mesh.faces)
+        turned = (rng.random(parts.max() + 1) < 0.5)[parts]
     faces = np.where(turned[:, None], scene.mesh.faces[:, ::-1], scene.mesh.faces)
     found = orientation(TriangleMesh(scene.mesh.vertices, faces))
     outwards = found.turned == turned[found.faces]
@@ -160,6 +182,21 @@ def table(seeds: int) -> dict[str, float]:
     }
 
 
+def enclosed(seeds: int) -> dict[str, float]:
+    """Mean error of the volume of shapes of which a share of the triangles is gone."""
+    shapes = {"ball": samples.sphere(3), "torus": samples.torus(n_around=48, n_across=24)}
+    return {
+        f"{name}, {share:.0%} gone": float(
+            np.mean(
+                [abs(complete(samples.without_faces(mesh, share, k)).volume / whole - 1) for k in range(seeds)],
+            )
+        )
+        for name, mesh in shapes.items()
+        for whole in [complete(mesh).volume]
+        for share in (0.3, 0.45, 0.55, 0.65, 0.75)
+    }
+
+
 def main(seeds: int = 2) -> None:
     usual = table(seeds)
     for name, share in usual.items():
@@ -173,6 +210,15 @@ def main(seeds: int = 2) -> None:
             moved = [f"{scene} {other[scene]:.3f}" for scene in usual if abs(other[scene] - usual[scene]) > CHANGED]
             name = f"{module.__name__.rpartition('.')[2]}.{number}"
             print(f"{name} {value:g} → {changed:g}: {'; '.join(moved) or 'nothing'}", flush=True)
+
+    value, errors = completion.TORN, {}
+    for changed in (value / 2, value, 2 * value):
+        completion.TORN = changed
+        errors[changed] = enclosed(seeds)
+    completion.TORN = value
+    print("error of the volume with completion.TORN " + ", ".join(f"{changed:g}" for changed in errors))
+    for name in errors[value]:
+        print(f"{name:36s} " + " ".join(f"{row[name]:6.4f}" for row in errors.values()))
 
 
 if __name__ == "__main__":
