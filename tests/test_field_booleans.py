@@ -7,6 +7,7 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
+from shapes.bodies import box
 from signedheat import samples
 
 GRID = sh.Grid((-2, -1.5, -1.5), 0.1, (41, 31, 31))
@@ -127,3 +128,18 @@ def test_bands_are_combined_where_they_are_the_same():
         with refused(sh.errors.GeometryError, "blocks"):
             wrong()
     assert (sh.signed_distance(samples.sphere(2), GRID) | A)([[-1.4, 0.0, 0.0]])[0] < 0
+
+
+def test_fields_of_solids_combine_as_their_solids_do():
+    grid = sh.Grid((-0.5, -0.5, -0.5), 0.1, (31, 21, 21))
+    whole, bite = box((0, 0, 0), (2, 1, 1)), box((0.5, 0, 0.75), (1, 1, 1))  # with three sides in those of the whole
+    one, other = (sh.signed_distance(shape, grid) for shape in (whole, bite))
+    less, both, common = one - other, one | other, one & sh.complete(bite)
+    assert [field.solid.volume for field in (less, both, common)] == pytest.approx([1.875, 2.0, 0.125], rel=1e-12)
+    points = np.random.default_rng(0).uniform(-0.5, 1.5, (200, 3))
+    assert np.array_equal(less(points), (sh.complete(whole) - sh.complete(bite)).distance(points))
+    assert less([[0.75, 0.5, 1.0]])[0] == pytest.approx(0.25)  # the bound max(a, −b) has 0 there
+    assert np.array_equal(sh.sharpen(less).values, less.values) and sh.sharpen(less).solid is less.solid
+    np.testing.assert_array_equal(sh.sharpen(-2 * less)(points), -less(points))
+    apart = one & sh.signed_distance(box((3, 3, 3), (4, 4, 4)), grid)
+    assert apart.solid is None and apart.values.min() > 0

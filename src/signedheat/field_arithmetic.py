@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .errors import GeometryError, UnsupportedTypeError
+from .errors import GeometryError, SourceError, UnsupportedTypeError
 from .grids.grid import Grid
 from .validation import finite_number
 
@@ -63,7 +64,7 @@ class Arithmetic:
 
     So ``field - 0.1`` is the offset by 0.1, and ``-field`` the field of the other side. NumPy's functions take fields
     for arrays of their values. A `GridField` that is exact between its nodes, as it holds its solid, stays so when it
-    is negated or multiplied, and when 0 is added; sums, unions, intersections and differences are interpolated.
+    is negated or multiplied, and when 0 is added; sums with other numbers are interpolated.
 
     Examples
     --------
@@ -112,9 +113,10 @@ class Arithmetic:
 class Combinable(Arithmetic):
     """A field that is negative inside a solid or a region: ``a | b``, ``a & b``, ``a - b`` and ``~a`` are fields again.
 
-    Where two fields overlap the result has the right sign and zero set, but is a bound of the distance, not distance
-    itself, on one side of the boundary (inside a union, outside an intersection or a difference); `sharpen` turns it
-    into distance. The confidence of fields that were sharpened to a shape is not carried on.
+    If both fields hold their solids, the result is the distance to what those make, and exact like them. Otherwise it
+    has the right sign and zero set, but is a bound of the distance, not distance itself, on one side of the boundary
+    (inside a union, outside an intersection or a difference); `sharpen` turns it into distance. The confidence of
+    fields that were sharpened to a shape is not carried on.
 
     Examples
     --------
@@ -128,16 +130,21 @@ class Combinable(Arithmetic):
 
     def __or__(self: Solid, other: Solid) -> Solid:
         """Union: inside where one of the two is."""
-        return combined(self, other, np.less_equal, 0.0)
+        exact = _of_solids(self, other, operator.or_)
+        return combined(self, other, np.less_equal, 0.0) if exact is None else exact
 
     def __and__(self: Solid, other: Solid) -> Solid:
         """Intersection: inside where both are."""
-        return combined(self, other, np.greater_equal, 0.0)
+        exact = _of_solids(self, other, operator.and_)
+        return combined(self, other, np.greater_equal, 0.0) if exact is None else exact
 
     def __sub__(self: Solid, other: Solid | Number) -> Solid:
         """Difference: inside where this is and the other is not. Of a number, it is taken from the values."""
         if isinstance(other, NUMBERS):
             return Arithmetic.__sub__(self, other)
+        exact = _of_solids(self, other, operator.sub)
+        if exact is not None:
+            return exact
         return combined(self, _checked(self, other)._mapped(np.negative), np.greater_equal, 0.0)
 
     def __invert__(self: Solid) -> Solid:
@@ -268,6 +275,19 @@ def combined(
         return values
 
     return a.combined_with(b, rule)
+
+
+def _of_solids(a: Solid, b: Solid, operation: Callable[[Any, Any], Any]) -> Any:
+    """The field of what the solids of two fields make; None unless both have one, and something is left."""
+    solids = [field if isinstance(field, HasFields) else getattr(field, "solid", None) for field in (a, b)]
+    if not all(isinstance(solid, HasFields) for solid in solids):
+        return None
+    if not isinstance(b, HasFields):
+        _checked(a, b)
+    try:
+        return operation(*solids).field_on(a)
+    except SourceError:
+        return None
 
 
 def _checked(a: Solid, b: Solid) -> Solid:

@@ -47,8 +47,8 @@ def sharpen(
 
     This is Section 7.3 of the paper.
 
-    On grids: the distance of every node to the zero set, second order, with the signs of the field. Distance to a shape
-    itself is that of `complete`.
+    On grids: the distance of every node to the zero set, second order, with the signs of the field. A field that holds
+    the solid of `complete` is exact already, and stays so.
 
     On surfaces: exact geodesic distance on the polyhedral surface, up to a tolerance (`Geodesic`, the default). For
     smooth curves on good triangles, such as a circle at ``t = h²``, mainly the largest errors become smaller. With a

@@ -59,7 +59,7 @@ def test_saved_fields_are_the_same_to_the_last_bit(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "change", [lambda f: f + 0.1, lambda f: f | f, lambda f: f & -f, lambda f: 1 - f, lambda f: 0 * f, lambda f: f - f]
+    "change", [lambda f: f + 0.1, lambda f: f | -f, lambda f: f & -f, lambda f: 1 - f, lambda f: 0 * f, lambda f: f - f]
 )
 def test_what_is_not_exact_any_more_says_so(change):
     result = change(FIELD)

@@ -16,11 +16,15 @@ from ..sharpening_methods import Method, Nearest, distance_to_nearest, nearest, 
 from .grid import Grid
 from .grid_field import GridField
 from .redistancing import redistance
+from .solid_queries import Scaled
 
 
 @sharpen_field.register
 def _(field: GridField, source: object, method: Method | None, progress: Progress | None) -> GridField:
-    """Distance of every node to the zero set, that of `redistance`; signs stay as they are."""
+    """Distance of every node to the zero set, that of `redistance`; signs stay as they are.
+
+    A field that holds its solid is that distance already, but for a factor.
+    """
     if source is not None or method is not None:
         raise UnsupportedTypeError(
             "fields on grids are measured to their zero set", remedy="leave out source and method", element="method"
@@ -31,6 +35,8 @@ def _(field: GridField, source: object, method: Method | None, progress: Progres
             remedy="fill them in, or use it as it is",
             element="field",
         )
+    if field.solid is not None:
+        return field / (abs(field.solid.factor) if isinstance(field.solid, Scaled) else 1.0)
     run = partial(distance_to_nearest, field.grid, field.values, None, None, 0.0, progress)
     values, diagnostics = timed(run, field.diagnostics, progress)
     return GridField(field.grid, values, diagnostics)
