@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 from importlib.util import find_spec
@@ -77,6 +78,11 @@ def escape(app: object, what: str, name: str, thing: object, options: object, li
     lines[:] = [line.replace("(*", "(\\*") for line in lines]
 
 
+def link_files(app: object, name: str, source: list[str]) -> None:
+    """Pages of the repository that are none of the site are files to download, as other files are."""
+    source[0] = re.sub(r"\]\((\.\./[^)#\s]+\.md)(#[^)\s]*)?\)", r"](<path:\1>)", source[0])
+
+
 def write_mathml(translator: HTML5Translator, node: Node) -> None:
     """Write a formula as MathML, which browsers draw without fetching anything."""
     display = "block" if isinstance(node, math_block) else "inline"
@@ -95,6 +101,7 @@ def check_anchors(app: Sphinx, error: Exception | None) -> None:
 def setup(app: Sphinx) -> None:
     """Connect what is done before numpydoc reads docstrings, and after all pages are written."""
     app.connect("autodoc-process-docstring", escape, priority=400)
+    app.connect("source-read", link_files)
     app.connect("build-finished", check_anchors)
     app.add_html_math_renderer("mathml", (write_mathml, None), (write_mathml, None))
 

@@ -83,6 +83,17 @@ def test_new_faces_run_as_their_neighbours_do_even_where_these_disagree_elsewher
     assert len(ways) and (ways > -1e-15).all()
 
 
+def test_scraps_within_a_hole_belong_to_it():
+    """Single faces in rings of lost ones, which hang together with the rest at their corners only."""
+    ball = samples.sphere(4)
+    neighbours = np.full((ball.n_faces, 3), -1)
+    for one, other in ball.edges.pairs // 3:
+        for a, b in ((one, other), (other, one)):
+            neighbours[a, np.argmin(neighbours[a])] = b
+    made = sh.fill_holes(sh.TriangleMesh(ball.vertices, np.delete(ball.faces, neighbours[[100, 2000, 4500]], axis=0)))
+    assert inspect(made).is_closed and made.n_faces == ball.n_faces and not made.left
+
+
 def test_polygons_stay_polygons():
     corners = box((0, 0, 0), (1, 1, 1)).vertices
     squares = [[k for k in range(len(corners)) if corners[k][axis] == side] for axis in range(3) for side in (0, 1)]

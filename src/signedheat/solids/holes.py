@@ -164,18 +164,18 @@ def _length(corners: NDArray[np.float64]) -> float:
 def _holes(
     around: Rims, lengths: NDArray[np.float64], faces: NDArray[np.int64], decided: Bounding, used: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
-    """(l,) which loops are holes: all along what bounds; of sheets, all along a single one but its longest."""
+    """(l,) which loops are holes: along what bounds, scraps of it included; of sheets, all of one but its longest."""
     n = int(faces.max(initial=-1)) + 1
     keys = (faces * n + np.roll(faces, -1, axis=1)).ravel()
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
-    bounds = (decided.counts != 0) & (decided.torn < 0)
+    bounds, scraps = decided.counts != 0, decided.torn >= 0
     longest: dict[int, int] = {}
     chosen, single = np.zeros(len(around), dtype=bool), np.full(len(around), -1)
     for k, loop in enumerate(around):
         behind = used[order[np.searchsorted(keys, np.roll(loop, -1) * n + loop)] // 3]
         pieces = np.unique(decided.pieces[behind]).tolist()
-        chosen[k] = bounds[behind].all()
+        chosen[k] = bounds[behind].all() and not scraps[behind].all()
         single[k] = pieces[0] if len(pieces) == 1 else -1
         for piece in pieces:
             if piece not in longest or lengths[k] > lengths[longest[piece]]:
