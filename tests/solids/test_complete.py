@@ -525,3 +525,13 @@ def test_lids_keep_to_the_faces_of_a_ball_of_which_less_than_half_is_gone(share)
     ball = samples.sphere(3)
     solid = sh.complete(samples.without_faces(ball, share))
     assert solid.volume == pytest.approx(sh.complete(ball).volume, rel=1e-3)
+
+
+def test_a_room_in_a_box_is_free_and_its_furniture_without_underside_is_not():
+    vertices, faces = box((6, 5, 3))
+    room = sh.TriangleMesh(vertices, faces[:, ::-1])
+    walls, table = sh.TriangleMesh(*box((8, 7, 5), (-1, -1, -1))), sh.TriangleMesh(*box((1, 1, 1), (2, 2, 0), (4,)))
+    solid = sh.complete([walls, room, table])
+    assert not solid.inside([[1, 1, 1], [2.5, 2.5, 2]]).any()
+    assert solid.inside([[2.5, 2.5, 0.5], [2.5, 2.5, -0.5], [-0.5, 2, 1]]).all()
+    assert solid.volume == pytest.approx(8 * 7 * 5 - 6 * 5 * 3 + 1)
