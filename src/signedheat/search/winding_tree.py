@@ -149,6 +149,8 @@ SQUARES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Terms of M: xx, yy, zz, xy, xz, yz."""
 CUBES = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 0, 1), (0, 0, 2), (0, 1, 1), (1, 1, 2), (0, 2, 2), (1, 2, 2), (0, 1, 2))
 """Terms of S: xxx, yyy, zzz, xxy, xxz, xyy, yyz, xzz, yzz, xyz."""
+BLOCK = 2**13
+"""Leaves whose moments are computed at a time."""
 WIDTH = 7 + len(SQUARES) + len(CUBES)
 
 
@@ -159,23 +161,10 @@ def moments_of(triangles: NDArray[np.float64], tree: BoxTree, opening: float) ->
     """
     leaves = len(tree.bounds) // 2
     grouped = tree.items.reshape(leaves, LEAF)
-    there = grouped >= 0
-    corners = np.where(there[..., None, None], triangles[grouped], 0.0)
-    corners = np.ascontiguousarray(corners.transpose(2, 3, 0, 1))  # corner, axis, leaf, place in it
-    middles = corners.mean(axis=0)
-    own = 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0], axis=0)
-    areas = np.linalg.norm(own, axis=0)
-    vectors, weights, firsts = own.sum(axis=2), areas.sum(axis=1), (areas * middles).sum(axis=2)
-    centres = _over(firsts, weights)
-    offsets = np.where(there, middles - centres[..., None], 0.0)
-    linear = _product(own, offsets)
-    quadratic = _product(linear, offsets)
-    for corner in corners:  # the second moment of a triangle about its own centre
-        arm = corner - middles
-        quadratic += _product(_product(own, arm), arm) / 12
-    first, second = linear.sum(axis=2), quadratic.sum(axis=2)
-    reaches = np.where(there, np.linalg.norm(corners - centres[..., None], axis=1), 0.0)
-    radii = reaches.max(axis=(0, 2))
+    blocks = [_of_leaves(triangles, grouped[start : start + BLOCK]) for start in range(0, leaves, BLOCK)]
+    vectors, weights, firsts, centres, first, second, radii = (
+        np.concatenate(part, axis=-1) for part in zip(*blocks, strict=True)
+    )
     moments = np.zeros((2 * leaves, WIDTH))
     level = leaves
     while True:
@@ -197,6 +186,28 @@ def moments_of(triangles: NDArray[np.float64], tree: BoxTree, opening: float) ->
         radii = (radii + np.linalg.norm(moved, axis=0)).reshape(-1, 2).max(axis=1)
         vectors, first, second = (_of_pairs(each) for each in (vectors, first, second))
         centres, weights = middle, total
+
+
+def _of_leaves(triangles: NDArray[np.float64], grouped: NDArray[np.int64]) -> tuple[NDArray[np.float64], ...]:
+    """Of some leaves: sums of area vectors, areas, and areas times centres; their centre, M and S, and radii."""
+    there = grouped >= 0
+    corners = np.where(there[..., None, None], triangles[grouped], 0.0)
+    corners = np.ascontiguousarray(corners.transpose(2, 3, 0, 1))  # corner, axis, leaf, place in it
+    middles = corners.mean(axis=0)
+    own = 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0], axis=0)
+    areas = np.linalg.norm(own, axis=0)
+    vectors, weights, firsts = own.sum(axis=2), areas.sum(axis=1), (areas * middles).sum(axis=2)
+    centres = _over(firsts, weights)
+    offsets = np.where(there, middles - centres[..., None], 0.0)
+    linear = _product(own, offsets)
+    quadratic = _product(linear, offsets)
+    for corner in corners:  # the second moment of a triangle about its own centre
+        arm = corner - middles
+        quadratic += _product(_product(own, arm), arm) / 12
+    first, second = linear.sum(axis=2), quadratic.sum(axis=2)
+    reaches = np.where(there, np.linalg.norm(corners - centres[..., None], axis=1), 0.0)
+    radii = reaches.max(axis=(0, 2))
+    return vectors, weights, firsts, centres, first, second, radii
 
 
 def _product(form: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np.float64]:

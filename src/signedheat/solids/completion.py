@@ -39,7 +39,7 @@ from .union import Surface, united
 
 STEPS = 2
 """Number of timed steps."""
-BYTES_PER_FACE = 1300
+BYTES_PER_FACE = 1400
 """Peak memory per face, measured on meshes of 330,000 faces; points take less."""
 BYTES_IF_LOOSE, BYTES_OF_HEAT = 3400, 150_000_000
 """The same for loose triangles; and memory of the grid on which they and points are completed."""

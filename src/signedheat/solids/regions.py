@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from ..mesh.arrangement import TOUCHING, Arrangement
 from ..mesh.components import sums_of
-from ..mesh.edges import edge_table
+from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import axes_across, unit
 from ..mesh.welding import coincident_faces
@@ -105,30 +105,45 @@ def _around_edges(
     the planes that faces are pieces of, so that slivers have them, too.
     """
     table = edge_table(faces)
-    edges, forward, counts = table.face_edges.ravel(), table.forward.ravel(), table.face_counts
-    owners = np.repeat(np.arange(len(faces)), 3)
-    along = points[table.vertices[:, 1]] - points[table.vertices[:, 0]]
+    halfedges = table.pairs[(_ways(table, table.pairs) * times[table.pairs // 3]).sum(axis=1) == 0]
+    one, other = _facing(table, halfedges.ravel(), halfedges[:, ::-1].ravel())
+
+    some = np.flatnonzero((table.face_counts > 2)[table.face_edges.ravel()])
+    edges, around = np.unique(table.face_edges.ravel()[some], return_inverse=True)
+    owners, ways, vertices = some // 3, _ways(table, some), table.vertices[edges]
+    along = points[vertices[:, 1]] - points[vertices[:, 0]]
     lengths, along = np.linalg.norm(along, axis=1), unit(along)
     first, second = axes_across(along)
-    angles = np.zeros(len(edges))  # of two faces the order does not matter
-    several = np.flatnonzero((counts > 2)[edges])
-    edge = edges[several]
-    across = np.cross(normals[owners[several]], np.where(forward[several, None], along[edge], -along[edge]))
-    angles[several] = np.arctan2((across * second[edge]).sum(axis=1), (across * first[edge]).sum(axis=1))
-    order = np.lexsort((angles, edges))
-    edge, starts, place = edges[order], np.cumsum(counts) - counts, np.arange(len(order))
-    last = place + 1 == (starts + counts)[edge]
-    following = order[np.where(last, starts[edge], place + 1)]
-    heights = face_areas(points[faces])[owners] / np.maximum(lengths[edges], 1e-300)
+    across = np.cross(normals[owners], ways[:, None] * along[around])
+    angles = np.arctan2((across * second[around]).sum(axis=1), (across * first[around]).sum(axis=1))
+    order, counts = np.lexsort((angles, around)), np.bincount(around, minlength=len(edges))
+    starts, place = np.cumsum(counts) - counts, np.arange(len(order))
+    last = place + 1 == (starts + counts)[around[order]]
+    following = order[np.where(last, starts[around[order]], place + 1)]
+    heights = face_areas(points[faces[owners]]) / np.maximum(lengths[around], 1e-300)
     apart = angles[following] - angles[order] + np.where(last, 2 * np.pi, 0.0)
-    apart *= np.minimum(lengths[edge], np.minimum(heights[order], heights[following]))
-    apart[(counts <= 2)[edge]] = np.inf
-    balanced = np.bincount(edges, np.where(forward, 1, -1) * times[owners], len(counts)) == 0
-    clear = np.flatnonzero(balanced[edge] & (apart > 0))
+    apart *= np.minimum(lengths[around[order]], np.minimum(heights[order], heights[following]))
+    balanced = np.bincount(around, ways * times[owners], len(edges)) == 0
+    clear = np.flatnonzero(balanced[around[order]] & (apart > 0))
     clear = clear[np.argsort(-apart[clear], kind="stable")]
-    turning, reached = order[clear], following[clear]
-    # counterclockwise around an edge, faces that run along it are left at their front, and reached at their back
-    return 2 * owners[turning] + forward[turning], 2 * owners[reached] + ~forward[reached]
+    beside = _facing(table, some[order[clear]], some[following[clear]])
+    return np.concatenate([one, beside[0]]), np.concatenate([other, beside[1]])
+
+
+def _ways(table: EdgeTable, halfedges: NDArray[np.int64]) -> NDArray[np.int64]:
+    """1 where a halfedge runs along its edge, −1 where it runs against it."""
+    return np.where(table.forward.ravel()[halfedges], 1, -1)
+
+
+def _facing(
+    table: EdgeTable, turning: NDArray[np.int64], reached: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Sides that face each other from halfedges to those that follow counterclockwise around their edge.
+
+    Faces that run along the edge are left at their front, and reached at their back.
+    """
+    forward = table.forward.ravel()
+    return 2 * (turning // 3) + forward[turning], 2 * (reached // 3) + ~forward[reached]
 
 
 @compiled
