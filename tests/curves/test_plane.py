@@ -130,6 +130,33 @@ def test_strokes_are_turned_or_left_out(damage):
     assert strokes.wrong_share(drawing, field(places)) < 0.03
 
 
+@pytest.mark.parametrize("angle", [0.1, 0.17, 0.87, 2.27])
+def test_outlines_that_share_lines_are_filled_by_turns(angle):
+    """What Clipper makes of them runs along the shared lines there and back."""
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    low, high = np.array([[0, 0], [1, 0], [0.4, 0]]), np.array([[2, 1], [3, 0.7], [1.5, 0.5]])
+    boxes = [np.array([a, [b[0], a[1]], b, [a[0], b[1]]]) for a, b in zip(low, high, strict=True)]
+    lines = [sh.Polyline(box @ turn + [0.3, 0.7], closed=True) for box in boxes]
+    field = sh.signed_distance(lines, resolution=32, fill="evenodd")
+    places = (field.grid.points - [0.3, 0.7]) @ turn.T
+    inside = ((places[..., None, :] > low) & (places[..., None, :] < high)).all(axis=-1).sum(axis=-1) % 2 == 1
+    clear = np.abs(field.values) > 1e-9
+    np.testing.assert_array_equal((field.values < 0)[clear], inside[clear])
+
+
+def test_a_tie_is_announced_and_decided_alike_however_it_is_given():
+    """Two halves of a circle that face each other: one of them is turned."""
+    angles = 2 * np.pi * np.arange(19) / 40
+    arc = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    found = []
+    for scale, order in ((1.0, [0, 1]), (1000.0, [0, 1]), (1.0, [1, 0]), (1.0, [1, 0, 0, 1])):
+        halves = [sh.Polyline(scale * arc), sh.Polyline(-scale * arc[::-1])]
+        with pytest.warns(InexactWarning, match="is a guess"):
+            field = sh.signed_distance([halves[k] for k in order], resolution=32)
+        found.append(field([[0.0, 0.0]]).item() / scale)
+    np.testing.assert_allclose(found, found[0], rtol=1e-3)
+
+
 def test_what_was_done_with_strokes_is_noted_and_may_be_refused():
     lines = sides(0.1)
     lines[1] = lines[1].reversed()
@@ -138,6 +165,7 @@ def test_what_was_done_with_strokes_is_noted_and_may_be_refused():
     note = field.diagnostics.note(CurvesTaken)
     assert note.turned == [1]
     assert note.left_out == [4]
+    assert note.share_left_out == pytest.approx(0.07, abs=0.02) and "of the length" in str(note)
     np.testing.assert_array_equal(field.values, sh.signed_distance(sides(0.1), field.grid).values)
     assert sh.signed_distance([*lines, scribble], field.grid, as_oriented=True)([[0.0, 0.9]]) > 0
     kept = sh.signed_distance([*sides(0.1), scribble], field.grid, every_piece=True)

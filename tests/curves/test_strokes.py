@@ -44,9 +44,11 @@ def test_agreement_of_strokes_is_that_of_the_surface_whatever_its_diagonals(arou
     mesh = sh.TriangleMesh(ring.vertices * [1, -1, 1], ring.faces[:, ::-1]) if mirrored else ring
     step, n = around // 48, around // 2
     pieces = [mesh.path(n * np.arange(begin * step, (begin + 8) * step + 1)) for begin in (0, 12, 24, 36)]
-    pieces.append(pieces[0])
-    found = Pieces.of(discretize(mesh), pieces).strokes.agreed
-    assert found[0, 4] > 20 * found[0, 1]
+    pieces.append(pieces[0].reversed())
+    seen = Pieces.of(discretize(mesh), pieces)
+    rank = seen.stroke[np.argsort(seen.numbers)]
+    found = seen.strokes.agreed[np.ix_(rank, rank)]
+    assert -found[0, 4] > 20 * found[0, 1]
     np.testing.assert_allclose(found[[0, 1, 2, 3], [1, 2, 3, 0]], 0.05, rtol=0.03)
     np.testing.assert_allclose(found[[0, 1], [2, 3]], 0.0022, atol=5e-4)
 
@@ -73,6 +75,23 @@ def test_a_stroke_may_be_given_in_bits():
     assert whole.turned.any()
     np.testing.assert_array_equal(cut.turned, whole.turned[np.array(of)[order]])
     np.testing.assert_allclose(cut.agreement, whole.agreement[np.array(of)[order]], atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_how_strokes_are_numbered_scaled_and_how_often_they_are_given_does_not_matter(seed):
+    drawing = strokes.drawing(np.random.default_rng(seed), "pieces_turned", 3)
+    mesh, random = drawing.mesh, np.random.default_rng(seed)
+    large = sh.TriangleMesh(1000 * mesh.vertices, mesh.faces)
+    rank = random.permutation(mesh.n_faces)
+    faces = np.empty_like(mesh.faces)
+    faces[rank] = mesh.faces
+    twice = [drawing.given[k] for k in random.permutation(len(drawing.given))] * 2
+    other = sh.TriangleMesh(mesh.vertices, faces)
+    moved = [sh.Curve(rank[curve.faces], curve.barycentric) for curve in twice]
+    one = sh.signed_distance(drawing.given, mesh)
+    np.testing.assert_array_equal(np.sign(sh.signed_distance(drawing.given, large).values), np.sign(one.values))
+    apart = np.sign(sh.signed_distance(moved, other).values) != np.sign(one.values)
+    assert np.abs(one.values[apart]).max(initial=0.0) < strokes.edge_length(mesh)
 
 
 def test_bits_of_a_whole_loop_leave_nothing_to_decide():

@@ -47,10 +47,13 @@ class CurvesTaken(Note):
         Curves whose positive side was made negative.
     left_out : (k,) int
         Curves that bound nothing together with the others.
+    share_left_out : float
+        Their share of the length of all curves.
     """
 
     turned: list[int]
     left_out: list[int]
+    share_left_out: float
 
     @property
     def important(self) -> bool:
@@ -62,7 +65,8 @@ class CurvesTaken(Note):
             for name, which in (("curves turned", self.turned), ("curves left out", self.left_out))
             if len(which)
         ]
-        return "; ".join(taken) or "curves are taken as given"
+        share = [f"{self.share_left_out:.2g} of the length left out"] if len(self.left_out) else []
+        return "; ".join(taken + share) or "curves are taken as given"
 
 
 def distance_to_pieces(
@@ -74,9 +78,9 @@ def distance_to_pieces(
     unless most of them do not. On parts of a surface where faces cannot agree, as those with one side, and across edges
     of more than two faces, pieces are taken as they are: left of a curve is another side from face to face.
 
-    There is a warning if most of them bound nothing, if loops were turned that might as well be right, if the inside
-    hangs on a piece for which wide gaps are closed, and if heat completes the curves otherwise than by what is
-    shortest.
+    There is a warning if most of them bound nothing, if they bound something else as well, if loops were turned that
+    might as well be right, if the inside hangs on a piece for which wide gaps are closed, if heat completes the curves
+    otherwise than by what is shortest, and if what was left out goes round.
     """
     listed = flattened(curves)
     surface_of(solver).segments(listed)  # refuses curves that do not fit
@@ -95,9 +99,17 @@ def distance_to_pieces(
     field = distance_unwarned(once, taken, constraint)
     turn[left_out] = False
     if turn.any() or len(left_out):
-        note = CurvesTaken(np.flatnonzero(turn).tolist(), left_out.tolist())
+        strokes = pieces.strokes
+        share = float(strokes.lengths[decision.loose].sum() / strokes.lengths.sum()) if len(left_out) else 0.0
+        note = CurvesTaken(np.flatnonzero(turn).tolist(), left_out.tolist(), share)
         field = replace(field, diagnostics=field.diagnostics.noting(note))
     reason = guess(decision, field, listed)
+    loops = decision.loops_left_out() if len(left_out) else left_out
+    if len(loops) and not reason:
+        reason = (
+            f"{named(loops)} go round, and bound nothing with the others: they were left out. every_piece=True takes "
+            "all curves"
+        )
     if reason:
         warn_user(reason, InexactWarning)
     return field, taken
@@ -128,6 +140,11 @@ def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[Curv
         return (
             f"{named(against)} ran against about as much of the others, and {'were' if len(against) > 1 else 'was'} "
             f"turned: which of them are right is a guess. {as_given}"
+        )
+    if decision.tied:
+        return (
+            "the curves bound something else as well: which of the two is meant is a guess. Draw what is missing, or "
+            f"turn curves that face the wrong way; {as_given}"
         )
     hinges = decision.worth_little()
     if len(hinges):

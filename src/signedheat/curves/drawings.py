@@ -23,7 +23,7 @@ from ..grids.polyline import Polyline
 from ..grids.solid_queries import Closest
 from ..kinds import Sources
 from ..mesh.components import sums_of
-from ..mesh.outlines import LEAST_SHARE, FillRule, filled_outlines
+from ..mesh.outlines import LEAST_SHARE, FillRule, filled_outlines, without_seams
 from ..mesh.unit_vectors import unit
 from ..progress import Progress, within
 from ..search.face_tree import FaceTree
@@ -84,7 +84,8 @@ def distance_to_lines(
         listed, filled = outlines_filled(listed, fill)
         notes += [filled] if filled else []
         if filled and all(line.closed for line in listed):
-            return _field_of(Drawing(_segments(listed)), domain, Diagnostics(notes=tuple(notes)), progress)
+            drawing = Drawing(without_seams(_segments(listed)))
+            return _field_of(drawing, domain, Diagnostics(notes=tuple(notes)), progress)
         listed, taken = strokes_that_agree(listed, every_piece, within(progress, 0.0, 0.4))
         notes += [taken] if taken else []
     solver = SignedHeatSolver(_grid_around(listed, domain), diffusion, within(progress, 0.4, 0.8))

@@ -5,24 +5,30 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import sparse
 
 from ..mesh.components import connected_components
-from ..mesh.curve_segments import CurveSegments, interpolation_at, joined_end_to_end
+from ..mesh.curve_segments import CurveSegments, interpolation_at, joined_end_to_end, without_copies
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.signed_graph import best_signs
 from ..parallel import n_threads
+from ..surfaces.curve_groups import STRAIGHT, nearest_others
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
+from ..surfaces.surface import Surface
 from ..surfaces.surface_curves import Curve, CurveOrPoints
 from ..surfaces.surface_discretization import SurfaceDiscretization
-from .strokes import Inside, Strokes
+from .strokes import TIE, Inside, Strokes
 
 AS_GIVEN = 0.5
 """What turning a stroke costs, relative to its length. Halved or doubled, one of 46 drawings changes, that is, on more
 than 2 % of the area."""
+TOGETHER = 0.5
+"""The same for all strokes of a curve, relative to that."""
 WEAKLY = 0.02
 """The same if sides are smooth, for a stroke of mean length. Of two that follow each other, with a gap of half of their
 length, the energy is less by 0.05. Halved and doubled, none of 46 drawings changes."""
@@ -54,43 +60,55 @@ drawings; doubled, 15 and 6."""
 class Pieces:
     """Oriented curves on a surface, as strokes; those that end inside the surface may be turned.
 
-    Curves that go on in each other, head to tail, are one stroke: a line may be given in as many bits as one likes.
+    Curves that go on in each other, head to tail, are one stroke: a line may be given in as many bits as one likes, and
+    as often. The order of strokes is that of their places, so that nothing depends on how curves are numbered.
 
     Attributes
     ----------
     numbers : (j,) int
-        Which of the curves given are oriented.
+        Which of the curves given are oriented, ordered by place.
     stroke : (j,) int
         The stroke that each of these is part of.
     movable : (k,) bool
         Whether each stroke is a piece: open, and not from boundary to boundary of the surface.
     strokes : Strokes
         The energy of the sets that they may bound.
+    is_loop : (k,) bool
+        Whether each is part of what is likely to be a closed curve, whose gaps are shorter than half of its strokes.
     """
 
     numbers: NDArray[np.int64]
     stroke: NDArray[np.int64]
     movable: NDArray[np.bool_]
     strokes: Strokes
+    is_loop: NDArray[np.bool_]
 
     @classmethod
     def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> Pieces | None:
         """The pieces; None if there are none."""
-        listed = {k: c for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented}
+        numbers = [k for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented]
+        listed = [cast("Curve", curves[k]) for k in numbers]
         if not listed:
             return None
-        each = [part for (part,) in surface.segments([[curve] for curve in listed.values()])]
-        by_points = np.array([curve.normals is None for curve in listed.values()])  # not by normals: they may disagree
-        parts, stroke = joined_end_to_end(each, by_points)
+        domain = given_domain(surface)
+        places = [domain.positions(curve) for curve in listed]
+        order = order_in_space(places)
+        listed = [listed[k] for k in order]
+        each = [part for (part,) in surface.segments([[curve] for curve in listed])]
+        by_points = np.array([curve.normals is None for curve in listed])  # not by normals: they may disagree
+        first, copy = without_copies(each, by_points)
+        parts, stroke = joined_end_to_end([each[k] for k in first], by_points[first])
         movable = np.array([is_piece(surface.triangles, part) for part in parts])
         if not movable.any():
             return None
-        strokes = Strokes.of(surface, parts, drawn_edge(surface))
-        return cls(np.array(list(listed), dtype=np.int64), stroke, movable, strokes)
+        group, gaps = likely_curves(np.concatenate([places[order[k]][[0, -1]] for k in first]), stroke)
+        strokes = Strokes.of(surface, parts, float(domain.triangulation.edge_lengths.mean()), group)
+        is_loop = gaps < STRAIGHT * np.bincount(group, strokes.lengths)
+        return cls(np.array(numbers, dtype=np.int64)[order], stroke[copy], movable, strokes, is_loop[group])
 
     def curves(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Numbers of the curves that make up the strokes chosen by (k,) bool."""
-        return self.numbers[chosen[self.stroke]]
+        return np.sort(self.numbers[chosen[self.stroke]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,11 +123,14 @@ class Decision:
         The best directions that were found, and what is inside then.
     bounds_nothing : bool
         Whether most of the length bounds nothing in the least energy, so that sides were taken to be smooth.
+    tied : bool
+        Whether something else is inside in another answer that costs the same.
     """
 
     pieces: Pieces
     best: Inside
     bounds_nothing: bool = False
+    tied: bool = False
 
     def turned(self, n: int) -> NDArray[np.bool_]:
         """(n,) which of all curves given are turned."""
@@ -122,6 +143,11 @@ class Decision:
         """(k,) which strokes bound nothing, where others do."""
         movable, explained = self.pieces.movable, self.best.explained >= EXPLAINED
         return movable & ~explained & (movable & explained).any()
+
+    def loops_left_out(self) -> NDArray[np.int64]:
+        """Numbers of the curves that are left out although they are likely to be a closed curve."""
+        group, loose = self.pieces.strokes.group, self.loose
+        return self.pieces.curves(self.pieces.is_loop & (np.bincount(group, loose) == np.bincount(group))[group])
 
     @property
     def all_bound(self) -> bool:
@@ -174,11 +200,33 @@ class Decision:
         return self.pieces.curves(found)
 
 
-def drawn_edge(surface: SurfaceDiscretization) -> float:
-    """Mean length of the edges of the surface as it was given."""
-    domain = surface.domain
-    mesh = domain.mesh if isinstance(domain, IntrinsicTriangulation) else domain.triangulation
-    return float(mesh.edge_lengths.mean())
+def order_in_space(places: Sequence[NDArray[np.float64]]) -> NDArray[np.int64]:
+    """(k,) the order of curves by their middles and first points, each (j, 3), whatever their number and scale."""
+    keys = np.array([[*points.mean(axis=0), *points[0]] for points in places])
+    low = np.minimum(keys[:, :3].min(axis=0), keys[:, 3:].min(axis=0))
+    size = max(float((keys - np.tile(low, 2)).max()), np.finfo(float).tiny)
+    return np.lexsort(np.rint((keys - np.tile(low, 2)) / (TIE * size)).T[::-1])
+
+
+def likely_curves(
+    ends: NDArray[np.float64], stroke: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Which strokes are likely to be one curve, by the (2 j, 3) ends of the j curves that they are made of; its gaps.
+
+    Shapes: `stroke` (j,); returned: group (k,) of each stroke, and the length of the gaps of each group (g,).
+    """
+    j = len(stroke)
+    nearest = nearest_others(ends)
+    tails, heads = np.concatenate([nearest, np.stack([np.arange(j), j + stroke], axis=1)]).T
+    group = np.unique(connected_components(j + int(stroke.max()) + 1, tails, heads)[j:], return_inverse=True)[1].ravel()
+    away = scipy.spatial.cKDTree(ends).query(ends, k=2)[0][:, 1]
+    return group, np.bincount(group[np.repeat(stroke, 2)], 0.5 * away)
+
+
+def given_domain(surface: SurfaceDiscretization) -> Surface:
+    """The surface that curves are given on."""
+    domain: Surface = surface.domain.mesh if isinstance(surface.domain, IntrinsicTriangulation) else surface.domain
+    return domain
 
 
 def is_piece(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
@@ -200,20 +248,28 @@ def decide(pieces: Pieces) -> Decision:
     are evidence, and sides are taken to be smooth.
     """
     strokes, movable = pieces.strokes, pieces.movable
-    k = len(movable)
     smooth = np.where(movable, smooth_signs(strokes, movable), 1.0)
-    started = settled_from(strokes, [np.ones(k), smooth], movable)
-    best = min(started, key=lambda inside: cost(strokes, inside))
+    best = least_of(strokes, settled_from(strokes, [np.ones(len(movable)), smooth], movable))
     while True:
         starts = [np.where(movable, -best.signs, best.signs)]
         starts += [altered(best.signs, rows, -1.0) for rows in turnable(strokes, best, movable)]
-        better = min(settled_from(strokes, starts, movable), key=lambda inside: cost(strokes, inside))
-        if cost(strokes, better) >= cost(strokes, best) - 1e-9 * strokes.lengths.sum():
+        better = least_of(strokes, [best, *settled_from(strokes, starts, movable)])
+        if better is best:
             break
         best = better
     if mostly_loose(strokes, best):
         return Decision(pieces, strokes.inside(smooth), bounds_nothing=True)
-    return Decision(pieces, best)
+    most = misfit(strokes, best) + TIE * strokes.lengths.sum()
+    rivals = [other for other in strokes.seen if misfit(strokes, other) <= most]
+    best = min(rivals, key=lambda other: (int((other.signs < 0).sum()), (other.signs < 0).tolist()))
+    otherwise = [strokes.either_way(best), *(strokes.areas[other.sides != best.sides].sum() for other in rivals)]
+    return Decision(pieces, best, tied=bool(max(otherwise) > OTHERWISE * strokes.areas.sum()))
+
+
+def least_of(strokes: Strokes, insides: list[Inside]) -> Inside:
+    """The first of those that cost the least, but for rounding."""
+    costs = np.array([misfit(strokes, inside) for inside in insides])
+    return insides[int(np.argmax(costs <= costs.min() + TIE * strokes.lengths.sum()))]
 
 
 def altered(signs: NDArray[np.float64], rows: list[int], factor: float) -> NDArray[np.float64]:
@@ -230,18 +286,30 @@ def mostly_loose(strokes: Strokes, inside: Inside) -> bool:
 
 
 def cost(strokes: Strokes, inside: Inside) -> float:
-    """The energy, and what turning costs."""
-    return inside.energy + AS_GIVEN * float(strokes.lengths[inside.signs < 0].sum())
+    """The energy, and what turning costs: less for all strokes of a curve, which say one and the same thing."""
+    turned, total = (np.bincount(strokes.group, strokes.lengths * way) for way in (inside.signs < 0, inside.signs != 0))
+    together = (turned == total) & (np.bincount(strokes.group) > 1)
+    return inside.energy + AS_GIVEN * float((np.where(together, TOGETHER, 1.0) * turned).sum())
+
+
+def misfit(strokes: Strokes, inside: Inside) -> float:
+    """The same, and what strokes cost that bound nothing: as much as if they were turned."""
+    loose = (inside.signs > 0) & (inside.explained < EXPLAINED)
+    return cost(strokes, inside) + AS_GIVEN * float(strokes.lengths[loose].sum())
 
 
 def turnable(strokes: Strokes, inside: Inside, movable: NDArray[np.bool_]) -> list[list[int]]:
-    """Strokes that could bound more if turned: those that bound nothing, and others that may be the reason for it."""
+    """Strokes that could bound more if turned: those that bound nothing, and others that may be the reason for it.
+
+    These are, too, all that are likely to be one curve.
+    """
     explained = inside.explained >= EXPLAINED
     loose, others = np.flatnonzero(movable & ~explained), np.flatnonzero(movable & explained)
-    if not len(loose):
-        return []
-    longest = [longest_of(strokes, rows) for rows in (loose, others)]
-    return [loose.tolist(), *([k] for k in np.concatenate(longest).tolist())]
+    longest = [longest_of(strokes, rows).tolist() for rows in (loose, others)]
+    curves = strokes.group[longest[0] + longest[1]]
+    several = [curve for curve in dict.fromkeys(curves.tolist()) if (curves == curve).sum() > 1]
+    together = [np.flatnonzero(movable & (strokes.group == curve)).tolist() for curve in several]
+    return [*together, loose.tolist(), *([k] for k in longest[0] + longest[1])] if len(loose) else together
 
 
 def longest_of(strokes: Strokes, rows: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -263,8 +331,7 @@ def settled(strokes: Strokes, signs: NDArray[np.float64], movable: NDArray[np.bo
         if not turn.any():
             break
         inside = strokes.inside(np.where(turn, -inside.signs, inside.signs))
-        if cost(strokes, inside) < cost(strokes, best):
-            best = inside
+        best = least_of(strokes, [best, inside])
     return best
 
 

@@ -29,6 +29,8 @@ STAIRS = 0.92
 """Length of a line relative to that of the edges' duals that it cuts."""
 LEVEL = 1e-6
 """Height above a segment, relative to its face, up to which a corner is on it."""
+TIE = 1e-6
+"""Difference of what two answers cost, relative to the length of all strokes, below which rounding would choose."""
 BLOCK = 64
 """Strokes whose jumps are solved for at a time."""
 
@@ -74,6 +76,8 @@ class Strokes:
         Integrals along each stroke of the slopes of hat functions towards its left.
     width : float
         Distance up to which strokes next to each other count as one.
+    group : (k,) int
+        Strokes whose ends are nearest to each other, which are likely to be one curve.
     """
 
     surface: SurfaceDiscretization
@@ -82,10 +86,13 @@ class Strokes:
     crossed: sparse.csr_matrix
     fluxes: sparse.csr_matrix
     width: float
+    group: NDArray[np.int64]
     _found: dict[bytes, Inside] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
-    def of(cls, surface: SurfaceDiscretization, parts: Sequence[CurveSegments], edge: float) -> Strokes:
+    def of(
+        cls, surface: SurfaceDiscretization, parts: Sequence[CurveSegments], edge: float, group: NDArray[np.int64]
+    ) -> Strokes:
         """See where the vertices lie from each stroke; `edge` is how far those may be apart that are drawn for one."""
         triangles = surface.triangles
         lengths = np.array([part.lengths.sum() for part in parts])
@@ -101,7 +108,7 @@ class Strokes:
         around = widened(triangles, seen, width)
         left, right = (_means(around.multiply(around * side > 0), areas) for side in (1, -1))
         means = sparse.csr_matrix(0.5 * (left - right))
-        return cls(surface, lengths, means, crossed, fluxes_across(triangles, parts), width)
+        return cls(surface, lengths, means, crossed, fluxes_across(triangles, parts), width, group)
 
     @property
     def areas(self) -> NDArray[np.float64]:
@@ -144,6 +151,11 @@ class Strokes:
             result[:, begin : begin + BLOCK] = fluxes @ blur.solve(np.asfortranarray(masses @ sides))
         return 0.5 * (result + result.T)
 
+    @property
+    def seen(self) -> list[Inside]:
+        """All that was asked of `inside`."""
+        return list(self._found.values())
+
     def inside(self, signs: NDArray[np.float64]) -> Inside:
         """The sides of least energy for strokes with these directions, 0 if one is left out: a minimum cut."""
         key = signs.tobytes()
@@ -151,12 +163,26 @@ class Strokes:
             self._found[key] = self._least(signs)
         return self._found[key]
 
+    def either_way(self, inside: Inside) -> float:
+        """Area that could as well be inside: that of least energy is the smallest of all that differ by rounding."""
+        labels = self.surface.triangles.face_components
+        parts = np.zeros(self.surface.triangles.n_vertices, dtype=np.int64)
+        parts[self.surface.triangles.corner_vertices] = labels[:, None]
+        reached = np.isin(parts, parts[np.unique(self.means.indices)])
+        return float(self.areas[reached & (self._cut(inside.signs, 1.0)[0] != inside.sides)].sum())
+
     def _least(self, signs: NDArray[np.float64]) -> Inside:
-        falling, rising = self._uncovered(signs)
-        sides = self.graph.cut(falling, rising, self.means.T @ (REWARD * self.lengths * signs))
+        sides, boundary = self._cut(signs, -1.0)
         explained = signs * (self.means @ sides)
-        boundary = self._boundary(sides, falling, rising).sum()
-        return Inside(signs, sides, explained, float(boundary - REWARD * (self.lengths @ explained)))
+        return Inside(signs, sides, explained, boundary - REWARD * float(self.lengths @ explained))
+
+    def _cut(self, signs: NDArray[np.float64], larger: float) -> tuple[NDArray[np.float64], float]:
+        """The sides of least energy, of several the largest inside (1) or the smallest (-1), and what it costs."""
+        falling, rising = self._uncovered(signs)
+        pull = self.means.T @ (REWARD * self.lengths * signs)
+        pull += larger * TIE * self.lengths.sum() / self.areas.sum() * self.areas
+        sides = self.graph.cut(falling, rising, pull)
+        return sides, float(self._boundary(sides, falling, rising).sum())
 
     def _uncovered(self, signs: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """(e,) cost of each edge between sides that fall from its first vertex to its second, and that rise."""

@@ -106,6 +106,24 @@ class MergedSources:
         return CurveSegments(self.nodes[nodes], ends, self.faces[mine], self.edges[mine], self.vectors[mine], oriented)
 
 
+def without_copies(
+    parts: Sequence[CurveSegments], by_points: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The first of all curves with the same segments, and which of these each curve is; not of those with normals.
+
+    Shapes: `by_points` (k,); returned: first (u,), which (k,).
+    """
+    merged = MergedSources.of(parts)
+    bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
+    keys = [
+        np.unique(merged.ends[begin:end], axis=0).tobytes() if may else str(begin).encode()
+        for (begin, end), may in zip(pairwise(bounds), by_points.tolist(), strict=True)
+    ]
+    first = {key: k for k, key in reversed(list(enumerate(keys)))}
+    found = np.unique(list(first.values()))
+    return found, np.searchsorted(found, [first[key] for key in keys])
+
+
 def joined_end_to_end(
     parts: Sequence[CurveSegments], may_go_on: NDArray[np.bool_]
 ) -> tuple[list[CurveSegments], NDArray[np.int64]]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import SignedHeatError
 from ..packages import lazy_module
+from .box_tree import BoxTree
 
 manifold3d: Any = lazy_module("manifold3d", "drawings of closed outlines")
 
@@ -17,6 +18,9 @@ FillRule: TypeAlias = Literal["nonzero", "evenodd"]
 """Which places closed outlines fill: those around which they run a number of times that is not zero, or that is odd."""
 SIZE = 2.0**30
 """Size to which outlines are scaled for manifold3d, which rounds coordinates to 1e-8."""
+SEAM = 1e-12
+"""Distance, relative to all outlines, up to which a corner is on a line: where outlines share lines, what they fill is
+bounded by lines that run there and back, without an area between them."""
 LEAST_SHARE = 1e-9
 """Of an area or a length, below which it is rounding."""
 
@@ -50,6 +54,37 @@ def filled_outlines(outlines: Sequence[NDArray[np.float64]], rule: FillRule) -> 
     else:
         region = _united(scaled)
     return [polygon[::-1] / scale + center for polygon in region.to_polygons()]
+
+
+def without_seams(segments: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k, 2, 2) segments of outlines, cut where corners lie on them, without those along which others run back.
+
+    Examples
+    --------
+    >>> spike = np.array([[0.0, 0], [2, 0], [2, 1], [1, 0]])
+    >>> without_seams(np.stack([spike, np.roll(spike, -1, axis=0)], axis=1)).tolist()
+    [[[1.0, 0.0], [2.0, 0.0]], [[2.0, 1.0], [1.0, 0.0]], [[2.0, 0.0], [2.0, 1.0]]]
+    """
+    near = SEAM * float(np.ptp(segments.reshape(-1, 2), axis=0).max(initial=0.0))
+    if near == 0:
+        return segments
+    _, first, ends = np.unique(np.rint(segments / near).reshape(-1, 2), axis=0, return_index=True, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    corners, (tails, heads) = segments.reshape(-1, 2)[first], ends[ends[:, 0] != ends[:, 1]].T
+    start, step = corners[tails], corners[heads] - corners[tails]
+    lengths, in_space = np.linalg.norm(step, axis=1), np.pad(corners, ((0, 0), (0, 1)))
+    begins, found = BoxTree.of(in_space, in_space).meeting(in_space[np.stack([tails, heads, heads], axis=1)], near)
+    which = np.repeat(np.arange(len(tails)), np.diff(begins))
+    away, along = corners[found] - start[which], step[which] / lengths[which, None]
+    share, off = (away * along).sum(axis=1), np.abs(along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0])
+    on = (off <= near) & (share >= -near) & (share <= lengths[which] + near)
+    order = np.flatnonzero(on)[np.lexsort((share[on], which[on]))]
+    goes_on = np.diff(which[order]) == 0
+    parts = np.stack([found[order][:-1], found[order][1:]], axis=1)[goes_on]
+    pairs, pair = np.unique(np.sort(parts, axis=1), axis=0, return_inverse=True)
+    net = np.bincount(pair.ravel(), np.where(parts[:, 0] < parts[:, 1], 1, -1), len(pairs))
+    kept = np.where(net[:, None] < 0, pairs[:, ::-1], pairs)[net != 0]
+    return corners[kept]
 
 
 def _united(outlines: list[NDArray[np.float64]]) -> Any:
