@@ -169,7 +169,7 @@ def _holes(
     keys = (faces * n + np.roll(faces, -1, axis=1)).ravel()
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
-    bounds, scraps = decided.counts != 0, decided.torn >= 0
+    bounds, scraps = decided.counts != 0, decided.loose >= 0
     longest: dict[int, int] = {}
     chosen, single = np.zeros(len(around), dtype=bool), np.full(len(around), -1)
     for k, loop in enumerate(around):
