@@ -16,7 +16,6 @@ from ..joining import concatenated
 from ..mesh.arrangement import arranged
 from ..mesh.welding import indexed
 from ..surfaces.triangle_mesh import TriangleMesh
-from .kept_faces import outward
 from .regions import Regions
 from .solid import Solid
 from .winding import Windings
@@ -47,8 +46,7 @@ def intersection(a: Solid, b: Solid) -> Solid:
 
 def _combination(a: Solid, b: Solid, turned: bool, around: NDArray[np.float64] | None = None) -> Solid:
     """The solid whose winding number is the sum of those of `a`, of `b`, turned or not, and of triangles `around`."""
-    first, of_first = outward(a)
-    second, of_second = outward(b)
+    (first, of_first), (second, of_second) = ((x.triangles[x.bounding], np.flatnonzero(x.bounding)) for x in (a, b))
     triangles = np.concatenate([first, second[:, ::-1] if turned else second])
     if not len(triangles):
         raise SourceError("neither of the two encloses anything", remedy="combine solids, not sheets", element="solid")

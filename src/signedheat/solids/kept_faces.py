@@ -75,7 +75,7 @@ class Joined:
 def given_surface(
     solid: Evaluated, contour: Callable[[], TriangleMesh], cell: float
 ) -> tuple[TriangleMesh, NDArray[np.float64]]:
-    """Triangles of a solid with the inside on one side, turned to have it behind them, joined into a closed mesh.
+    """Triangles of a solid that have the inside behind them only, joined into a closed mesh.
 
     Those that join already stay as they are, in their order. Where triangles do not join, the surface of `contour`,
     with cells of this size, takes their place; the middles of such places, (k, 3), are returned, too.
@@ -86,12 +86,12 @@ def given_surface(
         If there are no such triangles, or they do not join with the contour either.
     """
     windings = solid.windings
-    turned, _ = outward(solid)
-    if not len(turned):
+    bounding = solid.triangles[solid.bounding]
+    if not len(bounding):
         raise GeometryError(
             "nothing of the shape bounds a solid", remedy="thicken it, or take the surface at a distance above zero"
         )
-    whole = Joined.of(*indexed(turned))
+    whole = Joined.of(*indexed(bounding))
     if len(whole.bad):
         whole = _conforming(whole, windings)
     if not len(whole.bad):
@@ -134,14 +134,6 @@ def _without_doubles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     proper = first >= 0
     forth, back = (np.bincount(first[proper & (reverse == way)], minlength=len(faces)) for way in (False, True))
     return faces[proper & ~((forth == 1) & (back == 1))[first]]
-
-
-def outward(solid: Evaluated) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """(k, 3, 3) triangles with the inside on one side, turned to have it behind them, and which ones these are."""
-    behind, ahead = solid.windings.sides(solid.triangles)
-    chosen = np.flatnonzero(behind != ahead)
-    turned = np.where(ahead[chosen, None, None], solid.triangles[chosen, ::-1], solid.triangles[chosen])
-    return turned, chosen
 
 
 def unjoined(places: NDArray[np.float64]) -> str:

@@ -32,7 +32,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import transformed
 from ..validation import finite_number, flag, positive_number, query_points, shaped
 from .contouring import announce_lost, sharp_surface
-from .kept_faces import given_surface, outward, unjoined
+from .kept_faces import given_surface, unjoined
 from .offsets import Offset, Reach
 from .sample_set import Samples
 from .simplification import simplified
@@ -132,7 +132,7 @@ class Solid(Displayed, Represented, Frozen):
     @cached_property
     def outward(self) -> NDArray[np.float64]:
         """(k, 3, 3) triangles that bound the inside, counter-clockwise as seen from outside."""
-        return outward(self)[0]
+        return self.triangles[self.bounding]
 
     @property
     def volume(self) -> float:

@@ -80,7 +80,7 @@ def united(
         kept[:] = True
     confidence = _confidence(triangles[kept], given[kept], whole, points)
     diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds, copies)))
-    bounding = (behind & ~ahead)[kept]
+    bounding = (bounds & behind)[kept]
     return Solid(triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics)
 
 
