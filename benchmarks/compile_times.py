@@ -55,6 +55,8 @@ COMMANDS = {
     "offset, broken": "offset duck.stl 0.05 -o offset.stl",
     "sample": "sample ball.stl -o points.npz",
     "info": "info duck.stl",
+    "info, closed": "info ball.stl",
+    "watertight, closed": "watertight ball.stl -o whole.stl",
     "surface": "surface ball.stl curve.csv -o phi.ply",
     "close": "close ball.stl curve.csv -o curve.json",
     "tets": "volume ball.stl --tets -o phi.vtu",

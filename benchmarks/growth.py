@@ -1,6 +1,6 @@
 """How running times grow: seconds for n, 2n and 4n, and the exponent fitted to them; 1 is linear.
 
-python benchmarks/growth.py
+python benchmarks/growth.py [CASE …]
 """
 
 from __future__ import annotations
@@ -92,6 +92,108 @@ def holes_in_one_part(n: int) -> Callable[[], object]:
     return lambda: sh.complete(shape)
 
 
+def tube(n: int, heights: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of a tube of radius 1 with n sides, in rows between heights."""
+    angle, side = 2 * np.pi * np.arange(n) / n, np.arange(n)
+    rings = [np.stack([np.cos(angle), np.sin(angle), np.full(n, height)], axis=1) for height in heights]
+    after = (side + 1) % n
+    row = np.concatenate([np.stack([side, after, n + after], axis=1), np.stack([side, n + after, n + side], axis=1)])
+    return np.concatenate(rings), np.concatenate([row + n * k for k in range(len(heights) - 1)])
+
+
+def rim_edges(n: int) -> Callable[[], object]:
+    """The solid of a short tube, whose two rims have n edges as long as its faces are high."""
+    shape = tube(n, [0.0, 2 * np.pi / n, 4 * np.pi / n])
+    return lambda: sh.complete(shape)
+
+
+def slivers(n: int) -> Callable[[], object]:
+    """The solid of a tube of 2 n faces that are as high as the tube is wide."""
+    shape = tube(n, [0.0, 1.0])
+    return lambda: sh.complete(shape)
+
+
+def valence(n: int) -> Callable[[], object]:
+    """The solid of two cones, whose tips n faces meet in."""
+    ring = tube(n, [0.0, 1.0])[0][:n]
+    side, after = np.arange(n), (np.arange(n) + 1) % n
+    faces = [np.stack([side, after, 0 * side + n], axis=1), np.stack([after, side, 0 * side + n + 1], axis=1)]
+    shape = np.concatenate([ring, [[0, 0, 1], [0, 0, -1]]]), np.concatenate(faces)
+    return lambda: sh.complete(shape)
+
+
+def corners_of_polygons(n: int) -> Callable[[], object]:
+    """The solid of a prism over a flower of n corners."""
+    rings = tube(n, [-0.5, 0.5])[0]
+    rings[:, :2] *= 1 + 0.2 * np.cos(9 * 2 * np.pi * np.arange(2 * n) / n)[:, None]
+    sides = [[k, (k + 1) % n, n + (k + 1) % n, n + k] for k in range(n)]
+    shape = sh.PolygonMesh(rings, [list(range(n))[::-1], list(range(n, 2 * n)), *sides])
+    return lambda: sh.complete(shape)
+
+
+def crossing_faces(n: int) -> Callable[[], object]:
+    """The solid of n large triangles through each other; what they bound grows as well."""
+    ball = samples.sphere(3)
+    shape = ball.vertices[::-1], ball.faces[np.random.default_rng(0).permutation(ball.n_faces)[:n]]
+    return lambda: sh.complete(shape)
+
+
+def bars(n: int) -> Callable[[], object]:
+    """The solid of n bars through one place, where the faces of all cross those of all others."""
+    rng, box = np.random.default_rng(0), hull_of(np.array(list(np.ndindex(2, 2, 2))) * [2, 0.1, 0.1] - [1, 0.05, 0.05])
+    turns = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(n)]
+    return lambda: sh.complete(copies(box, [box.vertices @ (turn * np.linalg.det(turn)) for turn in turns]))
+
+
+def overlapping_balls(n: int) -> Callable[[], object]:
+    """The solid of n balls along a chain, each of which overlaps the next."""
+    ball = samples.sphere(2)
+    middles = np.stack([1.2 * np.arange(n), np.zeros(n), np.zeros(n)], axis=1)
+    middles += 0.1 * np.random.default_rng(0).normal(size=(n, 3))
+    return lambda: sh.complete(copies(ball, list(ball.vertices + middles[:, None])))
+
+
+def loose_pieces(n: int) -> Callable[[], object]:
+    """The solid of a ball of n triangles that do not touch each other."""
+    points = spiral(n // 2 + 2)
+    triangles = points[hull(points)]
+    triangles += 0.02 / n**0.5 * np.random.default_rng(0).normal(size=(len(triangles), 1, 3))
+    shape = triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
+    return lambda: sh.complete(shape)
+
+
+def points(n: int) -> Callable[[], object]:
+    """The solid of n points on a ball, without normals."""
+    cloud = sh.PointCloud(spiral(n))
+    return lambda: sh.complete(cloud)
+
+
+def faces(n: int) -> Callable[[], object]:
+    """The solid of a ball of n faces."""
+    places = spiral(n // 2 + 2)
+    shape = places, hull(places)
+    return lambda: sh.complete(shape)
+
+
+def voxels(n: int) -> Callable[[], object]:
+    """The solid of a ball of about n voxels."""
+    side = round((6 * n / np.pi) ** (1 / 3))
+    at = np.stack(np.indices((side,) * 3), axis=-1) - (side - 1) / 2
+    shape = sh.DigitalSurface(np.linalg.norm(at, axis=-1) < side / 2)
+    return lambda: sh.complete(shape)
+
+
+def hull_of(corners: np.ndarray) -> sh.TriangleMesh:
+    """The convex hull of some points."""
+    return sh.TriangleMesh(corners, hull(corners))
+
+
+def copies(shape: sh.TriangleMesh, places: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """A mesh as often as there are places of its vertices."""
+    firsts = shape.n_vertices * np.arange(len(places))
+    return np.concatenate(places), (shape.faces + firsts[:, None, None]).reshape(-1, 3)
+
+
 CASES = {
     fine_curve_in_a_face: 1000,
     curve_along_an_edge: 1000,
@@ -100,6 +202,17 @@ CASES = {
     groups_on_tets: 16,
     open_boxes: 250,
     holes_in_one_part: 100,
+    faces: 20000,
+    points: 1000,
+    voxels: 20000,
+    valence: 4000,
+    rim_edges: 1000,
+    slivers: 500,
+    corners_of_polygons: 2000,
+    loose_pieces: 500,
+    overlapping_balls: 50,
+    crossing_faces: 40,
+    bars: 5,
 }
 
 
@@ -112,6 +225,8 @@ def seconds(run: Callable[[], object]) -> float:
 
 def main() -> None:
     for case, n in CASES.items():
+        if sys.argv[1:] and case.__name__ not in sys.argv[1:]:
+            continue
         seconds(case(n))  # compiles
         sizes = [n, 2 * n, 4 * n]
         times = [seconds(case(size)) for size in sizes]

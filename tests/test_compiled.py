@@ -42,6 +42,19 @@ def test_kernels_call_kernels_and_themselves():
     assert bits.__name__ == "bits"
 
 
+def test_a_number_written_in_a_kernel_needs_no_compilation_of_its_own():
+    @compiled
+    def half(x):
+        return x // 2
+
+    @compiled
+    def quarters(x):
+        return half(4) * half(half(x))
+
+    assert quarters(12) == 6
+    assert len(half.dispatcher.signatures) == 1
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signal to one process")
 def test_ctrl_c_within_a_kernel_is_a_keyboard_interrupt():
     """Numba makes a SystemError of it; that of another process, so that this one is not stopped by a slip."""

@@ -96,12 +96,26 @@ class Kernel(Generic[Parameters, Returned]):
                     announce()
                 wanted, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
                 try:
-                    return numba.njit(cache=True, **self.options)(self.function)
+                    return _of_numbers(numba.njit(cache=True, **self.options)(self.function))
                 except RuntimeError as error:  # no folder can be written to
                     logger.info("compiled in every process: %s", error)
                 finally:
                     numba.config.CACHE_DIR = wanted
-            return numba.njit(**self.options)(self.function)
+            return _of_numbers(numba.njit(**self.options)(self.function))
+
+
+def _of_numbers(dispatcher: Any) -> Any:
+    """Let a kernel that others call with a number that is written there be compiled for numbers, not for that one."""
+    compile_for = dispatcher.compile
+
+    def compile_once(signature: Any) -> Any:
+        if isinstance(signature, tuple):
+            written = numba.types.IntegerLiteral, numba.types.BooleanLiteral
+            signature = tuple(numba.types.unliteral(k) if isinstance(k, written) else k for k in signature)
+        return compile_for(signature)
+
+    dispatcher.compile = compile_once
+    return dispatcher
 
 
 @overload

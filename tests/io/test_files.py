@@ -335,7 +335,7 @@ def test_what_cannot_be_compiled_says_nothing_about_the_file(tmp_path, monkeypat
     path = tmp_path / "curves.json"
     path.write_text(json.dumps({"polylines": [{"points": [[1.0, 0.1, 0.2], [0.0, 1.0, -0.1]]}]}))
     assert len(sh.io.read_curves(path, BALL)) == 1
-    monkeypatch.setattr(type(nearest.triangle_rows), "__call__", broken)
+    monkeypatch.setattr(type(nearest.foot_on_triangle), "__call__", broken)
     with pytest.raises(TypeError, match="compiler"):
         sh.io.read_curves(path, samples.sphere(1))
     monkeypatch.undo()

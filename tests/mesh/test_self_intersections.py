@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from signedheat.mesh import self_intersections as crossings
+from signedheat.mesh.box_tree import BoxTree
 
 
 def double_cone(n, depth):
@@ -42,3 +43,17 @@ def test_few_faces_of_a_fan_are_near_each_other():
     hubs = crossings._hubs(faces, len(points))
     tree = crossings.BoxTree.over(corners, crossings._order(corners, points, hubs), hubs)
     assert len(tree.meeting(corners, 1e-8, hubs)[1]) < 20 * len(faces)
+
+
+def test_long_thin_faces_meet_few_others():
+    """Those of a cylinder and its round caps: their boxes overlap far from where they are."""
+    n = 1000
+    angle, side = 2 * np.pi * np.arange(n) / n, np.arange(n)
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(n)], axis=1)
+    below, after = ring - [0, 0, 1], np.roll(ring, -1, axis=0)
+    walls = np.stack([ring, below, after], axis=1)
+    cap = np.stack([ring, after, np.zeros((n, 3))], axis=1)
+    triangles = np.concatenate([walls, cap])
+    order = np.concatenate([side, n + side])
+    starts, _ = BoxTree.over(triangles, order).meeting(walls, 1e-9)
+    assert np.diff(starts).max() < 40

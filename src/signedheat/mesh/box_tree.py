@@ -15,10 +15,16 @@ USUAL = 64
 """Boxes near a triangle for which there is room at first: faces of a mesh have some forty in the leaves around them."""
 FEW = 64
 """Points that are not worth ordering: it takes as long as the searches of some of them."""
-
-
+SPREAD = (
+    (32, 0x1F00000000FFFF),
+    (16, 0x1F0000FF0000FF),
+    (8, 0x100F00F00F00F00F),
+    (4, 0x10C30C30C30C30C3),
+    (2, 0x1249249249249249),
+)
+"""Shifts and masks that spread the 21 low bits of a number so that each is followed by two zero bits."""
 FLAT_LEVELS = 8
-"""Levels of a tree over triangles, from the leaves up, that are bounded along their mean normals as well."""
+"""Levels of a tree over triangles, from the leaves up, that are bounded by slabs as well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +39,9 @@ class BoxTree:
         Boxes in each leaf, −1 where there are none.
     groups : (2 · leaves,) int
         Group that all boxes below each node are of; −1 if they are of several.
-    slabs : (2 · leaves, 5) float
-        A direction, and the least and the largest extent along it of everything below each node.
+    slabs : (2 · leaves, 10) float
+        Two directions, the mean normal and the one across long faces, and the least and the largest extent along each
+        of everything below each node.
     triangles : (n, 9) or (0, 9) float
         What the boxes are of, if that is triangles.
     """
@@ -91,18 +98,16 @@ class BoxTree:
                 common[level : 2 * level] = np.where(left == right, left, -1)
             below = bounds[level : 2 * level].reshape(-1, 2, 6) if level > 1 else below
             level //= 2
-        slabs = np.zeros((2 * leaves, 5))
-        slabs[:, 3], slabs[:, 4] = -np.inf, np.inf
-        return cls(bounds, items, common, slabs, np.empty((0, 9)))
+        return cls(bounds, items, common, _unbounded(leaves), np.empty((0, 9)))
 
     @classmethod
     def over(
         cls, triangles: NDArray[np.float64], order: NDArray[np.int64], groups: NDArray[np.int64] | None = None
     ) -> BoxTree:
-        """Build the tree over (n, 3, 3) triangles, bounded along the mean normal of each node as well."""
+        """Build the tree over (n, 3, 3) triangles, bounded by slabs as well."""
         tree = cls.in_order(triangles.min(axis=1), triangles.max(axis=1), order, groups)
-        _fit_slabs(np.ascontiguousarray(triangles), tree.items, tree.slabs)
-        return replace(tree, triangles=np.ascontiguousarray(triangles).reshape(-1, 9))
+        corners = np.ascontiguousarray(triangles).reshape(-1, 9)
+        return replace(tree, slabs=_slabs(triangles, tree.items), triangles=corners)
 
     def meeting(
         self,
@@ -112,8 +117,8 @@ class BoxTree:
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Where what is near each of (n, 3, 3) triangles begins, and what it is: all in leaves that they may meet.
 
-        A triangle may meet a node if its box and its plane do, to a slack along each axis, and not all of the node is
-        of the triangle's own group.
+        A triangle may meet a node if its box, its plane and the prism over it do, to a slack along each axis, and not
+        all of the node is of the triangle's own group.
 
         Examples
         --------
@@ -150,48 +155,68 @@ def _meeting(
 ) -> None:
     """Write what is near each triangle, as far as there is room, and where it begins."""
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
-    lower, upper, normal = np.empty(3), np.empty(3), np.empty(3)
+    lower, upper, ways, ends = np.empty(3), np.empty(3), np.empty((4, 3)), np.empty((4, 2))
     for t in range(len(corners)):
-        level = 0.0
         for d in range(3):
             p, q = (d + 1) % 3, (d + 2) % 3
             a, b, c = corners[t, d], corners[t, 3 + d], corners[t, 6 + d]
             lower[d], upper[d] = min(a, b, c) - slacks[d], max(a, b, c) + slacks[d]
-            normal[d] = (corners[t, 3 + p] - corners[t, p]) * (corners[t, 6 + q] - corners[t, q])
-            normal[d] -= (corners[t, 3 + q] - corners[t, q]) * (corners[t, 6 + p] - corners[t, p])
-            level += normal[d] * a
+            ways[3, d] = (corners[t, 3 + p] - corners[t, p]) * (corners[t, 6 + q] - corners[t, q])
+            ways[3, d] -= (corners[t, 3 + q] - corners[t, q]) * (corners[t, 6 + p] - corners[t, p])
+        for k in range(3):  # at right angles to each side, in the plane
+            i, j = 3 * k, (3 * k + 3) % 9
+            for d in range(3):
+                p, q = (d + 1) % 3, (d + 2) % 3
+                ways[k, d] = ways[3, p] * (corners[t, j + q] - corners[t, i + q])
+                ways[k, d] -= ways[3, q] * (corners[t, j + p] - corners[t, i + p])
+        for k in range(4):
+            give = 0.0
+            ends[k, 0], ends[k, 1] = np.inf, -np.inf
+            for i in range(0, 9, 3):
+                along = ways[k, 0] * corners[t, i] + ways[k, 1] * corners[t, i + 1] + ways[k, 2] * corners[t, i + 2]
+                ends[k, 0], ends[k, 1] = min(ends[k, 0], along), max(ends[k, 1], along)
+            for d in range(3):
+                give += abs(ways[k, d]) * slacks[d]
+            ends[k, 0], ends[k, 1] = ends[k, 0] - give, ends[k, 1] + give
         stack[0], depth, count = 1, 1, starts[t]
         while depth > 0:
             depth -= 1
             node = stack[depth]
             if own[t] >= 0 and groups[node] == own[t]:
                 continue
-            apart, height, reach = False, -level, 0.0
+            apart = False
             for d in range(3):
-                low, high = bounds[node, d], bounds[node, 3 + d]
-                apart |= low > upper[d] or high < lower[d]
-                height += normal[d] * 0.5 * (low + high)
-                reach += abs(normal[d]) * (0.5 * (high - low) + slacks[d])
-            if apart or abs(height) > reach:
+                apart |= bounds[node, d] > upper[d] or bounds[node, 3 + d] < lower[d]
+            if apart:
                 continue
-            if slabs[node, 4] < np.inf:
+            for k in range(4):
+                height, reach = 0.0, 0.0
+                for d in range(3):
+                    low, high = bounds[node, d], bounds[node, 3 + d]
+                    height += ways[k, d] * 0.5 * (low + high)
+                    reach += abs(ways[k, d]) * 0.5 * (high - low)
+                apart |= height - reach > ends[k, 1] or height + reach < ends[k, 0]
+            if apart:
+                continue
+            for s in range(0, 10, 5):
                 least, most, give = np.inf, -np.inf, 0.0
                 for k in range(0, 9, 3):
                     along = 0.0
                     for d in range(3):
-                        along += slabs[node, d] * corners[t, k + d]
+                        along += slabs[node, s + d] * corners[t, k + d]
                     least, most = min(least, along), max(most, along)
                 for d in range(3):
-                    give += abs(slabs[node, d]) * slacks[d]
-                if least > slabs[node, 4] + give or most < slabs[node, 3] - give:
-                    continue
+                    give += abs(slabs[node, s + d]) * slacks[d]
+                apart |= least > slabs[node, s + 4] + give or most < slabs[node, s + 3] - give
+            if apart:
+                continue
             if node < leaves:
                 stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
                 depth += 2
                 continue
             for place in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
                 if items[place] >= 0:
-                    if len(triangles) and _is_beyond(triangles[items[place]], lower, upper, normal, level, slacks):
+                    if len(triangles) and _is_beyond(triangles[items[place]], lower, upper, ways, ends):
                         continue
                     if count < len(out):
                         out[count] = items[place]
@@ -204,57 +229,52 @@ def _is_beyond(
     triangle: NDArray[np.float64],
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
-    normal: NDArray[np.float64],
-    level: float,
-    slacks: NDArray[np.float64],
+    ways: NDArray[np.float64],
+    ends: NDArray[np.float64],
 ) -> bool:
-    """Whether a triangle lies off a box, or on one side of a plane."""
-    give, least, most = 0.0, np.inf, -np.inf
+    """Whether a triangle lies off a box, or beyond what is between two ends along any of some ways."""
     for d in range(3):
         a, b, c = triangle[d], triangle[3 + d], triangle[6 + d]
         if min(a, b, c) > upper[d] or max(a, b, c) < lower[d]:
             return True
-        give += abs(normal[d]) * slacks[d]
-    for k in range(0, 9, 3):
-        height = normal[0] * triangle[k] + normal[1] * triangle[k + 1] + normal[2] * triangle[k + 2] - level
-        least, most = min(least, height), max(most, height)
-    return least > give or most < -give
+    for k in range(len(ways)):
+        least, most = np.inf, -np.inf
+        for i in range(0, 9, 3):
+            along = ways[k, 0] * triangle[i] + ways[k, 1] * triangle[i + 1] + ways[k, 2] * triangle[i + 2]
+            least, most = min(least, along), max(most, along)
+        if least > ends[k, 1] or most < ends[k, 0]:
+            return True
+    return False
 
 
-@compiled
-def _fit_slabs(triangles: NDArray[np.float64], items: NDArray[np.int64], slabs: NDArray[np.float64]) -> None:
-    """Bound triangles along their mean normals, in the lowest nodes of a tree."""
-    n, size = np.empty(3), LEAF
-    first = len(slabs) // 2
-    for _ in range(FLAT_LEVELS):
-        for node in range(first, 2 * first):
-            begin = (node - first) * size
-            n[:] = 0.0
-            for place in range(begin, begin + size):
-                if items[place] < 0:
-                    break
-                t = triangles[items[place]]
-                for d in range(3):
-                    p, q = (d + 1) % 3, (d + 2) % 3
-                    n[d] += (t[1, p] - t[0, p]) * (t[2, q] - t[0, q]) - (t[1, q] - t[0, q]) * (t[2, p] - t[0, p])
-            length = np.sqrt((n * n).sum())
-            if not length > 0.0:
-                continue
-            least, most = np.inf, -np.inf
-            for place in range(begin, begin + size):
-                if items[place] < 0:
-                    break
-                for k in range(3):
-                    along = 0.0
-                    for d in range(3):
-                        along += n[d] / length * triangles[items[place], k, d]
-                    least, most = min(least, along), max(most, along)
-            slabs[node, :3] = n / length
-            slabs[node, 3], slabs[node, 4] = least, most
-        size *= 2
+@np.errstate(all="ignore")
+def _slabs(triangles: NDArray[np.float64], items: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(2 · leaves, 10) what bounds (n, 3, 3) triangles in the lowest nodes of a tree; see `BoxTree.slabs`."""
+    first, n = len(items) // LEAF, len(triangles)
+    slabs = _unbounded(first)
+    if not n:
+        return slabs
+    corners = triangles[np.where(items < 0, items[n - 1], items)]
+    sides = np.roll(corners, -1, axis=1) - corners
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    normals[n:] = 0.0
+    lines = sides[np.arange(len(sides)), np.einsum("tcd,tcd->tc", sides, sides).argmax(axis=1)]
+    for _ in range(min(FLAT_LEVELS, first.bit_length())):
+        normals, below = normals.reshape(first, -1, 3).sum(axis=1), len(items) // first
+        ways = np.stack([normals, np.cross(normals, lines[below // 2 :: below])], axis=1)
+        lengths = np.sqrt(np.einsum("nkd,nkd->nk", ways, ways))
+        ways /= np.where(lengths > 0.0, lengths, 1.0)[..., None]
+        heights = ways @ corners.reshape(first, -1, 3).transpose(0, 2, 1)
+        ends = np.stack([heights.min(axis=2), heights.max(axis=2)], axis=2)
+        own = slabs[first : 2 * first].reshape(first, 2, 5)
+        own[lengths > 0.0] = np.concatenate([ways, ends], axis=2)[lengths > 0.0]
         first //= 2
-        if first == 0:
-            return
+    return slabs
+
+
+def _unbounded(leaves: int) -> NDArray[np.float64]:
+    """(2 · leaves, 10) slabs that bound nothing."""
+    return np.tile([0.0, 0.0, 0.0, -np.inf, np.inf], (2 * leaves, 2))
 
 
 def order_in_space(points: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -264,24 +284,16 @@ def order_in_space(points: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.argsort(morton_codes(points), kind="stable")
 
 
+@np.errstate(all="ignore")
 def morton_codes(points: NDArray[np.float64]) -> NDArray[np.uint64]:
     """(n,) Morton codes of (n, 3) points: their positions along a space-filling curve, with 21 bits per axis."""
     lower = points.min(axis=0)
     extent = max(float((points.max(axis=0) - lower).max()), 1e-290)
-    return _codes(np.ascontiguousarray(points), lower, (2**21 - 1) / extent)
-
-
-@compiled
-def _codes(points: NDArray[np.float64], lower: NDArray[np.float64], scale: float) -> NDArray[np.uint64]:
-    """The 21 low bits of each cell are spread so that each is followed by two zero bits."""
     codes = np.zeros(len(points), dtype=np.uint64)
-    for p in range(len(points)):
-        for axis in range(3):
-            x = np.uint64((points[p, axis] - lower[axis]) * scale)
-            x = (x | (x << np.uint64(32))) & np.uint64(0x1F00000000FFFF)
-            x = (x | (x << np.uint64(16))) & np.uint64(0x1F0000FF0000FF)
-            x = (x | (x << np.uint64(8))) & np.uint64(0x100F00F00F00F00F)
-            x = (x | (x << np.uint64(4))) & np.uint64(0x10C30C30C30C30C3)
-            x = (x | (x << np.uint64(2))) & np.uint64(0x1249249249249249)
-            codes[p] |= x << np.uint64(axis)
+    for axis in range(3):
+        x = ((points[:, axis] - lower[axis]) * ((2**21 - 1) / extent)).astype(np.uint64)
+        for shift, mask in SPREAD:
+            x |= x << np.uint64(shift)
+            x &= np.uint64(mask)
+        codes |= x << np.uint64(axis)
     return codes

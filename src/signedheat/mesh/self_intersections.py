@@ -141,66 +141,65 @@ def _overlapping(
     depths: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
     """(k,) whether triangles overlap, each pair deeper than its depth."""
-    result, axis = np.empty(len(one), dtype=np.bool_), np.empty(3)
+    result, ways = np.empty(len(one), dtype=np.bool_), np.empty((10, 3))
     for k in range(len(one)):
-        result[k] = overlap(corners[one[k]], corners[other[k]], slack, depths[k], axis)
+        result[k] = overlap(corners[one[k]], corners[other[k]], slack, depths[k], ways)
     return result
 
 
 @compiled
 def overlap(
-    p: NDArray[np.float64], q: NDArray[np.float64], slack: float, depth: float, axis: NDArray[np.float64]
+    p: NDArray[np.float64], q: NDArray[np.float64], slack: float, depth: float, ways: NDArray[np.float64]
 ) -> bool:
     """Whether two triangles, (9,) each, overlap deeper than a depth along every axis that may separate them.
 
-    Along their normals they may be apart by a slack.
+    Along their normals they may be apart by a slack. There is room for ten `ways`: their sides, their normals, and
+    these of length 1.
     """
     for d in range(3):
         if min(p[d], p[3 + d], p[6 + d]) > max(q[d], q[3 + d], q[6 + d]) + slack:
             return False
         if min(q[d], q[3 + d], q[6 + d]) > max(p[d], p[3 + d], p[6 + d]) + slack:
             return False
-    normals = np.zeros((2, 3))
+    for t in range(2):
+        corners = p if t == 0 else q
+        for c in range(3):
+            for d in range(3):
+                ways[3 * t + c, d] = corners[(3 * c + 3) % 9 + d] - corners[3 * c + d]
+        for d in range(3):
+            e, f = (d + 1) % 3, (d + 2) % 3
+            ways[6 + t, d] = ways[3 * t + 2, e] * ways[3 * t, f] - ways[3 * t + 2, f] * ways[3 * t, e]
+            ways[8 + t, d] = 0.0
     for a in range(17):
         # normals of both; sides turned in their planes, which part most of those that touch; products of their sides
         if a < 2:
-            t = p if a == 0 else q
-            ux, uy, uz = t[3] - t[0], t[4] - t[1], t[5] - t[2]
-            vx, vy, vz = t[6] - t[0], t[7] - t[1], t[8] - t[2]
+            i, j = 3 * a, 3 * a + 2
         elif a < 8:
-            t = p if a < 5 else q
-            i = 3 * ((a - 2) % 3)
-            k = (i + 3) % 9
-            ux, uy, uz = t[k] - t[i], t[k + 1] - t[i + 1], t[k + 2] - t[i + 2]
-            sx, sy, sz = t[3] - t[0], t[4] - t[1], t[5] - t[2]
-            rx, ry, rz = t[6] - t[0], t[7] - t[1], t[8] - t[2]
-            vx, vy, vz = sy * rz - sz * ry, sz * rx - sx * rz, sx * ry - sy * rx
+            i, j = a - 2, 6 + (a - 2) // 3
         else:
-            i, j = 3 * ((a - 8) // 3), 3 * ((a - 8) % 3)
-            k, m = (i + 3) % 9, (j + 3) % 9
-            ux, uy, uz = p[k] - p[i], p[k + 1] - p[i + 1], p[k + 2] - p[i + 2]
-            vx, vy, vz = q[m] - q[j], q[m + 1] - q[j + 1], q[m + 2] - q[j + 2]
+            i, j = (a - 8) // 3, 3 + (a - 8) % 3
+        ux, uy, uz, vx, vy, vz = ways[i, 0], ways[i, 1], ways[i, 2], ways[j, 0], ways[j, 1], ways[j, 2]
         x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         length = np.sqrt(x * x + y * y + z * z)
         scale = np.sqrt((ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz))
         if not length > 1e-9 * scale:
             continue
-        axis[0], axis[1], axis[2] = x / length, y / length, z / length
+        x, y, z = x / length, y / length, z / length
         if a < 2:
-            normals[a, 0], normals[a, 1], normals[a, 2] = axis[0], axis[1], axis[2]
+            ways[8 + a, 0], ways[8 + a, 1], ways[8 + a, 2] = x, y, z
         elif a >= 8:  # along a normal both are flat, and touch
             upright = False
-            for n in range(2):
-                cosine = normals[n, 0] * axis[0] + normals[n, 1] * axis[1] + normals[n, 2] * axis[2]
+            for t in range(2):
+                cosine = ways[8 + t, 0] * x + ways[8 + t, 1] * y + ways[8 + t, 2] * z
                 upright |= abs(cosine) > 1.0 - UPRIGHT
             if upright:
                 continue
         p0 = q0 = np.inf
         p1 = q1 = -np.inf
         for c in range(0, 9, 3):
-            s = p[c] * axis[0] + p[c + 1] * axis[1] + p[c + 2] * axis[2]
+            s = p[c] * x + p[c + 1] * y + p[c + 2] * z
             p0, p1 = min(p0, s), max(p1, s)
-            s = q[c] * axis[0] + q[c + 1] * axis[1] + q[c + 2] * axis[2]
+            s = q[c] * x + q[c + 1] * y + q[c + 2] * z
             q0, q1 = min(q0, s), max(q1, s)
         if a < 2:
             if p0 > q1 + slack or q0 > p1 + slack:

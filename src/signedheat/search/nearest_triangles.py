@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..mesh.box_tree import LEAF, BoxTree
+from ..parallel import in_chunks
 
 # Feature codes of a foot: 0 inside the face; 1, 2, 3 on its edges (corner 0–1, 1–2, 2–0); 4, 5, 6 its corners 0, 1, 2.
 
@@ -20,49 +21,44 @@ TOGETHER = 8
 million, whose boxes are smaller than what 16 points at random are apart; with 4 half as much again."""
 
 
-@compiled
 def triangle_rows(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """(m, 16) what `foot_on_triangle` needs of (m, 9) corners: each triangle in a plane of its own.
 
     A corner; directions of two axes, along the first side and at a right angle to it; the length of this side; the
     directions in the plane, and the lengths, of the sides from the first corner to the third and from the second.
     """
-    rows = np.zeros((len(corners), 16))
-    u, v, w = np.empty(3), np.empty(3), np.empty(3)
-    for f in range(len(corners)):
-        for d in range(3):
-            rows[f, d] = corners[f, d]
-            u[d], v[d] = corners[f, 3 + d] - corners[f, d], corners[f, 6 + d] - corners[f, d]
-        length = np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
-        for d in range(3):
-            u[d] = u[d] / length if length > 0.0 else 1.0 if d == 0 else 0.0
-        across = v[0] * u[0] + v[1] * u[1] + v[2] * u[2]
-        for d in range(3):
-            w[d] = v[d] - across * u[d]
-        up = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-        flat = not up > HEIGHT * abs(across)
-        if flat:  # in any plane through its side
-            least = 0 if abs(u[0]) <= abs(u[1]) and abs(u[0]) <= abs(u[2]) else 1 if abs(u[1]) <= abs(u[2]) else 2
-            for d in range(3):
-                w[d] = 1.0 if d == least else 0.0
-        for _ in range(2):  # again for slivers, whose height is of few digits
-            lean = w[0] * u[0] + w[1] * u[1] + w[2] * u[2]
-            for d in range(3):
-                w[d] -= lean * u[d]
-            norm = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-            for d in range(3):
-                w[d] /= norm
-        up = 0.0 if flat else v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
-        for d in range(3):
-            rows[f, 3 + d], rows[f, 6 + d] = u[d], w[d]
-        rows[f, 9] = length
-        for k in range(2):
-            along = across - k * length
-            side = np.sqrt(along * along + up * up)
-            rows[f, 10 + 3 * k] = along / side if side > 0.0 else 1.0
-            rows[f, 11 + 3 * k] = up / side if side > 0.0 else 0.0
-            rows[f, 12 + 3 * k] = side
+    (rows,) = in_chunks(lambda chunk: (_rows(chunk),), corners)
     return rows
+
+
+@np.errstate(all="ignore")
+def _rows(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    rows = np.empty((len(corners), 16))
+    rows[:, :3] = corners[:, :3]
+    u, v = (corners[:, k : k + 3].T - corners[:, :3].T for k in (3, 6))
+    length = np.sqrt(_dot(u, u))
+    u = np.where(length > 0.0, u / np.where(length > 0.0, length, 1.0), [[1.0], [0.0], [0.0]])
+    across = _dot(v, u)
+    w = v - across * u
+    flat = ~(np.sqrt(_dot(w, w)) > HEIGHT * np.abs(across))
+    w = np.where(flat, np.arange(3)[:, None] == np.abs(u).argmin(axis=0), w)  # flat ones in any plane through the side
+    for _ in range(2):  # again for slivers, whose height is of few digits
+        w = w - _dot(w, u) * u
+        w /= np.sqrt(_dot(w, w))
+    up = np.where(flat, 0.0, _dot(v, w))
+    rows[:, 3:6], rows[:, 6:9], rows[:, 9] = u.T, w.T, length
+    for k in range(2):
+        along = across - k * length
+        side = np.sqrt(along * along + up * up)
+        whole = np.where(side > 0.0, side, 1.0)
+        rows[:, 10 + 3 * k], rows[:, 11 + 3 * k] = np.where(side > 0.0, along / whole, 1.0), up / whole
+        rows[:, 12 + 3 * k] = side
+    return rows
+
+
+def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    product: NDArray[np.float64] = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return product
 
 
 @compiled
