@@ -261,8 +261,8 @@ def open_bounding(
         if not wrong.any():
             break
         alive &= ~(wrong & (unexplained >= 0.5 * unexplained.max()))
-    loose, bodies = (np.bincount(clusters, areas * (alive & mask), n) for mask in (~own, own))
-    mostly = alive & (loose > bodies)[clusters]
+    of_loose, of_bodies = (np.bincount(clusters, areas * (alive & mask), n) for mask in (~own, own))
+    mostly = alive & (of_loose > of_bodies)[clusters]
     return signs, alive, np.where(mostly, clusters, -1), np.where(mostly, mean[clusters], 0.5)
 
 
