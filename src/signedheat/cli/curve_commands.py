@@ -179,7 +179,7 @@ def close(arguments: Namespace) -> Summary:
 
 def surface_and_curves(arguments: Namespace) -> tuple[Any, list[Any]]:
     """The surface, and the curves on it."""
-    domain: Any = sh.read(arguments.mesh)
+    domain: Any = sh.as_shape(sh.read(arguments.mesh))
     kind = type(domain).__name__
     if not hasattr(domain, "triangulation"):
         raise SourceError(
