@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 unexport PYTHONDONTWRITEBYTECODE  # each of a hundred processes of the tests would compile the package again
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary=:all:
 
-.PHONY: help blender demo docs test fuzz lint types conformance coverage matrix dist clean
+.PHONY: help blender demo docs paper test fuzz lint types conformance coverage matrix dist clean
 
 help:  # what there is to make
 	@sed -nE 's/^([a-z]+):[^#]*(# )?(.*)/  \1  \3/p' $(MAKEFILE_LIST) | awk '{name = $$1; $$1 = ""; printf "  make %-12s%s\n", name, $$0}'
@@ -40,6 +40,9 @@ types: $(VENV)/.installed-test  # mypy, on the code of the first pages too
 $(VENV)/.installed-docs: $(VENV)/.installed
 	$(PIP) --no-build-isolation --editable .[docs]
 	touch $@
+
+paper: $(VENV)/.installed-test  # docs/paper.md and its pictures, measured anew; FIGURES="8 10" for some of it
+	$(BIN)/python benchmarks/paper.py $(FIGURES)
 
 docs: $(VENV)/.installed-docs  # into docs/_build/html, without a warning; runs every example of the gallery
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html

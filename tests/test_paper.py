@@ -1,8 +1,9 @@
-"""The paper is findable: its equations in the source, and its sections in the table of docs/architecture.md."""
+"""The paper is findable: its equations in the source, its sections in docs/architecture.md, its numbers on the page."""
 
 from __future__ import annotations
 
 import importlib
+import inspect
 import re
 from pathlib import Path
 
@@ -11,7 +12,8 @@ import pytest
 import signedheat
 
 SOURCE = Path(signedheat.__file__).parent
-ARCHITECTURE = Path(__file__).parents[1] / "docs" / "architecture.md"
+ROOT = Path(__file__).parents[1]
+ARCHITECTURE = ROOT / "docs" / "architecture.md"
 TABLE = ARCHITECTURE.read_text(encoding="utf-8").partition("## From the paper to the code")[2]
 ROWS = [line for line in TABLE.splitlines() if line.startswith("|")][2:]
 NAMES = sorted({name for row in ROWS for name in re.findall(r"`(signedheat\.[\w.]+)`", row)})
@@ -49,3 +51,38 @@ def test_table_names_what_there_is(name):
 @pytest.mark.parametrize("row", ROWS)
 def test_every_row_names_code(row):
     assert "`signedheat." in row or "`benchmarks/`" in row
+
+
+@pytest.fixture(scope="module")
+def reproduction():
+    """The package that remakes the figures, and their numbers in docs/paper.md."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(ROOT / "benchmarks"))
+        pages = importlib.import_module("reproduction.pages")
+        for name in ("accuracy", "domains", "space", "surfaces"):
+            importlib.import_module(f"reproduction.{name}")
+        yield pages
+
+
+def test_page_has_the_numbers_and_the_words_of_its_script(reproduction):
+    page = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
+    numbers = reproduction.load_numbers(ROOT / "docs" / "paper")
+    assert set(numbers) == set(reproduction.FIGURES)
+    for number, section in reproduction.FIGURES.items():
+        assert inspect.getdoc(section.make) in page
+        assert "\n".join(reproduction.table(numbers[number])) in page
+
+
+@pytest.mark.parametrize("number", ["8", "10"])
+def test_page_is_no_older_than_what_it_measures(reproduction, number, tmp_path):
+    """What is quick, boundaries and constraints, is measured again, to a tenth."""
+    page = reproduction.Page(tmp_path, number)
+    reproduction.FIGURES[number].make(page)
+    written = reproduction.load_numbers(ROOT / "docs" / "paper")[number]
+    assert [list(row) for row in page.rows] == [list(row) for row in written]
+    for measured, row in zip(page.rows, written, strict=True):
+        for name, cell in row.items():
+            if re.fullmatch(r"[-+.e\d]+", cell):
+                assert float(measured[name]) == pytest.approx(float(cell), rel=0.1), f"{name}: make paper"
+            else:
+                assert measured[name] == cell

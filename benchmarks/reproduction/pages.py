@@ -103,7 +103,7 @@ def write_chapter(folder: Path, numbers: Mapping[str, list[Row]], versions: str)
         "on generated shapes. Baselines are in `benchmarks/reproduction/baselines.py`. The last section lists what is",
         "done differently.",
         "",
-        f"`python benchmarks/paper.py` makes this page. Last run with {versions}.",
+        f"`make paper` makes this page. Last run with {versions}.",
         "Errors ε are root mean squares in per cent of the range of the true distance (Sec. 9.1); t = h² if nothing",
         "is said.",
     ]
