@@ -27,9 +27,9 @@ def turned_face(face):
     return sh.TriangleMesh(BALL.vertices, faces)
 
 
-def with_fin():
+def with_fin(face=FAR):
     corner = np.vstack([BALL.vertices, [[0, 0, 1.5]]])
-    return sh.TriangleMesh(corner, np.vstack([BALL.faces, [[*BALL.faces[FAR][:2], BALL.n_vertices]]]))
+    return sh.TriangleMesh(corner, np.vstack([BALL.faces, [[*BALL.faces[face][:2], BALL.n_vertices]]]))
 
 
 def with_seam(lift=0.0):
@@ -46,6 +46,7 @@ BROKEN = {
     "doubled": lambda: sh.TriangleMesh(BALL.vertices, np.vstack([BALL.faces, BALL.faces[[FAR, NEAR]]])),
     "doubled and turned": lambda: sh.TriangleMesh(BALL.vertices, np.vstack([BALL.faces[[FAR], ::-1], BALL.faces])),
     "fin": with_fin,
+    "fin below a stroke": lambda: with_fin(NEAR),
     "seam": with_seam,
     "seam but for rounding": lambda: with_seam(2.0**-52),
 }
@@ -65,7 +66,7 @@ def test_strokes_are_repaired_on_broken_meshes(name, whole):
     away, same = cKDTree(BALL.vertices).query(mesh.vertices)
     on_ball = away < 1e-9
     np.testing.assert_allclose(field.values[on_ball], whole[same[on_ball]], atol=1e-3)
-    assert (field.diagnostics.note(MeshRepaired) is None) == (name == "fin")
+    assert (field.diagnostics.note(MeshRepaired) is None) == name.startswith("fin")
 
 
 def test_parts_with_one_side_do_not_matter_elsewhere(whole):

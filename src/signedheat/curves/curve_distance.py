@@ -14,7 +14,7 @@ from ..diagnostics import Note
 from ..errors import ConstraintError, InexactWarning, warn_user
 from ..foreign import as_list
 from ..kinds import AnySurface, SurfaceDomain
-from ..mesh.components import element_components
+from ..mesh.components import connected_components
 from ..progress import Progress
 from ..sharpening import sharpen
 from ..solver import SignedHeatSolver, distance_unwarned
@@ -116,15 +116,19 @@ def distance_to_pieces(
 
 
 def meets_bad_edges(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool:
-    """Whether curves run on faces with edges of more than two faces, or on parts of a mesh whose faces do not agree."""
+    """Whether curves run on parts of a mesh whose faces do not agree, or across edges of more than two faces.
+
+    Faces are of one part that hang together across edges of two: a fin on an edge that a curve crosses is none of it.
+    """
     edges = mesh.edges
     disagrees = ((edges.face_counts == 2) & (edges.balance != 0))[edges.face_edges].any(axis=1)
-    bad: NDArray[np.bool_] = np.asarray((edges.face_counts > 2)[edges.face_edges].any(axis=1))
-    if disagrees.any():
-        labels = element_components(edges.face_edges)
-        bad |= np.isin(labels, labels[disagrees])
-    parts = (segments_of(curve, mesh.intrinsic, mesh.vertices) for curve in curves) if bad.any() else ()
-    return any(bool(bad[part.faces].any()) for part in parts)
+    crowded: NDArray[np.bool_] = np.asarray((edges.face_counts > 2)[edges.face_edges].any(axis=1))
+    if not (disagrees.any() or crowded.any()):
+        return False
+    label = connected_components(mesh.n_faces, *(edges.pairs // 3).T)
+    bad = np.isin(label, label[disagrees])
+    parts = [segments_of(curve, mesh.intrinsic, mesh.vertices).faces for curve in curves]
+    return any(bool(bad[part].any() or (crowded[part].any() and np.ptp(label[part]) > 0)) for part in parts)
 
 
 def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> str:
