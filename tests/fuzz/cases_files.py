@@ -194,6 +194,18 @@ def fields() -> list[Files]:
 
 
 @cache
+def solids() -> list[Files]:
+    """Solids: whole, broken, of bodies that overlap."""
+    shapes = BALL, samples.without_faces(BALL, 0.2), samples.union(BALL, samples.sphere(1, center=(1, 0, 0)))
+    return [written(sh.complete(shape).save, "solid.npz") for shape in shapes]
+
+
+def load_and_ask(path: Path) -> np.ndarray:
+    """A solid from a file answers points, whatever numbers it holds."""
+    return sh.io.load(path).distance([[0.1, 0.2, 0.3], [2.0, 0.0, 0.0]])
+
+
+@cache
 def scans() -> list[Files]:
     """LAS, LAZ and E57, of those that can be written."""
     found = []
@@ -320,6 +332,7 @@ KINDS: dict[str, tuple[Callable[[Path], Any], Callable[[], list[Files]]]] = {
     "tets": (sh.read, tets),
     "tet fields": (sh.load_field, lambda: [f for f in tets() if b"signed_distance" in next(iter(f.values()))]),
     "fields": (sh.load_field, fields),
+    "solids": (load_and_ask, solids),
     "volumes": (sh.read, volumes),
     "labels": (read_labelled, labels),
     "lines": (sh.io.read_polylines, lines),
