@@ -73,15 +73,12 @@ class Pieces:
         Whether each stroke is a piece: open, and not from boundary to boundary of the surface.
     strokes : Strokes
         The energy of the sets that they may bound.
-    is_loop : (k,) bool
-        Whether each is part of what is likely to be a closed curve, whose gaps are shorter than half of its strokes.
     """
 
     numbers: NDArray[np.int64]
     stroke: NDArray[np.int64]
     movable: NDArray[np.bool_]
     strokes: Strokes
-    is_loop: NDArray[np.bool_]
 
     @classmethod
     def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> Pieces | None:
@@ -102,9 +99,9 @@ class Pieces:
         if not movable.any():
             return None
         group, gaps = likely_curves(np.concatenate([places[order[k]][[0, -1]] for k in first]), stroke)
-        strokes = Strokes.of(surface, parts, float(domain.triangulation.edge_lengths.mean()), group)
-        is_loop = gaps < STRAIGHT * np.bincount(group, strokes.lengths)
-        return cls(np.array(numbers, dtype=np.int64)[order], stroke[copy], movable, strokes, is_loop[group])
+        is_loop = gaps < STRAIGHT * np.bincount(group, [part.lengths.sum() for part in parts])
+        strokes = Strokes.of(surface, parts, float(domain.triangulation.edge_lengths.mean()), group, is_loop)
+        return cls(np.array(numbers, dtype=np.int64)[order], stroke[copy], movable, strokes)
 
     def curves(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Numbers of the curves that make up the strokes chosen by (k,) bool."""
@@ -146,8 +143,7 @@ class Decision:
 
     def loops_left_out(self) -> NDArray[np.int64]:
         """Numbers of the curves that are left out although they are likely to be a closed curve."""
-        group, loose = self.pieces.strokes.group, self.loose
-        return self.pieces.curves(self.pieces.is_loop & (np.bincount(group, loose) == np.bincount(group))[group])
+        return self.pieces.curves(self.pieces.strokes.whole_loops(self.loose)[self.pieces.strokes.group])
 
     @property
     def all_bound(self) -> bool:
@@ -219,8 +215,8 @@ def likely_curves(
     nearest = nearest_others(ends)
     tails, heads = np.concatenate([nearest, np.stack([np.arange(j), j + stroke], axis=1)]).T
     group = np.unique(connected_components(j + int(stroke.max()) + 1, tails, heads)[j:], return_inverse=True)[1].ravel()
-    away = scipy.spatial.cKDTree(ends).query(ends, k=2)[0][:, 1]
-    return group, np.bincount(group[np.repeat(stroke, 2)], 0.5 * away)
+    away = scipy.spatial.cKDTree(ends[::2]).query(ends[1::2])[0]  # where one ends another begins: no copy of it
+    return group, np.bincount(group[stroke], away)
 
 
 def given_domain(surface: SurfaceDiscretization) -> Surface:
@@ -288,13 +284,13 @@ def mostly_loose(strokes: Strokes, inside: Inside) -> bool:
 def cost(strokes: Strokes, inside: Inside) -> float:
     """The energy, and what turning costs: less for all strokes of a curve, which say one and the same thing."""
     turned, total = (np.bincount(strokes.group, strokes.lengths * way) for way in (inside.signs < 0, inside.signs != 0))
-    together = (turned == total) & (np.bincount(strokes.group) > 1)
+    together = (turned == total) & strokes.is_loop & (np.bincount(strokes.group) > 1)
     return inside.energy + AS_GIVEN * float((np.where(together, TOGETHER, 1.0) * turned).sum())
 
 
 def misfit(strokes: Strokes, inside: Inside) -> float:
-    """The same, and what strokes cost that bound nothing: as much as if they were turned."""
-    loose = (inside.signs > 0) & (inside.explained < EXPLAINED)
+    """The same, and what loops cost that bound nothing: as much as if all of their strokes were turned one by one."""
+    loose = strokes.whole_loops((inside.signs > 0) & (inside.explained < EXPLAINED))[strokes.group]
     return cost(strokes, inside) + AS_GIVEN * float(strokes.lengths[loose].sum())
 
 

@@ -78,6 +78,8 @@ class Strokes:
         Distance up to which strokes next to each other count as one.
     group : (k,) int
         Strokes whose ends are nearest to each other, which are likely to be one curve.
+    is_loop : (g,) bool
+        Whether that is likely to be closed: its gaps are shorter than half of its strokes.
     """
 
     surface: SurfaceDiscretization
@@ -87,11 +89,17 @@ class Strokes:
     fluxes: sparse.csr_matrix
     width: float
     group: NDArray[np.int64]
+    is_loop: NDArray[np.bool_]
     _found: dict[bytes, Inside] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(
-        cls, surface: SurfaceDiscretization, parts: Sequence[CurveSegments], edge: float, group: NDArray[np.int64]
+        cls,
+        surface: SurfaceDiscretization,
+        parts: Sequence[CurveSegments],
+        edge: float,
+        group: NDArray[np.int64],
+        is_loop: NDArray[np.bool_],
     ) -> Strokes:
         """See where the vertices lie from each stroke; `edge` is how far those may be apart that are drawn for one."""
         triangles = surface.triangles
@@ -108,7 +116,7 @@ class Strokes:
         around = widened(triangles, seen, width)
         left, right = (_means(around.multiply(around * side > 0), areas) for side in (1, -1))
         means = sparse.csr_matrix(0.5 * (left - right))
-        return cls(surface, lengths, means, crossed, fluxes_across(triangles, parts), width, group)
+        return cls(surface, lengths, means, crossed, fluxes_across(triangles, parts), width, group, is_loop)
 
     @property
     def areas(self) -> NDArray[np.float64]:
@@ -150,6 +158,11 @@ class Strokes:
             sides = surface.integration.factor.solve(right)
             result[:, begin : begin + BLOCK] = fluxes @ blur.solve(np.asfortranarray(masses @ sides))
         return 0.5 * (result + result.T)
+
+    def whole_loops(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(g,) the loops all of whose strokes, (k,), are chosen."""
+        whole: NDArray[np.bool_] = self.is_loop & (np.bincount(self.group, chosen) == np.bincount(self.group))
+        return whole
 
     @property
     def seen(self) -> list[Inside]:
