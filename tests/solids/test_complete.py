@@ -535,3 +535,17 @@ def test_a_room_in_a_box_is_free_and_its_furniture_without_underside_is_not():
     assert not solid.inside([[1, 1, 1], [2.5, 2.5, 2]]).any()
     assert solid.inside([[2.5, 2.5, 0.5], [2.5, 2.5, -0.5], [-0.5, 2, 1]]).all()
     assert solid.volume == pytest.approx(8 * 7 * 5 - 6 * 5 * 3 + 1)
+
+
+def test_loose_noisy_strips_and_sectors_are_the_cylinder_that_they_scatter_around():
+    """One dipole for a strip 23 times as long as it is wide turned the caps inwards."""
+    around = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+    circle = np.stack([np.cos(around), np.sin(around)], axis=1)
+    low, high = np.c_[circle, np.zeros(48)], np.c_[circle, np.full(48, 3.0)]
+    following = np.roll(np.arange(48), -1)
+    sides = [np.stack([low, low[following], high[following]], 1), np.stack([low, high[following], high], 1)]
+    caps = [np.stack([low[following], low, 0 * low], 1), np.stack([high, high[following], 0 * high + [0, 0, 3]], 1)]
+    triangles = np.concatenate(sides + caps)
+    noisy = triangles + 0.01 * np.random.default_rng(0).normal(size=triangles.shape)
+    solid = sh.complete(sh.TriangleMesh(noisy.reshape(-1, 3), np.arange(3 * len(noisy)).reshape(-1, 3)))
+    assert solid.volume == pytest.approx(3 * 24 * np.sin(np.pi / 24), rel=0.02)

@@ -20,7 +20,7 @@ from ..mesh.triangles import area_vectors
 from ..mesh.unit_vectors import unit
 from ..search.winding_tree import WindingTree
 from .chain import Chain
-from .gauss import Matrix, Pieces, means, sampled, system_of
+from .gauss import Matrix, Pieces, means, sampled, system_of, without_slender
 from .part_levels import levels_within
 from .rims import meeting_edges, open_edges
 
@@ -330,8 +330,9 @@ def clusters_of(pieces: Pieces) -> NDArray[np.int64]:
     np.minimum.at(low, pieces.labels, pieces.triangles.min(axis=1))
     np.maximum.at(high, pieces.labels, pieces.triangles.max(axis=1))
     radii = 0.5 * np.linalg.norm(high - low, axis=1)
-    faces, places = sampled(pieces, min(len(pieces.labels), PLACES))
-    owners = pieces.labels[faces]
+    elements = without_slender(pieces)
+    faces, places = sampled(elements, min(len(elements.labels), PLACES))
+    owners = elements.labels[faces]
     away, near = scipy.spatial.cKDTree(places).query(places, min(NEAREST, len(places)), workers=-1)
     away, others = away.reshape(len(places), -1), owners[near].reshape(len(places), -1)
     joined = away < 2 * REACH * np.minimum(radii[owners][:, None], radii[others])

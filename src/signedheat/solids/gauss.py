@@ -54,6 +54,9 @@ LARGE = 256
 """Faces of a piece from which on a tree of its own sums their solid angles."""
 FAR, OPENING = 4.0, 2.0
 """Distance from a piece, and from a node of the tree, over its radius, from which on it is a dipole."""
+SLENDER, HALVINGS = 6.0, 6
+"""Square of the longest side over the area from which on a triangle is halved there, lest one dipole stand for a strip;
+and times at most. An equilateral triangle has 2.3, half of a square 4."""
 ELEMENTS = 200_000
 """Dipoles at most; of more faces as many are drawn, evenly."""
 
@@ -165,6 +168,23 @@ class Matrix:
         return result
 
 
+def without_slender(pieces: Pieces) -> Pieces:
+    """The pieces with slender triangles halved."""
+    triangles, labels = pieces.triangles, pieces.labels
+    for _ in range(HALVINGS):
+        lengths = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+        slender = lengths.max(axis=1) ** 2 > SLENDER * face_areas(triangles)
+        if not slender.any() or len(triangles) + slender.sum() > ELEMENTS:
+            break
+        turn = (lengths[slender].argmax(axis=1)[:, None] + np.arange(3)) % 3
+        a, b, c = np.take_along_axis(triangles[slender], turn[:, :, None], axis=1).transpose(1, 0, 2)
+        middle = 0.5 * (a + b)
+        halves = [np.stack(corners, axis=1) for corners in ((a, middle, c), (middle, b, c))]
+        triangles = np.concatenate([triangles[~slender], *halves])
+        labels = np.concatenate([labels[~slender], labels[slender], labels[slender]])
+    return Pieces(triangles, labels)
+
+
 def sampled(pieces: Pieces, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Faces and (n, 3) places on them: one for each piece and `count` more, half by area, half alike for all."""
     areas, k = pieces.face_areas, len(pieces.areas)
@@ -247,7 +267,8 @@ class Dipoles:
 
     @classmethod
     def of_triangles(cls, pieces: Pieces) -> Dipoles:
-        """One for each triangle, or for as many as there is room for."""
+        """One for each triangle, for parts of slender ones, or for as many as there is room for."""
+        pieces = without_slender(pieces)
         faces, areas = np.arange(len(pieces.triangles)), pieces.face_areas
         if len(faces) > ELEMENTS:
             faces = np.unique(sampled(pieces, ELEMENTS)[0])
