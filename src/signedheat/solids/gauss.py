@@ -54,9 +54,9 @@ LARGE = 256
 """Faces of a piece from which on a tree of its own sums their solid angles."""
 FAR, OPENING = 4.0, 2.0
 """Distance from a piece, and from a node of the tree, over its radius, from which on it is a dipole."""
-SLENDER, HALVINGS = 6.0, 6
+SLENDER, HALVINGS = 12.0, 6
 """Square of the longest side over the area from which on a triangle is halved there, lest one dipole stand for a strip;
-and times at most. An equilateral triangle has 2.3, half of a square 4."""
+and times at most. An equilateral triangle has 2.3, a strip six times as long as wide 12."""
 ELEMENTS = 200_000
 """Dipoles at most; of more faces as many are drawn, evenly."""
 
