@@ -216,7 +216,7 @@ def likely_curves(
     tails, heads = np.concatenate([nearest, np.stack([np.arange(j), j + stroke], axis=1)]).T
     group = np.unique(connected_components(j + int(stroke.max()) + 1, tails, heads)[j:], return_inverse=True)[1].ravel()
     away = scipy.spatial.cKDTree(ends[::2]).query(ends[1::2])[0]  # where one ends another begins: no copy of it
-    return group, np.bincount(group[stroke], away)
+    return group.astype(np.int64), np.bincount(group[stroke], away).astype(np.float64)
 
 
 def given_domain(surface: SurfaceDiscretization) -> Surface:

@@ -285,6 +285,10 @@ class PlaceableTriangles(Triangles, Protocol):
         """The same triangles, with one vertex for those of rims at one place."""
 
     @property
+    def edge_lengths(self) -> NDArray[np.float64]:
+        """(e,) lengths of the edges."""
+
+    @property
     def search_tree(self) -> TriangleTree:
         """Tree of the faces."""
 
