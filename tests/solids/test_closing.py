@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import signedheat as sh
 from signedheat import samples
 from signedheat.mesh.edges import edge_table
 from signedheat.solids.closing import closed_by
@@ -162,3 +163,14 @@ def test_a_rim_of_many_edges_takes_no_quadratic_time():
     begin = time.process_time()
     volume(vertices, faces)
     assert time.process_time() - begin < 20
+
+
+def test_a_rim_with_mirror_images_has_one_lid_in_every_order_of_faces():
+    ball = samples.sphere(4)
+    middles = ball.vertices[ball.faces].mean(axis=1)
+    faces = ball.faces[(middles[:, 0] > 0) & (middles[:, 1] > 0)]  # four corners are equally far from the middle
+    volumes = [
+        sh.complete(sh.TriangleMesh(ball.vertices, faces[np.random.default_rng(seed).permutation(len(faces))])).volume
+        for seed in range(4)
+    ]
+    np.testing.assert_allclose(volumes, volumes[0], rtol=1e-9)

@@ -91,7 +91,7 @@ class SmoothRim:
     def of(cls, corners: NDArray[np.float64]) -> SmoothRim:
         """That of a loop."""
         sides = np.roll(corners, -1, axis=0) - corners
-        starts, length = _shares(corners)
+        starts, length = spanning.shares_of(corners)
         steps = np.diff(starts)[:, None]
         sums = np.concatenate([np.zeros((1, 3)), np.cumsum(steps * (corners + 0.5 * sides), axis=0)])
 
@@ -104,7 +104,7 @@ class SmoothRim:
             return np.asarray(turns[:, None] * sums[-1] + sums[k] + onward)
 
         away = np.linalg.norm(corners - sums[-1], axis=1)
-        first = starts[np.argmax(away > (1 - 1e-9) * away.max())]
+        first = starts[spanning.farthest(corners, away)]
         places = first + np.arange(PIECES + 1) / PIECES
         ends = integral(places[:-1] + 0.5 * SMOOTH), integral(places[:-1] - 0.5 * SMOOTH)
         return cls(length, starts, (ends[0] - ends[1]) / SMOOTH, places)
@@ -112,13 +112,6 @@ class SmoothRim:
     def edges_at(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
         """(m,) corner that comes last before each of these places."""
         return np.minimum(np.searchsorted(self.starts, places % 1.0, side="right") - 1, len(self.starts) - 2)
-
-
-def _shares(loop: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """(n + 1,) share of the length of a closed loop at which each corner comes, and 1; and that length."""
-    lengths = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
-    along = np.concatenate([[0.0], np.cumsum(lengths)])
-    return along / along[-1], float(along[-1])
 
 
 def cut_to_pieces(loop: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

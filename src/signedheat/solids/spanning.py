@@ -13,6 +13,8 @@ from ..mesh.edges import edge_keys, edge_table
 
 GROWTH = 0.35
 """How fast triangles grow with their distance from the rim, over that distance."""
+TIES = 128
+"""Points of a loop at most that are compared where they are equally far away, and places at which they are."""
 SPLITS = 8
 """How often edges of a rim are halved at most until all are edges of its triangulation."""
 MOVED = 1e-9
@@ -74,9 +76,30 @@ def frame_of(rim: NDArray[np.float64]) -> Frame | None:
     around = rim - rim.mean(axis=0)
     around -= np.outer(around @ normal, normal)
     reach = np.linalg.norm(around, axis=1)
-    first = around[np.argmax(reach > (1 - 1e-9) * reach.max())]  # turns with the rim
+    first = around[farthest(rim, reach)]  # turns with the rim
     first = first / np.linalg.norm(first)
     return rim[0], np.stack([first, np.cross(normal, first)], axis=1)
+
+
+def farthest(loop: NDArray[np.float64], away: NDArray[np.float64]) -> int:
+    """The point of a closed loop that is farthest away; of several, that from which on the loop stays away longest.
+
+    So loops that are symmetric begin at the same point, or at its image, whichever point comes first.
+    """
+    ties = np.flatnonzero(away > (1 - 1e-9) * away.max())[:TIES]
+    if len(ties) == 1:
+        return int(ties[0])
+    starts = shares_of(loop)[0]
+    onward = (starts[ties, None] + np.arange(TIES) / TIES) % 1.0
+    far = np.interp(onward, starts, np.append(away, away[0])) / max(float(away.max()), 1e-300)
+    return int(ties[np.lexsort(np.rint(1e6 * far).T[::-1])[-1]])
+
+
+def shares_of(loop: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """(n + 1,) share of the length of a closed loop at which each corner comes, and 1; and that length."""
+    lengths = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    return along / along[-1], float(along[-1])
 
 
 def area_vector(loop: NDArray[np.float64]) -> NDArray[np.float64]:
