@@ -175,7 +175,7 @@ def contour(
     TriangleMesh
         Of functions with flat sides, edges and corners are exact to rounding where cells see them; surfaces that bend
         are off by the square of the cells. Edges of arrays are exact where gradients are given; with differences they
-        are off by up to a fifth of a cell, and rims of holes by more.
+        are off by up to a quarter of a cell, and corners and rims of holes by more.
 
     Raises
     ------
