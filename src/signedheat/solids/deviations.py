@@ -291,8 +291,9 @@ def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, Face
     is_open = bool(areas[~was_given].sum() > OPEN * areas.sum())
     has_sides = was_given.copy()
     if not is_open:
-        behind, ahead = solid.windings.sides(solid.triangles)
-        has_sides &= ~(behind | ahead)
+        has_sides &= ~solid.bounding
+        behind, ahead = solid.windings.sides(solid.triangles[has_sides])
+        has_sides[has_sides] = ~(behind | ahead)
     if not has_sides.any():
         return False, None
     if isinstance(given, Solid):

@@ -44,9 +44,8 @@ def closed_surface(
 
     if thickness is not None:
         return contour(0.5 * thickness), f"thickened to {thickness:g}"
-    behind, ahead = solid.windings.sides(solid.triangles)
     areas = face_areas(solid.triangles)
-    if areas[behind != ahead].sum() < BOUNDS * areas.sum():
+    if areas[solid.bounding].sum() < BOUNDS * areas.sum():
         raise SourceError("the shape is a sheet, which bounds nothing", remedy="give it a thickness")
     if contoured:
         return contour(0.0), "contoured"
@@ -69,8 +68,7 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
     """
     corners = surface.vertices[surface.faces]
     volumes = part_volumes(surface.vertices, surface.faces)[1]
-    behind, ahead = solid.windings.sides(solid.triangles)
-    bounds = (behind != ahead) | (level > 0)
+    bounds = solid.bounding | (level > 0)
     given, made = solid.triangles[bounds & (solid.origins >= 0)], solid.triangles[bounds & (solid.origins < 0)]
     closest = solid.closest(_places(corners))
     off = np.abs(closest.distances - level)[~closest.completed]
