@@ -173,7 +173,7 @@ def verdict_of_solid(solid: Solid) -> str:
     --------
     >>> from signedheat import complete, samples
     >>> verdict_of_solid(complete(samples.without_faces(samples.sphere(2), 0.1)))
-    'a solid: closed, 9.93 % of its area completed; distance to it is exact'
+    'a solid: closed, 10.2 % of its area completed; distance to it is exact'
     """
     areas = face_areas(solid.triangles)
     made, sheets = (100 * areas[chosen].sum() / areas.sum() for chosen in (solid.origins < 0, ~solid.bounding))

@@ -22,7 +22,7 @@ from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
 from ..surfaces.surface import Surface
 from ..surfaces.surface_curves import Curve, CurveOrPoints
 from ..surfaces.surface_discretization import SurfaceDiscretization
-from .strokes import TIE, Inside, Strokes
+from .strokes import EXPLAINED, TIE, Inside, Strokes
 
 AS_GIVEN = 0.5
 """What turning a stroke costs, relative to its length. Halved or doubled, one of 46 drawings changes, that is, on more
@@ -35,9 +35,6 @@ length, the energy is less by 0.05. Halved and doubled, none of 46 drawings chan
 MOST = 0.5
 """Share of the length of all strokes that bounds nothing where none is left out: the greater part. Halved and doubled,
 none of 46 drawings changes."""
-EXPLAINED = 0.5
-"""How far a stroke is explained that bounds the inside: the greater part. Halved, none of 46 drawings changes, doubled
-two, and eleven more are announced."""
 ROUNDS = 20
 """Most cuts until the directions agree with the sides."""
 SINGLY = 16
