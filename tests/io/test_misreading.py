@@ -155,6 +155,15 @@ def test_gltf_extensions_that_are_needed_and_not_known_are_refused_by_name(gltf,
         gltf(extensionsRequired=[name])
 
 
+def test_gltf_1_is_refused_by_its_version(tmp_path):
+    path = tmp_path / "old.gltf"
+    path.write_text(
+        '{"asset": {"version": "1.0"}, "scenes": {"s": {"nodes": ["n"]}}, "nodes": {"n": {"meshes": ["m"]}}}'
+    )
+    with refused(FileFormatError, "version"):
+        sh.read(path)
+
+
 @pytest.mark.parametrize(
     ("mode", "corners", "faces"),
     [

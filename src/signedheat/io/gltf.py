@@ -127,6 +127,11 @@ def _opened(path: PathLike) -> _Scene:
         text = data[20 : 20 + length]
         inner = data[28 + length : 28 + length + int.from_bytes(data[20 + length : 24 + length], "little")]
     tree = json.loads(text.decode("utf-8-sig"))
+    version = str(tree.get("asset", {}).get("version", "2.0"))
+    if not version.startswith("2."):
+        raise FileFormatError(
+            f"it is glTF {version}, and glTF 2 is read", remedy="export it as glTF 2.0", element="version"
+        )
     buffers = []
     for buffer in tree.get("buffers", []):
         uri = buffer.get("uri")
