@@ -34,6 +34,7 @@ NUMBERS: list[tuple[ModuleType, str]] = [
     (gauss, "HELD"),
     (gauss, "AGREEMENT"),
     (gauss, "MANY"),
+    (gauss, "SLENDER"),
 ]
 CHANGED = 0.01
 """Share of the area by which a scene must change to be printed."""
@@ -120,6 +121,19 @@ def noisy_copies(rng: Random, mesh: TriangleMesh, share: float) -> TriangleMesh:
     )
 
 
+def noisy_strips(rng: Random) -> TriangleMesh:
+    """The triangles of a cylinder of 48 strips and of its fans, loose, each of their corners moved a little."""
+    turn, up = np.linspace(0, 2 * np.pi, 49), np.array([0.0, 0.0, 3.0])
+    low = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    high, (a, b) = low + up, (low[:-1], low[1:])
+    c, d, foot = high[1:], high[:-1], np.zeros((48, 3))
+    corners = np.concatenate(
+        [np.stack(each, axis=1) for each in ((a, b, c), (a, c, d), (b, a, foot), (d, c, foot + up))]
+    )
+    corners += 0.01 * rng.normal(size=corners.shape)
+    return TriangleMesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+
+
 def nested(rng: Random, share: float) -> Scene:
     """A ball within a ball, both given outwards but for some of their faces."""
     mesh = samples.union(samples.sphere(3), samples.sphere(2, radius=0.5))
@@ -131,6 +145,7 @@ SCENES: dict[str, Callable[[Random], Scene]] = {
     "ball, 75 % gone": lambda rng: body(samples.without_faces(samples.sphere(3), 0.75)),
     "ball, 85 % gone": lambda rng: body(samples.without_faces(samples.sphere(3), 0.85)),
     "loose noisy triangles of a torus": lambda rng: body(samples.soup(samples.torus(n_around=48, n_across=24), 0.01)),
+    "loose noisy strips of a cylinder": lambda rng: body(noisy_strips(rng)),
     "half a ball": lambda rng: body(part_of(samples.sphere(4), lambda at: at[:, 2] > 0)),
     "torus with holes": lambda rng: body(samples.without_patches(samples.torus(), 4, 0.25)),
     "six sides": lambda rng: body(sides((1, 0.8, 0.6))),

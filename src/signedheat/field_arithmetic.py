@@ -285,9 +285,10 @@ def _of_solids(a: Solid, b: Solid, operation: Callable[[Any, Any], Any]) -> Any:
     if not isinstance(b, HasFields):
         _checked(a, b)
     try:
-        return operation(*solids).field_on(a)
+        solid = operation(*solids)
     except SourceError:
         return None
+    return solid.field_on(a)
 
 
 def _checked(a: Solid, b: Solid) -> Solid:

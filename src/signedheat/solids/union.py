@@ -68,7 +68,7 @@ def united(
     regions = Regions.of(pieces, windings)
     triangles, behind, ahead = pieces.points[pieces.faces], regions.behind.copy(), regions.ahead.copy()
     closes = closing[pieces.origins]
-    # sheets share no edges with what closes, so that their regions do not end where they leave a wall
+    # winding numbers do not step across sheets
     behind[~closes], ahead[~closes] = windings.sides(triangles[~closes])
     origins = whole.origins[pieces.origins]
     given = origins >= 0
