@@ -17,6 +17,7 @@ PACKAGE = Path(signedheat.__file__).parent
 
 FLOORS = [
     {
+        "arrays",
         "cache",
         "compiled",
         "diagnostics",

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.conforming_refinement import cut_along, flip_new_faces
 from ..mesh.intrinsic_mesh import IntrinsicMesh
@@ -67,8 +67,8 @@ _CHUNK = 1 << 16
 
 
 def distance_to_zero_line(
-    triangles: IntrinsicMesh, values: NDArray[np.float64], tolerance: float = 1e-4, report: Report | None = None
-) -> tuple[NDArray[np.float64], int]:
+    triangles: IntrinsicMesh, values: Floats, tolerance: float = 1e-4, report: Report | None = None
+) -> tuple[Floats, int]:
     """Distance of every vertex to the zero set of a function that is linear in every face; and the number of windows.
 
     Any surface will do, nonmanifold and nonorientable ones too. Faces with a NaN corner contain no part of the zero
@@ -85,7 +85,7 @@ def distance_to_zero_line(
 
 def distance_to_segments(
     triangles: IntrinsicMesh, placed: Sequence[PlacedSegments], tolerance: float = 1e-4, report: Report | None = None
-) -> tuple[NDArray[np.float64], int]:
+) -> tuple[Floats, int]:
     """Distance of every vertex to segments and points: in faces, along edges, at vertices; the rest is as above."""
     limit = window_limit(triangles)
     placed = [through_vertices(triangles, each) for each in placed]
@@ -100,7 +100,7 @@ def distance_to_segments(
     return search.distance()[: triangles.n_vertices], windows
 
 
-def cleared(triangles: IntrinsicMesh, values: NDArray[np.float64], least: float) -> NDArray[np.float64]:
+def cleared(triangles: IntrinsicMesh, values: Floats, least: float) -> Floats:
     """Values moved away from zero by `least`, so that the zero set crosses edges and passes no vertex.
 
     A vertex with value zero gets the sign that fewer of its neighbours have: where both sides of a source have the same
@@ -113,7 +113,7 @@ def cleared(triangles: IntrinsicMesh, values: NDArray[np.float64], least: float)
     return np.where(near, np.where(around > 0, -least, least), values)
 
 
-def is_pseudosource(triangles: IntrinsicMesh) -> NDArray[np.bool_]:
+def is_pseudosource(triangles: IntrinsicMesh) -> Bools:
     """(n,) vertices that shortest paths can pass through: on a boundary, or with a total angle of more than 2π."""
     angles = np.arctan2(1.0, triangles.corner_cotangents)
     total = np.bincount(triangles.corner_vertices.ravel(), angles.ravel(), triangles.n_vertices)
@@ -171,7 +171,7 @@ class PausedSearch:
             continue_search(faces, search, slack, self.tolerance, min(search.counts[MADE] + _CHUNK, limit))
         return self
 
-    def distance(self) -> NDArray[np.float64]:
+    def distance(self) -> Floats:
         """(n,) of every vertex; along edges from what was reached, where it was not."""
         distance = self.search.distance
         if self.has_ended and np.isfinite(distance).all():
@@ -183,9 +183,7 @@ class PausedSearch:
         return np.where(np.isinf(distance), along, distance) if self.has_ended else along
 
 
-def distances_along_edges(
-    triangles: IntrinsicMesh, vertices: NDArray[np.int64], offsets: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def distances_along_edges(triangles: IntrinsicMesh, vertices: Ints, offsets: Floats) -> Floats:
     """(n,) distance of every vertex along edges from vertices (k,) that have distances of their own; inf if none.
 
     A vertex that is given several times starts with the least of its distances.
@@ -237,9 +235,7 @@ MANY = 4
 
 
 @compiled
-def _reach(
-    distance: NDArray[np.float64], pseudosources: NDArray[np.bool_], queue: Queue, first: int, v: int, length: float
-) -> None:
+def _reach(distance: Floats, pseudosources: Bools, queue: Queue, first: int, v: int, length: float) -> None:
     """Record a path of this length to a vertex; if paths can bend around it (a pseudosource), queue it."""
     if length < distance[v] * (1.0 - 1e-14):
         distance[v] = length
@@ -250,7 +246,7 @@ def _reach(
 @compiled
 def _collect(
     search: Search, halfedge: int, at_tail: float, at_head: float, length: float, slack: float, tolerance: float
-) -> tuple[NDArray[np.float64], int]:
+) -> tuple[Floats, int]:
     """The windows queued for a halfedge, in order along it, trimmed against each other and merged where possible.
 
     Only what is nearer than the windows that crossed the halfedge before is left, and joins them: without this, waves
@@ -297,9 +293,7 @@ def _collect(
 
 
 @compiled
-def _left(
-    windows: NDArray[np.float64], following: NDArray[np.int64], row: int, w: NDArray[np.float64], length: float
-) -> bool:
+def _left(windows: Floats, following: Ints, row: int, w: Floats, length: float) -> bool:
     """Trim a window against those of a list; whether anything is left."""
     while row >= 0:
         trim_by(windows[row], w, ROUND * length)
@@ -310,7 +304,7 @@ def _left(
 
 
 @compiled
-def _settle(search: Search, halfedge: int, chosen: NDArray[np.float64], count: int) -> None:
+def _settle(search: Search, halfedge: int, chosen: Floats, count: int) -> None:
     """Add windows to those that have crossed a halfedge, instead of the ones that they outdo."""
     _, _, _, _, settled, windows, following, counts = search
     row, before = settled[halfedge], -1
@@ -344,7 +338,7 @@ def start_search(faces: Faces, sources: GeodesicSources, search: Search, slack: 
 
 
 @compiled
-def _most_windows(faces: Faces, queued: NDArray[np.int64], following: NDArray[np.int64], item: int) -> int:
+def _most_windows(faces: Faces, queued: Ints, following: Ints, item: int) -> int:
     """The most windows that one item of the queue can make."""
     most, n_halfedges = 0, len(queued)
     if item >= n_halfedges:

@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Complexes, Floats, Ints
 from ..mesh.components import grouped, members_of
 from ..mesh.curve_segments import CurveSegments, MergedSources
 from ..mesh.intrinsic_mesh import IntrinsicMesh
@@ -31,25 +31,21 @@ from ..mesh.surface_points import (
     unique_points,
 )
 
-Mask = NDArray[np.bool_]
-Ids = NDArray[np.int64]
-Points = NDArray[np.complex128]
-
 
 class GeodesicSources(NamedTuple):
     """Where distance is zero, and the directions in which it grows. Positions are in the layouts of the faces."""
 
-    vertices: Ids  # (v,) vertices at which distance is zero; those of curves among them
+    vertices: Ints  # (v,) vertices at which distance is zero; those of curves among them
     # (b,) segments from which a parallel beam leaves to the left
-    beam_faces: Ids
-    beam_starts: Points
-    beam_stops: Points
+    beam_faces: Ints
+    beam_starts: Complexes
+    beam_stops: Complexes
     # (a,) points from which circular waves leave, in directions of more than 90° from the first and the second given; 0
     # for none
-    fan_faces: Ids
-    fan_points: Points
-    fan_firsts: Points
-    fan_seconds: Points
+    fan_faces: Ints
+    fan_points: Complexes
+    fan_firsts: Complexes
+    fan_seconds: Complexes
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +53,15 @@ class PlacedSegments:
     """Segments with the positions of their ends in the layouts of faces; unlike nodes, these are never ambiguous."""
 
     nodes: LocatedPoints  # (s,) distinct points
-    ends: Ids  # (k, 2) the nodes that each segment joins
+    ends: Ints  # (k, 2) the nodes that each segment joins
     # (k,) the face that each segment lies in. A segment along an edge is listed once for every face at the edge.
-    faces: Ids
+    faces: Ints
     # (k, 2) of both ends, in the layout of the face; along an edge in the direction that has the face to its left
-    positions: Points
-    along_edge: Mask  # (k,) whether the segment runs along an edge of its face
+    positions: Complexes
+    along_edge: Bools  # (k,) whether the segment runs along an edge of its face
     # (k,) 1 where φ grows to the left of the segment, −1 where it grows to the right, 0 where it does so on both sides
-    sides: Ids
-    given: Ids  # (k,) index of the segment among those given
+    sides: Ints
+    given: Ints  # (k,) index of the segment among those given
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> PlacedSegments:
@@ -77,8 +73,8 @@ class PlacedSegments:
 
     @staticmethod
     def _inside(
-        triangles: IntrinsicMesh, merged: MergedSources, oriented: Mask
-    ) -> tuple[Ids, Ids, Points, Mask, Ids, Ids]:
+        triangles: IntrinsicMesh, merged: MergedSources, oriented: Bools
+    ) -> tuple[Ints, Ints, Complexes, Bools, Ints, Ints]:
         nodes, rows = merged.nodes, np.flatnonzero(merged.edges < 0)
         ends, faces, vectors = merged.ends[rows], merged.faces[rows], merged.vectors[rows]
         corners = triangles.corner_positions[faces]
@@ -94,8 +90,8 @@ class PlacedSegments:
 
     @staticmethod
     def _adjacent(
-        triangles: IntrinsicMesh, merged: MergedSources, oriented: Mask
-    ) -> tuple[Ids, Ids, Points, Mask, Ids, Ids]:
+        triangles: IntrinsicMesh, merged: MergedSources, oriented: Bools
+    ) -> tuple[Ints, Ints, Complexes, Bools, Ints, Ints]:
         nodes, rows = merged.nodes, np.flatnonzero(merged.edges >= 0)
         ends, edges, vectors = merged.ends[rows], merged.edges[rows], merged.vectors[rows]
         along = np.stack([fractions_along_edges(triangles, nodes[ends[:, k]], edges) for k in range(2)], axis=1)
@@ -119,7 +115,7 @@ class PlacedSegments:
         return ends, faces, positions, np.ones(len(faces), dtype=bool), sides * oriented[rows][which], rows[which]
 
     @cached_property
-    def lengths(self) -> NDArray[np.float64]:
+    def lengths(self) -> Floats:
         """(k,) length of each segment."""
         return np.abs(self.positions[:, 1] - self.positions[:, 0])
 
@@ -132,7 +128,7 @@ class PlacedSegments:
         at_vertex = self.nodes.kinds == VERTEX
         return GeodesicSources(self.nodes.elements[at_vertex], faces, starts, stops, *self._fans(triangles))
 
-    def _fans(self, triangles: IntrinsicMesh) -> tuple[Ids, Points, Points, Points]:
+    def _fans(self, triangles: IntrinsicMesh) -> tuple[Ints, Complexes, Complexes, Complexes]:
         """Fans at nodes inside faces and on edges; at the latter one in every face at the edge."""
         nodes = self.nodes
         first, second = self._directions(triangles)
@@ -148,7 +144,7 @@ class PlacedSegments:
         across = on_sides(triangles, faces, k, nodes.along[node][:, None])[:, 0]
         return np.concatenate([home, faces]), np.concatenate([points, across]), firsts, seconds
 
-    def _directions(self, triangles: IntrinsicMesh) -> tuple[Points, Points]:
+    def _directions(self, triangles: IntrinsicMesh) -> tuple[Complexes, Complexes]:
         """(s,) directions away from each node of the first and of the last segment that ends there.
 
         As complex numbers in the layout of the node's face, or in the frame of its edge; 0 where there is no segment.
@@ -180,7 +176,7 @@ class PlacedSegments:
         return found[0], found[1]
 
 
-def zero_line(triangles: IntrinsicMesh, values: NDArray[np.float64], among: Mask | None = None) -> PlacedSegments:
+def zero_line(triangles: IntrinsicMesh, values: Floats, among: Bools | None = None) -> PlacedSegments:
     """Zero set, within faces `among`, of a function linear in faces: zero at no vertex, NaN where it is not known."""
     here = values[triangles.corner_vertices]
     faces, sides = crossed_sides(here > 0, ~np.isnan(here).any(axis=1) & (True if among is None else among))
@@ -204,25 +200,25 @@ def zero_line(triangles: IntrinsicMesh, values: NDArray[np.float64], among: Mask
     )
 
 
-def halfedges_of(triangles: IntrinsicMesh, edges: Ids) -> tuple[Ids, Ids]:
+def halfedges_of(triangles: IntrinsicMesh, edges: Ints) -> tuple[Ints, Ints]:
     """All halfedges ``3 face + side`` of each of some edges, as pairs: index into `edges`, and halfedge."""
     return members_of(*triangles.edges.halfedges, edges)
 
 
-def on_sides(triangles: IntrinsicMesh, faces: Ids, sides: Ids, along: NDArray[np.float64]) -> Points:
+def on_sides(triangles: IntrinsicMesh, faces: Ints, sides: Ints, along: Floats) -> Complexes:
     """(n, k) positions at fractions (n, k) along the edges, tail to head, that are given sides of faces."""
     share = np.where(triangles.edges.forward[faces, sides][:, None], along, 1 - along)
     return triangles.corner_positions[faces, sides][:, None] + share * triangles.edge_vectors[faces, sides][:, None]
 
 
-def fractions_along_edges(triangles: IntrinsicMesh, located: LocatedPoints, edges: Ids) -> NDArray[np.float64]:
+def fractions_along_edges(triangles: IntrinsicMesh, located: LocatedPoints, edges: Ints) -> Floats:
     """(n,) fraction of the way from tail to head at which point k lies on edge k."""
     return np.where(
         located.kinds == EDGE, located.along, (triangles.edges.vertices[edges, 0] != located.elements).astype(float)
     )
 
 
-def best_match(triangles: IntrinsicMesh, face: int, nodes: LocatedPoints, ends: Ids, length: float) -> Points:
+def best_match(triangles: IntrinsicMesh, face: int, nodes: LocatedPoints, ends: Ints, length: float) -> Complexes:
     """(2,) the positions of two nodes in a face that are closest to a given distance apart.
 
     In intrinsic triangulations a vertex may be two corners of one face, and an edge two of its sides.
@@ -279,6 +275,6 @@ def as_curve(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSegments 
     return CurveSegments(located[first], joined[kept], faces[kept], edges[kept], normals[kept], False)
 
 
-def rounded(barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
+def rounded(barycentric: Floats) -> Floats:
     kept = np.where(barycentric < NEAR, 0.0, barycentric)
     return kept / kept.sum(axis=-1, keepdims=True)

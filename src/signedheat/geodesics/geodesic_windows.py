@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Complexes, Floats, Ints
 from ..compiled import compiled
 from ..memory import refuse_beyond_memory
 from ..mesh.components import grouped
@@ -25,14 +25,14 @@ S0, S1, P, Q, SIGMA, KIND = range(6)
 
 
 @compiled
-def put(window: NDArray[np.float64], rows: NDArray[np.float64], k: int) -> None:
+def put(window: Floats, rows: Floats, k: int) -> None:
     """Write a window to row k, entry by entry: assignments to slices of arrays take long to compile."""
     for i in range(6):
         rows[k, i] = window[i]
 
 
 @compiled
-def arrival(w: NDArray[np.float64], x: float, y: float) -> float:
+def arrival(w: Floats, x: float, y: float) -> float:
     """Distance from the source of a window to a point in the frame of its edge."""
     if w[KIND] == BEAM:
         return w[SIGMA] + w[P] * x + w[Q] * y
@@ -40,7 +40,7 @@ def arrival(w: NDArray[np.float64], x: float, y: float) -> float:
 
 
 @compiled
-def ray(w: NDArray[np.float64], x: float) -> tuple[float, float]:
+def ray(w: Floats, x: float) -> tuple[float, float]:
     """Direction of propagation at a point of the edge; of any length."""
     if w[KIND] == BEAM:
         return w[P], w[Q]
@@ -48,7 +48,7 @@ def ray(w: NDArray[np.float64], x: float) -> tuple[float, float]:
 
 
 @compiled
-def outrun(w: NDArray[np.float64], at_tail: float, at_head: float, length: float, slack: float) -> bool:
+def outrun(w: Floats, at_tail: float, at_head: float, length: float, slack: float) -> bool:
     """Whether paths through an end of the edge are shorter everywhere in the window."""
     if at_tail + w[S1] < arrival(w, w[S1], 0.0) - slack:
         return True
@@ -56,7 +56,7 @@ def outrun(w: NDArray[np.float64], at_tail: float, at_head: float, length: float
 
 
 @compiled
-def trim(a: NDArray[np.float64], b: NDArray[np.float64]) -> None:
+def trim(a: Floats, b: Floats) -> None:
     """Trim two overlapping windows, of which a begins first, to where each has the smaller distance."""
     if b[S0] >= a[S1]:
         return
@@ -86,7 +86,7 @@ def trim(a: NDArray[np.float64], b: NDArray[np.float64]) -> None:
 
 
 @compiled
-def trim_by(old: NDArray[np.float64], w: NDArray[np.float64], slack: float) -> None:
+def trim_by(old: Floats, w: Floats, slack: float) -> None:
     """Trim a window to where it is nearer, by more than `slack`, than an older one; from the middle nothing is cut."""
     low, high = max(old[S0], w[S0]), min(old[S1], w[S1])
     if not high > low:
@@ -117,7 +117,7 @@ def trim_by(old: NDArray[np.float64], w: NDArray[np.float64], slack: float) -> N
 
 
 @compiled
-def outdoes(w: NDArray[np.float64], old: NDArray[np.float64]) -> bool:
+def outdoes(w: Floats, old: Floats) -> bool:
     """Whether a window covers another one and is nearer at its ends and in its middle."""
     if w[S0] > old[S0] or w[S1] < old[S1]:
         return False
@@ -129,7 +129,7 @@ def outdoes(w: NDArray[np.float64], old: NDArray[np.float64]) -> bool:
 
 
 @compiled
-def merge(a: NDArray[np.float64], b: NDArray[np.float64], length: float, tolerance: float) -> bool:
+def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
     """Merge window b into a, if they are neighbours and one wave approximates both; whether it was done."""
     if abs(a[S1] - b[S0]) > 1e-6 * length:
         return False
@@ -167,7 +167,7 @@ def merge(a: NDArray[np.float64], b: NDArray[np.float64], length: float, toleran
 
 
 @compiled
-def straighten(w: NDArray[np.float64]) -> None:
+def straighten(w: Floats) -> None:
     """Make a wave straight, nowhere nearer at the edge, which would pass its focus in the face ahead."""
     x, y = ray(w, 0.5 * (w[S0] + w[S1]))
     norm = np.sqrt(x * x + y * y)
@@ -204,16 +204,16 @@ BYTES_PER_WINDOW = 56.0
 class Faces(NamedTuple):
     """An intrinsic mesh as plain arrays, with the halfedges of each edge and the corners at each vertex in lists."""
 
-    vertices: NDArray[np.int64]
-    positions: NDArray[np.complex128]
-    edges: NDArray[np.int64]
-    forward: NDArray[np.bool_]
-    edge_vertices: NDArray[np.int64]
-    lengths: NDArray[np.float64]
-    halfedges: NDArray[np.int64]
-    first_halfedge: NDArray[np.int64]
-    corners: NDArray[np.int64]
-    first_corner: NDArray[np.int64]
+    vertices: Ints
+    positions: Complexes
+    edges: Ints
+    forward: Bools
+    edge_vertices: Ints
+    lengths: Floats
+    halfedges: Ints
+    first_halfedge: Ints
+    corners: Ints
+    first_corner: Ints
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh) -> Faces:
@@ -241,17 +241,17 @@ class Search(NamedTuple):
     queue holds halfedges, then vertices that paths bend around. `counts` are those at `USED`, `FREE`, ….
     """
 
-    distance: NDArray[np.float64]
-    pseudosources: NDArray[np.bool_]
+    distance: Floats
+    pseudosources: Bools
     queue: Queue
-    queued: NDArray[np.int64]
-    settled: NDArray[np.int64]
-    windows: NDArray[np.float64]
-    following: NDArray[np.int64]
-    counts: NDArray[np.int64]
+    queued: Ints
+    settled: Ints
+    windows: Floats
+    following: Ints
+    counts: Ints
 
     @classmethod
-    def start(cls, n_faces: int, pseudosources: NDArray[np.bool_], room: int) -> Search:
+    def start(cls, n_faces: int, pseudosources: Bools, room: int) -> Search:
         """Nothing known yet, and room for so many windows."""
         n = len(pseudosources)
         lists = np.full(3 * n_faces, -1), np.full(3 * n_faces, -1)
@@ -278,7 +278,7 @@ USED, FREE, MADE, WANTED = range(4)
 
 
 @compiled
-def has_room(counts: NDArray[np.int64], size: int, n: int) -> bool:
+def has_room(counts: Ints, size: int, n: int) -> bool:
     """Whether n more windows fit into an array of so many rows; otherwise notes how many were wanted."""
     if counts[USED] + n <= size:
         return True
@@ -287,7 +287,7 @@ def has_room(counts: NDArray[np.int64], size: int, n: int) -> bool:
 
 
 @compiled
-def take_row(counts: NDArray[np.int64], following: NDArray[np.int64]) -> int:
+def take_row(counts: Ints, following: Ints) -> int:
     """A row for a window; there must be room."""
     row = counts[FREE]
     if row >= 0:
@@ -299,7 +299,7 @@ def take_row(counts: NDArray[np.int64], following: NDArray[np.int64]) -> int:
 
 
 @compiled
-def free_row(counts: NDArray[np.int64], following: NDArray[np.int64], row: int) -> None:
+def free_row(counts: Ints, following: Ints, row: int) -> None:
     """Give a row back."""
     following[row] = counts[FREE]
     counts[FREE] = row
@@ -365,7 +365,7 @@ def propagate_across(
 
 
 @compiled
-def _reach_corners(faces: Faces, distance: NDArray[np.float64], face: int, start: complex, end: complex) -> None:
+def _reach_corners(faces: Faces, distance: Floats, face: int, start: complex, end: complex) -> None:
     """Distance of the corners of a face to a segment or a point in it."""
     along = end - start
     square = abs(along) ** 2

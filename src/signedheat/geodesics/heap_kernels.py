@@ -5,18 +5,18 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 
 
 class Queue(NamedTuple):
     """A binary heap: items by position, the position of each item (−1 outside), their keys, and how many are in it."""
 
-    items: NDArray[np.int64]
-    places: NDArray[np.int64]
-    keys: NDArray[np.float64]
-    size: NDArray[np.int64]
+    items: Ints
+    places: Ints
+    keys: Floats
+    size: Ints
 
     @classmethod
     def empty(cls, n_items: int) -> Queue:
@@ -25,7 +25,7 @@ class Queue(NamedTuple):
 
 
 @compiled
-def before(keys: NDArray[np.float64], a: int, b: int) -> bool:
+def before(keys: Floats, a: int, b: int) -> bool:
     """Whether item a leaves the queue before item b; equal keys go by number, so results are the same each time."""
     return bool(keys[a] < keys[b] or (keys[a] == keys[b] and a < b))
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from ..arrays import Complexes, Floats, Ints
 from ..compiled import compiled
 from ..errors import SourceError
 from ..mesh.intrinsic_mesh import IntrinsicMesh
@@ -31,8 +31,8 @@ from .heap_kernels import Queue, pop, push
 
 
 def join(
-    triangles: IntrinsicMesh, located: LocatedPoints, start: NDArray[np.int64], end: NDArray[np.int64], name: str
-) -> tuple[LocatedPoints, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    triangles: IntrinsicMesh, located: LocatedPoints, start: Ints, end: Ints, name: str
+) -> tuple[LocatedPoints, Ints, Ints, Ints]:
     """Join pairs of points, by geodesic paths where the two share no face, as segments that lie in one face each.
 
     Returns all points, the given ones first; the two that each segment (s,) joins, in order; and the pair that it
@@ -51,7 +51,7 @@ def join(
     return concatenated([located, middle]), starts, ends, pair
 
 
-def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> NDArray[np.int64]:
+def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> Ints:
     """Indices of the segments of a curve through points whose two ends share no face."""
     start = np.arange(len(located) if closed else len(located) - 1)
     return np.flatnonzero(shared_faces(triangles, located[start], located[(start + 1) % len(located)]) < 0)
@@ -59,7 +59,7 @@ def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> NDAr
 
 def geodesic_paths(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
-) -> tuple[LocatedPoints, NDArray[np.int64]]:
+) -> tuple[LocatedPoints, Ints]:
     """Points at which the shortest paths between k starts and ends cross edges or pass vertices.
 
     Paths are locally shortest: none becomes shorter by passing a vertex on its other side. The first guess is the
@@ -87,9 +87,7 @@ def geodesic_paths(
     return concatenated(parts), counts
 
 
-def faces_at(
-    triangles: IntrinsicMesh, located: LocatedPoints
-) -> tuple[NDArray[np.int64], NDArray[np.complex128], NDArray[np.int64]]:
+def faces_at(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[Ints, Complexes, Ints]:
     """All faces that contain each point, its position in their layouts, and where the faces of each point begin."""
     which, faces = incident_faces(triangles, located)
     order = np.lexsort([faces, which])
@@ -152,15 +150,15 @@ def toll(e: int) -> float:
 @compiled
 def find_sleeve(
     faces: Faces,
-    starts: NDArray[np.int64],
-    start_points: NDArray[np.complex128],
-    ends: NDArray[np.int64],
-    end_points: NDArray[np.complex128],
-    cost: NDArray[np.float64],
-    leave: NDArray[np.int64],
-    enter: NDArray[np.int64],
+    starts: Ints,
+    start_points: Complexes,
+    ends: Ints,
+    end_points: Complexes,
+    cost: Floats,
+    leave: Ints,
+    enter: Ints,
     queue: Queue,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[Ints, Ints]:
     """The faces between two sets of faces on the shortest path through midpoints of edges (Dijkstra).
 
     Returns the halfedges through which all faces but the last are left, and those through which all but the first are
@@ -214,9 +212,7 @@ def find_sleeve(
 
 
 @compiled
-def unfold(
-    faces: Faces, left: NDArray[np.int64], entered: NDArray[np.int64]
-) -> tuple[NDArray[np.complex128], NDArray[np.int64], NDArray[np.complex128]]:
+def unfold(faces: Faces, left: Ints, entered: Ints) -> tuple[Complexes, Ints, Complexes]:
     """Unfold a sleeve into the plane of its first face: tail and head of each halfedge left, and the last face.
 
     Also whether each face, the last one included, is turned over in that plane.
@@ -237,7 +233,7 @@ def unfold(
 
 
 @compiled
-def on_base(corners: NDArray[np.complex128], side: int, over: int, point: complex, a: complex, b: complex) -> complex:
+def on_base(corners: Complexes, side: int, over: int, point: complex, a: complex, b: complex) -> complex:
     """Where a point of a face is if a side of the face is from a to b, and the face perhaps turned over."""
     base = corners[(side + 1) % 3] - corners[side]
     ratio = (point - corners[side]) / base if abs(base) > 0 else 0j
@@ -251,9 +247,7 @@ def turns(a: complex, b: complex) -> float:
 
 
 @compiled
-def funnel(
-    portals: NDArray[np.complex128], over: NDArray[np.int64], start: complex, end: complex
-) -> tuple[list[int], list[int], float]:
+def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tuple[list[int], list[int], float]:
     """Shortest path inside an unfolded sleeve, by the simple stupid funnel algorithm.
 
     Returns the portals at which the path bends, whether it bends at their tail (0) or head (1), and its length.
@@ -286,13 +280,8 @@ def funnel(
 
 @compiled
 def other_way(
-    faces: Faces,
-    left: NDArray[np.int64],
-    entered: NDArray[np.int64],
-    portals: NDArray[np.complex128],
-    bend: int,
-    point: complex,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    faces: Faces, left: Ints, entered: Ints, portals: Complexes, bend: int, point: complex
+) -> tuple[Ints, Ints]:
     """The sleeve that passes the vertex of a bend on its other side; empty where no faces connect there."""
     first = last = bend
     while first > 0 and (portals[first - 1, 0] == point or portals[first - 1, 1] == point):
@@ -323,7 +312,7 @@ def other_way(
 
 
 @compiled
-def is_among(values: Sequence[int] | NDArray[np.int64], value: int, begin: int, end: int) -> bool:
+def is_among(values: Sequence[int] | Ints, value: int, begin: int, end: int) -> bool:
     """Whether a value is among some of others."""
     for k in range(begin, end):
         if values[k] == value:
@@ -333,8 +322,8 @@ def is_among(values: Sequence[int] | NDArray[np.int64], value: int, begin: int, 
 
 @compiled
 def spliced(
-    left: NDArray[np.int64],
-    entered: NDArray[np.int64],
+    left: Ints,
+    entered: Ints,
     first: int,
     last: int,
     out: list[int],
@@ -342,7 +331,7 @@ def spliced(
     before: list[int],
     k: int,
     across: int,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[Ints, Ints]:
     """A sleeve whose crossings `first` to `last` are exchanged for those of a walk, which ends at its entry k."""
     n, j = 1, k
     while before[j] >= 0:
@@ -366,7 +355,7 @@ def turned(h: int, at_tail: bool) -> int:
 
 
 @compiled
-def point_in(faces: NDArray[np.int64], points: NDArray[np.complex128], face: int) -> complex:
+def point_in(faces: Ints, points: Complexes, face: int) -> complex:
     """The point listed for a face, in its layout."""
     for s in range(len(faces)):
         if faces[s] == face:
@@ -376,14 +365,8 @@ def point_in(faces: NDArray[np.int64], points: NDArray[np.complex128], face: int
 
 @compiled
 def path_in(
-    faces: Faces,
-    left: NDArray[np.int64],
-    entered: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    start_points: NDArray[np.complex128],
-    ends: NDArray[np.int64],
-    end_points: NDArray[np.complex128],
-) -> tuple[NDArray[np.complex128], complex, complex, list[int], list[int], float]:
+    faces: Faces, left: Ints, entered: Ints, starts: Ints, start_points: Complexes, ends: Ints, end_points: Complexes
+) -> tuple[Complexes, complex, complex, list[int], list[int], float]:
     """The shortest path in a sleeve: its portals, its two ends, the bends as `funnel` returns them, and its length."""
     portals, over, placed = unfold(faces, left, entered)
     last = entered[-1] // 3
@@ -395,14 +378,8 @@ def path_in(
 
 @compiled
 def straighten(
-    faces: Faces,
-    left: NDArray[np.int64],
-    entered: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    start_points: NDArray[np.complex128],
-    ends: NDArray[np.int64],
-    end_points: NDArray[np.complex128],
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    faces: Faces, left: Ints, entered: Ints, starts: Ints, start_points: Complexes, ends: Ints, end_points: Complexes
+) -> tuple[Ints, Floats]:
     """The shortest path in a sleeve, improved as long as passing a vertex on its other side makes it shorter.
 
     Returns the halfedges crossed and the fraction along each.
@@ -440,13 +417,13 @@ def straighten(
 def shortest_lines(
     faces: Faces,
     queue: Queue,
-    starts: NDArray[np.int64],
-    start_points: NDArray[np.complex128],
-    start_at: NDArray[np.int64],
-    ends: NDArray[np.int64],
-    end_points: NDArray[np.complex128],
-    end_at: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    starts: Ints,
+    start_points: Complexes,
+    start_at: Ints,
+    ends: Ints,
+    end_points: Complexes,
+    end_at: Ints,
+) -> tuple[Ints, Floats, Ints]:
     """Shortest paths for many pairs of points: halfedges crossed, fractions along them, their number for each pair.
 
     The faces at the i-th start are ``starts[start_at[i] : start_at[i + 1]]``, and `start_points` has its position in

@@ -5,22 +5,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..memory import untouched_zeros
 from .node_sources import STRETCH, NodeSources
 
 
 def merge_in_cells(
-    corners: NDArray[np.float64],
-    vectors: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    components: NDArray[np.int64],
-    order: NDArray[np.int64],
-    shape: NDArray[np.int64],
+    corners: Floats,
+    vectors: Floats,
+    weights: Floats,
+    components: Ints,
+    order: Ints,
+    shape: Ints,
     size: float,
     sources: NodeSources,
     scale: float,
-) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]], NodeSources]:
+) -> tuple[tuple[Floats, Floats, Floats, Ints], NodeSources]:
     """Samples of the simplices `corners` (m, c, d), in cells, that lie on a grid of `shape` nodes.
 
     Every simplex is bisected at the midpoint of its longest edge until that is at most `size` cells long; parts whose
@@ -66,18 +67,18 @@ def _with_room(sums: NDArray[np.float32], used: int, more: int) -> NDArray[np.fl
 
 @compiled
 def _merge(
-    corners: NDArray[np.float64],
-    vectors: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    components: NDArray[np.int64],
-    order: NDArray[np.int64],
-    shape: NDArray[np.int64],
+    corners: Floats,
+    vectors: Floats,
+    weights: Floats,
+    components: Ints,
+    order: Ints,
+    shape: Ints,
     size: float,
     slots: NDArray[np.int32],
     nodes: NDArray[np.float32],
     places: NDArray[np.int32],
     scale: float,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float32]]:
+) -> tuple[Floats, Ints, NDArray[np.float32]]:
     """Sums of weight · position, vector and weight per (component, cell).
 
     Arrays are copied entry by entry, since assignments to slices compile slowly.

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 
 SIDE = 8
@@ -85,7 +86,7 @@ class BlockValues:
         """Nodes of the grid."""
         return self.blocks.shape
 
-    def __getitem__(self, nodes: tuple[NDArray[np.integer], ...]) -> NDArray[np.float64]:
+    def __getitem__(self, nodes: tuple[NDArray[np.integer], ...]) -> Floats:
         """(k,) values at nodes, given by their three indices; NaN where there is no block."""
         at = np.stack(nodes, axis=1)
         row = self.blocks.rows(at // SIDE)
@@ -95,7 +96,7 @@ class BlockValues:
         result[held] = self.values[row[held], a, b, c]
         return result
 
-    def interpolated(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def interpolated(self, points: Floats) -> Floats:
         """(k,) linear interpolation at (k, 3) points in cells; NaN where one of the nodes around has no value."""
         result = np.empty(len(points))
         limit = np.array(self.shape, dtype=np.float64) - 1
@@ -121,9 +122,9 @@ def _interpolate(
     cubes: NDArray[np.int32],
     rows: NDArray[np.int32],
     values: NDArray[np.float32],
-    points: NDArray[np.float64],
-    limit: NDArray[np.float64],
-    out: NDArray[np.float64],
+    points: Floats,
+    limit: Floats,
+    out: Floats,
 ) -> None:
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
@@ -152,8 +153,8 @@ def _gather(
     cubes: NDArray[np.int32],
     rows: NDArray[np.int32],
     values: NDArray[np.float32],
-    first: NDArray[np.int64],
-    limit: NDArray[np.int64],
+    first: Ints,
+    limit: Ints,
     out: NDArray[np.float32],
 ) -> None:
     for a in range(out.shape[0]):

@@ -9,8 +9,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, Literal, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Bools, Floats
 from ..errors import GeometryError, MemoryLimitError
 from ..exchange import Displayed
 from ..foreign import ForeignShape, Shape, as_shapes
@@ -73,24 +74,16 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
     array([1. , 1.5, 2. ])
     """
 
-    origin: NDArray[np.float64]
-    spacing: NDArray[np.float64]
+    origin: Floats
+    spacing: Floats
     shape: tuple[int, ...]
 
     @overload
     def __init__(
-        self: Grid[Literal[3]],
-        origin: ArrayLike,
-        spacing: ArrayLike,
-        shape: tuple[int, int, int],
+        self: Grid[Literal[3]], origin: ArrayLike, spacing: ArrayLike, shape: tuple[int, int, int]
     ) -> None: ...
     @overload
-    def __init__(
-        self: Grid[Literal[2]],
-        origin: ArrayLike,
-        spacing: ArrayLike,
-        shape: tuple[int, int],
-    ) -> None: ...
+    def __init__(self: Grid[Literal[2]], origin: ArrayLike, spacing: ArrayLike, shape: tuple[int, int]) -> None: ...
     @overload
     def __init__(self: Grid[int], origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike) -> None: ...
     def __init__(self, origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike) -> None:
@@ -182,23 +175,23 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         return math.prod(self.shape)
 
     @property
-    def upper(self) -> NDArray[np.float64]:
+    def upper(self) -> Floats:
         """(d,) position of the last node."""
         return self.origin + self.spacing * (np.array(self.shape) - 1)
 
     @cached_property
-    def axes(self) -> tuple[NDArray[np.float64], ...]:
+    def axes(self) -> tuple[Floats, ...]:
         """Coordinates of the nodes along each axis."""
         return tuple(
             frozen(o + s * np.arange(n)) for o, s, n in zip(self.origin, self.spacing, self.shape, strict=True)
         )
 
     @property
-    def points(self) -> NDArray[np.float64]:
+    def points(self) -> Floats:
         """Positions of the nodes, coordinates last; not cached, since they take d times the memory of a field."""
         return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
 
-    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
+    def contains(self, points: ArrayLike) -> Bools:
         """Whether points lie within the bounding box of the nodes.
 
         Parameters

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import lsqr
 
 from ..area_elements import sample_on_grid
+from ..arrays import Floats
 from ..discretization import DiffusesEach, Levels, SolvesEach, discretize
 from ..errors import MemoryLimitError, SourceError
 from ..linear.conjugate_gradients import conjugate_gradients
@@ -44,7 +45,7 @@ def memory_estimate(grid: Grid, per_node: float | None = None, extra: float = 0.
     return int(per_node * grid.n_nodes + extra) + libraries()
 
 
-def bytes_of_area(area: float, spacing: NDArray[np.float64], n_nodes: float) -> float:
+def bytes_of_area(area: float, spacing: Floats, n_nodes: float) -> float:
     """What so much surface adds on a grid of this spacing, in space."""
     if len(spacing) != 3:
         return 0.0
@@ -74,11 +75,11 @@ def refuse_large_grid(grid: Grid, per_node: float | None = None, extra: float = 
 
 def fitting_spacing(
     grid: Grid, available: int, per_node: float | None = None, extra: float = 0.0, area: float = 0.0
-) -> NDArray[np.float64]:
+) -> Floats:
     """(d,) about the least spacing, in the proportions of the grid's own, at which its box fits into memory."""
     base = memory_estimate(grid, 0.0, extra)
     whole = memory_estimate(grid, per_node, extra) - base
-    spacing: NDArray[np.float64] = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
+    spacing: Floats = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
     per_node = whole / grid.n_nodes
 
     def needed() -> float:
@@ -118,7 +119,7 @@ class GridDiscretization(DiffusesEach):
         directions = collapse(vectors, padded_shape(self.grid.shape), dimension, unit_vectors)
         return np.moveaxis(directions.reshape(dimension, *self.grid.shape), 0, -1)
 
-    def divergence(self, directions: NDArray[np.floating]) -> NDArray[np.float64]:
+    def divergence(self, directions: NDArray[np.floating]) -> Floats:
         """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
         return divergence(directions, self.grid.spacing)
 
@@ -156,13 +157,13 @@ class GridIntegration(SolvesEach):
         """λ of `Soft` where none is given, in 1/length."""
         return STIFFNESS / float(self.grid.spacing.mean())
 
-    def solve(self, divergence: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
+    def solve(self, divergence: Floats, source: GridSource) -> Floats:
         """Minimise ∫|∇φ − Y|² with nothing imposed: ``C φ = b`` (Eq. 13)."""
         phi = solve_poisson(divergence, self.grid.spacing, overwrite=True)
         phi -= np.average(source.at_samples(phi), weights=source.weights)
         return phi
 
-    def fit(self, divergence: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
+    def fit(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
         """Subtract from φ a smooth function that takes its error at the samples (in place of Eq. 14).
 
         At a node it is the mean of the errors of all samples, weighted by area and nearness: errors and areas are
@@ -173,7 +174,7 @@ class GridIntegration(SolvesEach):
         phi -= diffused_mean(source, excess)
         return phi
 
-    def penalize(self, divergence: NDArray[np.float64], source: GridSource, strength: float) -> NDArray[np.float64]:
+    def penalize(self, divergence: Floats, source: GridSource, strength: float) -> Floats:
         """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas of the samples.
 
         What is as good as nothing imposes nothing. Beyond `STIFFEST`, where conjugate gradients would not end, the
@@ -187,7 +188,7 @@ class GridIntegration(SolvesEach):
         zero = np.zeros(len(source.weights))
         return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
 
-    def fit_exactly(self, divergence: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
+    def fit_exactly(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
         """Solve Eq. 14 by an augmented Lagrangian, then the least correction at the nodes around the samples.
 
         The multipliers take up what the penalty leaves, except for what nearly dependent rows hide from it: that is
@@ -209,32 +210,32 @@ class GridIntegration(SolvesEach):
 
     def _penalized(
         self,
-        divergence: NDArray[np.float64],
+        divergence: Floats,
         source: GridSource,
         levels: Levels,
         strength: float,
-        multipliers: NDArray[np.float64],
-        start: NDArray[np.float64],
-    ) -> NDArray[np.float64]:
+        multipliers: Floats,
+        start: Floats,
+    ) -> Floats:
         """Minimise ∫|∇φ − Y|² + Σ w (strength · d² + 2 · multiplier · d), d the `deviation` of φ from the levels."""
         volume = float(np.prod(self.grid.spacing))
         rows, weights = source.interpolation, source.weights / volume
         free = Levels(np.zeros_like(levels.values), levels.groups)
 
-        def spread(at_samples: NDArray[np.float64]) -> NDArray[np.float64]:
-            at_nodes: NDArray[np.float64] = rows.T @ (weights * at_samples)
+        def spread(at_samples: Floats) -> Floats:
+            at_nodes: Floats = rows.T @ (weights * at_samples)
             return at_nodes.reshape(self.grid.shape)
 
-        def apply(phi: NDArray[np.float64]) -> NDArray[np.float64]:
+        def apply(phi: Floats) -> Floats:
             pull = strength * deviation(rows @ phi, source, free)
             return (laplacian(phi.reshape(self.grid.shape), self.grid.spacing) + spread(pull)).ravel()
 
         # constants are in the kernel of C; their cost is that of the penalty alone, and they are settled at the end
         constant = max(strength, LEAST * self.soft_weight) * float(weights.sum()) / self.grid.n_nodes
 
-        def precondition(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+        def precondition(residual: Floats) -> Floats:
             inverse = solve_poisson(residual.reshape(self.grid.shape), self.grid.spacing)
-            result: NDArray[np.float64] = inverse + residual.mean() / constant
+            result: Floats = inverse + residual.mean() / constant
             return result.ravel()
 
         wanted = strength * deviation(levels.values, source, free) - deviation(multipliers, source, free)
@@ -244,7 +245,7 @@ class GridIntegration(SolvesEach):
         return phi.reshape(self.grid.shape)
 
 
-def deviation(values: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
+def deviation(values: Floats, source: GridSource, levels: Levels) -> Floats:
     """(s,) values at the samples minus their levels; with groups, also minus the mean of the group."""
     excess = values - levels.values
     if levels.groups is not None:
@@ -254,7 +255,7 @@ def deviation(values: NDArray[np.float64], source: GridSource, levels: Levels) -
     return excess
 
 
-def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np.float32]:
+def diffused_mean(source: GridSource, values: Floats) -> NDArray[np.float32]:
     """(*grid.shape) mean of values at the samples, weighted by area and by heat: diffused as the normals are.
 
     It varies slowly, so the finest level of the hierarchy is skipped.
@@ -275,7 +276,7 @@ def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np
     return mean
 
 
-def least_correction(values: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
+def least_correction(values: Floats, source: GridSource) -> Floats:
     """(n_nodes,) grid function of least norm that interpolates these values at the samples, in least squares."""
     touched = np.unique(source.interpolation.indices)
     change = np.zeros(source.grid.n_nodes)

@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Floats
 from ..diagnostics import Diagnostics
 from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError
 from ..exchange import Displayed, with_values
@@ -81,7 +82,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     """
 
     grid: Grid[Dimension]
-    values: NDArray[np.float64]
+    values: Floats
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
     confidence: NDArray[np.float32] | None = field(default=None, repr=False)
     solid: SolidQueries | None = field(default=None, repr=False)
@@ -119,7 +120,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         if self.coarse is None:
             raise GeometryError("a field in a band has a coarse one for what lies beyond", element="coarse")
 
-    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
+    def __call__(self, points: ArrayLike) -> Floats:
         """φ at points in space: exact where the field has its solid, else that of `interpolate`.
 
         Parameters
@@ -134,7 +135,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         """
         return self.interpolate(points) if self.solid is None else self.solid.distance(points)
 
-    def interpolate(self, points: ArrayLike) -> NDArray[np.float64]:
+    def interpolate(self, points: ArrayLike) -> Floats:
         """φ at points in space, by multilinear interpolation between nodes; beyond a band between the coarse ones.
 
         Outside the grid φ is extrapolated linearly from the nearest point of the bounding box of the grid, along the
@@ -160,7 +161,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         (values,) = in_chunks(self._values_at, places)
         return shaped(values, shape)
 
-    def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
+    def gradient(self, points: ArrayLike) -> Floats:
         """∇φ at points in space: exact where the field has its solid, else central differences, interpolated.
 
         Outside the grid these are the gradient at the nearest point of the bounding box of the grid.
@@ -302,7 +303,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     def _placed(self, refine: Refine | None) -> Refine:
         """From points in cells to places in space, moved onto the level if there is a way to."""
 
-        def placed(cells: NDArray[np.float64]) -> NDArray[np.float64]:
+        def placed(cells: Floats) -> Floats:
             points = self.grid.origin + cells * self.grid.spacing
             return points if refine is None else refine(points)
 
@@ -422,7 +423,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         refuse_beyond_walls(walls, distance, "grid", padding)
         return self.contour(distance)
 
-    def with_values(self, values: NDArray[np.float64]) -> GridField[Dimension]:
+    def with_values(self, values: Floats) -> GridField[Dimension]:
         """Other values on the same grid, without what belongs to these.
 
         Parameters
@@ -591,10 +592,10 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         """
         files.write_field(self, path)
 
-    def _into_box(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _into_box(self, points: Floats) -> Floats:
         return np.clip(points, self.grid.origin, self.grid.upper)
 
-    def _values_at(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
+    def _values_at(self, points: Floats) -> tuple[Floats]:
         """φ at (n, d) points, within the box and outside of it."""
         inside = self._into_box(points)
         values = self._interpolate(inside)
@@ -605,7 +606,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             values[outside] += np.einsum("ij,ij->i", slopes, away[outside])
         return (values,)
 
-    def _interpolate(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _interpolate(self, points: Floats) -> Floats:
         index = ((points - self.grid.origin) / self.grid.spacing).T
         if self.blocks is not None:
             values = BlockValues(self.blocks, self.values).interpolated(index.T)
@@ -620,12 +621,12 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return np.where(weights > 0, sums / np.where(weights > 0, weights, 1.0), np.nan)
 
     @cached_property
-    def _defined(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    def _defined(self) -> tuple[Floats, Floats] | None:
         """Values with 0 where there is none, and 1 where there is one, else 0; or None if all nodes have one."""
         defined = ~np.isnan(self.values)
         return None if defined.all() else (np.where(defined, self.values, 0.0), defined.astype(np.float64))
 
-    def _slopes(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _slopes(self, points: Floats) -> Floats:
         """Central differences of the interpolant, which are those at the nodes, interpolated."""
         slopes = np.empty_like(points)
         for axis, step in enumerate(self.grid.spacing):

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..discretization import SourceTerm
 from ..errors import GeometryError, UnsupportedTypeError
 from ..jobs import run_cancellable
@@ -45,7 +45,7 @@ def _(field: GridField, source: object, method: Method | None, progress: Progres
 @nearest.register
 def _(
     grid: Grid,
-    values: NDArray[np.float64],
+    values: Floats,
     source: SourceTerm | None,
     given: None,
     tolerance: float,

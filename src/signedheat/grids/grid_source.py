@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from ..area_elements import AreaSamples
+from ..arrays import Floats, Ints
 from .grid import Grid
 from .node_sources import NodeSources
 from .stencil import interpolation_stencil
@@ -45,19 +45,19 @@ class GridSource:
         return self.samples.nodes
 
     @property
-    def weights(self) -> NDArray[np.float64]:
+    def weights(self) -> Floats:
         return self.samples.weights
 
     @property
-    def components(self) -> NDArray[np.int64]:
+    def components(self) -> Ints:
         return self.samples.components
 
     @property
-    def source_ids(self) -> NDArray[np.int64]:
+    def source_ids(self) -> Ints:
         return self.samples.source_ids
 
     @cached_property
-    def stencil(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def stencil(self) -> tuple[Ints, Floats]:
         """(s, 2^d) nodes and weights of multilinear interpolation at each sample."""
         return interpolation_stencil(self.samples.positions, self.grid.shape)
 
@@ -68,7 +68,7 @@ class GridSource:
         size = (len(nodes), self.grid.n_nodes)
         return csr_matrix((weights.ravel(), nodes.ravel(), starts), shape=size)
 
-    def at_samples(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at_samples(self, values: Floats) -> Floats:
         """(s,) node values interpolated at the samples."""
         nodes, weights = self.stencil
         return np.einsum("ij,ij->i", values.ravel()[nodes], weights)

@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..mesh.components import sums_of
 from ..parallel import n_threads
@@ -28,9 +29,7 @@ CLEARANCE = 10
 """Cells between the shape and the walls that the far field needs; fewer are made up for."""
 
 
-def winding_numbers(
-    nodes: NodeSources, shape: tuple[int, ...], positions: NDArray[np.float64], vectors: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def winding_numbers(nodes: NodeSources, shape: tuple[int, ...], positions: Floats, vectors: Floats) -> Floats:
     """(*shape) winding number of a shape around the nodes of a grid, smooth over two cells across the shape.
 
     Shapes: `positions` (s, d), `vectors` (s, d); returned: an array (*shape).
@@ -73,9 +72,7 @@ def _room(nodes: NodeSources, dimension: int) -> list[tuple[int, int]]:
     return [(int(below), int(above)) for below, above in rooms]
 
 
-def blocks_of_dipoles(
-    positions: NDArray[np.float64], vectors: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Floats]:
     """Mean positions and sums of the area vectors in each block of `BLOCK` cells."""
     blocks = np.floor(positions / BLOCK).astype(np.int64)
     blocks -= blocks.min(axis=0)
@@ -91,9 +88,7 @@ def blocks_of_dipoles(
     return sums_of(weights[:, None] * positions, which, n) / total[:, None], sums_of(vectors, which, n)
 
 
-def _sources(
-    nodes: NodeSources, shape: tuple[int, ...], below: list[int], spacing: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _sources(nodes: NodeSources, shape: tuple[int, ...], below: list[int], spacing: Floats) -> Floats:
     """(*shape) ∇·(n δ), with these layers of nodes before the grid's own; no vectors are at its walls."""
     dimension = len(shape)
     right = np.zeros((1,) * (4 - dimension) + shape)
@@ -107,12 +102,7 @@ def _sources(
 
 @compiled
 def _add_divergence(
-    stretches: NDArray[np.int64],
-    places: NDArray[np.int32],
-    sums: NDArray[np.float32],
-    first: NDArray[np.int64],
-    scales: NDArray[np.float64],
-    right: NDArray[np.float64],
+    stretches: Ints, places: NDArray[np.int32], sums: NDArray[np.float32], first: Ints, scales: Floats, right: Floats
 ) -> None:
     """Differences of the vectors in some stretches, between the nodes before and behind."""
     skipped = 0
@@ -130,7 +120,7 @@ def _add_divergence(
                     right[i - (axis == 0), j - (axis == 1), k - (axis == 2), n - (axis == 3)] -= flow
 
 
-def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, NDArray[np.float64]]:
+def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, Floats]:
     """A lattice of places, in cells, on a wall of the box: half a cell beyond its last nodes."""
     lines = [
         np.array([shape[d] - 0.5 if end else -0.5])
@@ -142,7 +132,7 @@ def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, NDArra
     return axis, end, lattice.squeeze(axis=axis)
 
 
-def _refined(values: NDArray[np.float64], shape: tuple[int, ...], axis: int) -> NDArray[np.float64]:
+def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
     """Values on a wall's lattice, interpolated to its nodes."""
     for d, n in enumerate(m for k, m in enumerate(shape) if k != axis):
         place = (np.arange(n) + 0.5) / n * (values.shape[d] - 1)
@@ -153,9 +143,7 @@ def _refined(values: NDArray[np.float64], shape: tuple[int, ...], axis: int) -> 
 
 
 @compiled
-def _far_field(
-    places: NDArray[np.float64], dipoles: NDArray[np.float64], strengths: NDArray[np.float64], axis: int, core: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _far_field(places: Floats, dipoles: Floats, strengths: Floats, axis: int, core: float) -> tuple[Floats, Floats]:
     """Winding number at places, and its derivative along an axis."""
     dimension = places.shape[1]
     sphere = 2.0 * np.pi if dimension == 2 else 4.0 * np.pi

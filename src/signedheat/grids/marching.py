@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError, OutsideError
 from ..packages import lazy_module
 from .blocks import SIDE, BlockValues
@@ -24,12 +25,8 @@ CAP = 0.01
 
 
 def closed_surface(
-    values: NDArray[np.float64],
-    origin: NDArray[np.float64],
-    spacing: NDArray[np.float64],
-    level: float,
-    refine: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    values: Floats, origin: Floats, spacing: Floats, level: float, refine: Callable[[Floats], Floats] | None = None
+) -> tuple[Floats, Ints]:
     """Marching cubes (Lewiner et al. 2003), with closed, manifold, outward-oriented output for every input.
 
     Values are those at ``origin + (i, j, k) * spacing``. `refine` moves (n, 3) points of the level set along the edges
@@ -53,9 +50,7 @@ def closed_surface(
     return positions if refine is None else refine(positions), faces
 
 
-def level_lines(
-    values: NDArray[np.float64], origin: NDArray[np.float64], spacing: NDArray[np.float64], level: float
-) -> list[tuple[NDArray[np.float64], bool]]:
+def level_lines(values: Floats, origin: Floats, spacing: Floats, level: float) -> list[tuple[Floats, bool]]:
     """Marching squares: points (k, 2) of each line, greater values to the left, and whether it closes.
 
     Lines are closed, unless they end at the box or at NaN values.
@@ -71,7 +66,7 @@ def level_lines(
     return [(origin + at * spacing, end) for at, end in zip(lines, closed, strict=True)]
 
 
-def heights_above(values: NDArray[np.float64], spacing: NDArray[np.float64], level: float) -> NDArray[np.float64]:
+def heights_above(values: Floats, spacing: Floats, level: float) -> Floats:
     """Values minus the level, kept away from zero so that crossings respect `CLEARANCE`."""
     height = values - level
     finite = height[np.isfinite(height)]
@@ -90,7 +85,7 @@ def heights_above(values: NDArray[np.float64], spacing: NDArray[np.float64], lev
     return height
 
 
-def closed_without_values(height: NDArray[np.float64]) -> NDArray[np.float64]:
+def closed_without_values(height: Floats) -> Floats:
     """Nodes without a value made positive, so that crossings lie about `CAP` cells from neighbours that have one."""
     unknown = np.isnan(height)
     if not unknown.any():
@@ -105,13 +100,13 @@ def closed_without_values(height: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(unknown, filling, height)
 
 
-def wall_signs(height: NDArray[np.float64]) -> set[bool]:
+def wall_signs(height: Floats) -> set[bool]:
     """Signs of the nodes on the walls of the box: {True} if all are positive, {False} if all are negative, or both."""
     walls = [height.take(end, axis=axis) for axis in range(height.ndim) for end in (0, -1)]
     return {bool(sign) for wall in walls for sign in ((wall > 0).any(), (wall > 0).all())}
 
 
-def capped(height: NDArray[np.float64]) -> NDArray[np.float64]:
+def capped(height: Floats) -> Floats:
     """One more layer of nodes all around, positive, so that crossings lie `CAP` cells outside the walls."""
     padded = np.pad(height, 1, mode="edge")
     for axis in range(height.ndim):
@@ -125,12 +120,12 @@ WINDOW = 8
 """Blocks along each edge of a window."""
 BITS = 20
 """Of the number of a node along an axis."""
-Refine = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Refine = Callable[[Floats], Floats]
 
 
 def block_contour(
-    values: BlockValues, spacing: NDArray[np.float64], level: float, refine: Refine | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    values: BlockValues, spacing: Floats, level: float, refine: Refine | None = None
+) -> tuple[Floats, Ints]:
     """Marching cubes (Lewiner et al. 2003) in the cells whose nodes all have a value: closed where those around do.
 
     Neighbouring windows share nodes, and so find the same points on the edges between them; these become one. Where the
@@ -142,9 +137,7 @@ def block_contour(
     return np.concatenate(vertices), np.concatenate(faces)
 
 
-def window_surfaces(
-    values: BlockValues, spacing: NDArray[np.float64], level: float
-) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]]:
+def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Iterator[tuple[Ints, Floats, Ints]]:
     """The place of each window of `WINDOW` blocks through which the level set goes, in order, with that part of it.
 
     Vertices are in cells from the first node of the grid, and those on walls between windows are in each of these.
@@ -168,7 +161,7 @@ def window_surfaces(
             yield window, found[0] + first, found[1].astype(np.int64)
 
 
-def _window_surface(height: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
+def _window_surface(height: NDArray[np.float32]) -> tuple[Floats, NDArray[np.int32]] | None:
     """Vertices in cells and faces, in cells whose nodes all have a value; None if there are none."""
     finite = ~np.isnan(height)
     whole = np.zeros(height.shape, dtype=bool)  # cells, at their last nodes
@@ -189,7 +182,7 @@ def _window_surface(height: NDArray[np.float32]) -> tuple[NDArray[np.float64], N
     return vertices.astype(np.float64), faces
 
 
-def edges_of(vertices: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+def edges_of(vertices: Floats) -> tuple[Bools, Ints]:
     """(n,) whether vertices, in cells, lie on edges of the grid, and numbers that those on the same edge share."""
     base = np.floor(vertices)
     crossed = vertices > base
@@ -209,7 +202,7 @@ def _reaches_walls(values: BlockValues, level: float) -> bool:
     return len(signs) == 2
 
 
-def _close_at_walls(height: NDArray[np.float32], first: NDArray[np.int64], limit: NDArray[np.int64]) -> None:
+def _close_at_walls(height: NDArray[np.float32], first: Ints, limit: Ints) -> None:
     """Values for the layer of nodes beyond the walls, outside, so that crossings lie `CAP` cells beyond the walls."""
     for axis in range(3):
         for beyond, wall in ((-1, 0), (int(limit[axis]), int(limit[axis]) - 1)):
@@ -220,15 +213,13 @@ def _close_at_walls(height: NDArray[np.float32], first: NDArray[np.int64], limit
                 layers[at] = np.where(layer < 0, -layer * np.float32(1 / CAP - 1), layer)
 
 
-Part = tuple[NDArray[np.float64], NDArray[np.int64]]
+Part = tuple[Floats, Ints]
 """Vertices, (n, 3), and faces, (m, 3), which count the vertices of all parts before."""
-_Seam = tuple[NDArray[np.int64], NDArray[np.int64]]
+_Seam = tuple[Ints, Ints]
 """Keys of the vertices on the walls of a window, ascending, and the numbers of these vertices."""
 
 
-def contour_parts(
-    values: BlockValues, spacing: NDArray[np.float64], level: float, refine: Refine | None = None
-) -> Iterator[Part]:
+def contour_parts(values: BlockValues, spacing: Floats, level: float, refine: Refine | None = None) -> Iterator[Part]:
     """The vertices and faces of `block_contour`, window by window: new vertices, and faces that use these and older.
 
     Only the vertices on walls between windows are kept, as long as neighboring windows are to come.
@@ -257,7 +248,7 @@ def contour_parts(
         )
 
 
-def _looked_up(seam: _Seam, keys: NDArray[np.int64]) -> NDArray[np.int64]:
+def _looked_up(seam: _Seam, keys: Ints) -> Ints:
     """(k,) number of the vertex with each key, −1 where there is none."""
     held, numbers = seam
     if not len(held):

@@ -26,6 +26,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..memory import untouched_zeros
 from .node_sources import STRETCH, NodeSources
@@ -56,11 +57,11 @@ class Level:
 
     vectors: NDArray[np.float32] | None  # (l₀, l₁, l₂, n, 4) X within the band; None if skipped
     # (l₀, l₁, l₂, stretches) where these values are valid; elsewhere those of the coarser level are
-    inside: NDArray[np.bool_] | None
-    factors: NDArray[np.int64]  # (4,) cells of this grid per cell of the next coarser one: see `coarsening`
+    inside: Bools | None
+    factors: Ints  # (4,) cells of this grid per cell of the next coarser one: see `coarsening`
 
 
-Guess = tuple[NDArray[np.float32], NDArray[np.bool_]]
+Guess = tuple[NDArray[np.float32], Bools]
 """X on a level, taken from a finer one, and the stretches in which it is known and not swept."""
 
 
@@ -92,7 +93,7 @@ def diffuse_multilevel(
         sources = sources.restricted(factors, shape, steps) if guess is None else NodeSources.empty(shape, steps)
 
 
-def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np.int64]:
+def coarsening(shape: tuple[int, ...], steps: Floats) -> Ints:
     """(4,) cells of a grid per cell of the next coarser one: 2 along its finest axes, 1 along the others.
 
     An axis with few nodes whose whole length is below the spacing along the others is reduced to one node; its factor
@@ -114,9 +115,7 @@ def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np
     return factors
 
 
-def skip_finest(
-    shape: tuple[int, ...], steps: NDArray[np.float64], finest: int
-) -> tuple[list[Level], tuple[int, ...], NDArray[np.float64]]:
+def skip_finest(shape: tuple[int, ...], steps: Floats, finest: int) -> tuple[list[Level], tuple[int, ...], Floats]:
     """The first `finest` levels of the hierarchy, empty; and shape and spacing of the grid that follows."""
     levels: list[Level] = []
     while len(levels) < finest and ((factors := coarsening(shape, steps)) > 1).any():
@@ -126,12 +125,7 @@ def skip_finest(
 
 
 def _diffuse_level(
-    sources: NodeSources,
-    guess: Guess | None,
-    time: Callable[[float], float],
-    factors: NDArray[np.int64],
-    rounds: int,
-    last: bool,
+    sources: NodeSources, guess: Guess | None, time: Callable[[float], float], factors: Ints, rounds: int, last: bool
 ) -> Level:
     t = time(_mean_step(sources.steps))
     real = sources.steps > 0
@@ -152,11 +146,11 @@ def _diffuse_level(
     return Level(vectors, inside, factors)
 
 
-def _mean_step(steps: NDArray[np.float64]) -> float:
+def _mean_step(steps: Floats) -> float:
     return float(steps[steps > 0].mean())
 
 
-def _dilated(mask: NDArray[np.bool_], width: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _dilated(mask: Bools, width: Ints) -> Bools:
     """The mask dilated by a box of this half width, in nodes."""
     grown = mask.astype(np.uint8)
     for axis, reach in enumerate((*width[:3], -(-int(width[3]) // STRETCH))):
@@ -165,7 +159,7 @@ def _dilated(mask: NDArray[np.bool_], width: NDArray[np.int64]) -> NDArray[np.bo
     return grown.astype(np.bool_)
 
 
-def _coarser(shape: tuple[int, ...], steps: NDArray[np.float64]) -> tuple[tuple[int, ...], NDArray[np.float64]]:
+def _coarser(shape: tuple[int, ...], steps: Floats) -> tuple[tuple[int, ...], Floats]:
     """Shape and spacing of the next coarser grid."""
     factors, counts = coarsening(shape, steps), np.array(shape)
     coarse = np.where(factors == 2, counts // 2 + 1, np.where(factors == 1, counts, 1))
@@ -212,8 +206,8 @@ def collapse(
 @compiled
 def _carry(
     vectors: NDArray[np.float32],
-    inside: NDArray[np.bool_],
-    factors: NDArray[np.int64],
+    inside: Bools,
+    factors: Ints,
     power: np.float32,
     coarse: NDArray[np.float32],
     counts: NDArray[np.integer],
@@ -240,7 +234,7 @@ def _carry(
 
 @compiled
 def _interpolate(
-    coarse: NDArray[np.float32], factors: NDArray[np.int64], out: NDArray[np.float32], axis: int, start: int, stop: int
+    coarse: NDArray[np.float32], factors: Ints, out: NDArray[np.float32], axis: int, start: int, stop: int
 ) -> None:
     """Interpolate the values of a coarser grid to all nodes, linearly along every axis that was coarsened."""
     _, n0, n1, n2, n = out.shape
@@ -277,7 +271,7 @@ def _interpolate(
 
 @compiled
 def unit_vectors(
-    vectors: NDArray[np.float32], inside: NDArray[np.bool_], out: NDArray[np.float32], axis: int, start: int, stop: int
+    vectors: NDArray[np.float32], inside: Bools, out: NDArray[np.float32], axis: int, start: int, stop: int
 ) -> None:
     """The vectors scaled to length one; where they have underflowed, `out` keeps the values of a coarser level."""
     dimension, n0, n1, n2, n = out.shape
@@ -304,7 +298,7 @@ def unit_vectors(
 
 @compiled
 def quotients(
-    vectors: NDArray[np.float32], inside: NDArray[np.bool_], out: NDArray[np.float32], axis: int, start: int, stop: int
+    vectors: NDArray[np.float32], inside: Bools, out: NDArray[np.float32], axis: int, start: int, stop: int
 ) -> None:
     """The second component divided by the first; `out` keeps its values where the first has underflowed."""
     _, n0, n1, n2, n = out.shape
@@ -325,11 +319,7 @@ TINY = np.float32(1e-34)
 
 
 def diffuse_by_sweeps(
-    sources: NodeSources,
-    active: NDArray[np.bool_],
-    ratios: NDArray[np.float64],
-    rounds: int,
-    given: NDArray[np.float32] | None = None,
+    sources: NodeSources, active: Bools, ratios: Floats, rounds: int, given: NDArray[np.float32] | None = None
 ) -> NDArray[np.float32]:
     """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j``, Eq. 12, with no flux through the walls.
 
@@ -356,7 +346,7 @@ def diffuse_by_sweeps(
     return vectors
 
 
-def line_pivots(shape: tuple[int, ...], ratios: NDArray[np.float64]) -> NDArray[np.float32]:
+def line_pivots(shape: tuple[int, ...], ratios: Floats) -> NDArray[np.float32]:
     """(8, n) reciprocal pivots of the tridiagonal matrix of a line; row bit k is set for lines at a wall of axis k."""
     n = shape[3]
     along = np.full(n, 2.0)
@@ -376,11 +366,11 @@ def _sweep_tiles(
     vectors: NDArray[np.float32],
     sums: NDArray[np.float32],
     places: NDArray[np.int32],
-    active: NDArray[np.bool_],
+    active: Bools,
     shape: tuple[int, int, int, int],
     ratios: tuple[np.float32, np.float32, np.float32, np.float32],
     pivots: NDArray[np.float32],
-    tiles: NDArray[np.int64],
+    tiles: Ints,
 ) -> None:
     """Update the lines of tiles in order, four components at once. Slices of lines help the compiler to vectorise."""
     n0, n1, n2, n = shape

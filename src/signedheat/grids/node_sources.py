@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from .stencil import interpolation_stencil
 
 STRETCH = 8
@@ -25,22 +26,17 @@ class NodeSources:
     places: NDArray[np.int32]
     sums: NDArray[np.float32]  # (k, STRETCH, 4) the vectors, padded to four components
     shape: tuple[int, ...]  # nodes along each axis
-    steps: NDArray[np.float64]  # (4,) spacing of the grid; 0 along axes of one node
+    steps: Floats  # (4,) spacing of the grid; 0 along axes of one node
 
     @classmethod
-    def empty(cls, shape: tuple[int, ...], steps: NDArray[np.float64]) -> NodeSources:
+    def empty(cls, shape: tuple[int, ...], steps: Floats) -> NodeSources:
         """Zero everywhere."""
         places = np.full((*shape[:3], -(-shape[3] // STRETCH)), -1, dtype=np.int32)
         return cls(places, np.zeros((0, STRETCH, 4), dtype=np.float32), shape, steps)
 
     @classmethod
     def scattered(
-        cls,
-        shape: tuple[int, ...],
-        steps: NDArray[np.float64],
-        nodes: NDArray[np.int64],
-        weights: NDArray[np.float64],
-        values: NDArray[np.floating],
+        cls, shape: tuple[int, ...], steps: Floats, nodes: Ints, weights: Floats, values: NDArray[np.floating]
     ) -> NodeSources:
         """Values (s, c ≤ 4) added to the `nodes` (s, k) of a grid with `weights` (s, k)."""
         used = weights > 0
@@ -58,13 +54,13 @@ class NodeSources:
             sums[:, k] = np.bincount(places, weights[used] * values[owners, k], len(sums))
         return cls(result.places, sums.reshape(-1, STRETCH, 4), shape, steps)
 
-    def restricted(self, factors: NDArray[np.int64], shape: tuple[int, ...], steps: NDArray[np.float64]) -> NodeSources:
+    def restricted(self, factors: Ints, shape: tuple[int, ...], steps: Floats) -> NodeSources:
         """The sources on a coarser grid, by the transpose of linear interpolation."""
         nodes, values = self.nonzero()
         coarse = np.where(np.array(shape) > 1, nodes / factors, 0.0)
         return NodeSources.scattered(shape, steps, *interpolation_stencil(coarse, shape), values)
 
-    def nonzero(self) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    def nonzero(self) -> tuple[Ints, NDArray[np.float32]]:
         """(k, 4) nodes whose vectors are not zero, and (k, 4) these."""
         taken = self.places >= 0
         stretches, vectors = np.argwhere(taken), self.sums[self.places[taken]]

@@ -7,8 +7,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats
 from ..errors import GeometryError
 from ..exchange import Displayed
 from ..frozen import Frozen
@@ -47,7 +48,7 @@ class Polyline(Displayed, Frozen):
     (4.0, -1.0)
     """
 
-    points: NDArray[np.float64]
+    points: Floats
     closed: bool
 
     def __init__(self, points: ArrayLike, closed: bool = False) -> None:
@@ -110,19 +111,19 @@ class Polyline(Displayed, Frozen):
         return len(self.points)
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Floats:
         """(2, 2) lower and upper corner of the box around the points."""
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
 
     @cached_property
-    def segments(self) -> NDArray[np.float64]:
+    def segments(self) -> Floats:
         """(m, 2, 2) start and end of every segment."""
         ends = np.roll(self.points, -1, axis=0)
         count = self.n_points if self.closed else self.n_points - 1
         return np.stack([self.points[:count], ends[:count]], axis=1)
 
     @cached_property
-    def segment_lengths(self) -> NDArray[np.float64]:
+    def segment_lengths(self) -> Floats:
         """(m,) lengths."""
         return np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1)
 

@@ -17,6 +17,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..errors import GeometryError, OutsideError
 from ..packages import lazy_module
@@ -27,9 +28,7 @@ from ..validation import array_of, flag, numbers, positive_steps
 from .wavefront import padded_shape
 
 
-def redistance(
-    values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | Sequence[bool] = False
-) -> NDArray[np.float64]:
+def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | Sequence[bool] = False) -> Floats:
     """Signed distance of the nodes of a grid to the zero set of an array: of a level set, or of an image of ±1.
 
     Where the zero set is smooth, distance is of second order, and exact for planes and spheres; at its edges it is
@@ -101,9 +100,7 @@ def _axes(periodic: bool | Sequence[bool], count: int) -> list[bool]:
     return [flag(one, "periodic") for one in each]
 
 
-def _distances(
-    values: NDArray[np.float64], spacing: NDArray[np.float64], pads: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _distances(values: Floats, spacing: Floats, pads: Ints) -> Floats:
     """Distance of each node that is no padding; axes have at least two nodes."""
     signs = values.ndim > 1 and bool((np.abs(values) == 1).all())
     if signs:
@@ -145,20 +142,20 @@ class Contour(NamedTuple):
     """The zero set of an array."""
 
     # (v, 3) and (m, 3): the contour of values that are linear along edges: axes 1 to 3. None in four dimensions.
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    numbers: NDArray[np.int64]  # (v,) the crossing at each vertex; −1 at such as are on no edge of the array
-    zeros: NDArray[np.float64]  # (k, 3) nodes that are zero, without a negative neighbour
+    vertices: Floats
+    faces: Ints
+    numbers: Ints  # (v,) the crossing at each vertex; −1 at such as are on no edge of the array
+    zeros: Floats  # (k, 3) nodes that are zero, without a negative neighbour
     # (c, 18) crossings, normals and shape operators of the cubic interpolant: see `crossings_at`
-    curved: NDArray[np.float64]
+    curved: Floats
     # (c, 4) the crossings: where smooth on the zero set of the cubic interpolant, else of values linear along edges
-    points: NDArray[np.float64]
-    smooth: NDArray[np.bool_]  # (c,) whether the interpolant tells distance around a crossing
+    points: Floats
+    smooth: Bools  # (c,) whether the interpolant tells distance around a crossing
     uneven: float  # how much distance to the interpolant may differ from that to the triangles
     reach: float  # no point of the zero set is farther from its nearest crossing
 
 
-def smoothed_signs(signs: NDArray[np.float64]) -> NDArray[np.float64]:
+def smoothed_signs(signs: Floats) -> Floats:
     """Values with the given signs, ±1, whose contour is smoother.
 
     Examples
@@ -170,7 +167,7 @@ def smoothed_signs(signs: NDArray[np.float64]) -> NDArray[np.float64]:
     return signs * np.clip(agreement, LEAST, MOST)
 
 
-def zero_contour(values: NDArray[np.float64], steps: NDArray[np.float64]) -> Contour:
+def zero_contour(values: Floats, steps: Floats) -> Contour:
     """The zero set of an array with one to four axes; zero counts as positive. On four it is smooth, without triangles.
 
     Steps along unused axes are 1.
@@ -198,7 +195,7 @@ def zero_contour(values: NDArray[np.float64], steps: NDArray[np.float64]) -> Con
     return Contour(vertices, faces, numbers, zeros, curved, points, smooth, least, reach)
 
 
-def distances_to(contour: Contour, places: NDArray[np.float64]) -> NDArray[np.float64]:
+def distances_to(contour: Contour, places: Floats) -> Floats:
     """(n,) distances of (n, 4) places to the zero set, without sign."""
     if not len(contour.vertices) and len(contour.points):  # four axes
         nearest = scipy.spatial.cKDTree(contour.points).query(places, workers=-1)[1]
@@ -208,7 +205,7 @@ def distances_to(contour: Contour, places: NDArray[np.float64]) -> NDArray[np.fl
         features = FaceFeatures.of(contour.vertices, contour.faces)
         tree, corners = FaceTree.of(features), contour.numbers[contour.faces[features.ids]]
 
-        def measured(some: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
+        def measured(some: Floats) -> tuple[Floats]:
             faces, squares = tree.nearest(np.ascontiguousarray(some[:, 1:]))
             return (_around(contour, corners[faces], squares, some),)
 
@@ -220,9 +217,7 @@ def distances_to(contour: Contour, places: NDArray[np.float64]) -> NDArray[np.fl
 
 
 @compiled
-def _around(
-    contour: Contour, corners: NDArray[np.int64], squares: NDArray[np.float64], places: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _around(contour: Contour, corners: Ints, squares: Floats, places: Floats) -> Floats:
     """(n,) distances to triangles of (n, 3) corners, given squared; where smooth, those to the interpolant instead."""
     result, away, room = np.empty(len(places)), np.empty(4), np.empty(4)
     for i in range(len(places)):
@@ -245,7 +240,7 @@ def _around(
 
 
 @compiled
-def _around_crossings(contour: Contour, nearest: NDArray[np.int64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def _around_crossings(contour: Contour, nearest: Ints, places: Floats) -> Floats:
     """(n,) distances to the interpolant's zero set around the nearest crossings; where not smooth, to a flat piece."""
     result, away, room = np.empty(len(places)), np.empty(4), np.empty(4)
     for i in range(len(places)):
@@ -262,9 +257,7 @@ def _around_crossings(contour: Contour, nearest: NDArray[np.int64], places: NDAr
     return result
 
 
-def _marched(
-    values: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int32], NDArray[np.int64], NDArray[np.int64]]:
+def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Ints]:
     """Vertices, in cells, and triangles; edges that are crossed, a vertex on each; numbers of edges by vertex, or −1.
 
     Marching cubes (Lewiner et al. 2003) decides how crossings are connected, by values that are compressed, so that
@@ -297,7 +290,7 @@ def _marched(
     return vertices, faces, edges, np.flatnonzero(on_edge)[first], numbers
 
 
-def _between_others(vertices: NDArray[np.float64], faces: NDArray[np.int64], chosen: NDArray[np.bool_]) -> None:
+def _between_others(vertices: Floats, faces: Ints, chosen: Bools) -> None:
     """Move vertices amid those that they share triangles with."""
     sums, counts = np.zeros_like(vertices), np.zeros(len(vertices))
     for k in range(3):
@@ -309,17 +302,15 @@ def _between_others(vertices: NDArray[np.float64], faces: NDArray[np.int64], cho
     vertices[counts > 0] = sums[counts > 0] / counts[counts > 0, None]
 
 
-def _lone_zeros(values: NDArray[np.float64]) -> NDArray[np.int64]:
+def _lone_zeros(values: Floats) -> Ints:
     """(k, d) nodes whose value is zero, with no negative one before or behind them."""
     around = scipy.ndimage.generate_binary_structure(values.ndim, 1)
     return np.argwhere((values == 0) & ~scipy.ndimage.binary_dilation(values < 0, around))
 
 
-def _unevenness(
-    curved: NDArray[np.float64], linear: NDArray[np.float64], pairs: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _unevenness(curved: Floats, linear: Floats, pairs: Ints) -> Floats:
     """(e,) how far each crossing moves, and how far those it is joined to lie off its paraboloid, at the most."""
-    uneven: NDArray[np.float64] = np.linalg.norm(curved[:, :4] - linear, axis=1)
+    uneven: Floats = np.linalg.norm(curved[:, :4] - linear, axis=1)
     one, other = np.concatenate([pairs, pairs[:, ::-1]]).T
     away, height, at = curved[other, :4] - curved[one, :4], np.zeros(len(one)), 8
     for d in range(4):
@@ -331,16 +322,14 @@ def _unevenness(
     return uneven
 
 
-def crossed_edges(field: NDArray[np.float64]) -> NDArray[np.int32]:
+def crossed_edges(field: Floats) -> NDArray[np.int32]:
     """(e, 5) node (4 indices) and axis of each edge whose two ends have different signs; zero counts as positive."""
     found = [np.argwhere(np.diff(field < 0, axis=axis)) for axis in range(4)]
     return np.concatenate([np.insert(nodes, 4, axis, axis=1) for axis, nodes in enumerate(found)]).astype(np.int32)
 
 
 @compiled
-def _cubic(
-    field: NDArray[np.float64], place: NDArray[np.float64], weights: NDArray[np.float64], gradient: NDArray[np.float64]
-) -> float:
+def _cubic(field: Floats, place: Floats, weights: Floats, gradient: Floats) -> float:
     """Value of the cubic convolution interpolant (Keys 1981) at a position in cells; writes its `gradient`."""
     base = np.empty(4, dtype=np.int64)
     for axis in range(4):
@@ -392,9 +381,7 @@ def _cubic(
 
 
 @compiled
-def crossings_at(
-    field: NDArray[np.float64], edges: NDArray[np.int32], steps: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> Floats:
     """(e, 18) position, unit normal and shape operator (symmetric, ten numbers) of the zero set at crossed edges."""
     result = np.zeros((len(edges), 18))
     weights = np.empty((2, 4, 4))
@@ -463,9 +450,7 @@ def crossings_at(
 
 
 @compiled
-def circle_distance(
-    crossing: NDArray[np.float64], away: NDArray[np.float64], across: NDArray[np.float64], reach: float
-) -> float:
+def circle_distance(crossing: Floats, away: Floats, across: Floats, reach: float) -> float:
     """Distance to the touching circle in the plane of a point, `away` from a crossing, and the normal there.
 
     With s along the normal, r across it and bending k in the direction of r, the distance to the circle of radius 1/k

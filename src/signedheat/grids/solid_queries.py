@@ -8,6 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Bools, Floats, Ints
+
 
 @dataclass(frozen=True, eq=False)
 class Closest:
@@ -36,15 +38,15 @@ class Closest:
     (array([2.]), [[0.0, 0.0, 1.0]], array([False]))
     """
 
-    distances: NDArray[np.float64]
-    points: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    barycentric: NDArray[np.float64]
-    gradients: NDArray[np.float64]
+    distances: Floats
+    points: Floats
+    faces: Ints
+    barycentric: Floats
+    gradients: Floats
     confidence: NDArray[np.float32]
 
     @property
-    def completed(self) -> NDArray[np.bool_]:
+    def completed(self) -> Bools:
         """(...) whether the place lies on the completion."""
         return self.faces < 0
 
@@ -56,13 +58,13 @@ class SolidQueries(Protocol):
     """What can answer queries at points exactly, as a `Solid` does."""
 
     @property
-    def triangles(self) -> NDArray[np.float64]:
+    def triangles(self) -> Floats:
         """(m, 3, 3) corners of all that distance is measured to."""
 
-    def distance(self, points: ArrayLike) -> NDArray[np.float64]:
+    def distance(self, points: ArrayLike) -> Floats:
         """(...) signed distances of (..., d) points, negative inside."""
 
-    def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
+    def inside(self, points: ArrayLike) -> Bools:
         """(...) whether points are inside."""
 
     def closest(self, points: ArrayLike) -> Closest:
@@ -77,15 +79,15 @@ class Scaled:
     factor: float  # what its distance is multiplied by; where it is negative inside and outside are exchanged
 
     @property
-    def triangles(self) -> NDArray[np.float64]:
+    def triangles(self) -> Floats:
         """(m, 3, 3) corners of all that distance is measured to."""
         return self.solid.triangles
 
-    def distance(self, points: ArrayLike) -> NDArray[np.float64]:
+    def distance(self, points: ArrayLike) -> Floats:
         """(...) values at (..., d) points."""
         return self.factor * self.solid.distance(points)
 
-    def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
+    def inside(self, points: ArrayLike) -> Bools:
         """(...) whether points are where the values are negative."""
         found = self.solid.inside(points)
         return found if self.factor > 0 else ~found

@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..parallel import n_threads
 from .wavefront import SMALL, padded_shape
 
@@ -20,7 +21,7 @@ SLAB = 4
 """Rows of grid lines in one job of a thread: with 16 what jobs hold adds a tenth to the memory of 128³ nodes."""
 
 
-def divergence(directions: NDArray[np.floating], spacing: NDArray[np.float64]) -> NDArray[np.float64]:
+def divergence(directions: NDArray[np.floating], spacing: Floats) -> Floats:
     """(*shape) −∇·Y, b of Eq. 13. The flux between two nodes is the mean of theirs, that through walls zero."""
     shape = directions.shape[:-1]
     components = np.moveaxis(directions, -1, 0).reshape(-1, *padded_shape(shape))
@@ -29,7 +30,7 @@ def divergence(directions: NDArray[np.floating], spacing: NDArray[np.float64]) -
     return out.reshape(shape)
 
 
-def laplacian(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> NDArray[np.float64]:
+def laplacian(values: Floats, spacing: Floats) -> Floats:
     """C φ, Eq. 10 on a grid: the positive semidefinite Laplacian of 2d + 1 points, with no flux through the walls."""
     result = np.zeros_like(values)
     for axis, h in enumerate(spacing):
@@ -41,9 +42,7 @@ def laplacian(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> NDAr
     return result
 
 
-def solve_poisson(
-    right_hand_side: NDArray[np.float64], spacing: NDArray[np.float64], overwrite: bool = False
-) -> NDArray[np.float64]:
+def solve_poisson(right_hand_side: Floats, spacing: Floats, overwrite: bool = False) -> Floats:
     """φ of mean zero with ``C φ = b`` (Eq. 13), by the cosine transform that diagonalises C."""
     workers = n_threads()
     transformed = scipy.fft.dctn(right_hand_side, type=2, overwrite_x=overwrite, workers=workers)
@@ -57,9 +56,7 @@ def solve_poisson(
     return scipy.fft.idctn(transformed, type=2, overwrite_x=True, workers=workers)
 
 
-def interpolation_stencil(
-    positions: NDArray[np.float64], shape: tuple[int, ...]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def interpolation_stencil(positions: Floats, shape: tuple[int, ...]) -> tuple[Ints, Floats]:
     """(s, 2^k) nodes and weights of multilinear interpolation at positions in cells; k axes have more than one node."""
     positions = np.clip(positions, 0, np.array(shape) - 1)  # rounding may put one outside
     cell = np.minimum(positions.astype(np.int64), np.array(shape) - 2)
@@ -94,9 +91,7 @@ def slab(axis: int, start: int, stop: int) -> tuple[slice, ...]:
     return tuple(slice(start, stop) if axis == k else slice(None) for k in range(4))
 
 
-def _divide(
-    eigenvalues: list[NDArray[np.float64]], transformed: NDArray[np.float64], axis: int, start: int, stop: int
-) -> None:
+def _divide(eigenvalues: list[Floats], transformed: Floats, axis: int, start: int, stop: int) -> None:
     """Divide by the eigenvalues of C, sums of one-dimensional ones; the quotient is zero where they are zero."""
     here = slab(axis, start, stop)
     total = np.zeros(())
@@ -107,12 +102,7 @@ def _divide(
 
 
 def _divergence(
-    components: NDArray[np.floating],
-    scales: NDArray[np.float64],
-    out: NDArray[np.float64],
-    axis: int,
-    start: int,
-    stop: int,
+    components: NDArray[np.floating], scales: Floats, out: Floats, axis: int, start: int, stop: int
 ) -> None:
     low, high = max(start - 1, 0), min(stop + 1, out.shape[axis])
     around = np.moveaxis(np.moveaxis(components, axis + 1, 0)[low:high], 0, axis + 1)

@@ -63,8 +63,7 @@ def chosen_backend(backend: str | None = None) -> str:
     name = backend or os.environ.get("SIGNEDHEAT_BACKEND") or available[0]
     if name not in available:
         raise SignedHeatError(
-            f"the solver {name!r} is not available here",
-            remedy=f"choose one of {', '.join(available)}",
+            f"the solver {name!r} is not available here", remedy=f"choose one of {', '.join(available)}"
         )
     return name
 

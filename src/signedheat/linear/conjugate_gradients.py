@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Operator = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+from ..arrays import Floats
+
+Operator = Callable[[Floats], Floats]
 
 
 def conjugate_gradients(
     operator: Operator,
-    rhs: NDArray[np.float64],
+    rhs: Floats,
     precondition: Operator | None = None,
-    start: NDArray[np.float64] | None = None,
+    start: Floats | None = None,
     tolerance: float = 1e-6,
     limit: int = 500,
-    converged: Callable[[NDArray[np.float64], NDArray[np.float64]], bool] | None = None,
-) -> NDArray[np.float64]:
+    converged: Callable[[Floats, Floats], bool] | None = None,
+) -> Floats:
     """Solve ``A x = b``, A symmetric and positive definite; or semidefinite, with b within its range.
 
     Preconditioned conjugate gradients (Hestenes & Stiefel 1952; Saad, *Iterative Methods for Sparse Linear Systems*,
@@ -59,6 +60,6 @@ def conjugate_gradients(
     return x
 
 
-def _products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _products(a: Floats, b: Floats) -> Floats:
     """(k,) inner products of columns; that of two vectors has no axis."""
     return np.asarray(np.vdot(a, b) if a.ndim == 1 else np.einsum("ij,ij->j", a, b))

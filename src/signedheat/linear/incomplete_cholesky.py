@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from threadpoolctl import threadpool_limits
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 from .conjugate_gradients import conjugate_gradients
 from .ordering import whole
@@ -25,14 +26,14 @@ MOST_ITERATIONS = 5000
 class IncompleteCholesky:
     """A symmetric positive definite matrix with its IC(0) factor, in a chosen order of unknowns."""
 
-    order: NDArray[np.int64]  # (k,) unknowns to solve for, in this order; the others stay zero
+    order: Ints  # (k,) unknowns to solve for, in this order; the others stay zero
     matrix: sparse.csr_matrix  # (k, k) rows and columns in that order
     factor: sparse.csr_matrix  # (k, k) strictly lower triangle of the factor
-    pivots: NDArray[np.float64]  # (k,) its inverse diagonal
+    pivots: Floats  # (k,) its inverse diagonal
     n: int  # number of unknowns, solved for or not
 
     @classmethod
-    def of(cls, matrix: sparse.csr_matrix, order: NDArray[np.int64]) -> IncompleteCholesky:
+    def of(cls, matrix: sparse.csr_matrix, order: Ints) -> IncompleteCholesky:
         """Factorise; if a pivot is not positive, again with a larger diagonal (Manteuffel 1980)."""
         chosen = sparse.csr_matrix(matrix[order][:, order])
         factor = sparse.csr_matrix(sparse.tril(chosen, -1))
@@ -45,7 +46,7 @@ class IncompleteCholesky:
             factor.data[:] = lower
             shift = max(1e-3, 2 * shift)
 
-    def solve(self, rhs: ArrayLike, relative: float = 1e-10, componentwise: float = 0.0) -> NDArray[np.float64]:
+    def solve(self, rhs: ArrayLike, relative: float = 1e-10, componentwise: float = 0.0) -> Floats:
         """Solve by conjugate gradients for one right-hand side (n,) or several (n, k), as one block-diagonal system.
 
         Conjugate gradients on all columns at once. They stop once ``‖r‖ ≤ relative · ‖b‖``, or once
@@ -61,20 +62,18 @@ class IncompleteCholesky:
             x[self.order] = self._iterate(load, relative, componentwise) * scale
         return x.reshape(b.shape)
 
-    def _iterate(self, load: NDArray[np.float64], relative: float, componentwise: float) -> NDArray[np.float64]:
+    def _iterate(self, load: Floats, relative: float, componentwise: float) -> Floats:
         shape, goal = load.shape, relative**2 * float(np.einsum("ij,ij->", load, load))
         diagonal, factor = self.matrix.diagonal(), self.factor
 
-        def multiply(p: NDArray[np.float64]) -> NDArray[np.float64]:
+        def multiply(p: Floats) -> Floats:
             return (self.matrix @ p.reshape(shape)).ravel()
 
-        def precondition(r: NDArray[np.float64]) -> NDArray[np.float64]:
-            solution: NDArray[np.float64] = _precondition(
-                factor.indptr, factor.indices, factor.data, self.pivots, r.reshape(shape)
-            )
+        def precondition(r: Floats) -> Floats:
+            solution: Floats = _precondition(factor.indptr, factor.indices, factor.data, self.pivots, r.reshape(shape))
             return solution.ravel()
 
-        def converged(x: NDArray[np.float64], r: NDArray[np.float64]) -> bool:
+        def converged(x: Floats, r: Floats) -> bool:
             small = np.einsum("i,i->", r, r) <= goal
             return bool(small or _settled(diagonal, x.reshape(shape), r.reshape(shape), componentwise))
 
@@ -85,7 +84,7 @@ class IncompleteCholesky:
         return solution.reshape(shape)
 
 
-def outward_order(matrix: sparse.csr_matrix, seeds: NDArray[np.int64]) -> NDArray[np.int64]:
+def outward_order(matrix: sparse.csr_matrix, seeds: Ints) -> Ints:
     """The unknowns that are connected to the seeds in the graph of the matrix, in order of distance from them."""
     n = matrix.shape[0]
     links = sparse.csr_matrix((np.ones(len(seeds)), (np.full(len(seeds), n), seeds)), shape=(n + 1, n + 1))
@@ -103,9 +102,7 @@ def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
 
 
 @compiled
-def _factorize(
-    indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: NDArray[np.float64], pivots: NDArray[np.float64]
-) -> bool:
+def _factorize(indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Floats, pivots: Floats) -> bool:
     """IC(0) in place; `pivots` becomes the inverse diagonal. Returns False if a pivot is not clearly positive."""
     for i in range(len(pivots)):
         own = pivots[i]
@@ -134,12 +131,8 @@ def _factorize(
 
 @compiled
 def _precondition(
-    indptr: NDArray[np.int32],
-    indices: NDArray[np.int32],
-    factor: NDArray[np.float64],
-    pivots: NDArray[np.float64],
-    r: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Floats, pivots: Floats, r: Floats
+) -> Floats:
     """z = (L Lᵀ)⁻¹ r, row by row down and up."""
     n, width = r.shape
     z = np.empty((n, width))
@@ -161,9 +154,7 @@ def _precondition(
 
 
 @compiled
-def _settled(
-    diagonal: NDArray[np.float64], x: NDArray[np.float64], r: NDArray[np.float64], componentwise: float
-) -> bool:
+def _settled(diagonal: Floats, x: Floats, r: Floats, componentwise: float) -> bool:
     """Whether every row's residual is small compared with its own unknowns."""
     n, width = x.shape
     for i in range(n):

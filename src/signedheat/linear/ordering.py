@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Ints
 from ..compiled import compiled
 
 _LEAF = 3  # regions of so many unknowns are not dissected further
 
 
-def elimination_order(upper: Any) -> NDArray[np.int64]:
+def elimination_order(upper: Any) -> Ints:
     """Nested dissection of a sparse symmetric matrix, from its upper triangle: ``order[k]`` is eliminated k-th.
 
     On surfaces the fill is that of METIS on even meshes, up to twice as much on very uneven ones, in a fifth of the
@@ -32,7 +33,7 @@ def elimination_order(upper: Any) -> NDArray[np.int64]:
 
 
 @compiled
-def dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32], leaf: int) -> NDArray[np.int64]:
+def dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32], leaf: int) -> Ints:
     """Elimination order: both sides of a small separator, each ordered in the same way, then the separator.
 
     A separator is the smallest level near the middle of a breadth-first search from the end of a long path, without the
@@ -120,11 +121,11 @@ def dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32], leaf: int) 
 def _levels(
     starts: NDArray[np.int32],
     neighbors: NDArray[np.int32],
-    region: NDArray[np.int64],
+    region: Ints,
     here: int,
     seed: int,
-    level: NDArray[np.int64],
-    queue: NDArray[np.int64],
+    level: Ints,
+    queue: Ints,
     begin: int,
 ) -> int:
     """Breadth-first search within a region, into the queue from `begin` on; returns the end of the queue."""
@@ -144,7 +145,7 @@ def _levels(
 
 
 @compiled
-def _thinnest(level: NDArray[np.int64], queue: NDArray[np.int64], reached: int, last: int) -> int:
+def _thinnest(level: Ints, queue: Ints, reached: int, last: int) -> int:
     """The smallest level that leaves at least 40 % of the unknowns on either side, or the median level."""
     best, size, median = -1, reached, level[queue[reached // 2]]
     p = 0

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Bools, Floats
+
 FAINT = 2.0**-900
 """Rows below this fraction of the largest are computed anew: what underflows on the way to them may be missing."""
 Solve = Callable[[NDArray[Any]], NDArray[Any]]
 """From right-hand sides (n, k) or (n,), the solutions."""
-Forces = Callable[[NDArray[Any], NDArray[np.bool_]], tuple[NDArray[np.bool_], NDArray[Any]]]
+Forces = Callable[[NDArray[Any], Bools], tuple[Bools, NDArray[Any]]]
 """From x, zero but on the faint rows, and these: (n,) rows that couple faint ones to others, and A x there."""
 
 
@@ -80,14 +82,14 @@ def matrix_forces(matrix: sparse.csr_matrix) -> Forces:
     """The forces at the border of faint rows, from the whole matrix A."""
     pattern = sparse.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
 
-    def border_forces(values: NDArray[Any], faint: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[Any]]:
+    def border_forces(values: NDArray[Any], faint: Bools) -> tuple[Bools, NDArray[Any]]:
         around = pattern @ faint
         return (around > 0) & (around < np.diff(matrix.indptr)), matrix @ values
 
     return border_forces
 
 
-def largest_components(values: NDArray[Any]) -> NDArray[np.float64]:
+def largest_components(values: NDArray[Any]) -> Floats:
     """(n,) largest real or imaginary part in each row: squares would underflow."""
     parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
     sizes = np.zeros(len(values))
@@ -97,6 +99,6 @@ def largest_components(values: NDArray[Any]) -> NDArray[np.float64]:
     return sizes
 
 
-def _rows(chosen: NDArray[np.bool_], values: NDArray[Any]) -> NDArray[np.bool_]:
+def _rows(chosen: Bools, values: NDArray[Any]) -> Bools:
     """The same choice for every column."""
     return chosen.reshape(-1, *[1] * (values.ndim - 1))

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from .box_tree import BoxTree
 from .components import grouped, members_of, sums_of
@@ -36,20 +36,20 @@ ON_EDGE, IN_FACE, EDGES, EDGE_AND_FACE = range(4)
 class Arrangement(NamedTuple):
     """Pieces of faces that meet in whole edges."""
 
-    points: NDArray[np.float64]  # (n, 3) those that were given, and where faces meet
-    faces: NDArray[np.int64]  # (p, 3) pieces, in order of the faces
-    origins: NDArray[np.int64]  # (p,) face that each is a piece of, ascending
-    cells: NDArray[np.int64]  # (p,) pieces of a face that hang together without a line between them have the same
+    points: Floats  # (n, 3) those that were given, and where faces meet
+    faces: Ints  # (p, 3) pieces, in order of the faces
+    origins: Ints  # (p,) face that each is a piece of, ascending
+    cells: Ints  # (p,) pieces of a face that hang together without a line between them have the same
 
 
 class Incidence(NamedTuple):
     """Points that lie on lines or faces: numbers of both, each pair once, in order."""
 
-    owners: NDArray[np.int64]
-    points: NDArray[np.int64]
+    owners: Ints
+    points: Ints
 
     @classmethod
-    def of(cls, *pairs: tuple[NDArray[np.int64], NDArray[np.int64]]) -> Incidence:
+    def of(cls, *pairs: tuple[Ints, Ints]) -> Incidence:
         """The pairs of several lists."""
         owners, points = (np.concatenate(column).astype(np.int64) for column in zip(*pairs, strict=True))
         order = np.lexsort((points, owners))
@@ -57,20 +57,20 @@ class Incidence(NamedTuple):
         new = np.append(True, (owners[1:] != owners[:-1]) | (points[1:] != points[:-1]))[: len(owners)]
         return cls(owners[new], points[new])
 
-    def starts(self, n: int) -> NDArray[np.int64]:
+    def starts(self, n: int) -> Ints:
         """(n + 1,) where the points of each of n owners begin."""
         return np.searchsorted(self.owners, np.arange(n + 1))
 
-    def without(self, *others: tuple[NDArray[np.int64], NDArray[np.int64]]) -> Incidence:
+    def without(self, *others: tuple[Ints, Ints]) -> Incidence:
         """The pairs that are in none of several lists."""
         owners, points = (np.concatenate(column) for column in zip(*others, strict=True))
         return self.select(~_are_among((self.owners, self.points), (owners, points)))
 
-    def select(self, chosen: NDArray[np.bool_]) -> Incidence:
+    def select(self, chosen: Bools) -> Incidence:
         """Some of the pairs."""
         return Incidence(self.owners[chosen], self.points[chosen])
 
-    def along(self, points: NDArray[np.float64], ends: NDArray[np.int64]) -> Incidence:
+    def along(self, points: Floats, ends: Ints) -> Incidence:
         """The points of lines in order from the first end of each to the other."""
         tails, heads = points[ends[self.owners, 0]], points[ends[self.owners, 1]]
         ahead = ((points[self.points] - tails) * (heads - tails)).sum(axis=1)
@@ -78,15 +78,13 @@ class Incidence(NamedTuple):
         return Incidence(self.owners, self.points[order])
 
 
-def meeting_faces(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def meeting_faces(points: Floats, faces: Ints) -> Ints:
     """(k, 2) pairs of faces that cross, cover each other in one plane, or touch without a vertex in common."""
     slack = TOUCHING * float(np.ptp(points, axis=0).max())
     return overlapping_faces(points, faces, slack, -slack)
 
 
-def arranged(
-    points: NDArray[np.float64], faces: NDArray[np.int64], pairs: NDArray[np.int64] | None = None
-) -> Arrangement:
+def arranged(points: Floats, faces: Ints, pairs: Ints | None = None) -> Arrangement:
     """Divide faces where pairs of them, (k, 2), meet, and where edges that do not cancel end on others.
 
     Points nearer than rounding are one, those that are this near to edges and faces lie on them, and triangles that are
@@ -130,12 +128,12 @@ def arranged(
 class Lines(NamedTuple):
     """Edges, and after them segments along which two faces meet."""
 
-    ends: NDArray[np.int64]  # (l, 2) points at which each line begins and ends
+    ends: Ints  # (l, 2) points at which each line begins and ends
     on: Incidence  # points on lines, but for their ends
     within: Incidence  # points in faces, beside those on their edges
-    sides: NDArray[np.int64] = np.zeros((0, 2), dtype=np.int64)  # (s, 2) the two faces of each segment
+    sides: Ints = np.zeros((0, 2), dtype=np.int64)  # (s, 2) the two faces of each segment
 
-    def renamed(self, rename: NDArray[np.int64]) -> Lines:
+    def renamed(self, rename: Ints) -> Lines:
         """With points that have become one."""
         ends = rename[self.ends]
         on = Incidence.of((self.on.owners, rename[self.on.points]))
@@ -143,13 +141,13 @@ class Lines(NamedTuple):
         return self._replace(ends=ends, on=on, within=Incidence.of((self.within.owners, rename[self.within.points])))
 
 
-def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _heights(corners: Floats) -> Floats:
     """(m,) of triangles above their longest sides."""
     sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
     return 2.0 * face_areas(corners) / np.maximum(sides, 1e-300)
 
 
-def _welded(points: NDArray[np.float64], chosen: NDArray[np.int64], slack: float) -> NDArray[np.int64]:
+def _welded(points: Floats, chosen: Ints, slack: float) -> Ints:
     """(n,) the first of the chosen points that each of them is one with; all others stay."""
     rename = np.arange(len(points))
     chosen = np.unique(chosen)
@@ -157,13 +155,7 @@ def _welded(points: NDArray[np.float64], chosen: NDArray[np.int64], slack: float
     return rename
 
 
-def _with_new(
-    points: NDArray[np.float64],
-    names: NDArray[np.int64],
-    places: NDArray[np.float64],
-    new: NDArray[np.bool_],
-    ids: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _with_new(points: Floats, names: Ints, places: Floats, new: Bools, ids: Ints) -> tuple[Floats, Ints]:
     """Points, with one for each different name that is new, and the number of the point of each name."""
     numbers, first = distinct_rows(names[new])
     ids = ids.copy()
@@ -171,24 +163,20 @@ def _with_new(
     return np.concatenate([points, places[new][first]]), ids
 
 
-def _are_among(
-    pairs: tuple[NDArray[np.int64], NDArray[np.int64]], others: tuple[NDArray[np.int64], NDArray[np.int64]]
-) -> NDArray[np.bool_]:
+def _are_among(pairs: tuple[Ints, Ints], others: tuple[Ints, Ints]) -> Bools:
     """(n,) whether pairs of numbers are among others."""
     shift = 1 + max(int(pairs[1].max(initial=0)), int(others[1].max(initial=0)))
     return np.isin(pairs[0] * shift + pairs[1], others[0] * shift + others[1])
 
 
-def _listed(starts: NDArray[np.int64], rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _listed(starts: Ints, rows: Ints) -> tuple[Ints, Ints]:
     """For lists that begin somewhere: which of the rows each member is of, and its place."""
     counts = starts[rows + 1] - starts[rows]
     owners = np.repeat(np.arange(len(rows)), counts)
     return owners, np.arange(len(owners)) + np.repeat(starts[rows] - np.cumsum(counts) + counts, counts)
 
 
-def _on_open_edges(
-    points: NDArray[np.float64], table: EdgeTable, slack: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _on_open_edges(points: Floats, table: EdgeTable, slack: float) -> tuple[Ints, Ints]:
     """Edges that do not cancel, and ends of others that lie on them."""
     edges = np.flatnonzero(table.balance != 0)
     if not len(edges):
@@ -206,7 +194,7 @@ def _on_open_edges(
     return edges[near[on]], vertex[on]
 
 
-def _members(faces: NDArray[np.int64], table: EdgeTable, lines: Lines, chosen: NDArray[np.int64]) -> Incidence:
+def _members(faces: Ints, table: EdgeTable, lines: Lines, chosen: Ints) -> Incidence:
     """All points of chosen faces: corners, those on edges and those within."""
     starts = lines.on.starts(len(lines.ends))
     owners, places = _listed(starts, table.face_edges[chosen].ravel())
@@ -218,19 +206,14 @@ def _members(faces: NDArray[np.int64], table: EdgeTable, lines: Lines, chosen: N
 class Records(NamedTuple):
     """Parts of lines that lie in faces: the face, the line, and the points between which it does, (r,) each."""
 
-    faces: NDArray[np.int64]
-    lines: NDArray[np.int64]
-    tails: NDArray[np.int64]
-    heads: NDArray[np.int64]
+    faces: Ints
+    lines: Ints
+    tails: Ints
+    heads: Ints
 
 
 def _with_segments(
-    points: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    table: EdgeTable,
-    pairs: NDArray[np.int64],
-    lines: Lines,
-    slack: float,
+    points: Floats, faces: Ints, table: EdgeTable, pairs: Ints, lines: Lines, slack: float
 ) -> tuple[Lines, Records]:
     """Add the segments along which pairs of faces meet, from the points that they have in common."""
     members = _members(faces, table, lines, np.unique(pairs))
@@ -252,12 +235,8 @@ def _with_segments(
 
 
 def _with_crossings(
-    points: NDArray[np.float64],
-    lines: Lines,
-    records: Records,
-    slack: float,
-    busy: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], Lines, Records]:
+    points: Floats, lines: Lines, records: Records, slack: float, busy: Ints
+) -> tuple[Floats, Lines, Records]:
     """Add the points where lines meet within faces."""
     if not len(records.faces):
         return points, lines, records
@@ -282,12 +261,7 @@ def _with_crossings(
 
 
 def _divided(
-    points: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    origins: NDArray[np.int64],
-    table: EdgeTable,
-    lines: Lines,
-    records: Records,
+    points: Floats, faces: Ints, origins: Ints, table: EdgeTable, lines: Lines, records: Records
 ) -> Arrangement:
     """Triangulate all faces that have points on edges or lines within."""
     n_lines = len(lines.ends)
@@ -313,7 +287,7 @@ def _divided(
     place = np.arange(len(row)) - np.repeat(np.cumsum(high - low) - (high - low), high - low) + low[row]
     face, one, two = records.faces[row], whole[place], whole[place + 1]
 
-    busy: NDArray[np.bool_] = np.asarray(counts[table.face_edges].any(axis=1))
+    busy: Bools = np.asarray(counts[table.face_edges].any(axis=1))
     busy[face] = True
     busy[lines.within.owners] = True
     chosen = np.flatnonzero(busy)
@@ -411,7 +385,7 @@ def _with_copies_alike(pieces: Arrangement) -> Arrangement:
 
 
 @compiled
-def _is_on(points: NDArray[np.float64], v: int, a: int, b: int, slack: float) -> bool:
+def _is_on(points: Floats, v: int, a: int, b: int, slack: float) -> bool:
     """Whether a point lies on an edge, between its ends."""
     square, ahead = 0.0, 0.0
     for d in range(3):
@@ -427,7 +401,7 @@ def _is_on(points: NDArray[np.float64], v: int, a: int, b: int, slack: float) ->
 
 
 @compiled
-def _closest(points: NDArray[np.float64], a: int, b: int, c: int, d: int, place: NDArray[np.float64]) -> float:
+def _closest(points: Floats, a: int, b: int, c: int, d: int, place: Floats) -> float:
     """Distance between two edges where they pass each other, and the place there; infinity if they do not."""
     u, v, w = points[b] - points[a], points[d] - points[c], points[c] - points[a]
     n, square, s, t = np.empty(3), 0.0, 0.0, 0.0
@@ -452,7 +426,7 @@ def _closest(points: NDArray[np.float64], a: int, b: int, c: int, d: int, place:
 
 
 @compiled
-def _normal(points: NDArray[np.float64], face: NDArray[np.int64]) -> NDArray[np.float64]:
+def _normal(points: Floats, face: Ints) -> Floats:
     u, v = points[face[1]] - points[face[0]], points[face[2]] - points[face[0]]
     n = np.empty(3)
     n[0], n[1], n[2] = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
@@ -460,9 +434,7 @@ def _normal(points: NDArray[np.float64], face: NDArray[np.int64]) -> NDArray[np.
 
 
 @compiled
-def _is_over(
-    points: NDArray[np.float64], x: NDArray[np.float64], face: NDArray[np.int64], n: NDArray[np.float64]
-) -> bool:
+def _is_over(points: Floats, x: Floats, face: Ints, n: Floats) -> bool:
     """Whether a place lies over a face, within its edges."""
     for k in range(3):
         a, b = face[k], face[(k + 1) % 3]
@@ -480,13 +452,8 @@ def _is_over(
 
 @compiled
 def _meet(
-    points: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    edges: NDArray[np.int64],
-    face_edges: NDArray[np.int64],
-    pairs: NDArray[np.int64],
-    slack: float,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Ints, slack: float
+) -> tuple[Ints, Ints, Ints, Floats]:
     """What pairs of faces have in common: of which kind, the two that meet, and where if that is a new point."""
     size = 4 * len(pairs) + 64
     events, places, count = np.empty((size, 3), np.int64), np.zeros((size, 3)), 0
@@ -562,15 +529,7 @@ def _meet(
 
 
 @compiled
-def _shared_edge(
-    face_edges: NDArray[np.int64],
-    ends: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    on: NDArray[np.int64],
-    f: int,
-    a: int,
-    b: int,
-) -> int:
+def _shared_edge(face_edges: Ints, ends: Ints, starts: Ints, on: Ints, f: int, a: int, b: int) -> int:
     """The edge of a face that two points lie on, or −1."""
     for k in range(3):
         e = face_edges[f, k]
@@ -590,7 +549,7 @@ def _shared_edge(
 
 
 @compiled
-def _within(sorted_points: NDArray[np.int64], begin: int, end: int, p: int) -> bool:
+def _within(sorted_points: Ints, begin: int, end: int, p: int) -> bool:
     """Whether a number is in a part of a list that is in order."""
     stop = end
     while begin < end:
@@ -604,16 +563,16 @@ def _within(sorted_points: NDArray[np.int64], begin: int, end: int, p: int) -> b
 
 @compiled
 def _segments(
-    points: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    members: NDArray[np.int64],
-    face_edges: NDArray[np.int64],
-    ends: NDArray[np.int64],
-    line_starts: NDArray[np.int64],
-    on: NDArray[np.int64],
-    pairs: NDArray[np.int64],
+    points: Floats,
+    starts: Ints,
+    members: Ints,
+    face_edges: Ints,
+    ends: Ints,
+    line_starts: Ints,
+    on: Ints,
+    pairs: Ints,
     straight: float,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[Ints, Ints]:
     """Parts of lines in faces, as rows of face, line and ends; and the faces of new lines."""
     records, sides = [(0, 0, 0, 0)], [(0, 0)]
     n_lines = len(ends)
@@ -689,14 +648,8 @@ def _segments(
 
 @compiled
 def _cross(
-    points: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    lines: NDArray[np.int64],
-    ends: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    near: NDArray[np.int64],
-    slack: float,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    points: Floats, faces: Ints, lines: Ints, ends: Ints, starts: Ints, near: Ints, slack: float
+) -> tuple[Ints, Ints, Floats]:
     """Lines and points that lie on them; and pairs of parts of lines that cross within a face, and where."""
     touching, crossing, places = [(0, 0)], [(0, 0)], [(0.0, 0.0, 0.0)]
     place = np.empty(3)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 
 LEAF = 4
@@ -46,14 +47,14 @@ class BoxTree:
         What the boxes are of, if that is triangles.
     """
 
-    bounds: NDArray[np.float64]
-    items: NDArray[np.int64]
-    groups: NDArray[np.int64]
-    slabs: NDArray[np.float64]
-    triangles: NDArray[np.float64]
+    bounds: Floats
+    items: Ints
+    groups: Ints
+    slabs: Floats
+    triangles: Floats
 
     @classmethod
-    def of(cls, lower: NDArray[np.float64], upper: NDArray[np.float64]) -> BoxTree:
+    def of(cls, lower: Floats, upper: Floats) -> BoxTree:
         """Build the tree over boxes given by (n, 3) lower and (n, 3) upper corners, in O(n log n) time.
 
         Examples
@@ -65,13 +66,7 @@ class BoxTree:
         return cls.in_order(lower, upper, np.argsort(morton_codes((lower + upper) / 2), kind="stable"))
 
     @classmethod
-    def in_order(
-        cls,
-        lower: NDArray[np.float64],
-        upper: NDArray[np.float64],
-        order: NDArray[np.int64],
-        groups: NDArray[np.int64] | None = None,
-    ) -> BoxTree:
+    def in_order(cls, lower: Floats, upper: Floats, order: Ints, groups: Ints | None = None) -> BoxTree:
         """The same, with boxes in a given order, in which those near each other in space should be near each other.
 
         Those of a group, named by (n,) numbers from 0, should follow each other; −1 is in none.
@@ -101,20 +96,13 @@ class BoxTree:
         return cls(bounds, items, common, _unbounded(leaves), np.empty((0, 9)))
 
     @classmethod
-    def over(
-        cls, triangles: NDArray[np.float64], order: NDArray[np.int64], groups: NDArray[np.int64] | None = None
-    ) -> BoxTree:
+    def over(cls, triangles: Floats, order: Ints, groups: Ints | None = None) -> BoxTree:
         """Build the tree over (n, 3, 3) triangles, bounded by slabs as well."""
         tree = cls.in_order(triangles.min(axis=1), triangles.max(axis=1), order, groups)
         corners = np.ascontiguousarray(triangles).reshape(-1, 9)
         return replace(tree, slabs=_slabs(triangles, tree.items), triangles=corners)
 
-    def meeting(
-        self,
-        triangles: NDArray[np.float64],
-        slack: float | NDArray[np.float64] = 0.0,
-        groups: NDArray[np.int64] | None = None,
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def meeting(self, triangles: Floats, slack: float | Floats = 0.0, groups: Ints | None = None) -> tuple[Ints, Ints]:
         """Where what is near each of (n, 3, 3) triangles begins, and what it is: all in leaves that they may meet.
 
         A triangle may meet a node if its box, its plane and the prism over it do, to a slack along each axis, and not
@@ -142,16 +130,16 @@ class BoxTree:
 
 @compiled
 def _meeting(
-    bounds: NDArray[np.float64],
-    items: NDArray[np.int64],
-    groups: NDArray[np.int64],
-    slabs: NDArray[np.float64],
-    triangles: NDArray[np.float64],
-    corners: NDArray[np.float64],
-    slacks: NDArray[np.float64],
-    own: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    out: NDArray[np.int64],
+    bounds: Floats,
+    items: Ints,
+    groups: Ints,
+    slabs: Floats,
+    triangles: Floats,
+    corners: Floats,
+    slacks: Floats,
+    own: Ints,
+    starts: Ints,
+    out: Ints,
 ) -> None:
     """Write what is near each triangle, as far as there is room, and where it begins."""
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
@@ -225,13 +213,7 @@ def _meeting(
 
 
 @compiled
-def _is_beyond(
-    triangle: NDArray[np.float64],
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-    ways: NDArray[np.float64],
-    ends: NDArray[np.float64],
-) -> bool:
+def _is_beyond(triangle: Floats, lower: Floats, upper: Floats, ways: Floats, ends: Floats) -> bool:
     """Whether a triangle lies off a box, or beyond what is between two ends along any of some ways."""
     for d in range(3):
         a, b, c = triangle[d], triangle[3 + d], triangle[6 + d]
@@ -248,7 +230,7 @@ def _is_beyond(
 
 
 @np.errstate(all="ignore")
-def _slabs(triangles: NDArray[np.float64], items: NDArray[np.int64]) -> NDArray[np.float64]:
+def _slabs(triangles: Floats, items: Ints) -> Floats:
     """(2 · leaves, 10) what bounds (n, 3, 3) triangles in the lowest nodes of a tree; see `BoxTree.slabs`."""
     first, n = len(items) // LEAF, len(triangles)
     slabs = _unbounded(first)
@@ -272,12 +254,12 @@ def _slabs(triangles: NDArray[np.float64], items: NDArray[np.int64]) -> NDArray[
     return slabs
 
 
-def _unbounded(leaves: int) -> NDArray[np.float64]:
+def _unbounded(leaves: int) -> Floats:
     """(2 · leaves, 10) slabs that bound nothing."""
     return np.tile([0.0, 0.0, 0.0, -np.inf, np.inf], (2 * leaves, 2))
 
 
-def order_in_space(points: NDArray[np.float64]) -> NDArray[np.int64]:
+def order_in_space(points: Floats) -> Ints:
     """(n,) numbers of (n, 3) points along a space-filling curve; few points stay as they are."""
     if len(points) < FEW:
         return np.arange(len(points))
@@ -285,7 +267,7 @@ def order_in_space(points: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 @np.errstate(all="ignore")
-def morton_codes(points: NDArray[np.float64]) -> NDArray[np.uint64]:
+def morton_codes(points: Floats) -> NDArray[np.uint64]:
     """(n,) Morton codes of (n, 3) points: their positions along a space-filling curve, with 21 bits per axis."""
     lower = points.min(axis=0)
     extent = max(float((points.max(axis=0) - lower).max()), 1e-290)

@@ -5,16 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..frozen import read_only
 
 
-def connected_components(n: int, one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[np.int64]:
+def connected_components(n: int, one: NDArray[np.integer], other: NDArray[np.integer]) -> Ints:
     """(n,) component of each node of a graph with edges from `one` to `other`, numbered by first appearance."""
     return _labels(n, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (one, other)))
 
 
-def element_components(elements: NDArray[np.int64]) -> NDArray[np.int64]:
+def element_components(elements: Ints) -> Ints:
     """(m,) connected component of each element, numbered by first appearance: those that share a vertex are connected.
 
     The (m, k) elements may name their edges or faces instead of vertices.
@@ -24,7 +25,7 @@ def element_components(elements: NDArray[np.int64]) -> NDArray[np.int64]:
     return by_first_use(labels, int(labels.max()) + 1)[0]
 
 
-def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
     """New numbers for ids below n, in order of first appearance; and the old id of each number."""
     first = np.full(n, -1)
     first[ids[::-1]] = np.arange(len(ids))[::-1]
@@ -36,7 +37,7 @@ def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[NDArray[np.int64], N
 
 
 @compiled
-def _labels(n: int, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
+def _labels(n: int, one: Ints, other: Ints) -> Ints:
     """The root of a tree is its least node; paths are halved on the way to it."""
     parents = np.arange(n)
     for k in range(len(one)):
@@ -58,22 +59,20 @@ def _labels(n: int, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray
     return -1 - parents
 
 
-def grouped(groups: NDArray[np.integer], n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def grouped(groups: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
     """(n + 1,) where the members of each of n groups begin, and the members in order: each is in one of `groups`."""
     starts, members = _grouped(read_only(np.ascontiguousarray(groups, dtype=np.int64)), n)
     return starts, members
 
 
-def members_of(
-    starts: NDArray[np.int64], members: NDArray[np.int64], chosen: NDArray[np.integer]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def members_of(starts: Ints, members: Ints, chosen: NDArray[np.integer]) -> tuple[Ints, Ints]:
     """All members of some groups, as pairs: index into `chosen`, and member."""
     begin, count = starts[chosen], starts[chosen + 1] - starts[chosen]
     which = np.repeat(np.arange(len(chosen)), count)
     return which, members[np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(which))]
 
 
-def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -> NDArray[np.float64]:
+def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -> Floats:
     """(n, ...) sums of the rows of (k, ...) values in each of n groups."""
     columns = values.reshape(len(values), int(np.prod(values.shape[1:]))).T
     sums = np.stack([np.bincount(groups, column, n) for column in columns], axis=1)
@@ -81,7 +80,7 @@ def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -
 
 
 @compiled
-def _grouped(groups: NDArray[np.int64], n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _grouped(groups: Ints, n: int) -> tuple[Ints, Ints]:
     starts = np.zeros(n + 1, dtype=np.int64)
     for group in groups:
         starts[group + 1] += 1

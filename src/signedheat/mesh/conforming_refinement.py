@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order
 
+from ..arrays import Bools, Complexes, Floats, Ints
 from ..errors import SourceError
 from .constrained_triangulation import Triangulation, edges_of
 from .curve_segments import CurveSegments, MergedSources
@@ -44,8 +45,8 @@ def cut_along(
     triangles: IntrinsicMesh,
     parts: Sequence[CurveSegments],
     unfit: Sequence[bool] | None = None,
-    begin: NDArray[np.int64] | None = None,
-) -> tuple[IntrinsicMesh, MergedSources, NDArray[np.bool_], NDArray[np.int64]]:
+    begin: Ints | None = None,
+) -> tuple[IntrinsicMesh, MergedSources, Bools, Ints]:
     """Cut faces so that sources run along edges: triangles, sources on them, which faces are new, and their parents.
 
     Only sources that are `unfit` must run along edges, by default all. Others are cut only in faces, and at edges, that
@@ -59,9 +60,7 @@ def cut_along(
     return FaceCutter(triangles, merged, faces, edges, begin).assemble()
 
 
-def affected_elements(
-    triangles: IntrinsicMesh, merged: MergedSources, unfit: Sequence[bool]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Sequence[bool]) -> tuple[Ints, Ints]:
     """Faces to cut and edges to split: those of nonconforming sources, and those that these entail in turn.
 
     Where a face is cut, the edges on which a segment in it ends are split; where an edge is split, its faces are cut.
@@ -90,14 +89,7 @@ def affected_elements(
 class FaceCutter:
     """An intrinsic mesh while some of its faces are being cut."""
 
-    def __init__(
-        self,
-        triangles: IntrinsicMesh,
-        merged: MergedSources,
-        faces: NDArray[np.int64],
-        edges: NDArray[np.int64],
-        begin: NDArray[np.int64],
-    ) -> None:
+    def __init__(self, triangles: IntrinsicMesh, merged: MergedSources, faces: Ints, edges: Ints, begin: Ints) -> None:
         self.triangles, self.merged, self.begin = triangles, merged, begin
         self.n_vertices, self.n_edges = triangles.n_vertices, triangles.n_edges
         self.faces: list[NewFace] = []
@@ -233,7 +225,7 @@ class FaceCutter:
                     NewSegment(*ends_here, -1, edge, np.conj(vector) if over else vector, merged.owners[p])
                 )
 
-    def assemble(self) -> tuple[IntrinsicMesh, MergedSources, NDArray[np.bool_], NDArray[np.int64]]:
+    def assemble(self) -> tuple[IntrinsicMesh, MergedSources, Bools, Ints]:
         """What `cut_along` returns."""
         triangles, merged = self.triangles, self.merged
         kept = np.setdiff1d(np.arange(triangles.n_faces), self.cut_faces)
@@ -287,7 +279,7 @@ class NewFace(NamedTuple):
     corners: list[int]
     edges: list[int]
     ahead: list[bool]
-    positions: NDArray[np.complex128]
+    positions: Complexes
 
 
 class NewSegment(NamedTuple):
@@ -302,11 +294,7 @@ class NewSegment(NamedTuple):
 
 
 def points_on_elements(
-    triangles: IntrinsicMesh,
-    kinds: NDArray[np.int64],
-    elements: NDArray[np.int64],
-    along: NDArray[np.float64],
-    barycentric: NDArray[np.float64],
+    triangles: IntrinsicMesh, kinds: Ints, elements: Ints, along: Floats, barycentric: Floats
 ) -> LocatedPoints:
     """Points given by their elements: by the fraction `along` an edge, or by `barycentric` coordinates in a face."""
     faces, weights = elements.copy(), barycentric.copy()
@@ -319,7 +307,7 @@ def points_on_elements(
 
 
 def flip_new_faces(
-    triangles: IntrinsicMesh, merged: MergedSources, is_new: NDArray[np.bool_]
+    triangles: IntrinsicMesh, merged: MergedSources, is_new: Bools
 ) -> tuple[IntrinsicMesh, MergedSources]:
     """Flip edges of new faces to Delaunay, except those that a segment uses and those of faces with one inside.
 

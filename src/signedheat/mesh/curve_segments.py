@@ -8,9 +8,9 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from ..arrays import Bools, Complexes, Floats, Ints
 from ..errors import SourceError
 from .components import connected_components
 from .face_pairs import face_pairs
@@ -39,11 +39,11 @@ class CurveSegments:
     """One source as straight segments, each of which lies in one face or along one edge."""
 
     nodes: LocatedPoints  # (s,) distinct points of the source, in order of first appearance
-    ends: NDArray[np.int64]  # (k, 2) the nodes that each segment joins; no segments for isolated points
-    faces: NDArray[np.int64]  # (k,) a face that contains the segment
-    edges: NDArray[np.int64]  # (k,) the edge that the segment runs along, or −1 for a segment inside its face
+    ends: Ints  # (k, 2) the nodes that each segment joins; no segments for isolated points
+    faces: Ints  # (k,) a face that contains the segment
+    edges: Ints  # (k,) the edge that the segment runs along, or −1 for a segment inside its face
     # (k,) normal times length: the direction in which φ grows, in the layout of the face, or in the frame of the edge
-    vectors: NDArray[np.complex128]
+    vectors: Complexes
     oriented: bool  # whether the curve has a positive and a negative side
 
     @classmethod
@@ -53,7 +53,7 @@ class CurveSegments:
         return cls(nodes, np.empty((0, 2), dtype=np.int64), none, none, np.empty(0, dtype=np.complex128), False)
 
     @cached_property
-    def lengths(self) -> NDArray[np.float64]:
+    def lengths(self) -> Floats:
         """(k,) length of each segment."""
         return np.abs(self.vectors)
 
@@ -68,12 +68,12 @@ class MergedSources:
     """The segments of several sources in one list, with points that coincide counted once."""
 
     nodes: LocatedPoints
-    ends: NDArray[np.int64]
-    faces: NDArray[np.int64]
-    edges: NDArray[np.int64]
-    vectors: NDArray[np.complex128]
-    owners: NDArray[np.int64]
-    samples: list[NDArray[np.int64]]
+    ends: Ints
+    faces: Ints
+    edges: Ints
+    vectors: Complexes
+    owners: Ints
+    samples: list[Ints]
 
     @classmethod
     def of(cls, parts: Sequence[CurveSegments]) -> MergedSources:
@@ -98,7 +98,7 @@ class MergedSources:
         each = zip(pairwise(bounds), self.samples, oriented, strict=True)
         return [self._part(order[begin:end], old, has_sides) for (begin, end), old, has_sides in each]
 
-    def _part(self, mine: NDArray[np.int64], old: NDArray[np.int64], oriented: bool) -> CurveSegments:
+    def _part(self, mine: Ints, old: Ints, oriented: bool) -> CurveSegments:
         """The source that has some of the pieces; its old nodes come first."""
         nodes = np.concatenate([old, np.setdiff1d(self.ends[mine], old)]).astype(np.int64)
         distinct, first = np.unique(nodes, return_index=True)
@@ -106,9 +106,7 @@ class MergedSources:
         return CurveSegments(self.nodes[nodes], ends, self.faces[mine], self.edges[mine], self.vectors[mine], oriented)
 
 
-def without_copies(
-    parts: Sequence[CurveSegments], by_points: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def without_copies(parts: Sequence[CurveSegments], by_points: Bools) -> tuple[Ints, Ints]:
     """The first of all curves with the same segments, and which of these each curve is; not of those with normals.
 
     Shapes: `by_points` (k,); returned: first (u,), which (k,).
@@ -124,9 +122,7 @@ def without_copies(
     return found, np.searchsorted(found, [first[key] for key in keys])
 
 
-def joined_end_to_end(
-    parts: Sequence[CurveSegments], may_go_on: NDArray[np.bool_]
-) -> tuple[list[CurveSegments], NDArray[np.int64]]:
+def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple[list[CurveSegments], Ints]:
     """Lines in which one curve goes on in the next where they touch, and no third one ends there.
 
     A curve that runs back along the one before it is a copy of that, and does not continue it.
@@ -194,7 +190,7 @@ def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegmen
     return fewer.parts([part.oriented for part in parts])
 
 
-def _nodes_between(merged: MergedSources) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
     """Where one segment goes on in another, in a face or along an edge in the same direction: the node, and these two.
 
     A node is there once for each source that goes on there.
@@ -219,9 +215,7 @@ def _nodes_between(merged: MergedSources) -> tuple[NDArray[np.int64], NDArray[np
     return places[at] % max(len(merged.nodes), 1), before, after
 
 
-def _runs(
-    k: int, before: NDArray[np.int64], after: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def _runs(k: int, before: Ints, after: Ints) -> tuple[Ints, Ints, Ints]:
     """The run of each of k segments, in order of their first ones; the first and the last segment of each run."""
     is_first, is_last = np.ones(k, dtype=bool), np.ones(k, dtype=bool)
     is_first[after] = False
@@ -236,13 +230,8 @@ def _runs(
 
 
 def given_directions(
-    triangles: IntrinsicMesh,
-    positions: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    edges: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    name: str,
-) -> NDArray[np.complex128]:
+    triangles: IntrinsicMesh, positions: Floats, faces: Ints, edges: Ints, normals: Floats, name: str
+) -> Complexes:
     """(k,) unit vectors along given normals: in the layout of the face, or in the frame of the edge.
 
     On an edge the normal is projected into the plane of each of the edge's faces; the mean of these projections,
@@ -276,9 +265,7 @@ def given_directions(
     return directions / length
 
 
-def carried_left(
-    triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDArray[np.int64], lengths: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def carried_left(triangles: IntrinsicMesh, faces: Ints, edges: Ints, lengths: Floats) -> Floats:
     """(k,) −1 where the face that decides a segment's left is turned against those of most of the curve, else 1.
 
     Faces are compared across the edges around the curve, so left stays on one side of it however faces are turned. On a
@@ -291,7 +278,7 @@ def carried_left(
     return signs * most
 
 
-def loses_orientation(triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDArray[np.int64]) -> bool:
+def loses_orientation(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> bool:
     """Whether the faces around a curve cannot all be turned to agree, as those around the middle of a Möbius strip."""
     _, links, number = _agreement_around(triangles, faces, edges)
     of_two = np.abs(links.weights) == 1  # of three faces around an edge two cannot agree
@@ -300,9 +287,7 @@ def loses_orientation(triangles: IntrinsicMesh, faces: NDArray[np.int64], edges:
     return bool((signs[links.tails] * signs[links.heads] * links.weights < 0).any())
 
 
-def _agreement_around(
-    triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], Links, NDArray[np.int64]]:
+def _agreement_around(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> tuple[Ints, Links, Ints]:
     """The face that decides the left of each segment; which faces around a curve agree; and their numbers there."""
     first = triangles.first_halfedges
     first_faces = np.zeros(triangles.n_edges, dtype=np.int64)
@@ -323,9 +308,7 @@ def _agreement_around(
     return telling, links, number
 
 
-def in_layout(
-    triangles: IntrinsicMesh, positions: NDArray[np.float64], faces: NDArray[np.int64], vectors: NDArray[np.float64]
-) -> NDArray[np.complex128]:
+def in_layout(triangles: IntrinsicMesh, positions: Floats, faces: Ints, vectors: Floats) -> Complexes:
     """(k,) vectors in space projected into the planes of their faces, in layout coordinates."""
     of_faces = positions[faces] if positions.ndim == 3 else positions[triangles.corner_vertices[faces]]
     a, b, c = of_faces.transpose(1, 0, 2)

@@ -23,8 +23,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from .components import connected_components
 from .edge_flips import flipped_along_creases
 from .self_intersections import self_intersections
@@ -40,27 +40,25 @@ class Crossings:
     """Edges of a grid that a level set crosses."""
 
     # (e, 3) and (e,): first node of each, and what it runs along
-    nodes: NDArray[np.int64]
-    axes: NDArray[np.int64]
-    rising: NDArray[np.bool_]  # (e,) whether the first node is inside
-    shares: NDArray[np.float64]  # (e,) how far from the first node the crossing is, in cells
+    nodes: Ints
+    axes: Ints
+    rising: Bools  # (e,) whether the first node is inside
+    shares: Floats  # (e,) how far from the first node the crossing is, in cells
 
 
 @dataclass(frozen=True, eq=False)
 class DualCells:
     """Cells that a level set passes through."""
 
-    places: NDArray[np.int64]  # (c, 3) first node of each
-    edges: NDArray[np.int64]  # (c, 12) number of each crossed edge; −1 where an edge is not crossed
+    places: Ints  # (c, 3) first node of each
+    edges: Ints  # (c, 12) number of each crossed edge; −1 where an edge is not crossed
     # (c, 12) the piece of the level set to which each crossed edge belongs; −1 where an edge is not crossed
-    pieces: NDArray[np.int64]
-    owners: NDArray[np.int64]  # (v,) the cell of each piece
-    quads: NDArray[np.int64]  # (e, 4) the pieces around each crossed edge, counter-clockwise as seen from its end
+    pieces: Ints
+    owners: Ints  # (v,) the cell of each piece
+    quads: Ints  # (e, 4) the pieces around each crossed edge, counter-clockwise as seen from its end
 
 
-def cells_around(
-    crossings: Crossings, shape: tuple[int, ...]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def cells_around(crossings: Crossings, shape: tuple[int, ...]) -> tuple[Ints, Ints, Ints, Ints]:
     """The cells around crossed edges, none of which is on a wall of a grid with so many nodes along each axis.
 
     Returns the first nodes (c, 3) of the cells, the crossed edges (c, 12) of each, −1 where an edge is not crossed; and
@@ -79,9 +77,7 @@ def cells_around(
     return np.stack(np.unravel_index(cells, shape), axis=1).astype(np.int64), edges, rows, sides
 
 
-def dual_cells(
-    crossings: Crossings, shape: tuple[int, ...], inside: Callable[[NDArray[np.float64]], NDArray[np.bool_]]
-) -> DualCells:
+def dual_cells(crossings: Crossings, shape: tuple[int, ...], inside: Callable[[Floats], Bools]) -> DualCells:
     """The pieces of a level set in the cells of a grid with so many nodes along each axis.
 
     `inside` says of (n, 3) places, in cells, whether they are inside: it is asked about the middles of faces.
@@ -129,24 +125,24 @@ def dual_cells(
     return DualCells(places, edges, pieces, owners, pieces[rows, sides])
 
 
-def open_cells(edges: NDArray[np.int64]) -> NDArray[np.int64]:
+def open_cells(edges: Ints) -> Ints:
     """Cells with a face of which an odd number of edges is crossed: a node around them has no value."""
     return np.flatnonzero((_crossed_faces(edges) % 2 == 1).any(axis=1))
 
 
-def _face_edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def _face_edges(faces: Ints) -> Ints:
     """(n, 4) edges of faces of a cell, in order around them."""
     axis, side = faces // 2, faces % 2
     b, c = 4 * AFTER[axis, 1], 4 * AFTER[axis, 2] + 2 * side
     return np.stack([b + side, c + 1, b + 2 + side, c], axis=1)
 
 
-def _crossed_faces(edges: NDArray[np.int64]) -> NDArray[np.int64]:
+def _crossed_faces(edges: Ints) -> Ints:
     """(c, 6) number of crossed edges of each face."""
     return (edges[:, _face_edges(np.arange(6))] >= 0).sum(axis=2)
 
 
-def _pieces(edges: NDArray[np.int64], ways: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _pieces(edges: Ints, ways: Bools) -> Ints:
     """(c, 12) number of the piece to which each crossed edge of each cell belongs, cell after cell; −1 for others.
 
     Of a face with four crossed edges, numbered around it from the first corner, way 0 links the first with the last and
@@ -171,8 +167,8 @@ ROUNDS = 8
 
 
 def dual_triangles(
-    cells: DualCells, crossings: Crossings, vertices: NDArray[np.float64], fanned: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    cells: DualCells, crossings: Crossings, vertices: Floats, fanned: Bools
+) -> tuple[Floats, Ints, Ints]:
     """Triangles (m, 3) between the vertices of pieces, counter-clockwise as seen from outside.
 
     The four vertices around an edge make two triangles. Of the two diagonals between them, if both are possible, the
@@ -206,9 +202,7 @@ def dual_triangles(
     return np.concatenate([vertices, added]), faces, fans
 
 
-def separate_triangles(
-    cells: DualCells, crossings: Crossings, choices: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) -> tuple[Floats, Ints]:
     """Vertices and triangles as of `dual_triangles`; wherever possible none of them pass through each other.
 
     Edges are flipped to run along creases. Vertices of triangles that pass through each other go from one of three
@@ -231,7 +225,7 @@ def separate_triangles(
     return found, faces
 
 
-def _safe(flat: NDArray[np.float64], height: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+def _safe(flat: Floats, height: Floats) -> tuple[Bools, Floats]:
     """(n,) whether the diagonal from the first to the third of (n, 4, 2) corners stays within the tetrahedra.
 
     Seen along the edge, which is from 0 to 1 above the origin, the diagonal passes on one side of it. The triangle on
@@ -261,5 +255,5 @@ def _safe(flat: NDArray[np.float64], height: NDArray[np.float64]) -> tuple[NDArr
     return safe, at
 
 
-def _cross(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cross(u: Floats, v: Floats) -> Floats:
     return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..arrays import Floats, Ints
 
 
-def cut_into_ears(
-    polygon: NDArray[np.float64], normal: NDArray[np.float64], allowed: Callable[[int, int], bool] | None = None
-) -> NDArray[np.int64]:
+def cut_into_ears(polygon: Floats, normal: Floats, allowed: Callable[[int, int], bool] | None = None) -> Ints:
     """Cut a simple polygon along diagonals, best-shaped ears first: (k − 2, 3) corners; empty if it runs out of ears.
 
     It is counter-clockwise as seen from the normal. `allowed` says whether a diagonal may be made from one corner to

@@ -8,8 +8,8 @@ edges, has its diagonal along the crease.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from .edges import EdgeTable, edge_keys, edge_table
 from .triangles import area_vectors
 from .unit_vectors import unit
@@ -24,9 +24,7 @@ MOST = 4_000_000
 """Faces beyond which creases stay as they are, lest looking for them takes more memory than the surface itself."""
 
 
-def flipped_along_creases(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], held: NDArray[np.bool_] | None = None
-) -> NDArray[np.int64]:
+def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = None) -> Ints:
     """(m, 3) faces on the same vertices, with edges flipped wherever that makes the surface bend less.
 
     No edge has more than two faces, which agree; it stays so. Around vertices that are held, (n,), nothing is flipped.
@@ -49,7 +47,7 @@ def flipped_along_creases(
     near = np.zeros(len(vertices), dtype=bool)
     near[faces[sharp // 3]] = True
     some = np.flatnonzero(near[faces].any(axis=1))
-    result: NDArray[np.int64] = faces.copy()
+    result: Ints = faces.copy()
     for _ in range(ROUNDS):
         first, second, one, other = _flips(vertices, result[some], near, held)
         if not len(first):
@@ -58,18 +56,14 @@ def flipped_along_creases(
     return result
 
 
-def _creases(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[EdgeTable, NDArray[np.float64], NDArray[np.int64]]:
+def _creases(vertices: Floats, faces: Ints) -> tuple[EdgeTable, Floats, Ints]:
     """Edges and unit normals of faces, and both halfedges of the edges at which two make an angle of over `SHARP`."""
     table, normals = edge_table(faces), unit(area_vectors(vertices[faces]))
     one, other = normals[table.pairs // 3].swapaxes(0, 1)
     return table, normals, table.pairs[np.einsum("ij,ij->i", one, other) < np.cos(SHARP)]
 
 
-def _flips(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], whole: NDArray[np.bool_], held: NDArray[np.bool_] | None
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> tuple[Ints, Ints, Ints, Ints]:
     """Pairs of faces to replace, (k,) each, no two of them neighbors, and what replaces them, (k, 3) each.
 
     The edge from a to b has c and d across; the edge from c to d takes its place, unless there is one already: of the
@@ -114,13 +108,7 @@ def _flips(
     return first[won], second[won], new[0][won], new[1][won]
 
 
-def _bend(
-    vertices: NDArray[np.float64],
-    tails: NDArray[np.int64],
-    heads: NDArray[np.int64],
-    one: NDArray[np.float64],
-    other: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _bend(vertices: Floats, tails: Ints, heads: Ints, one: Floats, other: Floats) -> Floats:
     """(k,) length times the angle between the unit normals on both sides of edges."""
     lengths = np.linalg.norm(vertices[heads] - vertices[tails], axis=1)
     return lengths * np.arccos(np.clip(np.einsum("ij,ij->i", one, other), -1.0, 1.0))

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..frozen import Frozen, read_only
 from .components import connected_components, grouped
@@ -17,14 +18,14 @@ from .components import connected_components, grouped
 class HalfedgePairs:
     """Edges of polygons, and the halfedges that run along them; halfedge c begins at the face's corner c."""
 
-    edges: NDArray[np.int64]  # (h,) edge of each halfedge; −1 where it joins a vertex to itself or its face is left out
-    counts: NDArray[np.int64]  # (e,) halfedges of each edge
+    edges: Ints  # (h,) edge of each halfedge; −1 where it joins a vertex to itself or its face is left out
+    counts: Ints  # (e,) halfedges of each edge
     # (e,) least halfedge of each edge and the next; −1 where there is none
-    first: NDArray[np.int64]
-    second: NDArray[np.int64]
+    first: Ints
+    second: Ints
 
     @property
-    def around(self) -> NDArray[np.int64]:
+    def around(self) -> Ints:
         """(h,) halfedges along the edge of each; 0 for those that have none."""
         return np.append(self.counts, 0)[self.edges]
 
@@ -33,24 +34,22 @@ class HalfedgePairs:
 class FaceOrientation:
     """Parts of faces that hang together across edges of two faces, and how the faces of each agree."""
 
-    parts: NDArray[np.int64]  # (n_faces,) part of each face; parts are numbered by first appearance
-    turned: NDArray[np.bool_]  # (n_faces,) which faces must turn; of parts that cannot be oriented, none
+    parts: Ints  # (n_faces,) part of each face; parts are numbered by first appearance
+    turned: Bools  # (n_faces,) which faces must turn; of parts that cannot be oriented, none
     # (n_parts,) whether all neighbours of the part can agree; whether each of its edges has two faces
-    orientable: NDArray[np.bool_]
-    closed: NDArray[np.bool_]
+    orientable: Bools
+    closed: Bools
     disagreeing: int  # edges whose two faces run along them the same way
 
 
-def following_corners(offsets: NDArray[np.int64]) -> NDArray[np.int32]:
+def following_corners(offsets: Ints) -> NDArray[np.int32]:
     """(c,) place of the corner that follows each around its face."""
     following = np.arange(1, offsets[-1] + 1, dtype=np.int32)
     following[offsets[1:] - 1] = offsets[:-1]
     return following
 
 
-def pair_halfedges(
-    tails: NDArray[np.int64], heads: NDArray[np.int64], n_vertices: int, used: NDArray[np.bool_] | None = None
-) -> HalfedgePairs:
+def pair_halfedges(tails: Ints, heads: Ints, n_vertices: int, used: Bools | None = None) -> HalfedgePairs:
     """Find the edges of polygons and the first two used halfedges of each. Takes O(n) time, hubs included.
 
     Examples
@@ -64,9 +63,7 @@ def pair_halfedges(
     return HalfedgePairs(edges, *table)
 
 
-def orient_faces(
-    pairs: HalfedgePairs, tails: NDArray[np.int64], owners: NDArray[np.integer], weights: NDArray[np.float64]
-) -> FaceOrientation:
+def orient_faces(pairs: HalfedgePairs, tails: Ints, owners: NDArray[np.integer], weights: Floats) -> FaceOrientation:
     """Make faces agree with their neighbours across edges of two faces, in each part with the majority by area.
 
     The weights, (n_faces,), say how much each face is to stay as it is: its area; negative where it is rather to turn.
@@ -97,7 +94,7 @@ def orient_faces(
     )
 
 
-def may_coincide(pairs: HalfedgePairs, tails: NDArray[np.int64], following: NDArray[np.integer]) -> bool:
+def may_coincide(pairs: HalfedgePairs, tails: Ints, following: NDArray[np.integer]) -> bool:
     """Whether any two faces may be on the same corners: they would share an edge, and a corner next to it.
 
     `following` is the halfedge that follows each around its face.
@@ -116,28 +113,28 @@ def may_coincide(pairs: HalfedgePairs, tails: NDArray[np.int64], following: NDAr
 class EdgeTable(Frozen):
     """Edges, and how faces and edges are incident."""
 
-    vertices: NDArray[np.int64]  # (e, 2) tail and head: the direction in which the FIRST face of the edge runs along it
-    face_edges: NDArray[np.int64]  # (m, 3) edge from corner k to corner k + 1 of each face
-    forward: NDArray[np.bool_]  # (m, 3) whether the face runs along that edge from tail to head
+    vertices: Ints  # (e, 2) tail and head: the direction in which the FIRST face of the edge runs along it
+    face_edges: Ints  # (m, 3) edge from corner k to corner k + 1 of each face
+    forward: Bools  # (m, 3) whether the face runs along that edge from tail to head
 
     @cached_property
-    def face_counts(self) -> NDArray[np.int64]:
+    def face_counts(self) -> Ints:
         """(e,) number of faces at each edge: 1 at a boundary, more than 2 where nonmanifold."""
         return read_only(np.bincount(self.face_edges.ravel(), minlength=len(self.vertices)))
 
     @cached_property
-    def balance(self) -> NDArray[np.int64]:
+    def balance(self) -> Ints:
         """(e,) number of faces that run along each edge, less those that run against it."""
         ahead = np.bincount(self.face_edges.ravel(), self.forward.ravel(), len(self.vertices)).astype(np.int64)
         return read_only(2 * ahead - self.face_counts)
 
     @cached_property
-    def halfedges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def halfedges(self) -> tuple[Ints, Ints]:
         """(e + 1,) where the halfedges 3 f + k of each edge begin, and the halfedges: see `grouped`."""
         return grouped(self.face_edges.ravel(), len(self.vertices))
 
     @cached_property
-    def mates(self) -> NDArray[np.int64]:
+    def mates(self) -> Ints:
         """(3 m,) the other halfedge of the edge of each, where there are exactly two; else −1."""
         starts, members = self.halfedges
         first = starts[:-1][np.diff(starts) == 2]
@@ -146,12 +143,12 @@ class EdgeTable(Frozen):
         return read_only(mates)
 
     @cached_property
-    def pairs(self) -> NDArray[np.int64]:
+    def pairs(self) -> Ints:
         """(k, 2) both halfedges of each edge that has exactly two."""
         one = np.flatnonzero(self.mates > np.arange(len(self.mates)))
         return read_only(np.stack([one, self.mates[one]], axis=1))
 
-    def elimination_order(self, vertex_order: NDArray[np.integer]) -> NDArray[np.int64]:
+    def elimination_order(self, vertex_order: NDArray[np.integer]) -> Ints:
         """Fill-reducing order of unknowns at edges, from one of the vertices: ``order[k]`` is eliminated k-th.
 
         An edge is eliminated with its first eliminated end. Where a set of vertices separates two parts of the mesh, no
@@ -164,7 +161,7 @@ class EdgeTable(Frozen):
         return np.argsort((np.minimum(a, b) + 1) * len(rank) - np.maximum(a, b), kind="stable")
 
 
-def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
+def edge_table(faces: Ints) -> EdgeTable:
     """Find the edges of triangles, numbered by first appearance (corner 0–1, 1–2, 2–0, face after face).
 
     Time is linear in the number of faces, even if all of them share a vertex.
@@ -185,15 +182,13 @@ def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
     return EdgeTable(vertices, edges.reshape(-1, 3), forward.reshape(-1, 3))
 
 
-def edge_keys(one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[np.int64]:
+def edge_keys(one: NDArray[np.integer], other: NDArray[np.integer]) -> Ints:
     """(k,) a number for each pair of vertices, whichever comes first."""
     return (np.minimum(one, other).astype(np.int64) << 32) | np.maximum(one, other)
 
 
 @compiled
-def find_edges(
-    tails: NDArray[np.int64], heads: NDArray[np.int64], used: NDArray[np.bool_], n_vertices: int
-) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def find_edges(tails: Ints, heads: Ints, used: Bools, n_vertices: int) -> tuple[Ints, Bools, Ints, Ints, Ints]:
     """Edges of halfedges (h,), in order of first appearance; those that are not used have none.
 
     There is one list per vertex: an edge is in that of its end with fewer halfedges, so that lists stay short. Returns

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from .components import connected_components
 from .intrinsic_mesh import IntrinsicMesh
 
@@ -19,17 +19,17 @@ class FacePairs:
     separating one face from all others then costs as much as separating two faces at a manifold edge.
     """
 
-    faces: NDArray[np.int64]  # (p, 2) the two faces
+    faces: Ints  # (p, 2) the two faces
     # (p, 2) local index of the edge in each of the two faces; side k runs from corner k to corner k + 1
-    sides: NDArray[np.int64]
-    edges: NDArray[np.int64]  # (p,) the edge
+    sides: Ints
+    edges: Ints  # (p,) the edge
     # (p, 2) in each face the corner at the edge's tail, and the one at its head, as an index into raveled (m, 3)
     # corners
-    tails: NDArray[np.int64]
-    heads: NDArray[np.int64]
-    shares: NDArray[np.float64]  # (p,) weight of each pair: 1, or ½ where three or more faces meet
+    tails: Ints
+    heads: Ints
+    shares: Floats  # (p,) weight of each pair: 1, or ½ where three or more faces meet
 
-    def ends(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ends(self, corner_values: Floats) -> Floats:
         """(p, 2) difference, first face less second, of (m, 3) corner values at the edge's tail and at its head.
 
         Of the values that a face field Y integrates to, the two differ by the edge's length times its curl (Eq. 15).
@@ -64,7 +64,7 @@ def face_pairs(triangles: IntrinsicMesh) -> FacePairs:
     )
 
 
-def split_corners(triangles: IntrinsicMesh, pairs: FacePairs, cut: NDArray[np.bool_]) -> NDArray[np.int64]:
+def split_corners(triangles: IntrinsicMesh, pairs: FacePairs, cut: Bools) -> Ints:
     """(3m,) vertex of each corner, once the surface is cut open between some of the pairs (p,): ids from zero."""
     ends = np.concatenate([pairs.tails[~cut], pairs.heads[~cut]])
     return connected_components(triangles.corner_vertices.size, *ends.T)

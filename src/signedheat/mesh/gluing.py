@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..frozen import Number
 from .edges import EdgeTable
@@ -29,23 +30,23 @@ class Gluing(NamedTuple):
     """An intrinsic triangulation under construction; arrays are longer than the part that is in use."""
 
     # (3 m,) tail vertex and edge of every halfedge
-    tail: NDArray[np.int64]
-    edge: NDArray[np.int64]
-    forward: NDArray[np.bool_]  # (3 m,) whether the halfedge runs in the direction of its edge
+    tail: Ints
+    edge: Ints
+    forward: Bools  # (3 m,) whether the halfedge runs in the direction of its edge
     # (3 m,) which of the two sides of its edge the halfedge is on: it stays through all steps, so that the two sides of
     # a source do, until the edge is flipped
-    front: NDArray[np.bool_]
-    sibling: NDArray[np.int64]  # (3 m,) next halfedge of the same edge, cyclically; the halfedge itself at a boundary
-    start: NDArray[np.int64]  # (e,) one halfedge of every edge
-    length: NDArray[np.float64]  # (e,) length of every edge, in multiples of `unit`
-    fixed: NDArray[np.bool_]  # (e,) edges that must not be flipped
-    flips: NDArray[np.int64]  # (e,) how often each edge has been flipped
-    counts: NDArray[np.int64]  # (5,) numbers of faces, edges, vertices, steps of the history, and edges on the stack
+    front: Bools
+    sibling: Ints  # (3 m,) next halfedge of the same edge, cyclically; the halfedge itself at a boundary
+    start: Ints  # (e,) one halfedge of every edge
+    length: Floats  # (e,) length of every edge, in multiples of `unit`
+    fixed: Bools  # (e,) edges that must not be flipped
+    flips: Ints  # (e,) how often each edge has been flipped
+    counts: Ints  # (5,) numbers of faces, edges, vertices, steps of the history, and edges on the stack
     # (s, 4) and (s, 4): the history: kind of the step, two halfedges or faces, the new vertex; and the affine
     # dependency of its points
-    steps: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    scratch: NDArray[np.int64]  # work array
+    steps: Ints
+    weights: Floats
+    scratch: Ints  # work array
     unit: float  # unit of length
 
 
@@ -134,7 +135,7 @@ def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float,
 
 
 @kernel
-def faces_around(steps: NDArray[np.int64], n: int, around: NDArray[np.int64], start: NDArray[np.int64]) -> None:
+def faces_around(steps: Ints, n: int, around: Ints, start: Ints) -> None:
     """The faces that step n of a history has or makes, and the corner of each that its first point is at."""
     kind = steps[n, 0]
     around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
@@ -213,7 +214,7 @@ def flip(g: Gluing, h: int) -> bool:
 
 
 @kernel
-def flip_until_delaunay(g: Gluing, stack: NDArray[np.int64], stacked: NDArray[np.bool_]) -> bool:
+def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
     """Flip until every edge that is not fixed is Delaunay; returns False if the history is full before that.
 
     `stack` holds the edges still to be checked, `counts[4]` of them; `stacked` marks them.
@@ -237,7 +238,7 @@ def flip_until_delaunay(g: Gluing, stack: NDArray[np.int64], stacked: NDArray[np
 
 
 @kernel
-def look_at(g: Gluing, stack: NDArray[np.int64], stacked: NDArray[np.bool_], e: int) -> None:
+def look_at(g: Gluing, stack: Ints, stacked: Bools, e: int) -> None:
     """Push an edge on the stack of edges to be checked."""
     if not stacked[e]:
         stack[g.counts[4]] = e
@@ -350,7 +351,7 @@ def pair(g: Gluing, h: int, tail: int, t: int, head: int, e: int) -> None:
     g.start[e] = h
 
 
-def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None) -> Gluing:
+def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
     """Start an intrinsic triangulation, with an empty history."""
     edges, first = triangles.edges, triangles.first_halfedges
     edge, n_edges = edges.face_edges.ravel(), triangles.n_edges

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Bools, Complexes, Floats, Ints
 from ..errors import GeometryError
 from ..frozen import Frozen
 from .components import element_components
 from .edges import EdgeTable, edge_table
 from .triangles import Triangles
 
-Index = NDArray[np.int64] | slice
+Index = Ints | slice
 FLATTEST = 1e-18
 """Area relative to the square of the longest edge, below which a face is taken to be as thick as that."""
 
@@ -29,20 +29,16 @@ FLATTEST = 1e-18
 class IntrinsicMesh(Frozen):
     """Triangles given by their vertices, their edges and their shapes alone, without positions in space."""
 
-    corner_vertices: NDArray[np.int64]  # (m, 3) vertex ids
-    corner_positions: NDArray[np.complex128]  # (m, 3) corners in the plane of the face, counter-clockwise
+    corner_vertices: Ints  # (m, 3) vertex ids
+    corner_positions: Complexes  # (m, 3) corners in the plane of the face, counter-clockwise
     edges: EdgeTable  # edge k of a face runs from corner k to corner k + 1. Two edges may join the same two vertices.
     n_vertices: int  # number of vertices, used or not
     # (e,) halfedge 3 f + k of each edge whose face f counts as the first face of the edge; by default the lowest face
-    leading_sides: NDArray[np.int64] | None = None
+    leading_sides: Ints | None = None
 
     @classmethod
     def from_lengths(
-        cls,
-        corner_vertices: NDArray[np.int64],
-        lengths: NDArray[np.float64],
-        n_vertices: int,
-        edges: EdgeTable | None = None,
+        cls, corner_vertices: Ints, lengths: Floats, n_vertices: int, edges: EdgeTable | None = None
     ) -> IntrinsicMesh:
         """Lay out triangles of given edge lengths; ``lengths[:, k]`` runs from corner k to corner k + 1.
 
@@ -76,17 +72,17 @@ class IntrinsicMesh(Frozen):
         return len(self.edges.vertices)
 
     @cached_property
-    def edge_vectors(self) -> NDArray[np.complex128]:
+    def edge_vectors(self) -> Complexes:
         """(m, 3) from corner k to corner k + 1, in the face's layout."""
         return np.roll(self.corner_positions, -1, axis=1) - self.corner_positions
 
     @cached_property
-    def edge_lengths(self) -> NDArray[np.float64]:
+    def edge_lengths(self) -> Floats:
         """(m, 3) lengths of `edge_vectors`."""
         return np.abs(self.edge_vectors)
 
     @cached_property
-    def lengths_of_edges(self) -> NDArray[np.float64]:
+    def lengths_of_edges(self) -> Floats:
         """(e,) lengths, each as one of the edge's faces has it."""
         lengths = np.zeros(self.n_edges)
         lengths[self.edges.face_edges] = self.edge_lengths
@@ -99,32 +95,32 @@ class IntrinsicMesh(Frozen):
         return bool(np.allclose(of_edges, self.edge_lengths, rtol=1e-6, atol=0))
 
     @cached_property
-    def face_areas(self) -> NDArray[np.float64]:
+    def face_areas(self) -> Floats:
         """(m,) areas, where rounding does not make them negative."""
         first, _, last = self.edge_vectors.T
         return np.maximum(-0.5 * (np.conj(first) * last).imag, 0.0)
 
     @property
-    def areas_as_divisors(self) -> NDArray[np.float64]:
+    def areas_as_divisors(self) -> Floats:
         """(m,) areas, those of flat faces as if they were `FLATTEST`."""
-        squares: NDArray[np.float64] = (np.abs(self.edge_vectors) ** 2).max(axis=1)
+        squares: Floats = (np.abs(self.edge_vectors) ** 2).max(axis=1)
         return np.maximum(self.face_areas, FLATTEST * squares)
 
     @cached_property
-    def vertex_areas(self) -> NDArray[np.float64]:
+    def vertex_areas(self) -> Floats:
         """(n_vertices,) a third of the area of the faces at each vertex."""
         thirds = np.repeat(self.face_areas / 3, 3)
         return np.bincount(self.corner_vertices.ravel(), thirds, self.n_vertices).astype(np.float64)
 
     @cached_property
-    def corner_cotangents(self) -> NDArray[np.float64]:
+    def corner_cotangents(self) -> Floats:
         """(m, 3) cotangent of the angle at each corner."""
         leaving = self.edge_vectors
         arriving = -np.roll(leaving, 1, axis=1)
         return (np.conj(leaving) * arriving).real / (2.0 * self.areas_as_divisors)[:, None]
 
     @cached_property
-    def edge_directions(self) -> NDArray[np.complex128]:
+    def edge_directions(self) -> Complexes:
         """(m, 3) z_fe: unit vector of edge k, tail to head, in the face's layout.
 
         Two edges e, g of a face differ by the rotation ``conj(z_fe) z_fg``, which is r of Eq. 8.
@@ -133,7 +129,7 @@ class IntrinsicMesh(Frozen):
         return np.where(self.edges.forward, 1.0, -1.0) * self.edge_vectors / lengths
 
     @cached_property
-    def reflected(self) -> NDArray[np.bool_]:
+    def reflected(self) -> Bools:
         """(m, 3) where the frame of edge k is a reflection, not a rotation, of the layout of the face.
 
         The second axis of an edge's frame points into the first face of the edge and out of all others. The direction
@@ -146,7 +142,7 @@ class IntrinsicMesh(Frozen):
         return self.edges.forward != is_first.reshape(-1, 3)
 
     @cached_property
-    def first_halfedges(self) -> NDArray[np.int64]:
+    def first_halfedges(self) -> Ints:
         """(k,) halfedge 3 f + j in the first face of every edge that has a face."""
         if self.leading_sides is not None:
             return self.leading_sides
@@ -159,13 +155,11 @@ class IntrinsicMesh(Frozen):
         return not self.reflected.any()
 
     @cached_property
-    def face_components(self) -> NDArray[np.int64]:
+    def face_components(self) -> Ints:
         """(m,) part of the surface that each face lies in, joined across edges; parts may share vertices."""
         return element_components(self.edges.face_edges)
 
-    def in_edge_frames(
-        self, vectors: NDArray[np.complex128], faces: Index = slice(None), sides: Index = slice(None)
-    ) -> NDArray[np.complex128]:
+    def in_edge_frames(self, vectors: Complexes, faces: Index = slice(None), sides: Index = slice(None)) -> Complexes:
         """Vectors in the layouts of some faces, as the frames of some of their edges see them.
 
         Without `sides` there is a vector for each side of the faces, (k, 3), or one for all three, (k, 1); with them
@@ -174,18 +168,18 @@ class IntrinsicMesh(Frozen):
         turned = np.conj(self.edge_directions[faces, sides]) * vectors
         return np.where(self.reflected[faces, sides], np.conj(turned), turned)
 
-    def in_face_frames(self, vectors: NDArray[np.complex128], faces: Index = slice(None)) -> NDArray[np.complex128]:
+    def in_face_frames(self, vectors: Complexes, faces: Index = slice(None)) -> Complexes:
         """(k, 3) the vectors of an (e,) edge array as seen in the layouts of some faces."""
         of_face = vectors[self.edges.face_edges[faces]]
         return self.edge_directions[faces] * np.where(self.reflected[faces], np.conj(of_face), of_face)
 
-    def sums_in_faces(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def sums_in_faces(self, vectors: Complexes) -> Complexes:
         """(m, c) sums over the edges of each face, in its layout, of the columns of an (e, c) edge array.
 
         Three times the means of Sec. 6.
         """
         straight, mirrored = self._face_sums
-        sums: NDArray[np.complex128] = straight @ vectors
+        sums: Complexes = straight @ vectors
         return sums + mirrored @ np.conj(vectors) if mirrored.nnz else sums
 
     @cached_property
@@ -204,7 +198,7 @@ MARGIN = 1e-14
 """Margin of the triangle inequalities, relative to the mean length, to which flat triangles are mollified at least."""
 
 
-def mollify(lengths: NDArray[np.float64], margin: float) -> tuple[NDArray[np.float64], float]:
+def mollify(lengths: Floats, margin: float) -> tuple[Floats, float]:
     """Add one length δ to all edges, (m, 3), the smallest for which every triangle inequality holds with a margin.
 
     The margin is the least ``a + b − c`` in every triangle, as a fraction of the mean length. Returns the new lengths,

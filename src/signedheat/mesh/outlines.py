@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import SignedHeatError
 from ..packages import lazy_module
 from .box_tree import BoxTree
@@ -25,7 +25,7 @@ LEAST_SHARE = 1e-9
 """Of an area or a length, below which it is rounding."""
 
 
-def filled_outlines(outlines: Sequence[NDArray[np.float64]], rule: FillRule) -> list[NDArray[np.float64]]:
+def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
     """Outlines, (n, 2) each, of what closed outlines fill: clockwise around it, counter-clockwise around its holes.
 
     They do not cross, but may touch at vertices. What is filled without having an area is left out. By the rule
@@ -56,7 +56,7 @@ def filled_outlines(outlines: Sequence[NDArray[np.float64]], rule: FillRule) -> 
     return [polygon[::-1] / scale + center for polygon in region.to_polygons()]
 
 
-def without_seams(segments: NDArray[np.float64]) -> NDArray[np.float64]:
+def without_seams(segments: Floats) -> Floats:
     """(k, 2, 2) segments of outlines, cut where corners lie on them, without those along which others run back.
 
     Examples
@@ -87,7 +87,7 @@ def without_seams(segments: NDArray[np.float64]) -> NDArray[np.float64]:
     return corners[kept]
 
 
-def _united(outlines: list[NDArray[np.float64]]) -> Any:
+def _united(outlines: list[Floats]) -> Any:
     """What outlines fill by the rule "nonzero", after those in no other one are turned alike, with all within them."""
     nonzero = manifold3d.FillRule.NonZero
     parts = [manifold3d.CrossSection([outline], nonzero) for outline in outlines]
@@ -111,6 +111,6 @@ def _united(outlines: list[NDArray[np.float64]]) -> Any:
     return manifold3d.CrossSection(polygons, nonzero)
 
 
-def _doubled_area(outline: NDArray[np.float64]) -> float:
+def _doubled_area(outline: Floats) -> float:
     x, y = (outline - outline[0]).T
     return float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)

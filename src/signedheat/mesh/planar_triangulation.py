@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 
 FLAT = 1e-13
@@ -21,23 +21,18 @@ ROUNDS = 64
 class Planar(NamedTuple):
     """The triangulation of one face; edge k of a triangle begins at its vertex k."""
 
-    x: NDArray[np.float64]  # (n, 2) positions
-    tri: NDArray[np.int64]  # (t, 3) vertices of triangles, counter-clockwise
-    adj: NDArray[np.int64]  # (t, 3) triangle across each edge, or −1
-    fixed: NDArray[np.bool_]  # (t, 3) whether it is part of a segment
-    at: NDArray[np.int64]  # (n,) a triangle at each vertex
+    x: Floats  # (n, 2) positions
+    tri: Ints  # (t, 3) vertices of triangles, counter-clockwise
+    adj: Ints  # (t, 3) triangle across each edge, or −1
+    fixed: Bools  # (t, 3) whether it is part of a segment
+    at: Ints  # (n,) a triangle at each vertex
     flat: float  # height below which a triangle is flat
 
 
 @compiled
 def triangulate_faces(
-    points: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    members: NDArray[np.int64],
-    corners: NDArray[np.int64],
-    segment_starts: NDArray[np.int64],
-    segments: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    points: Floats, starts: Ints, members: Ints, corners: Ints, segment_starts: Ints, segments: Ints
+) -> tuple[Ints, Ints, Ints]:
     """Triangulate faces, each with points on its rim and within, so that segments between these are edges.
 
     The `members` of each face, from ``starts[f]`` on, are those of the `points` (n, 3) on its rim, in order from the
@@ -76,7 +71,7 @@ def triangulate_faces(
 
 
 @compiled
-def _number_cells(adj: NDArray[np.int64], fixed: NDArray[np.bool_], cells: NDArray[np.int64], n_cells: int) -> int:
+def _number_cells(adj: Ints, fixed: Bools, cells: Ints, n_cells: int) -> int:
     """Number triangles, none of which has a number, by what hangs together; returns the next number."""
     stack = np.empty(len(cells), np.int64)
     for seed in range(len(cells)):
@@ -98,9 +93,7 @@ def _number_cells(adj: NDArray[np.int64], fixed: NDArray[np.bool_], cells: NDArr
 
 
 @compiled
-def _flattened(
-    points: NDArray[np.float64], members: NDArray[np.int64], corners: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _flattened(points: Floats, members: Ints, corners: Ints) -> Floats:
     """(n, 2) the two coordinates along which a face is largest, counter-clockwise, from its first corner."""
     a, b, c = members[0], members[corners[0]], members[corners[1]]
     normal = np.empty(3)
@@ -120,18 +113,18 @@ def _flattened(
 
 
 @compiled
-def _turn(x: NDArray[np.float64], a: int, b: int, c: int) -> float:
+def _turn(x: Floats, a: int, b: int, c: int) -> float:
     """Twice the signed area of a triangle."""
     return (x[b, 0] - x[a, 0]) * (x[c, 1] - x[a, 1]) - (x[b, 1] - x[a, 1]) * (x[c, 0] - x[a, 0])
 
 
 @compiled
-def _length(x: NDArray[np.float64], a: int, b: int) -> float:
+def _length(x: Floats, a: int, b: int) -> float:
     return np.sqrt((x[b, 0] - x[a, 0]) ** 2 + (x[b, 1] - x[a, 1]) ** 2)
 
 
 @compiled
-def _rim(mesh: Planar, corners: NDArray[np.int64]) -> int:
+def _rim(mesh: Planar, corners: Ints) -> int:
     """Divide the face at the points on its rim; returns how many triangles there are."""
     tri, at = mesh.tri, mesh.at
     tri[0, 0], tri[0, 1], tri[0, 2] = 0, corners[0], corners[1]
@@ -148,7 +141,7 @@ def _rim(mesh: Planar, corners: NDArray[np.int64]) -> int:
 
 
 @compiled
-def _point_to(tri: NDArray[np.int64], adj: NDArray[np.int64], t: int, tail: int, neighbour: int) -> None:
+def _point_to(tri: Ints, adj: Ints, t: int, tail: int, neighbour: int) -> None:
     """Make a triangle know its neighbour across the edge that begins at a vertex."""
     if t >= 0:
         for k in range(3):
@@ -279,7 +272,7 @@ def _bad(mesh: Planar, t: int, k: int) -> bool:
 
 
 @compiled
-def _convex(x: NDArray[np.float64], a: int, b: int, c: int, d: int, flat: float) -> bool:
+def _convex(x: Floats, a: int, b: int, c: int, d: int, flat: float) -> bool:
     """Whether the edge from a to b between the apexes c, on its left, and d can be flipped."""
     least = flat * _length(x, c, d)
     return _turn(x, c, a, d) > least and _turn(x, d, b, c) > least
@@ -307,7 +300,7 @@ def _locate(mesh: Planar, count: int, i: int) -> tuple[int, int, float]:
 
 
 @compiled
-def _side(x: NDArray[np.float64], tri: NDArray[np.int64], t: int, i: int) -> tuple[int, float]:
+def _side(x: Floats, tri: Ints, t: int, i: int) -> tuple[int, float]:
     """The edge of a triangle that a point is farthest beyond, and twice the area between."""
     side, depth = 0, np.inf
     for k in range(3):
@@ -382,7 +375,7 @@ def _aim(mesh: Planar, a: int, b: int) -> tuple[int, int, int]:
 
 
 @compiled
-def _place(tri: NDArray[np.int64], t: int, a: int) -> int:
+def _place(tri: Ints, t: int, a: int) -> int:
     k = 0
     while tri[t, k] != a:
         k += 1

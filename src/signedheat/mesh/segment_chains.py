@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..arrays import Bools, Floats, Ints
 
 
-def assemble_polylines(
-    tails: NDArray[np.int64], heads: NDArray[np.int64], directed: bool = True
-) -> list[tuple[NDArray[np.int64], NDArray[np.bool_], bool]]:
+def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[tuple[Ints, Bools, bool]]:
     """Join segments end to end into polylines, which end where not exactly two segments meet.
 
     Segments join nodes. Unless they are directed they are reversed where needed. Of each polyline: segments in order,
@@ -56,7 +55,7 @@ def assemble_polylines(
     return found
 
 
-def leaving(points: NDArray[np.float64], closed: bool, room: NDArray[np.float64]) -> NDArray[np.int64]:
+def leaving(points: Floats, closed: bool, room: Floats) -> Ints:
     """Which of (n, d) points of a polyline are left for another place, which is farther than the `room` (n,) of each.
 
     The end of an open polyline, which is left for nothing, is kept as well.

@@ -6,8 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..parallel import CHUNK, n_threads
 from .box_tree import BoxTree, morton_codes
@@ -26,7 +26,7 @@ UPRIGHT = 1e-13
 """One less the cosine between two directions up to which they are one."""
 
 
-def self_intersections(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def self_intersections(vertices: Floats, faces: Ints) -> Ints:
     """(k, 2) pairs of faces that pass through each other, or cover each other in one plane.
 
     Those that have no vertex in common must not touch, either; vertices at one place are one.
@@ -41,9 +41,7 @@ def self_intersections(vertices: NDArray[np.float64], faces: NDArray[np.int64]) 
     return overlapping_faces(vertices, same_positions(vertices)[faces], slack, -slack)
 
 
-def overlapping_faces(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], slack: float, depth: float
-) -> NDArray[np.int64]:
+def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float) -> Ints:
     """(k, 2) pairs of faces that overlap to a depth, or by `slack` if they have a vertex in common.
 
     Along their normals they may be apart by `slack`. Those that have an edge in common overlap if they are folded.
@@ -60,21 +58,21 @@ def overlapping_faces(
     arcs = _arcs(centred, ids[fans], hubs[fans]) if len(fans) else corners[:0]
     around = BoxTree.of(arcs.min(axis=1), arcs.max(axis=1)) if len(fans) else tree
 
-    def overlapping(one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
+    def overlapping(one: Ints, other: Ints) -> Ints:
         shared = sum((i == j).astype(np.int8) for i, j in product(ids[one].T.copy(), ids[other].T.copy()))
         meet, few, many = np.empty(len(one), dtype=bool), np.flatnonzero(shared < 2), np.flatnonzero(shared > 1)
         meet[many] = _folded(corners, ids, one[many], other[many])
         meet[few] = _overlapping(flat, one[few], other[few], slack, np.where(shared[few] > 0, slack, depth))
         return np.stack([one, other], axis=1)[meet]
 
-    def of_tree(start: int) -> NDArray[np.int64]:
+    def of_tree(start: int) -> Ints:
         own = hubs[start : start + CHUNK]
         starts, near = tree.meeting(corners[start : start + CHUNK], slack, own)
         owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         asked = (near > owners) & ((hubs[owners] < 0) | (hubs[owners] != hubs[near]))
         return overlapping(owners[asked], near[asked])
 
-    def of_fans(start: int) -> NDArray[np.int64]:
+    def of_fans(start: int) -> Ints:
         starts, near = around.meeting(arcs[start : start + CHUNK], NEAR_ARC)
         owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         asked = (near > owners) & (hubs[fans[owners]] == hubs[fans[near]])
@@ -86,7 +84,7 @@ def overlapping_faces(
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
 
-def _hubs(faces: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]:
+def _hubs(faces: Ints, n_vertices: int) -> Ints:
     """(m,) the corner of each face that most faces meet at, if these are more than `CROWD`; else −1.
 
     Faces around one vertex meet elsewhere only where the arcs do that they are seen as from there.
@@ -96,7 +94,7 @@ def _hubs(faces: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]:
     return np.where(valences.max(axis=1) > CROWD, hubs, -1)
 
 
-def _order(corners: NDArray[np.float64], vertices: NDArray[np.float64], hubs: NDArray[np.int64]) -> NDArray[np.int64]:
+def _order(corners: Floats, vertices: Floats, hubs: Ints) -> Ints:
     """(m,) triangles along a space-filling curve, those around one hub after each other."""
     middles = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
     if not (hubs >= 0).any():
@@ -105,7 +103,7 @@ def _order(corners: NDArray[np.float64], vertices: NDArray[np.float64], hubs: ND
     return np.lexsort((morton_codes(middles), hubs, morton_codes(places)))
 
 
-def _arcs(vertices: NDArray[np.float64], faces: NDArray[np.int64], hubs: NDArray[np.int64]) -> NDArray[np.float64]:
+def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:
     """(k, 3, 3) triangles around the arcs that faces are seen as from their hubs, each hub in a place of its own."""
     at = np.argmax(faces == hubs[:, None], axis=1)
     ends = [faces[np.arange(len(faces)), (at + k) % 3] for k in (1, 2)]
@@ -117,9 +115,7 @@ def _arcs(vertices: NDArray[np.float64], faces: NDArray[np.int64], hubs: NDArray
     return arcs
 
 
-def _folded(
-    corners: NDArray[np.float64], ids: NDArray[np.int64], one: NDArray[np.int64], other: NDArray[np.int64]
-) -> NDArray[np.bool_]:
+def _folded(corners: Floats, ids: Ints, one: Ints, other: Ints) -> Bools:
     """(k,) whether faces with an edge in common lie on the same side of it, or have all corners in common."""
     same = ids[one][:, :, None] == ids[other][:, None, :]
     apex = np.argmin(same.any(axis=2), axis=1)
@@ -128,18 +124,12 @@ def _folded(
     along = unit(end - start)
     away = [place - start for place in (corners[one, apex], corners[other, beyond])]
     first, second = (unit(each - (each * along).sum(axis=1)[:, None] * along) for each in away)
-    folded: NDArray[np.bool_] = ((first * second).sum(axis=1) > 1.0 - FOLDED) | same.any(axis=2).all(axis=1)
+    folded: Bools = ((first * second).sum(axis=1) > 1.0 - FOLDED) | same.any(axis=2).all(axis=1)
     return folded
 
 
 @compiled
-def _overlapping(
-    corners: NDArray[np.float64],
-    one: NDArray[np.int64],
-    other: NDArray[np.int64],
-    slack: float,
-    depths: NDArray[np.float64],
-) -> NDArray[np.bool_]:
+def _overlapping(corners: Floats, one: Ints, other: Ints, slack: float, depths: Floats) -> Bools:
     """(k,) whether triangles overlap, each pair deeper than its depth."""
     result, ways = np.empty(len(one), dtype=np.bool_), np.empty((10, 3))
     for k in range(len(one)):
@@ -148,9 +138,7 @@ def _overlapping(
 
 
 @compiled
-def overlap(
-    p: NDArray[np.float64], q: NDArray[np.float64], slack: float, depth: float, ways: NDArray[np.float64]
-) -> bool:
+def overlap(p: Floats, q: Floats, slack: float, depth: float, ways: Floats) -> bool:
     """Whether two triangles, (9,) each, overlap deeper than a depth along every axis that may separate them.
 
     Along their normals they may be apart by a slack. There is room for ten `ways`: their sides, their normals, and

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import eigh
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 
 _ROUNDS = 50
@@ -26,9 +27,9 @@ class Links:
         How sure that is; weights of the same pair add up.
     """
 
-    tails: NDArray[np.int64]
-    heads: NDArray[np.int64]
-    weights: NDArray[np.float64]
+    tails: Ints
+    heads: Ints
+    weights: Floats
 
     @classmethod
     def joined(cls, *parts: Links) -> Links:
@@ -36,7 +37,7 @@ class Links:
         columns = zip(*((part.tails, part.heads, part.weights) for part in parts), strict=True)
         return cls(*(np.concatenate(column) for column in columns))
 
-    def renamed(self, nodes: NDArray[np.int64]) -> Links:
+    def renamed(self, nodes: Ints) -> Links:
         """The same links between other nodes: those of which the ones here are part."""
         return Links(nodes[self.tails], nodes[self.heads], self.weights)
 
@@ -44,19 +45,19 @@ class Links:
         """Links with weights that many times as large."""
         return Links(self.tails, self.heads, factor * self.weights)
 
-    def strength(self, n_nodes: int) -> NDArray[np.float64]:
+    def strength(self, n_nodes: int) -> Floats:
         """(n,) sum of the sizes of the weights at each node."""
         sizes = np.abs(self.weights)
         ends = np.bincount(self.tails, sizes, n_nodes), np.bincount(self.heads, sizes, n_nodes)
         return (ends[0] + ends[1]).astype(np.float64)
 
-    def coherence(self, found: NDArray[np.float64]) -> float:
+    def coherence(self, found: Floats) -> float:
         """Share of the weights that signs agree with, less the share that they contradict: 1 if they agree with all."""
         total = float((self.weights * found[self.tails] * found[self.heads]).sum())
         return total / max(float(np.abs(self.weights).sum()), np.finfo(float).tiny)
 
 
-def signs_of(links: Links, n_nodes: int) -> NDArray[np.float64]:
+def signs_of(links: Links, n_nodes: int) -> Floats:
     """(n,) signs s that make Σ w s_tail s_head large: no sign gains by turning alone, and hardly any group of them.
 
     Groups with the strongest links merge first, and their links to third ones add up (greedy additive contraction,
@@ -76,7 +77,7 @@ def signs_of(links: Links, n_nodes: int) -> NDArray[np.float64]:
     return result
 
 
-def nested_groups(links: Links, n_nodes: int) -> list[NDArray[np.int64]]:
+def nested_groups(links: Links, n_nodes: int) -> list[Ints]:
     """The groups that `signs_of` merges, each (n,) group of every node: the few large ones first.
 
     Examples
@@ -92,7 +93,7 @@ def nested_groups(links: Links, n_nodes: int) -> list[NDArray[np.int64]]:
     return levels[::-1]
 
 
-def best_signs(weights: NDArray[np.float64], first: NDArray[np.float64]) -> NDArray[np.float64]:
+def best_signs(weights: Floats, first: Floats) -> Floats:
     """(n,) signs s that make ``sᵀ W s`` large, of a dense symmetric matrix: more thorough than `signs_of`.
 
     From several starts, the groups in which signs synchronise, on all levels, are turned as long as that gains; the
@@ -116,9 +117,7 @@ def best_signs(weights: NDArray[np.float64], first: NDArray[np.float64]) -> NDAr
     return max(found, key=lambda one: float(one @ weights @ one))
 
 
-def _turned_in_groups(
-    weights: NDArray[np.float64], groups: list[NDArray[np.int64]], found: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _turned_in_groups(weights: Floats, groups: list[Ints], found: Floats) -> Floats:
     """Signs, with groups turned one after the other as long as that makes them agree more with the others."""
     agreement, least = weights @ found, 1e-12 * float(np.abs(weights).sum())
     for _ in range(_ROUNDS):
@@ -135,7 +134,7 @@ def _turned_in_groups(
     return found
 
 
-def _contractions(weights: sparse.csr_matrix) -> list[tuple[sparse.csr_matrix, NDArray[np.int64], NDArray[np.float64]]]:
+def _contractions(weights: sparse.csr_matrix) -> list[tuple[sparse.csr_matrix, Ints, Floats]]:
     """Each matrix of weights, the group of each of its nodes and the sign in it, until no link is left."""
     levels = []
     while weights.nnz:
@@ -159,7 +158,7 @@ def _weights(links: Links, n_nodes: int) -> sparse.csr_matrix:
     return total
 
 
-def _contraction(weights: sparse.csr_matrix) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _contraction(weights: sparse.csr_matrix) -> tuple[Ints, Floats]:
     """Group of each node, and its sign in it: pairs that are each other's strongest, and whose strongest is in one."""
     n, neighbors = weights.shape[0], weights.indices
     degrees = np.diff(weights.indptr)
@@ -182,11 +181,7 @@ def _contraction(weights: sparse.csr_matrix) -> tuple[NDArray[np.int64], NDArray
 
 @compiled
 def turn_where_better(
-    starts: NDArray[np.int32],
-    neighbors: NDArray[np.int32],
-    weights: NDArray[np.float64],
-    signs: NDArray[np.float64],
-    rounds: int,
+    starts: NDArray[np.int32], neighbors: NDArray[np.int32], weights: Floats, signs: Floats, rounds: int
 ) -> None:
     """Turn signs that disagree with their neighbours, one after the other, until none does."""
     for _ in range(rounds):

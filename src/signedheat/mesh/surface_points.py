@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..errors import SourceError
 from .components import grouped, members_of
 from .edges import EdgeTable
@@ -23,25 +23,23 @@ SNAP = 1e-9
 class LocatedPoints:
     """Points of a surface, each with the lowest-dimensional element that contains it."""
 
-    faces: NDArray[np.int64]  # (n,) a face that contains the point
+    faces: Ints  # (n,) a face that contains the point
     # (n, 3) barycentric coordinates in that face; exact zeros on edges and at vertices
-    barycentric: NDArray[np.float64]
-    kinds: NDArray[np.int64]  # (n,) `VERTEX`, `EDGE` or `FACE`
-    elements: NDArray[np.int64]  # (n,) id of the vertex, edge or face
-    along: NDArray[np.float64]  # (n,) on edges, the fraction of the way from tail to head; otherwise 0
+    barycentric: Floats
+    kinds: Ints  # (n,) `VERTEX`, `EDGE` or `FACE`
+    elements: Ints  # (n,) id of the vertex, edge or face
+    along: Floats  # (n,) on edges, the fraction of the way from tail to head; otherwise 0
 
     def __len__(self) -> int:
         return len(self.faces)
 
-    def __getitem__(self, index: NDArray[np.int64]) -> LocatedPoints:
+    def __getitem__(self, index: Ints) -> LocatedPoints:
         return LocatedPoints(
             self.faces[index], self.barycentric[index], self.kinds[index], self.elements[index], self.along[index]
         )
 
 
-def locate_points(
-    triangles: IntrinsicMesh, faces: NDArray[np.int64], barycentric: NDArray[np.float64], name: str = "point"
-) -> LocatedPoints:
+def locate_points(triangles: IntrinsicMesh, faces: Ints, barycentric: Floats, name: str = "point") -> LocatedPoints:
     """Find the vertex, edge or face that contains each of n points, given by faces and barycentric coordinates."""
     outside = np.flatnonzero((faces < 0) | (faces >= triangles.n_faces))
     if len(outside):
@@ -69,16 +67,14 @@ def locate_points(
     return LocatedPoints(faces, inside, kinds, elements, along)
 
 
-def points_at_vertices(triangles: IntrinsicMesh, vertices: NDArray[np.int64]) -> LocatedPoints:
+def points_at_vertices(triangles: IntrinsicMesh, vertices: Ints) -> LocatedPoints:
     """Vertices as located points, each through its first face."""
     corners = corners_at(triangles.corner_vertices, vertices, triangles.n_vertices)
     kinds = np.full(len(vertices), VERTEX)
     return LocatedPoints(corners // 3, np.eye(3)[corners % 3], kinds, vertices, np.zeros(len(vertices)))
 
 
-def corners_at(
-    faces: NDArray[np.int64], vertices: NDArray[np.int64], n_vertices: int, name: str = "point"
-) -> NDArray[np.int64]:
+def corners_at(faces: Ints, vertices: Ints, n_vertices: int, name: str = "point") -> Ints:
     """(k,) the first corner ``3 face + k`` at each vertex."""
     if not np.issubdtype(vertices.dtype, np.integer):
         if len(vertices) == 0:
@@ -106,7 +102,7 @@ def corners_at(
     return first[vertices]
 
 
-def contain(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: LocatedPoints) -> NDArray[np.bool_]:
+def contain(triangles: IntrinsicMesh, faces: Ints, located: LocatedPoints) -> Bools:
     """(n,) whether face k contains point k."""
     return np.choose(
         located.kinds,
@@ -118,9 +114,9 @@ def contain(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: Located
     )
 
 
-def barycentric_in(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: LocatedPoints) -> NDArray[np.float64]:
+def barycentric_in(triangles: IntrinsicMesh, faces: Ints, located: LocatedPoints) -> Floats:
     """(n, 3) barycentric coordinates of point k in face k, which must contain it."""
-    weights: NDArray[np.float64] = located.barycentric.copy()
+    weights: Floats = located.barycentric.copy()
     moved = np.flatnonzero(faces != located.faces)
     kinds, elements, along, other = (a[moved] for a in (located.kinds, located.elements, located.along, faces))
     weights[moved] = 0.0
@@ -136,23 +132,19 @@ def barycentric_in(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: 
     return weights
 
 
-def barycentric_on_edges(
-    edges: EdgeTable, faces: NDArray[np.int64], sides: NDArray[np.int64], along: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def barycentric_on_edges(edges: EdgeTable, faces: Ints, sides: Ints, along: Floats) -> Floats:
     """(n, 3) barycentric coordinates, in faces, of points on a side of each at fractions along the edge there."""
     return barycentric_on_sides(sides, np.where(edges.forward[faces, sides], along, 1 - along))
 
 
-def edges_between(
-    triangles: IntrinsicMesh, faces: NDArray[np.int64], starts: NDArray[np.float64], ends: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def edges_between(triangles: IntrinsicMesh, faces: Ints, starts: Floats, ends: Floats) -> tuple[Ints, Ints]:
     """(n,) the edge along which a segment in a face, by barycentric coordinates, runs, or −1; and its side there."""
     empty = (starts == 0) & (ends == 0)
     sides = (empty.argmax(axis=1) + 1) % 3
     return np.where(empty.any(axis=1), triangles.edges.face_edges[faces, sides], -1), sides
 
 
-def barycentric_on_sides(sides: NDArray[np.int64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
+def barycentric_on_sides(sides: Ints, shares: Floats) -> Floats:
     """(n, 3) barycentric coordinates of points at a share of the way along sides of faces."""
     weights, row = np.zeros((len(sides), 3)), np.arange(len(sides))
     weights[row, sides] = 1 - shares
@@ -160,7 +152,7 @@ def barycentric_on_sides(sides: NDArray[np.int64], shares: NDArray[np.float64]) 
     return weights
 
 
-def crossed_sides(above: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def crossed_sides(above: Bools, chosen: Bools) -> tuple[Ints, Ints]:
     """Faces that a level set crosses, and the (k, 2) sides at which it enters and leaves: what is above is to its left.
 
     Each corner of each face is above the level, (m, 3), or not; only chosen faces, (m,), are looked at.
@@ -170,7 +162,7 @@ def crossed_sides(above: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> tuple[
     return faces, np.stack([(here & ~there).argmax(axis=1), (there & ~here).argmax(axis=1)], axis=1)
 
 
-def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints) -> NDArray[np.int64]:
+def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints) -> Ints:
     """(k,) a face that contains both ends, or −1; preferably a face through which one of them is given."""
     shared = np.where(contain(triangles, end.faces, start), end.faces, -1)
     shared = np.where(contain(triangles, start.faces, end), start.faces, shared)
@@ -184,7 +176,7 @@ def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoi
     return shared
 
 
-def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[Ints, Ints]:
     """All faces that contain each point, as pairs: index of the point, and face."""
     inside = np.flatnonzero(located.kinds == FACE)
     which, faces = [inside], [located.elements[inside]]
@@ -203,7 +195,7 @@ def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[ND
     return np.concatenate(which), np.concatenate(faces)
 
 
-def unique_points(located: LocatedPoints) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def unique_points(located: LocatedPoints) -> tuple[Ints, Ints]:
     """Distinct points in order of first appearance: index of the first of each, and the inverse index of all points."""
     inner = np.where((located.kinds == FACE)[:, None], located.barycentric, 0.0)
     columns = [located.kinds, located.elements, located.along, inner[:, 0], inner[:, 1]]

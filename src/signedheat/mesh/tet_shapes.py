@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Floats, Ints
 from .box_tree import BoxTree
 from .components import grouped, sums_of
 from .triangles import area_vectors
@@ -27,16 +27,16 @@ FACE_CORNERS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 class FaceTable:
     """The faces of tets, and how tets and faces are incident."""
 
-    vertices: NDArray[np.int64]  # (f, 3) vertex ids, counter-clockwise as seen from outside the FIRST tet at the face
-    tet_faces: NDArray[np.int64]  # (m, 4) face opposite each corner of each tet
+    vertices: Ints  # (f, 3) vertex ids, counter-clockwise as seen from outside the FIRST tet at the face
+    tet_faces: Ints  # (m, 4) face opposite each corner of each tet
 
     @cached_property
-    def tet_counts(self) -> NDArray[np.int64]:
+    def tet_counts(self) -> Ints:
         """(f,) number of tets at each face: 1 on the boundary, more than 2 where nonmanifold."""
         return np.bincount(self.tet_faces.ravel(), minlength=len(self.vertices))
 
     @cached_property
-    def neighbors(self) -> NDArray[np.int64]:
+    def neighbors(self) -> Ints:
         """(m, 4) the tet beyond the face opposite each corner, −1 at the boundary."""
         flat = self.tet_faces.ravel()
         _, order = grouped(flat, len(self.vertices))
@@ -47,7 +47,7 @@ class FaceTable:
         return beyond.reshape(-1, 4)
 
 
-def face_table(tets: NDArray[np.int64]) -> FaceTable:
+def face_table(tets: Ints) -> FaceTable:
     """Find the faces of tets, numbered by first appearance, in linear time."""
     corners = tets[:, FACE_CORNERS].reshape(-1, 3)
     number, first = distinct_rows(np.sort(corners, axis=1))
@@ -58,28 +58,28 @@ def face_table(tets: NDArray[np.int64]) -> FaceTable:
 class TetShapes:
     """Tets in space."""
 
-    vertices: NDArray[np.float64]  # (n, 3) positions
-    tets: NDArray[np.int64]  # (m, 4) corners; of positive volume, or degenerate
+    vertices: Floats  # (n, 3) positions
+    tets: Ints  # (m, 4) corners; of positive volume, or degenerate
 
     @cached_property
-    def area_vectors(self) -> NDArray[np.float64]:
+    def area_vectors(self) -> Floats:
         """(m, 4, 3) N_k: area times outward normal of the face opposite each corner."""
         return np.stack([area_vectors(self.vertices[self.tets[:, face]]) for face in FACE_CORNERS], axis=1)
 
     @cached_property
-    def volumes(self) -> NDArray[np.float64]:
+    def volumes(self) -> Floats:
         """(m,) signed volumes."""
         return signed_volumes(self.vertices, self.tets)
 
     @cached_property
-    def longest_edges(self) -> NDArray[np.float64]:
+    def longest_edges(self) -> Floats:
         """(m,) length of each tet's longest edge."""
         points = [self.vertices[self.tets[:, k]] for k in range(4)]
         squares = [np.square(points[i] - points[j]).sum(axis=1) for i in range(4) for j in range(i)]
         return np.sqrt(np.max(squares, axis=0))
 
     @cached_property
-    def thickness(self) -> NDArray[np.float64]:
+    def thickness(self) -> Floats:
         """(m,) volume over the cube of the longest edge; zero for tets whose corners coincide."""
         cubes = self.longest_edges**3
         return np.maximum(self.volumes, 0) / np.where(cubes > 0, cubes, 1)
@@ -96,7 +96,7 @@ class TetShapes:
         return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
 
 
-def signed_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int64]) -> NDArray[np.float64]:
+def signed_volumes(vertices: Floats, tets: Ints) -> Floats:
     """(m,) volumes, negative for inverted tets."""
     a, b, c, d = (vertices[tets[:, k]] for k in range(4))
     return np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6
@@ -113,7 +113,7 @@ class Tetrahedra(TetShapes):
     """Operators of tets."""
 
     @cached_property
-    def stiffness_factors(self) -> NDArray[np.float64]:
+    def stiffness_factors(self) -> Floats:
         """(m,) w / |T|, w the `weights`, by which every term of thin tets is reduced.
 
         The equations stay consistent with any positive weights. These keep the stiffness of flat tets bounded.
@@ -123,17 +123,17 @@ class Tetrahedra(TetShapes):
         return 1 / np.where(thick, np.maximum(self.volumes, np.finfo(float).tiny), THIN * cubes)
 
     @cached_property
-    def weights(self) -> NDArray[np.float64]:
+    def weights(self) -> Floats:
         """(m,) w: one, less than one for thin tets, zero for flat ones."""
         return np.minimum(self.thickness / THIN, 1)
 
     @cached_property
-    def ties(self) -> NDArray[np.float64]:
+    def ties(self) -> Floats:
         """(m,) extra stiffness between any two faces of a flat tet, whose own stiffness is nearly zero."""
         lengths = np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
         return lengths * (1 - np.minimum(self.thickness / FLAT, 1))
 
-    def face_mass(self) -> NDArray[np.float64]:
+    def face_mass(self) -> Floats:
         """(f,) M of Eq. 12, lumped: a quarter of the volume at each face.
 
         The consistent mass of Eq. 23 has 2/5 of the volume on its diagonal and −1/20 between two faces of a tet. These
@@ -151,7 +151,7 @@ class Tetrahedra(TetShapes):
         faces = self.faces
         return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.tet_faces, len(faces.vertices))
 
-    def vertex_laplacian(self, corners: NDArray[np.int64], n: int) -> sparse.csr_matrix:
+    def vertex_laplacian(self, corners: Ints, n: int) -> sparse.csr_matrix:
         """(n, n) cotan Laplacian, Eq. 10 in tets: C_ij = Σ_T N_i·N_j / (9|T|), −(1/6) |e| cot θ between two vertices.
 
         e is the edge of the tet opposite edge ij, θ the dihedral angle there.
@@ -159,7 +159,7 @@ class Tetrahedra(TetShapes):
         """
         return _assemble(self.area_vectors, self.stiffness_factors / 9, 1e-4 * self.ties, corners, n)
 
-    def divergence(self, directions: NDArray[np.float64], corners: NDArray[np.int64], n: int) -> NDArray[np.float64]:
+    def divergence(self, directions: Floats, corners: Ints, n: int) -> Floats:
         """(n,) b of Eq. 13 for one vector Y per tet: the divergence of Eq. 22, ``∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T``.
 
         Eq. 22 is printed without the ⅓, and with the opposite sign, as the paper's Laplacian is negative semidefinite.
@@ -167,13 +167,13 @@ class Tetrahedra(TetShapes):
         parts = np.einsum("mki,mi->mk", self.area_vectors, directions) * (self.weights / -3)[:, None]
         return np.asarray(np.bincount(corners.ravel(), parts.ravel(), n), np.float64)
 
-    def gradients(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def gradients(self, corner_values: Floats) -> Floats:
         """(m, 3) gradient of the linear interpolant of (m, 4) corner values; zero on flat tets."""
         flat = self.thickness < 1e-10
         sums = np.einsum("mki,mk->mi", self.area_vectors, corner_values)
         return np.where(flat[:, None], 0.0, sums / (-3 * np.where(flat, 1.0, self.volumes))[:, None])
 
-    def mean_gradients(self, values: NDArray[np.float64], corners: NDArray[np.int64], n: int) -> NDArray[np.float64]:
+    def mean_gradients(self, values: Floats, corners: Ints, n: int) -> Floats:
         """(n, 3) gradients at vertices: volume-weighted means over the tets around each that have values, else NaN."""
         sums = np.einsum("mki,mk->mi", self.area_vectors, values[corners]) * (self.weights / -3)[:, None]
         finite = np.isfinite(sums).all(axis=1)
@@ -183,13 +183,7 @@ class Tetrahedra(TetShapes):
         return totals / np.where(total > 0, total, np.nan)[:, None]
 
 
-def _assemble(
-    vectors: NDArray[np.float64],
-    factors: NDArray[np.float64],
-    ties: NDArray[np.float64],
-    ids: NDArray[np.int64],
-    n: int,
-) -> sparse.csr_matrix:
+def _assemble(vectors: Floats, factors: Floats, ties: Floats, ids: Ints, n: int) -> sparse.csr_matrix:
     """Sparse (n, n) matrix with ``Σ_T factor · N_a·N_b`` at the entry (id of a, id of b), plus the ties."""
     entries = np.einsum("mai,mbi->mab", vectors, vectors) * factors[:, None, None]
     entries += ties[:, None, None] * (4.0 * np.eye(4) - 1.0)

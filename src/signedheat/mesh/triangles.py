@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from .components import element_components
 from .edges import EdgeTable
@@ -16,11 +16,11 @@ class Triangles(Protocol):
     """Triangles in space."""
 
     @property
-    def vertices(self) -> NDArray[np.float64]:
+    def vertices(self) -> Floats:
         """(n, 3) positions."""
 
     @property
-    def faces(self) -> NDArray[np.int64]:
+    def faces(self) -> Ints:
         """(m, 3) vertex ids."""
 
     @property
@@ -36,23 +36,21 @@ class Triangles(Protocol):
         """Number of faces."""
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Floats:
         """(2, 3) lower and upper corner of the box around the faces."""
 
 
-def area_vectors(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+def area_vectors(triangles: Floats) -> Floats:
     """(m, 3) of (m, 3, 3) triangles: their normals, as long as their areas."""
     return 0.5 * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
 
-def face_areas(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+def face_areas(triangles: Floats) -> Floats:
     """(m,) areas of (m, 3, 3) triangles."""
     return np.linalg.norm(area_vectors(triangles), axis=1)
 
 
-def part_volumes(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def part_volumes(vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:
     """(m,) connected part of each triangle, and the volume inside each part; negative for cavities.
 
     Volumes are taken about a vertex of each part, so that nothing cancels far from the origin.
@@ -63,16 +61,14 @@ def part_volumes(
     return parts, np.bincount(parts, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6
 
 
-def divided_at(
-    faces: NDArray[np.int64], rows: NDArray[np.int64], corners: NDArray[np.int64], points: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def divided_at(faces: Ints, rows: Ints, corners: Ints, points: Ints) -> Ints:
     """Faces, some of which are divided by a point on the side that begins at a corner; their halves are at the end."""
     a, b, c = (faces[rows, (corners + k) % 3] for k in range(3))
     halves = np.concatenate([np.stack([a, points, c], axis=1), np.stack([points, b, c], axis=1)])
     return np.concatenate([np.delete(faces, rows, axis=0), halves])
 
 
-def gradients_along(sides: NDArray[np.float64], rises: NDArray[np.float64]) -> NDArray[np.float64]:
+def gradients_along(sides: Floats, rises: Floats) -> Floats:
     """(p, 3) gradients in the planes of sides (p, 2, 3), along which a function rises by (p, 2); 0 if these are one."""
     normals = np.cross(sides[:, 0], sides[:, 1])
     square = np.einsum("pd,pd->p", normals, normals)
@@ -85,9 +81,7 @@ EPSILON = 2.0**-52
 
 
 @compiled
-def areas_of_polygons(
-    vertices: NDArray[np.float64], corners: NDArray[np.int64], offsets: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[Floats, Bools]:
     """(p,) areas of polygons; and which are degenerate: without area, to roundoff, or with a vertex twice.
 
     An area is none if it is below what moving the corners by a few units in the last place of the coordinates makes.

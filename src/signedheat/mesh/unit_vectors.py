@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..parallel import n_threads
 
 
@@ -47,7 +48,7 @@ def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
     return result
 
 
-def axes_across(vectors: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def axes_across(vectors: Floats) -> tuple[Floats, Floats]:
     """(n, 3) unit vectors at right angles to (n, 3) vectors, and to both: right-handed in this order after them."""
     first = unit(np.cross(vectors, np.eye(3)[np.abs(vectors).argmin(axis=1)]))
     return first, unit(np.cross(vectors, first))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..frozen import read_only
 from .edges import find_edges
@@ -18,9 +19,7 @@ _CELL = 16.0
 """Side of the cells in which points are looked up, over the tolerance: few points are near a wall."""
 
 
-def welded_vertices(
-    points: NDArray[np.float64], tails: NDArray[np.int64], heads: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def welded_vertices(points: Floats, tails: Ints, heads: Ints) -> Ints:
     """Find the vertices of faces that are at one place, exactly or but for rounding.
 
     Only rims may be torn by rounding. So vertices at different places become one where both are on open edges, of an
@@ -58,7 +57,7 @@ def welded_vertices(
     return same
 
 
-def joined_rims(points: NDArray[np.float64], tails: NDArray[np.int64], heads: NDArray[np.int64]) -> NDArray[np.int64]:
+def joined_rims(points: Floats, tails: Ints, heads: Ints) -> Ints:
     """(n,) first vertex at the place of each that is on a rim, as of a seam; other vertices are on their own."""
     edges, _, counts, _, _ = find_edges(read_only(tails), read_only(heads), tails != heads, len(points))
     is_open = (edges >= 0) & (np.append(counts, 0)[edges] == 1)
@@ -68,19 +67,19 @@ def joined_rims(points: NDArray[np.float64], tails: NDArray[np.int64], heads: ND
     return places
 
 
-def _is_single(points: NDArray[np.float64]) -> bool:
+def _is_single(points: Floats) -> bool:
     """Whether single precision holds all coordinates without loss."""
     with np.errstate(over="ignore", under="ignore"):
         return bool((points.astype(np.float32) == points).all())
 
 
-def _is_rounded(points: NDArray[np.float64], single: bool) -> NDArray[np.bool_]:
+def _is_rounded(points: Floats, single: bool) -> Bools:
     """(3,) whether coordinates along an axis make use of the last place of the largest of them."""
     last_places = np.ldexp(1.0, np.frexp(np.abs(points).max(axis=0))[1] - (24 if single else 53))
     return (np.fmod(points, 2.0 * last_places) != 0).any(axis=0)
 
 
-def welded(points: NDArray[np.float64], tolerance: float | NDArray[np.float64]) -> NDArray[np.int64]:
+def welded(points: Floats, tolerance: float | Floats) -> Ints:
     """(n,) first point within `tolerance` along each axis of each of (n, 3) points; its own index if there is none.
 
     Chains are not followed: a point is compared with such only as stand for themselves. Takes O(n) time as long as few
@@ -90,34 +89,32 @@ def welded(points: NDArray[np.float64], tolerance: float | NDArray[np.float64]) 
     return _weld(np.ascontiguousarray(points), np.maximum(np.broadcast_to(tolerance, 3), max(smallest, 1e-300)))
 
 
-def same_positions(points: NDArray[np.float64]) -> NDArray[np.int64]:
+def same_positions(points: Floats) -> Ints:
     """(n,) first point at exactly the same position as each of (n, d) points."""
     return same_rows((np.ascontiguousarray(points) + 0.0).view(np.uint64))  # −0 becomes 0
 
 
-def indexed(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def indexed(triangles: Floats) -> tuple[Floats, Ints]:
     """(n, 3) points of (m, 3, 3) triangles in order of first use, and (m, 3) triangles between them."""
     corners = triangles.reshape(-1, 3)
     used, faces = np.unique(same_positions(corners), return_inverse=True)
     return corners[used], faces.reshape(-1, 3)
 
 
-def same_rows(rows: NDArray[np.integer]) -> NDArray[np.int64]:
+def same_rows(rows: NDArray[np.integer]) -> Ints:
     """(n,) first row that equals each of (n, k) rows, in O(n) time."""
     numbers = np.ascontiguousarray(rows)
     return _same_rows(numbers.view(np.int64) if numbers.itemsize == 8 else numbers.astype(np.int64))
 
 
-def distinct_rows(rows: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def distinct_rows(rows: NDArray[np.integer]) -> tuple[Ints, Ints]:
     """Number of each of (n, k) rows among the different ones, in order of first appearance; and the first of each."""
     first = same_rows(rows)
     is_first = first == np.arange(len(first))
     return (np.cumsum(is_first) - 1)[first], np.flatnonzero(is_first)
 
 
-def coincident_faces(
-    corners: NDArray[np.int64], offsets: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def coincident_faces(corners: Ints, offsets: Ints) -> tuple[Ints, Bools]:
     """First face on the same corners as each, and whether it runs the other way round.
 
     Returned: first (p,), reversed (p,).
@@ -149,7 +146,7 @@ def mixed(a: int, b: int, c: int) -> int:
 
 
 @compiled
-def _weld(points: NDArray[np.float64], tolerances: NDArray[np.float64]) -> NDArray[np.int64]:
+def _weld(points: Floats, tolerances: Floats) -> Ints:
     n = len(points)
     bits = 4
     while (1 << bits) < 2 * n:
@@ -184,7 +181,7 @@ def _weld(points: NDArray[np.float64], tolerances: NDArray[np.float64]) -> NDArr
 
 
 @compiled
-def _same_rows(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+def _same_rows(rows: Ints) -> Ints:
     count, width = rows.shape
     size = 16
     while size < 2 * count:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..mesh.box_tree import morton_codes
 from ..mesh.components import by_first_use, connected_components, grouped, sums_of
 from ..mesh.edges import EdgeTable, edge_table
@@ -26,32 +27,30 @@ class FaceFeatures(NamedTuple):
     side of a point x whose nearest place is y.
     """
 
-    corners: NDArray[np.float64]  # (m, 9) corners of the faces, each face once, in the order of a space-filling curve
-    rows: NDArray[np.float64]  # (m, 16) the same as `foot_on_triangle` wants it
-    vertices: NDArray[np.float64]  # (n, 3) their positions
+    corners: Floats  # (m, 9) corners of the faces, each face once, in the order of a space-filling curve
+    rows: Floats  # (m, 16) the same as `foot_on_triangle` wants it
+    vertices: Floats  # (n, 3) their positions
     # (m, 3) vertices, which are different where positions are; and edges, corner k to corner k + 1
     faces: NDArray[np.int32]
     edges: NDArray[np.int32]
     # (·, 3) unit normals of the faces, their sums at edges, and angle-weighted at vertices
-    face_normals: NDArray[np.float64]
-    edge_normals: NDArray[np.float64]
-    vertex_normals: NDArray[np.float64]
+    face_normals: Floats
+    edge_normals: Floats
+    vertex_normals: Floats
     # (·,) whether the surface is closed and consistent there
-    edge_regular: NDArray[np.bool_]
-    vertex_regular: NDArray[np.bool_]
+    edge_regular: Bools
+    vertex_regular: Bools
     # (m, 3) the face on the other side of each edge, and its vertex that is not on it; −1 where the edge is not regular
     across: NDArray[np.int32]
     apexes: NDArray[np.int32]
     # (n + 1,) and (3 m,): corners around each vertex, in compressed rows: three times the face, plus 0, 1 or 2
-    vertex_starts: NDArray[np.int64]
+    vertex_starts: Ints
     vertex_corners: NDArray[np.int32]
     trusted: NDArray[np.float32]  # (m,) confidence in each face: 1 where it was there, less where it was put back
-    ids: NDArray[np.int64]  # (m,) which of the triangles given each is
+    ids: Ints  # (m,) which of the triangles given each is
 
     @classmethod
-    def of(
-        cls, vertices: NDArray[np.float64], faces: NDArray[np.int64], trusted: NDArray[np.float32] | None = None
-    ) -> FaceFeatures:
+    def of(cls, vertices: Floats, faces: Ints, trusted: NDArray[np.float32] | None = None) -> FaceFeatures:
         """Features of (m, 3) faces. Vertices at one position are one; faces without extent and copies are left out."""
         faces = same_positions(vertices)[faces]
         trusted = np.ones(len(faces), dtype=np.float32) if trusted is None else trusted
@@ -105,9 +104,7 @@ class FaceFeatures(NamedTuple):
         )
 
 
-def _regular(
-    faces: NDArray[np.int64], table: EdgeTable, edge_normals: NDArray[np.float64], n_vertices: int
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.int64]]:
+def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: int) -> tuple[Bools, Bools, Ints]:
     """Which edges and vertices are regular; and (3 m,) the other halfedge of each at a regular edge, else −1."""
     edges = (table.face_counts == 2) & (table.balance == 0) & ((edge_normals**2).sum(axis=1) > FOLD**2)
     mates = np.where(edges[table.face_edges].ravel(), table.mates, -1)
@@ -122,7 +119,7 @@ def _regular(
     return edges, vertices, mates
 
 
-def _copies(faces: NDArray[np.int64], table: EdgeTable) -> NDArray[np.bool_]:
+def _copies(faces: Ints, table: EdgeTable) -> Bools:
     """Which faces are there before, with the same corners in the same order of rotation."""
     copies = np.zeros(len(faces), dtype=bool)
     crowded = np.flatnonzero((table.face_counts > 2)[table.face_edges].all(axis=1))

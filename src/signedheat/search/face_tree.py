@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.box_tree import LEAF, BoxTree
 from ..parallel import in_chunks
@@ -47,24 +48,24 @@ class FaceTree:
         return cls(features, BoxTree.in_order(lower, upper, np.arange(len(triangles))))
 
     @classmethod
-    def of_triangles(cls, triangles: NDArray[np.float64], trusted: NDArray[np.float32] | None = None) -> FaceTree:
+    def of_triangles(cls, triangles: Floats, trusted: NDArray[np.float32] | None = None) -> FaceTree:
         """The tree of (m, 3, 3) triangles, of which one has area; corners at one position are one vertex."""
         return cls.of(FaceFeatures.of(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), trusted))
 
     @cached_property
-    def discs(self) -> NDArray[np.float64]:
+    def discs(self) -> Floats:
         """(2 · leaves, 8) centre, normal, radius and half the thickness of what is below each node.
 
         Thickness is negative where there is no disc, or none that is flat.
         """
         return _discs(self.features.corners, self.tree.bounds, self.tree.items)
 
-    def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def distances(self, points: Floats) -> Floats:
         """(n,) distance of each of (n, 3) points to the nearest face."""
         (distances,) = in_chunks(lambda chunk: (self._distances(chunk),), points)
         return distances
 
-    def search(self, points: NDArray[np.float64]) -> NearestFaces:
+    def search(self, points: Floats) -> NearestFaces:
         """The nearest face of each of (n, 3) points: fast where those that follow each other are near each other.
 
         Each `RUN` of points is searched on its own: what comes before does not matter.
@@ -74,13 +75,13 @@ class FaceTree:
         found = search_from(self.features, nearer, faces[:, None])
         return found if nearer is points else replace(found, distances=np.linalg.norm(points - found.places, axis=1))
 
-    def _distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _distances(self, points: Floats) -> Floats:
         nearer = self._brought_near(points)
         if nearer is not points:
             return self.search(points).distances
         return np.sqrt(self.nearest(points)[1])
 
-    def _brought_near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _brought_near(self, points: Floats) -> Floats:
         """The points; those farther than `FAR` sizes of the surface are moved towards its middle, to that distance."""
         lower, upper = self.tree.bounds[1, :3], self.tree.bounds[1, 3:]
         middle, limit = 0.5 * (lower + upper), FAR * float(np.linalg.norm(upper - lower))
@@ -89,17 +90,17 @@ class FaceTree:
         far = (distances > limit) & (limit > 0)
         if not far.any():
             return points
-        result: NDArray[np.float64] = points.copy()
+        result: Floats = points.copy()
         result[far] = middle + away[far] * (limit / distances[far])[:, None]
         return result
 
-    def nearest(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    def nearest(self, points: Floats) -> tuple[NDArray[np.int32], Floats]:
         """Nearest faces of points, and the squares of their distances."""
         return nearest_faces(self.features.rows, self.tree, self.discs, points, RUN)
 
 
 @compiled
-def _discs(corners: NDArray[np.float64], bounds: NDArray[np.float64], items: NDArray[np.int64]) -> NDArray[np.float64]:
+def _discs(corners: Floats, bounds: Floats, items: Ints) -> Floats:
     """See `FaceTree.discs`. Discs are convex, so that it is enough to put the corners of the faces into them."""
     leaves = len(bounds) // 2
     discs = np.full((2 * leaves, 8), -1.0)
@@ -148,16 +149,16 @@ class NearestFaces:
     """The nearest face of each of some points."""
 
     faces: NDArray[np.int32]  # (n,) which one
-    distances: NDArray[np.float64]  # (n,) to it
-    places: NDArray[np.float64]  # (n, 3) the nearest place
+    distances: Floats  # (n,) to it
+    places: Floats  # (n, 3) the nearest place
     features: NDArray[np.int8]  # (n,) what it lies on, in the code of `foot_on_triangle`
     # (n,) of the angle between the way from the foot to the point and the normal there: positive in front of the face
     cosines: NDArray[np.float32]
     # (n,) whether that decides the side: the nearest place is inside a face, or on a regular edge or vertex
-    regular: NDArray[np.bool_]
+    regular: Bools
 
 
-def search_from(features: FaceFeatures, points: NDArray[np.float64], candidates: NDArray[np.int32]) -> NearestFaces:
+def search_from(features: FaceFeatures, points: Floats, candidates: NDArray[np.int32]) -> NearestFaces:
     """The nearest of (n, c) candidate faces of each of (n, 3) points, or one that it leads on to; −1 is none.
 
     Where a point has no candidate, there is no face, and distance is infinite.
@@ -172,14 +173,14 @@ def search_from(features: FaceFeatures, points: NDArray[np.float64], candidates:
 @compiled
 def nearest_of_candidates(
     features: FaceFeatures,
-    points: NDArray[np.float64],
+    points: Floats,
     candidates: NDArray[np.int32],
     out_faces: NDArray[np.int32],
-    out_squares: NDArray[np.float64],
+    out_squares: Floats,
     out_features: NDArray[np.int8],
-    out_places: NDArray[np.float64],
+    out_places: Floats,
     out_cosines: NDArray[np.float32],
-    out_regular: NDArray[np.bool_],
+    out_regular: Bools,
 ) -> None:
     """From the nearest of some faces, and the nearest place on it, to faces that are nearer, across their rims.
 

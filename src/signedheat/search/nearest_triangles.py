@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..mesh.box_tree import LEAF, BoxTree
 from ..parallel import in_chunks
@@ -21,7 +22,7 @@ TOGETHER = 8
 million, whose boxes are smaller than what 16 points at random are apart; with 4 half as much again."""
 
 
-def triangle_rows(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def triangle_rows(corners: Floats) -> Floats:
     """(m, 16) what `foot_on_triangle` needs of (m, 9) corners: each triangle in a plane of its own.
 
     A corner; directions of two axes, along the first side and at a right angle to it; the length of this side; the
@@ -32,7 +33,7 @@ def triangle_rows(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @np.errstate(all="ignore")
-def _rows(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rows(corners: Floats) -> Floats:
     rows = np.empty((len(corners), 16))
     rows[:, :3] = corners[:, :3]
     u, v = (corners[:, k : k + 3].T - corners[:, :3].T for k in (3, 6))
@@ -56,15 +57,13 @@ def _rows(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     return rows
 
 
-def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    product: NDArray[np.float64] = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def _dot(a: Floats, b: Floats) -> Floats:
+    product: Floats = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     return product
 
 
 @compiled
-def foot_on_triangle(
-    rows: NDArray[np.float64], f: int, x: float, y: float, z: float
-) -> tuple[float, int, float, float, float]:
+def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tuple[float, int, float, float, float]:
     """Squared distance to triangle f, feature code, and the three coordinates of the foot.
 
     Inside, where the foot of the perpendicular is; else the nearest on three sides.
@@ -106,9 +105,7 @@ def foot_on_triangle(
 
 
 @compiled
-def away_from_triangle(
-    rows: NDArray[np.float64], f: int, places: NDArray[np.float64], at: int, out: NDArray[np.float64]
-) -> None:
+def away_from_triangle(rows: Floats, f: int, places: Floats, at: int, out: Floats) -> None:
     """Squared distance of (3, n) places to triangle f, and the way to each from its foot, into ``out[at]``, (4, n).
 
     The same as `foot_on_triangle`, without a branch, so that processors do several places at once. The compiler must
@@ -157,9 +154,7 @@ def away_from_triangle(
 
 
 @compiled
-def barycentric_on_triangles(
-    rows: NDArray[np.float64], faces: NDArray[np.int32], points: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def barycentric_on_triangles(rows: Floats, faces: NDArray[np.int32], points: Floats) -> Floats:
     """(n, 3) barycentric coordinates of the place of a triangle that is nearest to each point."""
     weights = np.zeros((len(points), 3))
     for k in range(len(points)):
@@ -186,7 +181,7 @@ def barycentric_on_triangles(
     return weights
 
 
-def weights_in(triangles: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def weights_in(triangles: Floats, places: Floats) -> Floats:
     """(n, 3) barycentric coordinates of (n, 3) places, each in one of (n, 3, 3) triangles."""
     rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
     return barycentric_on_triangles(rows, np.arange(len(rows), dtype=np.int32), places)
@@ -196,20 +191,20 @@ def weights_in(triangles: NDArray[np.float64], places: NDArray[np.float64]) -> N
 class TriangleTree:
     """Triangles in a tree of boxes, in which the nearest to points are found."""
 
-    rows: NDArray[np.float64]  # (m, 16) the triangles, as `triangle_rows` gives them
+    rows: Floats  # (m, 16) the triangles, as `triangle_rows` gives them
     tree: BoxTree  # of their bounding boxes
 
     @classmethod
-    def of(cls, triangles: NDArray[np.float64]) -> TriangleTree:
+    def of(cls, triangles: Floats) -> TriangleTree:
         """The tree of (m, 3, 3) corners."""
         rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
         return cls(rows, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)))
 
     @cached_property
-    def _no_discs(self) -> NDArray[np.float64]:
+    def _no_discs(self) -> Floats:
         return np.full((len(self.tree.bounds), 8), -1.0)
 
-    def nearest(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def nearest(self, points: Floats) -> tuple[Ints, Floats]:
         """Closest triangle to each of (k, 3) points, and barycentric coordinates of the closest point in it."""
         points = np.ascontiguousarray(points)
         found, _ = nearest_faces(self.rows, self.tree, self._no_discs, points, TOGETHER * max(len(points), 1))
@@ -217,8 +212,8 @@ class TriangleTree:
 
 
 def nearest_faces(
-    rows: NDArray[np.float64], tree: BoxTree, discs: NDArray[np.float64], points: NDArray[np.float64], run: int
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    rows: Floats, tree: BoxTree, discs: Floats, points: Floats, run: int
+) -> tuple[NDArray[np.int32], Floats]:
     """(n,) nearest face of each of (n, 3) points, and the square of its distance: see `descend`."""
     faces, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
     best = np.empty(min(max(len(points), 1), TOGETHER))
@@ -228,15 +223,15 @@ def nearest_faces(
 
 @compiled
 def descend(
-    rows: NDArray[np.float64],
-    bounds: NDArray[np.float64],
-    discs: NDArray[np.float64],
-    items: NDArray[np.int64],
-    points: NDArray[np.float64],
+    rows: Floats,
+    bounds: Floats,
+    discs: Floats,
+    items: Ints,
+    points: Floats,
     run: int,
-    best: NDArray[np.float64],
+    best: Floats,
     out_faces: NDArray[np.int32],
-    out_squares: NDArray[np.float64],
+    out_squares: Floats,
 ) -> None:
     """Nearest face of each point (n, 3), and the square of its distance, down a tree of boxes; into `out_…`, (n,).
 

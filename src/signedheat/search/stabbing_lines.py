@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..frozen import read_only
 from ..mesh.components import grouped
@@ -23,24 +24,20 @@ from ..mesh.components import grouped
 class LineCrossings:
     """Where lines cross triangles, line after line and along each in order."""
 
-    starts: NDArray[np.int64]  # (n_lines + 1,) where the crossings of each line begin
+    starts: Ints  # (n_lines + 1,) where the crossings of each line begin
     crossed: NDArray[np.integer]  # (k,) triangle of each crossing, or the face that it is part of
-    entering: NDArray[np.bool_]  # (k,) whether the line comes from the side to which the triangle's normal points
-    depths: NDArray[np.float64]  # (k,) place along the line, in units of length
-    cosines: NDArray[np.float64]  # (k,) of the angle between line and normal, not negative
+    entering: Bools  # (k,) whether the line comes from the side to which the triangle's normal points
+    depths: Floats  # (k,) place along the line, in units of length
+    cosines: Floats  # (k,) of the angle between line and normal, not negative
 
-    def chosen(self, kept: NDArray[np.bool_]) -> LineCrossings:
+    def chosen(self, kept: Bools) -> LineCrossings:
         """Some of the crossings, of as many lines."""
         starts = np.concatenate([[0], np.cumsum(kept)])[self.starts]
         return LineCrossings(starts, self.crossed[kept], self.entering[kept], self.depths[kept], self.cosines[kept])
 
 
 def stabbing_lines(
-    vertices: NDArray[np.float64],
-    triangles: NDArray[np.int64],
-    bounds: NDArray[np.float64],
-    n_lines: int,
-    n_directions: int = 16,
+    vertices: Floats, triangles: Ints, bounds: Floats, n_lines: int, n_directions: int = 16
 ) -> LineCrossings:
     """Cross a shape by about so many lines, through its shadows along some directions. The same lines every time.
 
@@ -73,7 +70,7 @@ def _in_order(found: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]], n_li
 
 
 @lru_cache(maxsize=4)
-def line_frames(n: int) -> NDArray[np.float64]:
+def line_frames(n: int) -> Floats:
     """(n, 3, 3) right-handed frames whose last rows are spread evenly over half a sphere, none along an axis."""
     height = (np.arange(n) + 0.5) / n
     turn = np.pi * (3 - 5**0.5) * np.arange(n)
@@ -90,15 +87,15 @@ def line_frames(n: int) -> NDArray[np.float64]:
 
 @compiled
 def crossings_at_pixels(
-    vertices: NDArray[np.float64],
-    triangles: NDArray[np.int64],
-    frame: NDArray[np.float64],
-    center: NDArray[np.float64],
+    vertices: Floats,
+    triangles: Ints,
+    frame: Floats,
+    center: Floats,
     pixel: float,
-    shift: NDArray[np.float64],
-    shape: NDArray[np.int64],
+    shift: Floats,
+    shape: Ints,
     first_line: int,
-) -> tuple[NDArray[np.int32], NDArray[np.bool_], NDArray[np.float64]]:
+) -> tuple[NDArray[np.int32], Bools, Floats]:
     """Crossings of the lines through a picture's pixels: lines and triangles, whether they enter, depths and cosines.
 
     A row's pixels from one side of a triangle on to before the next. Line `first_line` is that of the first pixel, the
@@ -165,9 +162,7 @@ def _crossed(ax: float, ay: float, bx: float, by: float, y: float) -> float:
 
 
 @compiled
-def _doubled(
-    ids: NDArray[np.int32], entering: NDArray[np.bool_], places: NDArray[np.float64]
-) -> tuple[NDArray[np.int32], NDArray[np.bool_], NDArray[np.float64]]:
+def _doubled(ids: NDArray[np.int32], entering: Bools, places: Floats) -> tuple[NDArray[np.int32], Bools, Floats]:
     """The same rows with room for as many more."""
     n = len(ids)
     more = np.empty((2 * n, 2), np.int32), np.empty(2 * n, np.bool_), np.empty((2 * n, 2))

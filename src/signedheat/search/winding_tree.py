@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..mesh.box_tree import LEAF, BoxTree
 from ..parallel import in_chunks
@@ -31,15 +32,15 @@ OPENING = 1.25
 class WindingTree:
     """Triangles in a tree, of which each node can replace its triangles for points far away."""
 
-    triangles: NDArray[np.float64]  # (m, 3, 3) their corners, counterclockwise from outside
+    triangles: Floats  # (m, 3, 3) their corners, counterclockwise from outside
     tree: BoxTree  # over their boxes
 
     @classmethod
-    def of(cls, triangles: NDArray[np.float64]) -> WindingTree:
+    def of(cls, triangles: Floats) -> WindingTree:
         """A tree of its own over (m, 3, 3) triangles."""
         return cls(triangles, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)))
 
-    def numbers(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def numbers(self, points: Floats) -> Floats:
         """(n,) winding numbers around (n, 3) points, to some hundredths, in time O(n log m).
 
         On a face it is that of one of its sides: take `behind`.
@@ -49,7 +50,7 @@ class WindingTree:
         (numbers,) = in_chunks(lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk),), points)
         return numbers
 
-    def behind(self, faces: NDArray[np.integer], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def behind(self, faces: NDArray[np.integer], places: Floats) -> Floats:
         """(n,) winding numbers just behind places (n, 3) in faces (n,): 1 more than in front, where no other face lies.
 
         They must not be on the rims of these, where other faces meet them.
@@ -61,14 +62,12 @@ class WindingTree:
         return self.numbers(places - depth[:, None] * normals)
 
     @cached_property
-    def _moments(self) -> NDArray[np.float64]:
+    def _moments(self) -> Floats:
         return moments_of(self.triangles, self.tree, OPENING)
 
 
 @compiled
-def _winding(
-    corners: NDArray[np.float64], items: NDArray[np.int64], moments: NDArray[np.float64], points: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> Floats:
     """(n,) winding numbers around points, down the tree (Barill et al. 2018).
 
     Far from a node, the first three terms of the expansion about its centre replace its triangles: area vector, first
@@ -117,7 +116,7 @@ def _winding(
 
 
 @compiled
-def solid_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z: float) -> tuple[float, float]:
+def solid_angle(corners: Floats, face: int, x: float, y: float, z: float) -> tuple[float, float]:
     """Parts of a complex number whose argument is half the signed solid angle of a triangle from a point.
 
     Positive from behind it (van Oosterom & Strackee 1983).
@@ -135,7 +134,7 @@ def solid_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z: 
 
 
 @compiled
-def mean_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z: float) -> float:
+def mean_angle(corners: Floats, face: int, x: float, y: float, z: float) -> float:
     """Signed solid angle of a triangle from a point; from a point in its plane the mean of both sides, 0."""
     rest, volume = solid_angle(corners, face, x, y, z)
     scale = 1.0
@@ -154,7 +153,7 @@ BLOCK = 2**13
 WIDTH = 7 + len(SQUARES) + len(CUBES)
 
 
-def moments_of(triangles: NDArray[np.float64], tree: BoxTree, opening: float) -> NDArray[np.float64]:
+def moments_of(triangles: Floats, tree: BoxTree, opening: float) -> Floats:
     """(2 · leaves, 23) of what is below each node of a tree.
 
     Area vector, centre, the square of `opening` times the radius around it, then the coefficients of M and S.
@@ -188,7 +187,7 @@ def moments_of(triangles: NDArray[np.float64], tree: BoxTree, opening: float) ->
         centres, weights = middle, total
 
 
-def _of_leaves(triangles: NDArray[np.float64], grouped: NDArray[np.int64]) -> tuple[NDArray[np.float64], ...]:
+def _of_leaves(triangles: Floats, grouped: Ints) -> tuple[Floats, ...]:
     """Of some leaves: sums of area vectors, areas, and areas times centres; their centre, M and S, and radii."""
     there = grouped >= 0
     corners = np.where(there[..., None, None], triangles[grouped], 0.0)
@@ -210,7 +209,7 @@ def _of_leaves(triangles: NDArray[np.float64], grouped: NDArray[np.int64]) -> tu
     return vectors, weights, firsts, centres, first, second, radii
 
 
-def _product(form: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np.float64]:
+def _product(form: Floats, line: Floats) -> Floats:
     """Coefficients of a linear or quadratic form, (3, …) or (6, …), times a linear one."""
     given, wanted = (((0,), (1,), (2,)), SQUARES) if len(form) == 3 else (SQUARES, CUBES)
     result = np.zeros((len(wanted), *form.shape[1:]))
@@ -220,10 +219,10 @@ def _product(form: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np
     return result
 
 
-def _over(firsts: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+def _over(firsts: Floats, weights: Floats) -> Floats:
     return firsts / np.where(weights > 0, weights, 1.0)
 
 
-def _of_pairs(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _of_pairs(values: Floats) -> Floats:
     """(…, n / 2) sums of the two nodes below each."""
     return values[..., ::2] + values[..., 1::2]

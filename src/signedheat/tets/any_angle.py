@@ -10,8 +10,8 @@ anywhere on an edge, costs a length of second order.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..geodesics.heap_kernels import Queue, pop, push
 from ..search.nearest_triangles import foot_on_triangle
@@ -22,13 +22,13 @@ from .visibility import stays_inside
 @compiled
 def _seen(
     planes: Planes,
-    neighbors: NDArray[np.int64],
-    tets: NDArray[np.int64],
-    points: NDArray[np.float64],
-    first_tet: NDArray[np.int64],
-    tets_at: NDArray[np.int64],
+    neighbors: Ints,
+    tets: Ints,
+    points: Floats,
+    first_tet: Ints,
+    tets_at: Ints,
     v: int,
-    target: NDArray[np.float64],
+    target: Floats,
     slack: float,
 ) -> bool:
     """Whether the segment from vertex v to a target in the mesh lies in the mesh."""
@@ -49,15 +49,8 @@ def _seen(
 
 @compiled
 def nearest_around(
-    rows: NDArray[np.float64],
-    triangles_at: NDArray[np.int64],
-    first_triangle: NDArray[np.int64],
-    corners: NDArray[np.int64],
-    near: int,
-    x: float,
-    y: float,
-    z: float,
-) -> tuple[int, NDArray[np.float64]]:
+    rows: Floats, triangles_at: Ints, first_triangle: Ints, corners: Ints, near: int, x: float, y: float, z: float
+) -> tuple[int, Floats]:
     """The triangle nearest to (x, y, z) of those that share a corner with triangle `near`, and its nearest point."""
     best, found, place = np.inf, near, np.zeros(3)
     for c in range(3):
@@ -70,27 +63,27 @@ def nearest_around(
 
 
 @compiled
-def _length(point: NDArray[np.float64], x: float, y: float, z: float) -> float:
+def _length(point: Floats, x: float, y: float, z: float) -> float:
     return np.sqrt((point[0] - x) ** 2 + (point[1] - y) ** 2 + (point[2] - z) ** 2)
 
 
 @compiled
 def any_angle_distance(
     planes: Planes,
-    neighbors: NDArray[np.int64],
-    tets: NDArray[np.int64],
-    points: NDArray[np.float64],
-    first_tet: NDArray[np.int64],
-    tets_at: NDArray[np.int64],
-    rows: NDArray[np.float64],
-    corners: NDArray[np.int64],
-    first_triangle: NDArray[np.int64],
-    triangles_at: NDArray[np.int64],
-    owners: NDArray[np.int64],
-    nearest: NDArray[np.int64],
+    neighbors: Ints,
+    tets: Ints,
+    points: Floats,
+    first_tet: Ints,
+    tets_at: Ints,
+    rows: Floats,
+    corners: Ints,
+    first_triangle: Ints,
+    triangles_at: Ints,
+    owners: Ints,
+    nearest: Ints,
     slack: float,
     queue: Queue,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], int]:
+) -> tuple[Floats, Ints, Floats, int]:
     """Distance of every vertex from triangles in the mesh.
 
     Parameters

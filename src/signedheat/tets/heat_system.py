@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Bools, Floats, Ints
 from ..linear import Factor, factorize
 from ..linear.incomplete_cholesky import IncompleteCholesky, outward_order
 from ..linear.restarts import Stage, matrix_forces, solve_with_restarts
@@ -39,25 +39,19 @@ class HeatSystem:
         """Its factor."""
         return factorize(self.matrix)
 
-    def solve(self, loads: NDArray[np.float64]) -> list[Stage]:
+    def solve(self, loads: Floats) -> list[Stage]:
         """X for columns (n, k), in stages: it leaves the range of floating-point numbers a few hundred cells away."""
         size = float(self.matrix.diagonal().mean())
         return solve_with_restarts(self._solve, matrix_forces(self.matrix), loads, size)
 
-    def _solve(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _solve(self, loads: Floats) -> Floats:
         if self.direct:
             return self.factor.solve(loads)
         order = outward_order(self.matrix, np.flatnonzero(loads.any(axis=1)))
         return IncompleteCholesky.of(self.matrix, order).solve(loads, relative=0.0, componentwise=self.accuracy)
 
 
-def bend_around_corners(
-    vectors: NDArray[np.float64],
-    falling: NDArray[np.float64],
-    heights: NDArray[np.float64],
-    neighbors: NDArray[np.int64],
-    straight: NDArray[np.bool_],
-) -> NDArray[np.float64]:
+def bend_around_corners(vectors: Floats, falling: Floats, heights: Floats, neighbors: Ints, straight: Bools) -> Floats:
     """X, turned where it has come round a corner.
 
     In flat space diffusion carries vectors along without turning them. Where the straight line to the source leaves the

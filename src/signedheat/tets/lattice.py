@@ -14,9 +14,9 @@ from typing import Any, cast
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from ..area_elements import area_elements, bounds_around
+from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError, MemoryLimitError
 from ..foreign import converted
 from ..grids.grid import room_around
@@ -122,7 +122,7 @@ def tetrahedralize(
     return TetMesh(origin + points * (spacing / 2), tets)
 
 
-def sample_points(shape: Shape, spacing: float) -> NDArray[np.float64]:
+def sample_points(shape: Shape, spacing: float) -> Floats:
     """Points on a shape such that no point of it is farther than `spacing` from one of them."""
     if isinstance(shape, PointCloud):
         return shape.points
@@ -157,14 +157,8 @@ def _refuse_too_many(least: float, expected: float, resolution: float, power: in
 
 
 def _octree(
-    samples: Any,
-    origin: NDArray[np.float64],
-    spacing: float,
-    counts: NDArray[np.int64],
-    depth: int,
-    grading: float,
-    resolution: float,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    samples: Any, origin: Floats, spacing: float, counts: Ints, depth: int, grading: float, resolution: float
+) -> tuple[Ints, Ints]:
     """Lower corners and sizes of the leaves, in half cells of the finest level.
 
     The distance to the samples is Lipschitz with constant one, so no leaf has a neighbour that was split twice more:
@@ -188,14 +182,12 @@ def _octree(
     return np.concatenate(corners), np.concatenate(sizes)
 
 
-def _join_leaves(
-    corners: NDArray[np.int64], sizes: NDArray[np.int64], upper: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
     """Points, in half cells of the finest level, and tets that join the centres of leaves that share a face."""
     stride = np.array([(upper[1] + 1) * (upper[2] + 1), upper[2] + 1, 1])
     leaves = np.sort((corners * 32 + np.log2(sizes).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
 
-    def is_leaf(corner: NDArray[np.int64], size: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def is_leaf(corner: Ints, size: Ints) -> Bools:
         return _contains(leaves, (corner * 32 + np.log2(size).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
 
     octants = np.array(list(itertools.product((0, 1), repeat=3)))
@@ -234,6 +226,6 @@ def _join_leaves(
     return points, tets
 
 
-def _contains(sorted_keys: NDArray[np.int64], keys: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _contains(sorted_keys: Ints, keys: Ints) -> Bools:
     found = np.minimum(np.searchsorted(sorted_keys, keys), len(sorted_keys) - 1)
     return sorted_keys[found] == keys

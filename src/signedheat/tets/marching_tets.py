@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..errors import OutsideError
 from ..mesh.components import connected_components
 from ..mesh.tet_shapes import TetShapes, face_table
@@ -35,9 +35,7 @@ _LIDS = {
 }
 
 
-def closed_level_set(
-    mesh: TetShapes, values: NDArray[np.float64], gradients: NDArray[np.float64], level: float
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def closed_level_set(mesh: TetShapes, values: Floats, gradients: Floats, level: float) -> tuple[Floats, Ints]:
     """Vertices and triangles of the surface that separates mesh vertices below a level from the others.
 
     Normals point to the greater values. Vertices of the surface lie where φ takes the level, to second order, by its
@@ -62,9 +60,7 @@ def closed_level_set(
     return manifold(*_crossings(mesh.vertices, values, gradients, level, keys, CLEARANCE))
 
 
-def level_triangles(
-    vertices: NDArray[np.float64], tets: NDArray[np.int64], values: NDArray[np.float64], level: float
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+def level_triangles(vertices: Floats, tets: Ints, values: Floats, level: float) -> tuple[Floats, Ints, Ints]:
     """The level set of the linear interpolant, open at the boundary: positions (n, 3), triangles (k, 3), tets (k,)."""
     finite = np.flatnonzero(~np.isnan(values[tets]).any(axis=1))
     keys, owners = _triangles(tets[finite], (values < level)[tets[finite]], len(vertices), _CUTS)
@@ -72,13 +68,8 @@ def level_triangles(
 
 
 def _crossings(
-    vertices: NDArray[np.float64],
-    values: NDArray[np.float64],
-    gradients: NDArray[np.float64],
-    level: float,
-    keys: NDArray[np.int64],
-    clearance: float,
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    vertices: Floats, values: Floats, gradients: Floats, level: float, keys: Ints, clearance: float
+) -> tuple[Floats, Ints]:
     """Positions at which edges take the level, and the index of the position of each key.
 
     A key is ``smaller · n + larger`` vertex id of an edge. At the fraction s of an edge e from a to b, φ is
@@ -95,8 +86,8 @@ def _crossings(
 
 
 def _triangles(
-    elements: NDArray[np.int64], below: NDArray[np.bool_], n: int, table: dict[int, list[list[tuple[int, int]]]]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    elements: Ints, below: Bools, n: int, table: dict[int, list[list[tuple[int, int]]]]
+) -> tuple[Ints, Ints]:
     """(k, 3) triangles whose corners are ``smaller · n + larger`` vertex id of their edge, and (k,) their elements."""
     corners = elements.shape[1]
     masks = below @ (1 << np.arange(corners))
@@ -116,9 +107,7 @@ def _triangles(
     return np.concatenate(found), np.concatenate(owners)
 
 
-def manifold(
-    positions: NDArray[np.float64], triangles: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def manifold(positions: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     """A closed oriented surface made manifold: vertices and edges at which it touches itself are split.
 
     Every halfedge is paired with one that runs in the opposite direction; corners that meet across a pair share a

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..area_elements import area_elements, bounds_around
+from ..arrays import Floats, Ints
 from ..errors import GeometryError
 from ..grids.grid import room_around
 from ..packages import lazy_module
@@ -41,10 +42,7 @@ def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: flo
 def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:
     """Fill a box around a shape with tets that approximately conform to its faces, by fTetWild."""
     if isinstance(shape, PointCloud):
-        raise GeometryError(
-            "fTetWild follows faces, and a point cloud has none",
-            remedy="use tetrahedralize",
-        )
+        raise GeometryError("fTetWild follows faces, and a point cloud has none", remedy="use tetrahedralize")
     lower, upper, spacing = _box_around(shape, resolution, padding)
     corners, faces = box_walls(lower, upper, np.ones(3, dtype=np.int64))
     triangles = area_elements(shape).corners
@@ -61,9 +59,7 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
     return TetMesh(vertices, tets[:, [0, 1, 3, 2]])  # fTetWild's own order has negative volumes
 
 
-def _box_around(
-    shape: Any, resolution: int, padding: float | None
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def _box_around(shape: Any, resolution: int, padding: float | None) -> tuple[Floats, Floats, float]:
     """Lower and upper corner of the padded bounding box of a shape, and the target edge length."""
     lower, upper = bounds_around([shape])
     longest = float((upper - lower).max())
@@ -75,9 +71,7 @@ def _box_around(
     return lower - padding, upper + padding, longest / resolution
 
 
-def box_walls(
-    lower: NDArray[np.float64], upper: NDArray[np.float64], counts: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def box_walls(lower: Floats, upper: Floats, counts: Ints) -> tuple[Floats, NDArray[np.int32]]:
     """Triangulated box: vertices, and faces from `counts` rectangles along x, y and z, each cut into two triangles."""
     stride = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
     faces = []

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.tet_shapes import TetShapes
 from ..parallel import CHUNK, in_chunks
@@ -43,12 +43,12 @@ class ClippedPolygons:
         Corner opposite to the face that it lies in, −1 in the interior of the tet.
     """
 
-    tets: NDArray[np.int64]
-    parents: NDArray[np.int64]
-    area_vectors: NDArray[np.float64]
-    areas: NDArray[np.float64]
-    barycentric: NDArray[np.float64]
-    in_face: NDArray[np.int64]
+    tets: Ints
+    parents: Ints
+    area_vectors: Floats
+    areas: Floats
+    barycentric: Floats
+    in_face: Ints
 
 
 class Planes(NamedTuple):
@@ -74,14 +74,14 @@ class Planes(NamedTuple):
         Centre of the mesh; coordinates are taken relative to it to reduce rounding errors.
     """
 
-    tet_faces: NDArray[np.int64]
-    normals: NDArray[np.float64]
-    offsets: NDArray[np.float64]
-    tolerances: NDArray[np.float64]
-    signs: NDArray[np.float64]
-    shares: NDArray[np.float64]
-    solid: NDArray[np.bool_]
-    center: NDArray[np.float64]
+    tet_faces: Ints
+    normals: Floats
+    offsets: Floats
+    tolerances: Floats
+    signs: Floats
+    shares: Floats
+    solid: Bools
+    center: Floats
 
     @classmethod
     def of(cls, mesh: TetShapes) -> Planes:
@@ -108,7 +108,7 @@ class Planes(NamedTuple):
         )
 
 
-def clip_triangles(mesh: TetShapes, planes: Planes, triangles: NDArray[np.float64]) -> ClippedPolygons:
+def clip_triangles(mesh: TetShapes, planes: Planes, triangles: Floats) -> ClippedPolygons:
     """Clip (k, 3, 3) triangles against the tets that they cross; parts outside the mesh are dropped.
 
     Examples
@@ -130,7 +130,7 @@ def clip_triangles(mesh: TetShapes, planes: Planes, triangles: NDArray[np.float6
     return ClippedPolygons(tets, parents, vectors, areas, barycentric(mesh, tets, centers + planes.center), in_face)
 
 
-def containing_tets(mesh: TetShapes, planes: Planes, points: NDArray[np.float64]) -> NDArray[np.int64]:
+def containing_tets(mesh: TetShapes, planes: Planes, points: Floats) -> Ints:
     """(k,) a tet that contains each point, −1 outside the mesh.
 
     Examples
@@ -140,7 +140,7 @@ def containing_tets(mesh: TetShapes, planes: Planes, points: NDArray[np.float64]
     array([ 0, -1])
     """
 
-    def found(some: NDArray[np.float64]) -> tuple[NDArray[np.int64]]:
+    def found(some: Floats) -> tuple[Ints]:
         near = mesh.search_tree.meeting(np.repeat(some[:, None], 3, axis=1), slack)
         return (_locate(planes, some - planes.center, *near),)
 
@@ -148,13 +148,13 @@ def containing_tets(mesh: TetShapes, planes: Planes, points: NDArray[np.float64]
     return in_chunks(found, points)[0]
 
 
-def _slack(mesh: TetShapes) -> NDArray[np.float64]:
+def _slack(mesh: TetShapes) -> Floats:
     """(3,) how far beyond its box a tet is looked for: rounding may put a point there."""
     lower, upper = mesh.search_tree.bounds[1].reshape(2, 3)
     return 1e-9 * (upper - lower)
 
 
-def barycentric(mesh: TetShapes, tets: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def barycentric(mesh: TetShapes, tets: Ints, points: Floats) -> Floats:
     """(k, 4) barycentric coordinates of points in given tets, clamped to be nonnegative, each row with sum one."""
     from_corner = points[:, None] - mesh.vertices[mesh.tets[tets][:, [1, 0, 0, 0]]]  # on the face opposite each corner
     inward = -np.einsum("pki,pki->pk", mesh.area_vectors[tets], from_corner)
@@ -173,9 +173,7 @@ def beyond(planes: Planes, tet: int, k: int, x: float, y: float, z: float) -> fl
 
 
 @compiled
-def _locate(
-    planes: Planes, points: NDArray[np.float64], starts: NDArray[np.int64], near: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _locate(planes: Planes, points: Floats, starts: Ints, near: Ints) -> Ints:
     found = np.full(len(points), -1, dtype=np.int64)
     for p in range(len(points)):
         deepest = -np.inf
@@ -193,9 +191,7 @@ def _locate(
 
 
 @compiled
-def _clip(
-    planes: Planes, triangles: NDArray[np.float64], parents: NDArray[np.int64], tets: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+def _clip(planes: Planes, triangles: Floats, parents: Ints, tets: Ints) -> tuple[Floats, Floats, Floats, Ints]:
     """Area vector, area and centroid of what of a triangle lies in a tet, and the face of the tet that it lies in."""
     area_vectors, centers = np.zeros((len(tets), 3)), np.zeros((len(tets), 3))
     areas, in_face = np.zeros(len(tets)), np.full(len(tets), -1)
@@ -230,13 +226,7 @@ def _clip(
 
 @compiled
 def _cut(
-    planes: Planes,
-    tet: int,
-    corner: int,
-    polygon: NDArray[np.float64],
-    n: int,
-    other: NDArray[np.float64],
-    heights: NDArray[np.float64],
+    planes: Planes, tet: int, corner: int, polygon: Floats, n: int, other: Floats, heights: Floats
 ) -> tuple[int, bool]:
     """Clip a polygon to the inner side of a face of a tet. Also whether the whole polygon lies in the face's plane.
 
@@ -269,13 +259,7 @@ def _cut(
 
 
 @compiled
-def _measure(
-    polygon: NDArray[np.float64],
-    n: int,
-    normal: NDArray[np.float64],
-    area_vector: NDArray[np.float64],
-    center: NDArray[np.float64],
-) -> float:
+def _measure(polygon: Floats, n: int, normal: Floats, area_vector: Floats, center: Floats) -> float:
     """Area vector and centroid of a convex polygon; returns its area, negative if rounding has turned it over."""
     area_vector[:] = 0.0
     center[:] = 0.0

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Bools, Floats, Ints
 from ..cache import LastUsed
 from ..direct_integration import STIFFEST
 from ..discretization import DiffusesEach, Levels, SourceTerm, discretize
@@ -79,7 +79,7 @@ class TetDiscretization(DiffusesEach):
         return float(np.mean([np.linalg.norm(edge, axis=1).mean() for edge in pairs])) / 3
 
     @cached_property
-    def unknowns(self) -> NDArray[np.int64]:
+    def unknowns(self) -> Ints:
         """(m, 4) unknown of φ at each corner of each tet.
 
         Heat flows through faces only. Parts of the mesh that meet in an edge or a vertex only are separate domains, and
@@ -103,7 +103,7 @@ class TetDiscretization(DiffusesEach):
             return TetIntegration(matrix, strength=strength, gradients=self._gradients)
         return TetIntegration(matrix, factorize=from_first, spring=1e4, strength=strength, gradients=self._gradients)
 
-    def _gradients(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _gradients(self, values: Floats) -> Floats:
         return np.nan_to_num(self.mesh.geometry.mean_gradients(values, self.unknowns, self.n_unknowns))
 
     def adapt(self, sources: Sequence[Any]) -> tuple[TetDiscretization, Sequence[Any]]:
@@ -114,7 +114,7 @@ class TetDiscretization(DiffusesEach):
         """X₀ (Sec. 8.1; Eq. 11 in space) and the rows that average φ over the sources (Eq. 14)."""
         return tet_source(self.mesh, self.planes, self.unknowns, sources, diffusion, self.spacing)
 
-    def diffuse(self, source: TetSource) -> NDArray[np.float64]:
+    def diffuse(self, source: TetSource) -> Floats:
         """Solve ``(M + tL) X = X₀`` (Eq. 12): one vector per face, averaged in the tets (App. B.2)."""
         heat = self._heats(source.time, lambda: self._heat_system(source.time))
         if self._is_convex:
@@ -132,7 +132,7 @@ class TetDiscretization(DiffusesEach):
         matrix.setdiag(matrix.diagonal() + mass)
         return HeatSystem(matrix, self.direct, DIRECTION_ERROR)
 
-    def _in_tets(self, stages: list[Stage]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _in_tets(self, stages: list[Stage]) -> tuple[Floats, Floats, Floats]:
         """Means of X in the tets, positive multiples of the gradient of its last column, and logarithms of its scale.
 
         Each tet takes them from the last stage in which all its four faces are known.
@@ -148,7 +148,7 @@ class TetDiscretization(DiffusesEach):
             gradients[finite], factors[finite] = slopes, factor
         return means, gradients, factors
 
-    def _straight(self, source: TetSource) -> NDArray[np.bool_]:
+    def _straight(self, source: TetSource) -> Bools:
         """(m,) tets that the source reaches along a straight line."""
         planes, centers = self.planes, self.mesh.tet_barycenters
         nearest = source.centers[scipy.spatial.cKDTree(source.centers).query(centers)[1]]
@@ -159,7 +159,7 @@ class TetDiscretization(DiffusesEach):
     def _laplacian(self) -> sparse.csr_matrix:
         return self.mesh.geometry.face_laplacian()
 
-    def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_cells(self, vectors: Floats) -> Floats:
         """X at the tets: `diffuse` has averaged it already."""
         return vectors
 
@@ -172,18 +172,18 @@ class TetDiscretization(DiffusesEach):
             return False
         return bool(self.mesh.tet_volumes.sum() >= (1 - 1e-9) * hull.volume)
 
-    def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    def divergence(self, directions: Floats) -> Floats:
         """b, the right-hand side of ``C φ = b`` (Eq. 13, Eq. 22)."""
         return self.mesh.geometry.divergence(directions, self.unknowns, self.n_unknowns)
 
     @cached_property
-    def vertices(self) -> NDArray[np.int64]:
+    def vertices(self) -> Ints:
         """(n,) vertex of the mesh that each unknown belongs to."""
         vertices = np.empty(self.n_unknowns, dtype=np.int64)
         vertices[self.unknowns] = self.mesh.tets
         return vertices
 
-    def at_vertices(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at_vertices(self, values: Floats) -> Floats:
         """(n_vertices,) values at the vertices: means over the unknowns of each, NaN where none has a value."""
         finite = np.flatnonzero(~np.isnan(values))
         vertices, n = self.vertices[finite], self.mesh.n_vertices
@@ -220,34 +220,29 @@ class TetIntegration(SpringIntegration):
         From φ at the unknowns to (n, 3) gradients there.
     """
 
-    gradients: Callable[[NDArray[np.float64]], NDArray[np.float64]] = np.zeros_like
+    gradients: Callable[[Floats], Floats] = np.zeros_like
 
-    def corrected(
-        self,
-        levels: NDArray[np.float64],
-        solve: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-        source: SourceTerm,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def corrected(self, levels: Floats, solve: Callable[[Floats], Floats], source: SourceTerm) -> tuple[Floats, Floats]:
         """Levels less the quadratic correction of a first φ, and the φ with these."""
         values = levels - self._quadratic_correction(solve(levels), source)
         return values, solve(values)
 
-    def fit_exactly(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+    def fit_exactly(self, divergence: Floats, source: SourceTerm, levels: Levels) -> Floats:
         """Impose levels at the samples exactly (Eq. 14)."""
         correction = self._quadratic_correction(self.factor.solve(divergence), source)
         return super().fit_exactly(divergence, source, replace(levels, values=levels.values - correction))
 
-    def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
+    def penalize(self, divergence: Floats, source: SourceTerm, strength: float) -> Floats:
         """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), where A φ is corrected for the curvature of φ."""
         strength = min(strength, STIFFEST * float(self.stiffness.diagonal().max()) / float(source.weights.max()))
         free = super().penalize(divergence, source, strength)
         pull = source.interpolation.T @ (strength * source.weights * self._quadratic_correction(free, source))
         return super().penalize(divergence - pull, source, strength)
 
-    def _at_samples(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+    def _at_samples(self, values: Floats, source: SourceTerm) -> Floats:
         return super()._at_samples(values, source) + self._quadratic_correction(values, source)
 
-    def _quadratic_correction(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+    def _quadratic_correction(self, values: Floats, source: SourceTerm) -> Floats:
         """(s,) φ minus its linear interpolant, on the source."""
         assert isinstance(source, TetSource)
         return source.quadratic_correction @ self.gradients(np.nan_to_num(values)).ravel()

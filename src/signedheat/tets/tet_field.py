@@ -8,8 +8,9 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats, Ints
 from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
 from ..errors import GeometryError, UnsupportedTypeError
@@ -65,7 +66,7 @@ class TetField(Displayed, Combinable, Frozen):
     """
 
     mesh: TetMesh
-    values: NDArray[np.float64]
+    values: Floats
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
     source: SourceTerm | None = field(default=None, repr=False)
 
@@ -84,7 +85,7 @@ class TetField(Displayed, Combinable, Frozen):
         """The mesh."""
         return self.mesh
 
-    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
+    def __call__(self, points: ArrayLike) -> Floats:
         """φ at points in space, to second order, from values and gradients at the corners of their tets.
 
         Outside the mesh φ is extrapolated linearly from the nearest point of the boundary, along the gradient there.
@@ -110,7 +111,7 @@ class TetField(Displayed, Combinable, Frozen):
             values[outside] += np.einsum("pi,pi->p", slopes, away[outside])
         return shaped(values, shape)
 
-    def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
+    def gradient(self, points: ArrayLike) -> Floats:
         """∇φ at points in space: volume-weighted means at the vertices, interpolated.
 
         Outside the mesh it is the gradient at the nearest point of the boundary.
@@ -136,7 +137,7 @@ class TetField(Displayed, Combinable, Frozen):
         return shaped(np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners]), shape)
 
     @property
-    def tet_gradients(self) -> NDArray[np.float64]:
+    def tet_gradients(self) -> Floats:
         """(m, 3) ∇φ of the linear interpolant in every tet."""
         return self.mesh.geometry.gradients(self.values[self.mesh.tets])
 
@@ -198,7 +199,7 @@ class TetField(Displayed, Combinable, Frozen):
         refuse_beyond_walls(self.values[np.unique(self.mesh.boundary.faces)], distance, "tet mesh", remedy)
         return self.contour(distance)
 
-    def with_values(self, values: NDArray[np.float64]) -> TetField:
+    def with_values(self, values: Floats) -> TetField:
         """Other values on the same mesh, without what belongs to these.
 
         Parameters
@@ -268,7 +269,7 @@ class TetField(Displayed, Combinable, Frozen):
         files.write_field(self, path)
 
     @cached_property
-    def _vertex_gradients(self) -> NDArray[np.float64]:
+    def _vertex_gradients(self) -> Floats:
         return self.mesh.geometry.mean_gradients(self.values, self.mesh.tets, self.mesh.n_vertices)
 
     @cached_property
@@ -279,7 +280,7 @@ class TetField(Displayed, Combinable, Frozen):
     def _wall_tree(self) -> TriangleTree:
         return TriangleTree.of(self.mesh.vertices[self.mesh.boundary.faces])
 
-    def _place(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def _place(self, points: Floats) -> tuple[Ints, Floats, Floats]:
         """(k, 4) vertices and weights that interpolate at each point, or at the closest point of the mesh, and offsets.
 
         The offset is the vector (k, 3) from the closest point of the mesh to the point, zero inside the mesh.

@@ -9,8 +9,9 @@ from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats, Ints
 from ..errors import GeometryError
 from ..exchange import Displayed, shapes, tets_of_meshio, tets_of_pyvista
 from ..frozen import Frozen
@@ -60,9 +61,9 @@ class TetMesh(Displayed, Frozen):
     4
     """
 
-    vertices: NDArray[np.float64]
-    tets: NDArray[np.int64]
-    reoriented: NDArray[np.int64]
+    vertices: Floats
+    tets: Ints
+    reoriented: Ints
 
     def __init__(self, vertices: ArrayLike, tets: ArrayLike) -> None:
         positions = coordinates(vertices, "vertices", 3)
@@ -100,12 +101,12 @@ class TetMesh(Displayed, Frozen):
         return self.geometry.faces
 
     @property
-    def tet_volumes(self) -> NDArray[np.float64]:
+    def tet_volumes(self) -> Floats:
         """(m,) volumes."""
         return self.geometry.volumes
 
     @cached_property
-    def tet_barycenters(self) -> NDArray[np.float64]:
+    def tet_barycenters(self) -> Floats:
         """(m, 3) barycentres."""
         return self.vertices[self.tets].mean(axis=1)
 
@@ -115,12 +116,12 @@ class TetMesh(Displayed, Frozen):
         return TriangleMesh(self.vertices, self.faces.vertices[self.faces.tet_counts == 1])
 
     @cached_property
-    def parts(self) -> NDArray[np.int64]:
+    def parts(self) -> Ints:
         """(m,) connected component of each tet, through shared faces."""
         return element_components(self.faces.tet_faces)
 
     @cached_property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Floats:
         """(2, 3) lower and upper corner of the bounding box of the tets, without unreferenced vertices."""
         return used_bounds(self.vertices, self.tets)
 
@@ -177,7 +178,7 @@ class TetMesh(Displayed, Frozen):
         """
         return cls(mesh.points, tets_of_meshio(mesh))
 
-    def to_meshio(self, point_data: Mapping[str, NDArray[np.float64]] | None = None) -> meshio.Mesh:
+    def to_meshio(self, point_data: Mapping[str, Floats] | None = None) -> meshio.Mesh:
         """Convert to meshio.
 
         Parameters

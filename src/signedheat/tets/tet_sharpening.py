@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..diagnostics import Note, RoundCorners, SharpenedToShape
 from ..discretization import SourceTerm
 from ..errors import SourceError
@@ -52,7 +52,7 @@ def _(field: TetField, source: Shapes | None, method: Method | None, progress: P
 @nearest.register
 def _(
     lowered: TetDiscretization,
-    values: NDArray[np.float64],
+    values: Floats,
     source: SourceTerm | None,
     given: Sequence[SurfaceShape] | None,
     tolerance: float,
@@ -90,7 +90,7 @@ def _(
     return Nearest(found.distances, sides, (RoundCorners(found.hidden), *notes))
 
 
-def faces_of(shapes: Sequence[SurfaceShape], center: NDArray[np.float64]) -> FaceFeatures | None:
+def faces_of(shapes: Sequence[SurfaceShape], center: Floats) -> FaceFeatures | None:
     """The faces of some shapes around a centre; None if none has any extent."""
     meshes = [shape for shape in shapes if not isinstance(shape, PointCloud)]
     if len(meshes) != len(shapes):
@@ -113,24 +113,22 @@ class Surface:
         The tet that each triangle lies in; −1 for such as lie in several.
     """
 
-    positions: NDArray[np.float64]
-    corners: NDArray[np.int64]
-    owners: NDArray[np.int64]
+    positions: Floats
+    corners: Ints
+    owners: Ints
 
 
 @dataclass(frozen=True, eq=False)
 class Reached:
     """Distances to a surface, without sign: see `any_angle_distance`."""
 
-    distances: NDArray[np.float64]
-    nearest: NDArray[np.int64]
-    points: NDArray[np.float64]
+    distances: Floats
+    nearest: Ints
+    points: Floats
     hidden: int
 
 
-def distance_around(
-    lowered: TetDiscretization, points: NDArray[np.float64], values: NDArray[np.float64], surface: Surface
-) -> Reached:
+def distance_around(lowered: TetDiscretization, points: Floats, values: Floats, surface: Surface) -> Reached:
     """Any-angle distance of all points with a value from a surface, of which triangles in one tet are φ's zero set.
 
     A curved φ does not vanish where its linear interpolant does. The difference is known to second order from the
@@ -171,7 +169,7 @@ def distance_around(
     return Reached(distance, nearest, found, int(hidden))
 
 
-def by_element(ids: NDArray[np.int64], n: int, width: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def by_element(ids: Ints, n: int, width: int) -> tuple[Ints, Ints]:
     """Inverse index: where the rows that contain each of n ids begin, and these rows, `width` ids to a row."""
     starts, places = grouped(ids.ravel(), n)
     return starts, places // width

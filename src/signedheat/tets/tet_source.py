@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from ..area_elements import AreaElements, area_elements
+from ..arrays import Bools, Floats, Ints
 from ..diagnostics import Note, OutsideMesh
 from ..errors import SourceError
 from ..frozen import Frozen
@@ -51,20 +51,20 @@ class TetSource(Frozen):
         The parts of the sources that lie outside the mesh.
     """
 
-    vectors: NDArray[np.float64]
-    strengths: NDArray[np.float64]
-    centers: NDArray[np.float64]
+    vectors: Floats
+    strengths: Floats
+    centers: Floats
     time: float
     interpolation: sparse.csr_matrix
     quadratic_correction: sparse.csr_matrix
-    weights: NDArray[np.float64]
-    components: NDArray[np.int64]
-    source_ids: NDArray[np.int64]
+    weights: Floats
+    components: Ints
+    source_ids: Ints
     notes: tuple[Note, ...]
 
 
 def tet_source(
-    mesh: TetMesh, planes: Planes, unknowns: NDArray[np.int64], sources: Sequence[Any], diffusion: float, spacing: float
+    mesh: TetMesh, planes: Planes, unknowns: Ints, sources: Sequence[Any], diffusion: float, spacing: float
 ) -> TetSource:
     """Lower sources to a tet mesh.
 
@@ -91,8 +91,7 @@ def tet_source(
             )
         if not elements.vectors.any():
             raise SourceError(
-                f"source {number} ({source!r}) has no area at all: its faces are degenerate",
-                element=f"source {number}",
+                f"source {number} ({source!r}) has no area at all: its faces are degenerate", element=f"source {number}"
             )
         polygons = _cut(mesh, planes, elements)
         if len(polygons.tets) == 0:
@@ -110,8 +109,7 @@ def tet_source(
     loads = np.sum([_loads(mesh, polygons, np.sqrt(time)) for polygons in cuts], axis=0)
     if not np.abs(loads[:, :3]).max() > 1e-12 * np.abs(loads[:, 3]).max():
         raise SourceError(
-            "the normals of the source cancel each other everywhere",
-            remedy="turn one of its coinciding sides",
+            "the normals of the source cancel each other everywhere", remedy="turn one of its coinciding sides"
         )
     leaving = np.flatnonzero(outside > 1e-9)
     patches = [_patches(mesh, unknowns, n_unknowns, *part) for part in zip(cuts, components, strict=True)]
@@ -142,7 +140,7 @@ def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygo
     return ClippedPolygons(tets[k], k, elements.vectors[k], elements.weights[k], centers, np.full(len(k), -1))
 
 
-def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> NDArray[np.float64]:
+def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> Floats:
     """(f, 4) X₀ at the faces (Sec. 8.1), and in the last column the scalar source, from areas without their normals.
 
     A polygon is distributed to the four faces of its tet in proportion to ψ = 1 − 3λ of the Crouzeix–Raviart basis,
@@ -167,12 +165,8 @@ def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> NDArray[np
 
 
 def _patches(
-    mesh: TetMesh,
-    unknowns: NDArray[np.int64],
-    n_unknowns: int,
-    polygons: ClippedPolygons,
-    components: NDArray[np.int64],
-) -> tuple[sparse.csr_matrix, sparse.csr_matrix, NDArray[np.float64], NDArray[np.int64]]:
+    mesh: TetMesh, unknowns: Ints, n_unknowns: int, polygons: ClippedPolygons, components: Ints
+) -> tuple[sparse.csr_matrix, sparse.csr_matrix, Floats, Ints]:
     """Interpolation rows, quadratic corrections, areas and components of the patches.
 
     One row per clipped polygon would be more constraints than a function that is linear on tets can meet without being
@@ -191,7 +185,7 @@ def _patches(
     keys += np.concatenate([at_vertices, nearest])
     areas = np.concatenate([np.repeat(polygons.areas[k] / 3, 3), polygons.areas[inside]])
     found, patch = np.unique(keys, return_inverse=True)
-    weights: NDArray[np.float64] = np.bincount(patch, weights=areas).astype(np.float64)
+    weights: Floats = np.bincount(patch, weights=areas).astype(np.float64)
     real = weights > 1e-9 * np.bincount(patch, weights=np.abs(areas))  # drop fan triangles that cancel
     n_on = len(at_vertices)
     columns = np.concatenate([at_vertices, corners[inside].ravel()])
@@ -208,11 +202,11 @@ def _patches(
     return rows[real], corrections[real], weights[real], found[real] // n_unknowns
 
 
-def _centers(mesh: TetMesh, polygons: ClippedPolygons) -> NDArray[np.float64]:
+def _centers(mesh: TetMesh, polygons: ClippedPolygons) -> Floats:
     return np.einsum("pk,pki->pi", polygons.barycentric, mesh.vertices[mesh.tets[polygons.tets]])
 
 
-def _on_whole_faces(mesh: TetMesh, polygons: ClippedPolygons, components: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _on_whole_faces(mesh: TetMesh, polygons: ClippedPolygons, components: Ints) -> Bools:
     """(p,) polygons that lie in a face of the mesh that their component covers entirely."""
     on = polygons.in_face >= 0
     covered = np.zeros(len(on), dtype=bool)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from .tet_clipping import Planes, beyond
 
@@ -14,16 +14,7 @@ GRAZING = 1e-6
 
 @compiled
 def stays_inside(
-    planes: Planes,
-    neighbors: NDArray[np.int64],
-    tet: int,
-    x: float,
-    y: float,
-    z: float,
-    u: float,
-    w: float,
-    t: float,
-    slack: float,
+    planes: Planes, neighbors: Ints, tet: int, x: float, y: float, z: float, u: float, w: float, t: float, slack: float
 ) -> bool:
     """Whether the segment from (x, y, z), in a tet, to (u, w, t), in the mesh, lies in the mesh."""
     for _ in range(len(neighbors)):
@@ -43,13 +34,7 @@ def stays_inside(
 
 
 @compiled
-def visible(
-    planes: Planes,
-    neighbors: NDArray[np.int64],
-    starts: NDArray[np.float64],
-    targets: NDArray[np.float64],
-    slack: float,
-) -> NDArray[np.bool_]:
+def visible(planes: Planes, neighbors: Ints, starts: Floats, targets: Floats, slack: float) -> Bools:
     """(m,) whether the straight line from a point in each tet to its target stays in the mesh, up to a length."""
     seen = np.empty(len(starts), dtype=np.bool_)
     for tet in range(len(starts)):
@@ -59,9 +44,7 @@ def visible(
     return seen
 
 
-def uphill_roots(
-    heights: NDArray[np.float64], neighbors: NDArray[np.int64], settled: NDArray[np.bool_]
-) -> NDArray[np.int64]:
+def uphill_roots(heights: Floats, neighbors: Ints, settled: Bools) -> Ints:
     """(m,) the settled tet, or the local maximum, that steepest ascent from tet to tet leads to.
 
     Examples
