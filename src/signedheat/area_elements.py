@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from .arrays import Floats, Ints
 from .errors import CancellingNormalsError, SourceError
 from .foreign import what_to_pass
 from .grids.binning import merge_in_cells
@@ -59,10 +59,10 @@ class AreaElements:
         Mean distance between points of a cloud; 0 for simplices, which can be sampled as densely as needed.
     """
 
-    corners: NDArray[np.float64]
-    vectors: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    components: NDArray[np.int64]
+    corners: Floats
+    vectors: Floats
+    weights: Floats
+    components: Ints
     spacing: float = 0.0
 
 
@@ -91,17 +91,17 @@ class AreaSamples:
         X₀: the vectors spread to the nodes by linear interpolation, up to a common factor.
     """
 
-    positions: NDArray[np.float64]
-    vectors: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    components: NDArray[np.int64]
-    source_ids: NDArray[np.int64]
+    positions: Floats
+    vectors: Floats
+    weights: Floats
+    components: Ints
+    source_ids: Ints
     spacing: float
     outside: float
     cancelled: float
     nodes: NodeSources
 
-    def chosen(self, rows: NDArray[np.int64]) -> AreaSamples:
+    def chosen(self, rows: Ints) -> AreaSamples:
         """Some of the samples; what is said of all of them stays."""
         each = ("positions", "vectors", "weights", "components", "source_ids")
         return replace(self, **{name: getattr(self, name)[rows] for name in each})
@@ -156,7 +156,7 @@ def _(shape: PointCloud) -> AreaElements:
     return AreaElements(shape.points[:, None], areas[:, None] * shape.normals, areas, components, spacing)
 
 
-def bounds_around(shapes: Sequence[Any]) -> NDArray[np.float64]:
+def bounds_around(shapes: Sequence[Any]) -> Floats:
     """(2, d) lower and upper corner of the box around shapes that have area elements."""
     for shape in shapes:
         if area_elements.dispatch(type(shape)) is area_elements.dispatch(object):
@@ -165,7 +165,7 @@ def bounds_around(shapes: Sequence[Any]) -> NDArray[np.float64]:
     return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
 
 
-def point_areas(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def point_areas(points: Floats) -> Floats:
     """(n,) area that each point represents: that of the disk around it up to its k-th neighbour, divided by k.
 
     Points that coincide share the area of one. In d dimensions the disk is a ball of dimension d − 1.
@@ -177,11 +177,11 @@ def point_areas(points: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.ones(len(points)) / counts[which.ravel()]
     reach = scipy.spatial.cKDTree(places).query(places, k=[k + 1], workers=-1)[0][:, 0]
     unit_ball = pi ** (dimension / 2) / gamma(dimension / 2 + 1)
-    areas: NDArray[np.float64] = unit_ball * reach**dimension / k / counts
+    areas: Floats = unit_ball * reach**dimension / k / counts
     return areas[which.ravel()]
 
 
-def components_of(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def components_of(vertices: Floats, faces: Ints) -> Ints:
     """(m,) connected component of each face; vertices at the same position are one vertex."""
     return element_components(same_positions(vertices)[faces])
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Floats
 from .discretization import Integration, Levels, SourceTerm
 from .errors import ConstraintError
 from .reprs import ShortRepr
@@ -19,9 +19,7 @@ from .validation import LARGEST, numbers, positive_number
 class Constraint(Protocol):
     """Protocol of constraints, which finish step 3."""
 
-    def integrate(
-        self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
-    ) -> NDArray[np.float64]:
+    def integrate(self, integration: Integration, divergence: Floats, source: SourceTerm) -> Floats:
         """Solve step 3 for φ under the constraint.
 
         Parameters
@@ -57,9 +55,7 @@ class Free(Constraint):
     Free()
     """
 
-    def integrate(
-        self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
-    ) -> NDArray[np.float64]:
+    def integrate(self, integration: Integration, divergence: Floats, source: SourceTerm) -> Floats:
         return integration.solve(divergence, source)
 
 
@@ -83,9 +79,7 @@ class ZeroSet(Constraint):
 
     hard: bool = False
 
-    def integrate(
-        self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
-    ) -> NDArray[np.float64]:
+    def integrate(self, integration: Integration, divergence: Floats, source: SourceTerm) -> Floats:
         levels = Levels(np.zeros(len(source.weights)))
         return (integration.fit_exactly if self.hard else integration.fit)(divergence, source, levels)
 
@@ -107,9 +101,7 @@ class EachComponent(Constraint):
 
     hard: bool = False
 
-    def integrate(
-        self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
-    ) -> NDArray[np.float64]:
+    def integrate(self, integration: Integration, divergence: Floats, source: SourceTerm) -> Floats:
         levels = Levels(np.zeros(len(source.weights)), source.components)
         return (integration.fit_exactly if self.hard else integration.fit)(divergence, source, levels)
 
@@ -147,9 +139,7 @@ class LevelValues(ShortRepr, Constraint):
             raise ConstraintError(f"level values must be numbers up to {LARGEST:g}, not {values}", element="values")
         object.__setattr__(self, "values", tuple(values.tolist()))
 
-    def integrate(
-        self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
-    ) -> NDArray[np.float64]:
+    def integrate(self, integration: Integration, divergence: Floats, source: SourceTerm) -> Floats:
         n_sources, n_components = int(source.source_ids.max()) + 1, int(source.components.max()) + 1
         if len(self.values) == n_sources:
             index = source.source_ids
@@ -192,8 +182,6 @@ class Soft(Constraint):
         if self.weight is not None:
             object.__setattr__(self, "weight", positive_number(self.weight, "weight", ConstraintError))
 
-    def integrate(
-        self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
-    ) -> NDArray[np.float64]:
+    def integrate(self, integration: Integration, divergence: Floats, source: SourceTerm) -> Floats:
         weight = integration.soft_weight if self.weight is None else self.weight
         return integration.penalize(divergence, source, weight)

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from typing import ClassVar, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Ints
 from .frozen import Frozen
 from .reprs import ShortRepr
 
@@ -73,7 +73,7 @@ class Diagnostics(ShortRepr):
 
     timings: Mapping[str, float] = field(default_factory=dict)
     time: float = float("nan")
-    unreached: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    unreached: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     notes: tuple[Note, ...] = ()
 
     @property

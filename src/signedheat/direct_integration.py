@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .arrays import Floats, Ints
 from .cache import LastUsed, fingerprint
 from .discretization import Levels, SourceTerm
 from .errors import ConstraintError
@@ -49,7 +50,7 @@ class DirectIntegration(Frozen):
     _of_this_pattern: LastUsed[bytes, list[Factor]] = field(default_factory=LastUsed, init=False, repr=False)
 
     @cached_property
-    def components(self) -> NDArray[np.int64]:
+    def components(self) -> Ints:
         """(n,) connected component of the domain that each unknown lies in."""
         labels: NDArray[np.int32] = sparse.csgraph.connected_components(self.stiffness, directed=False)[1]
         return labels.astype(np.int64)
@@ -59,18 +60,16 @@ class DirectIntegration(Frozen):
         """Factor of C, made definite by grounding one vertex of each connected component."""
         return self.factorize(_grounded(self.stiffness, self._first_vertices))
 
-    def solve(self, divergence: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+    def solve(self, divergence: Floats, source: SourceTerm) -> Floats:
         """Minimise ∫|∇φ − Y|² with nothing imposed: ``C φ = b`` (Eq. 13)."""
         return self.solve_many([divergence], [source])[0]
 
-    def solve_many(
-        self, divergences: Iterable[NDArray[np.float64]], sources: Sequence[SourceTerm]
-    ) -> list[NDArray[np.float64]]:
+    def solve_many(self, divergences: Iterable[Floats], sources: Sequence[SourceTerm]) -> list[Floats]:
         """The same for several sources at once."""
         solved = self.factor.solve(np.stack(list(divergences)).T)
         return [self._centered(values, source) for values, source in zip(solved.T, sources, strict=True)]
 
-    def fit_exactly(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+    def fit_exactly(self, divergence: Floats, source: SourceTerm, levels: Levels) -> Floats:
         """Impose levels at every sample, or levels up to one unknown constant for each group of samples (Eq. 14).
 
         The constants are those at which the multipliers of each group add up to zero. On each connected component of
@@ -100,7 +99,7 @@ class DirectIntegration(Frozen):
         fitted, _ = self._interpolate(rows, divergence[:, None], (values + loads @ constants)[:, None])
         return self._centered(fitted[:, 0], source)
 
-    def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
+    def penalize(self, divergence: Floats, source: SourceTerm, strength: float) -> Floats:
         """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the line or area elements of the samples.
 
         λ → 0 is the solution of Eq. 13, and what exceeds λ = ∞ by less than rounding is solved as well as that.
@@ -115,13 +114,11 @@ class DirectIntegration(Frozen):
         """Factor of C with φ held at zero along the source."""
         return self._pulled_factor(source.interpolation, self.springs(source))
 
-    def springs(self, source: SourceTerm) -> NDArray[np.float64]:
+    def springs(self, source: SourceTerm) -> Floats:
         """(s,) stiffness of the springs that hold φ at the samples."""
         return np.full(len(source.weights), self.spring * self.stiffness.diagonal().max())
 
-    def _interpolate(
-        self, rows: sparse.csr_matrix, forces: NDArray[np.float64], levels: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _interpolate(self, rows: sparse.csr_matrix, forces: Floats, levels: Floats) -> tuple[Floats, Floats]:
         """Minimise ``½ φᵀ C φ − fᵀ φ`` where ``A φ = l``; also the multipliers μ of ``C φ + Aᵀ μ = f`` (Eq. 14).
 
         An augmented Lagrangian: its matrix ``C + ρ Aᵀ A`` is definite even if rows of A are dependent, and with stiff
@@ -134,7 +131,7 @@ class DirectIntegration(Frozen):
         spring = self.spring * self.stiffness.diagonal().max()
         factor = self._pulled_factor(rows, np.full(rows.shape[0], spring))
 
-        def pull(displacements: NDArray[np.float64]) -> NDArray[np.float64]:
+        def pull(displacements: Floats) -> Floats:
             return factor.solve(spring * (rows.T @ displacements))
 
         values, multipliers = np.zeros_like(forces), np.zeros_like(levels)
@@ -155,12 +152,12 @@ class DirectIntegration(Frozen):
             slow = slow or worst > 0.1 * previous
         return values, multipliers
 
-    def _pulled_factor(self, rows: sparse.csr_matrix, springs: NDArray[np.float64]) -> Factor:
+    def _pulled_factor(self, rows: sparse.csr_matrix, springs: Floats) -> Factor:
         """Factor of ``C + Aᵀ S A``; the last one is kept."""
         key = fingerprint(rows.indptr, rows.indices, rows.data, springs)
         return self._pulled(key, lambda: self._factorize_pulled(rows, springs))
 
-    def _factorize_pulled(self, rows: sparse.csr_matrix, springs: NDArray[np.float64]) -> Factor:
+    def _factorize_pulled(self, rows: sparse.csr_matrix, springs: Floats) -> Factor:
         matrix = upper_triangle(self.stiffness + upper_triangle(rows.T @ sparse.diags_array(springs) @ rows))
         unreached = np.isin(self.components[self._first_vertices], self._component_of(rows[springs > 0]), invert=True)
         matrix = _grounded(matrix, self._first_vertices[unreached])
@@ -170,19 +167,19 @@ class DirectIntegration(Frozen):
         return factor
 
     @cached_property
-    def _first_vertices(self) -> NDArray[np.int64]:
+    def _first_vertices(self) -> Ints:
         """The first vertex of each connected component."""
         return np.unique(self.components, return_index=True)[1]
 
-    def _component_of(self, rows: sparse.csr_matrix) -> NDArray[np.int64]:
+    def _component_of(self, rows: sparse.csr_matrix) -> Ints:
         """(s,) connected component of the domain that each sample lies in."""
         return self.components[rows.indices[rows.indptr[:-1]]]
 
-    def _reached(self, values: NDArray[np.float64], rows: sparse.csr_matrix) -> NDArray[np.float64]:
+    def _reached(self, values: Floats, rows: sparse.csr_matrix) -> Floats:
         """The values, with NaN on connected components without samples."""
         return np.where(np.isin(self.components, self._component_of(rows)), values, np.nan)
 
-    def _centered(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+    def _centered(self, values: Floats, source: SourceTerm) -> Floats:
         """Shift φ to a weighted mean of zero over the samples of each connected component; NaN on those without any."""
         rows = source.interpolation
         part, n_parts = self._component_of(rows), len(self._first_vertices)
@@ -192,12 +189,12 @@ class DirectIntegration(Frozen):
         np.divide(np.bincount(part, at_samples, n_parts), weight, out=mean, where=weight > 0)
         return values - mean[self.components]
 
-    def _at_samples(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+    def _at_samples(self, values: Floats, source: SourceTerm) -> Floats:
         """(s,) φ on the source."""
         return source.interpolation @ values
 
 
-def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.csr_matrix:
+def _grounded(matrix: sparse.csr_matrix, vertices: Ints) -> sparse.csr_matrix:
     """The matrix, made definite by larger entries at the vertices given.
 
     Since b sums to zero on each connected component, the solution is zero at these vertices.
@@ -208,9 +205,7 @@ def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.
     return sparse.csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
-def refuse_contradictions(
-    rows: sparse.csr_matrix, levels: NDArray[np.float64], values: NDArray[np.float64], allowed: float
-) -> None:
+def refuse_contradictions(rows: sparse.csr_matrix, levels: Floats, values: Floats, allowed: float) -> None:
     """Refuse levels that some sample misses by more than is allowed, unless all are the same."""
     gap = np.abs(levels - rows @ values)
     worst = int(gap.argmax())

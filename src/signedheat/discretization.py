@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from functools import singledispatch
 from typing import Any, Protocol
 
-import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Floats, Ints
 from .errors import UnsupportedTypeError
 from .exchange import TAKEN
 
@@ -34,15 +34,15 @@ class SourceTerm(Protocol):
         """A of Eq. 14: sparse (s, n), row i interpolates φ at source sample i."""
 
     @property
-    def weights(self) -> NDArray[np.float64]:
+    def weights(self) -> Floats:
         """(s,) line or area element of each sample."""
 
     @property
-    def components(self) -> NDArray[np.int64]:
+    def components(self) -> Ints:
         """(s,) connected component of the source that each sample lies on, from 0."""
 
     @property
-    def source_ids(self) -> NDArray[np.int64]:
+    def source_ids(self) -> Ints:
         """(s,) index of the source, among those passed to the solver, that each sample lies on."""
 
 
@@ -57,19 +57,19 @@ class Integration(Protocol):
     def soft_weight(self) -> float:
         """λ of `Soft` where none is given, in 1/length."""
 
-    def solve(self, divergence: Any, source: Any) -> NDArray[np.float64]:
+    def solve(self, divergence: Any, source: Any) -> Floats:
         """Minimise ∫|∇φ − Y|² (Eq. 2) with nothing imposed: ``C φ = b`` (Eq. 13)."""
 
-    def solve_many(self, divergences: Iterable[Any], sources: Sequence[Any]) -> Iterable[NDArray[np.float64]]:
+    def solve_many(self, divergences: Iterable[Any], sources: Sequence[Any]) -> Iterable[Floats]:
         """The same for several sources (see `SolvesEach`)."""
 
-    def fit(self, divergence: Any, source: Any, levels: Levels) -> NDArray[np.float64]:
+    def fit(self, divergence: Any, source: Any, levels: Levels) -> Floats:
         """Impose levels at the samples (Eq. 14), in the way that suits the domain best."""
 
-    def fit_exactly(self, divergence: Any, source: Any, levels: Levels) -> NDArray[np.float64]:
+    def fit_exactly(self, divergence: Any, source: Any, levels: Levels) -> Floats:
         """Impose levels at the samples exactly (Eq. 14), as far as the rows of A do not contradict each other."""
 
-    def penalize(self, divergence: Any, source: Any, strength: float) -> NDArray[np.float64]:
+    def penalize(self, divergence: Any, source: Any, strength: float) -> Floats:
         """Minimise ∫|∇φ − Y|² + strength · Σ weight · φ(sample)² (Sec. 7.1, Fig. 11)."""
 
 
@@ -120,9 +120,7 @@ class DiffusesEach:
 class SolvesEach:
     """For step 3 that has nothing to gain by solving for several sources at once."""
 
-    def solve_many(
-        self: Integration, divergences: Iterable[Any], sources: Sequence[Any]
-    ) -> Iterable[NDArray[np.float64]]:
+    def solve_many(self: Integration, divergences: Iterable[Any], sources: Sequence[Any]) -> Iterable[Floats]:
         """One after the other, each when it is needed."""
         return (self.solve(divergence, source) for divergence, source in zip(divergences, sources, strict=True))
 
@@ -139,8 +137,8 @@ class Levels:
         Group of each sample.
     """
 
-    values: NDArray[np.float64]
-    groups: NDArray[np.int64] | None = None
+    values: Floats
+    groups: Ints | None = None
 
     def at(self, places: Any) -> Levels:
         """The levels at means of samples: sparse (r, s), each of samples of one group."""
@@ -152,7 +150,4 @@ class Levels:
 @singledispatch
 def discretize(domain: Any, **options: Any) -> Discretization:
     """Lower a domain to its discretisation; every kind of domain registers a function of its own."""
-    raise UnsupportedTypeError(
-        f"{type(domain).__name__} is not a domain",
-        remedy=f"use a Grid, or {TAKEN}",
-    )
+    raise UnsupportedTypeError(f"{type(domain).__name__} is not a domain", remedy=f"use a Grid, or {TAKEN}")

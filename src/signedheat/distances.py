@@ -241,11 +241,7 @@ def distance_to_solid(
 
 
 def plain_distance(
-    shape: Any,
-    domain: Grid | TetMesh,
-    method: Heat,
-    as_oriented: bool,
-    progress: Progress | None = None,
+    shape: Any, domain: Grid | TetMesh, method: Heat, as_oriented: bool, progress: Progress | None = None
 ) -> Any:
     """Run the method alone on a shape in space, whose faces are oriented but not completed; nothing is sharpened."""
     if isinstance(shape, TriangleMesh | PolygonMesh) and not as_oriented:

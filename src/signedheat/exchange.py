@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Ints
 from .errors import GeometryError, UnsupportedTypeError
 from .mesh.components import members_of
 from .mesh.tet_shapes import face_table, signed_volumes
@@ -103,7 +104,7 @@ class Displayed:
         return drawing.html_of(self)
 
 
-def _no_ids() -> NDArray[np.int64]:
+def _no_ids() -> Ints:
     return np.empty(0, dtype=np.int64)
 
 
@@ -128,10 +129,10 @@ class Elements:
     """
 
     points: NDArray[Any]
-    corners: NDArray[np.int64] = field(default_factory=_no_ids)
-    counts: NDArray[np.int64] = field(default_factory=_no_ids)
+    corners: Ints = field(default_factory=_no_ids)
+    counts: Ints = field(default_factory=_no_ids)
     normals: NDArray[Any] | None = None
-    tets: NDArray[np.int64] | None = None
+    tets: Ints | None = None
     areas: NDArray[Any] | None = None
     values: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
@@ -151,14 +152,14 @@ class Elements:
         return "TriangleMesh" if (self.counts == 3).all() else "PolygonMesh"
 
     @property
-    def faces(self) -> list[NDArray[np.int64]]:
+    def faces(self) -> list[Ints]:
         """Vertex ids of each face; of tets without faces, of the outer ones."""
         if self.tets is not None:
             return list(outer_faces(self.points, self.tets))
         return np.split(self.corners, np.cumsum(self.counts)[:-1]) if len(self.counts) else []
 
     @property
-    def triangles(self) -> NDArray[np.int64]:
+    def triangles(self) -> Ints:
         """(m, 3) vertex ids of the faces, which must be triangles; of tets without faces, the outer ones."""
         if self.tets is not None:
             return outer_faces(self.points, self.tets)
@@ -172,7 +173,7 @@ class Elements:
         return self.corners.reshape(-1, 3)
 
 
-def outer_faces(points: NDArray[Any], tets: NDArray[np.int64]) -> NDArray[np.int64]:
+def outer_faces(points: NDArray[Any], tets: Ints) -> Ints:
     """(m, 3) vertex ids of the faces of tets that have a single tet, oriented outward."""
     ids = element_ids(tets, "tets", 4, len(points))
     turned = np.where(signed_volumes(coordinates(points, "vertices", 3), ids)[:, None] < 0, ids[:, [0, 1, 3, 2]], ids)
@@ -479,7 +480,7 @@ def _from_cells(thing: Any) -> Elements:
     return Elements(np.asarray(thing.points), corners[taken], np.diff(offsets)[faces], normals)
 
 
-def tets_of_pyvista(grid: Any) -> NDArray[np.int64]:
+def tets_of_pyvista(grid: Any) -> Ints:
     """(t, 4) the tets of a `pyvista.UnstructuredGrid`."""
     cells = {int(kind): ids for kind, ids in grid.cells_dict.items()}
     if _VTK_TETRA not in cells:
@@ -518,7 +519,7 @@ def from_meshio(thing: Any, as_points: bool = False) -> Elements:
     return Elements(thing.points, np.concatenate(corners) if corners else _no_ids(), counts, normals)
 
 
-def tets_of_meshio(mesh: Any) -> NDArray[np.int64]:
+def tets_of_meshio(mesh: Any) -> Ints:
     """(t, 4) the tets of a `meshio.Mesh`."""
     blocks = [block.data for block in mesh.cells if block.type == "tetra"]
     if not blocks:
@@ -581,7 +582,7 @@ def from_arrays(pair: Any) -> Elements:
     return Elements(np.asarray(points), flat, counts)
 
 
-def _triangles_only(shape: Elements, package: str) -> NDArray[np.int64]:
+def _triangles_only(shape: Elements, package: str) -> Ints:
     if (shape.counts != 3).any():
         raise GeometryError(
             f"{package} holds triangles only, and this has polygons", remedy="use to_pyvista or to_meshio"

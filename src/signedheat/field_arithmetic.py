@@ -9,12 +9,13 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from .arrays import Bools, Floats
 from .errors import GeometryError, SourceError, UnsupportedTypeError
 from .grids.grid import Grid
 from .validation import finite_number
 
 Change = Callable[[NDArray[Any]], NDArray[Any]]
-Rule = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+Rule = Callable[[Floats, Floats], Floats]
 Number = float | np.number[Any]
 NUMBERS = (int, float, np.number)
 
@@ -40,7 +41,7 @@ class SolidField(HasValues, Protocol):
     def domain(self) -> object:
         """Where the unknowns are."""
 
-    def with_values(self: Solid, values: NDArray[np.float64]) -> Solid:
+    def with_values(self: Solid, values: Floats) -> Solid:
         """A field with other values on the same domain."""
 
     def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
@@ -247,12 +248,7 @@ def smooth_difference(a: Solid, b: Solid, width: float) -> Solid:
     return smooth_intersection(a, _checked(a, b)._mapped(np.negative), width)
 
 
-def combined(
-    a: Solid,
-    b: Solid,
-    takes_first: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]],
-    bulge: float,
-) -> Solid:
+def combined(a: Solid, b: Solid, takes_first: Callable[[Floats, Floats], Bools], bulge: float) -> Solid:
     """Everywhere the values of one of two fields, moved where they are nearly equal.
 
     Parameters
@@ -266,7 +262,7 @@ def combined(
     """
     b = _checked(a, b)
 
-    def rule(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rule(one: Floats, other: Floats) -> Floats:
         values = np.where(takes_first(one, other), one, other)
         if bulge:
             near = np.maximum(abs(bulge) - np.abs(one - other), 0.0)

@@ -8,9 +8,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy import sparse
 
+from .arrays import Bools, Floats
 from .diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
 from .errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
 from .grids.grid_discretization import GridDiscretization
@@ -36,24 +36,19 @@ NEAREST = 8
 
 
 @singledispatch
-def to_field(discretization: Any, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics) -> Field:
+def to_field(discretization: Any, values: Floats, source: Any, diagnostics: Diagnostics) -> Field:
     """The field with the values of a discretisation's unknowns, and with its notes added to the diagnostics."""
     raise UnsupportedTypeError(f"there is no field for {type(discretization).__name__}", element="domain")
 
 
 @to_field.register
-def _(
-    discretization: GridDiscretization, values: NDArray[np.float64], source: GridSource, diagnostics: Diagnostics
-) -> GridField:
+def _(discretization: GridDiscretization, values: Floats, source: GridSource, diagnostics: Diagnostics) -> GridField:
     return GridField(discretization.grid, values, diagnostics.noting(sampled(source)))
 
 
 @to_field.register
 def _(
-    discretization: SurfaceDiscretization,
-    values: NDArray[np.float64],
-    source: SurfaceSource,
-    diagnostics: Diagnostics,
+    discretization: SurfaceDiscretization, values: Floats, source: SurfaceSource, diagnostics: Diagnostics
 ) -> VertexField:
     """φ at the vertices of the domain; NaN where diffusion did not reach, such as behind a single shared vertex."""
     values = np.where(discretization.reached_by(source.vectors), values, np.nan)
@@ -89,9 +84,7 @@ def _named(domain: object, vertex: int) -> str:
 
 
 @to_field.register
-def _(
-    discretization: TetDiscretization, values: NDArray[np.float64], source: TetSource, diagnostics: Diagnostics
-) -> TetField:
+def _(discretization: TetDiscretization, values: Floats, source: TetSource, diagnostics: Diagnostics) -> TetField:
     """φ at the vertices of the mesh."""
     mesh, at_vertices = discretization.mesh, discretization.at_vertices(values)
     unreached = np.flatnonzero(np.isnan(at_vertices))
@@ -144,7 +137,7 @@ def small_loops(source: SurfaceSource) -> int:
     return int(((length > 0) & ~is_open & (length**2 < SMALL_LOOP * weighted)).sum())
 
 
-def spread(points: NDArray[np.float64], values: NDArray[np.float64], used: NDArray[np.bool_]) -> NDArray[np.float64]:
+def spread(points: Floats, values: Floats, used: Bools) -> Floats:
     """(n,) signed distances, continued from point to neighbouring point where they are NaN.
 
     The shortest way to a point with a value adds to its absolute value; the sign stays. Points that are not used, and
@@ -172,7 +165,7 @@ def spread(points: NDArray[np.float64], values: NDArray[np.float64], used: NDArr
         shape=(len(ids) + 1,) * 2,
     )
     away, before = sparse.csgraph.dijkstra(whole, indices=len(ids), return_predecessors=True)
-    result: NDArray[np.float64] = values.copy()
+    result: Floats = values.copy()
     sign = np.where(values[ids] < 0, -1.0, 1.0)
     for k in np.argsort(away, kind="stable").tolist():
         if k == len(ids) or not lacking[ids[k]] or not np.isfinite(away[k]):

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Floats, Ints
 from .errors import OutsideError
 from .grids.grid import Grid
 from .grids.marching import CLEARANCE
@@ -23,10 +23,10 @@ class NodeValues(Protocol):
 
     @property
     def shape(self) -> tuple[int, ...]: ...
-    def __getitem__(self, nodes: tuple[NDArray[np.int64], ...], /) -> NDArray[np.float64]: ...
+    def __getitem__(self, nodes: tuple[Ints, ...], /) -> Floats: ...
 
 
-def refuse_beyond_walls(walls: NDArray[np.float64], distance: float, domain: str, remedy: str) -> None:
+def refuse_beyond_walls(walls: Floats, distance: float, domain: str, remedy: str) -> None:
     """Raise `OutsideError` if the level at a distance leaves a domain although the shape does not.
 
     `walls` are the values at the boundary; `domain` and `remedy` appear in the message.
@@ -41,12 +41,8 @@ def refuse_beyond_walls(walls: NDArray[np.float64], distance: float, domain: str
 
 
 def on_level(
-    distance: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-    points: NDArray[np.float64],
-    values: NodeValues,
-    grid: Grid,
-    level: float,
-) -> NDArray[np.float64]:
+    distance: Callable[[Floats], Floats], points: Floats, values: NodeValues, grid: Grid, level: float
+) -> Floats:
     """Move (n, 3) points along the edges of a grid from the interpolated level to the exact level of `distance`.
 
     This is regula falsi with halved weights (Dowell & Jarratt 1971). Points inside cells are not moved.

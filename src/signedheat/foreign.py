@@ -241,8 +241,5 @@ def as_list(sources: One | Sequence[One]) -> list[One]:
     """One source or several sources, as a list, with those of other packages as shapes."""
     listed: list[One] = as_shapes(sources)
     if not listed:
-        raise SourceError(
-            "there is no source",
-            remedy="pass at least one curve, point or shape",
-        )
+        raise SourceError("there is no source", remedy="pass at least one curve, point or shape")
     return listed

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Floats, Ints
 from .foreign import Shape
 from .mesh.components import connected_components
 from .mesh.edges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
@@ -213,19 +214,19 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
     )
 
 
-def _n_marked(n: int, ids: NDArray[np.int64]) -> int:
+def _n_marked(n: int, ids: Ints) -> int:
     """Count the distinct ids."""
     marked = np.zeros(n, dtype=bool)
     marked[ids] = True
     return int(marked.sum())
 
 
-def _n_components(n: int, tails: NDArray[np.int64], heads: NDArray[np.int64]) -> int:
+def _n_components(n: int, tails: Ints, heads: Ints) -> int:
     """Count the connected sets of halfedges."""
     return _n_marked(n, connected_components(n, tails, heads)[tails])
 
 
-def _n_nonmanifold(n: int, tails: NDArray[np.int64], following: NDArray[np.int32], pairs: HalfedgePairs) -> int:
+def _n_nonmanifold(n: int, tails: Ints, following: NDArray[np.int32], pairs: HalfedgePairs) -> int:
     """Count vertices whose faces do not form a single fan, or that lie on an edge of more than two faces."""
     two = pairs.counts == 2
     first, second = pairs.first[two], pairs.second[two]
@@ -240,10 +241,10 @@ def _n_nonmanifold(n: int, tails: NDArray[np.int64], following: NDArray[np.int32
     return _n_marked(n, np.concatenate(bad))
 
 
-def _n_repeated(points: NDArray[np.float64]) -> int:
+def _n_repeated(points: Floats) -> int:
     """Count points at exactly the position of an earlier one."""
     return int(np.count_nonzero(same_positions(points) != np.arange(len(points))))
 
 
-def _tuple(values: NDArray[np.float64]) -> tuple[float, ...]:
+def _tuple(values: Floats) -> tuple[float, ...]:
     return tuple(float(value) for value in values)

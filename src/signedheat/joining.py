@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TypeAlias, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Floats, Ints
 from .errors import SourceError
 from .foreign import SurfaceShape, as_shape, as_shapes, refuse_arrays
 from .grids.polyline import Polyline
@@ -18,7 +18,7 @@ from .surfaces.surface_curves import Curve, SurfacePoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
 
-Body: TypeAlias = tuple[NDArray[np.float64], NDArray[np.int64]]
+Body: TypeAlias = tuple[Floats, Ints]
 """(n, 3) vertices and (m, 3) faces."""
 
 
@@ -51,7 +51,7 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
     return TriangleMesh(*joined_triangles(meshes))
 
 
-def joined_triangles(parts: Sequence[TriangleMesh | PolygonMesh], origin: NDArray[np.float64] | float = 0.0) -> Body:
+def joined_triangles(parts: Sequence[TriangleMesh | PolygonMesh], origin: Floats | float = 0.0) -> Body:
     """Vertices, relative to `origin`, and triangles of all meshes together."""
     meshes = [part.triangulation for part in parts]
     return concatenated([(mesh.vertices - origin, mesh.faces) for mesh in meshes])
@@ -71,7 +71,7 @@ def concatenated(bodies: Sequence[Body]) -> Body:
     return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
 
 
-def placed(body: Body, matrix: NDArray[np.float64]) -> Body:
+def placed(body: Body, matrix: Floats) -> Body:
     """Move a body by a (4, 3) matrix that multiplies rows from the right; a mirrored body keeps its outside.
 
     Examples

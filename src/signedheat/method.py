@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Floats
 from .constraints import Constraint, Free
 from .discretization import Discretization, SourceTerm
 from .mesh.unit_vectors import unit
@@ -33,7 +33,7 @@ def normalize(discretization: Discretization, vectors: Any) -> NDArray[Any]:
 
 def integrate(
     discretization: Discretization, directions: NDArray[Any], source: SourceTerm, constraint: Constraint
-) -> NDArray[np.float64]:
+) -> Floats:
     """Step 3: solve ``C φ = b`` (Eq. 13), b the divergence of Y, under a constraint (Eq. 14). Minimises Eq. 2."""
     return constraint.integrate(discretization.integration, discretization.divergence(directions), source)
 
@@ -43,7 +43,7 @@ def integrate_many(
     directions: Iterable[NDArray[Any]],
     sources: Sequence[SourceTerm],
     constraint: Constraint,
-) -> Iterable[NDArray[np.float64]]:
+) -> Iterable[Floats]:
     """Step 3 for each of several sources; at once, where nothing is imposed and the discretisation can."""
     if isinstance(constraint, Free):
         divergences = (discretization.divergence(each) for each in directions)

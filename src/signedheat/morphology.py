@@ -11,9 +11,10 @@ from typing import Literal, Protocol, TypeAlias, cast, overload
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .area_elements import area_elements, bounds_around
+from .arrays import Floats
 from .distances import signed_distance
 from .errors import (
     GeometryError,
@@ -357,8 +358,7 @@ def shell(
     inner, outer = finite_number(inner, "the inner distance"), finite_number(outer, "the outer distance")
     if not inner < outer:
         raise SignedHeatError(
-            f"a shell needs inner < outer, not {inner:g} and {outer:g}",
-            remedy="swap them, or set them apart",
+            f"a shell needs inner < outer, not {inner:g} and {outer:g}", remedy="swap them, or set them apart"
         )
     if keep_outside and outer != 0:
         raise SignedHeatError("the faces of the shape are at distance 0", remedy="leave out keep_outside")
@@ -446,7 +446,7 @@ def thicken(
     return GridField(grid, depth).offset(0.0)
 
 
-def _linear(shape: Shapes, values: NDArray[np.float64]) -> Reach:
+def _linear(shape: Shapes, values: Floats) -> Reach:
     """The function that interpolates values at the vertices of a mesh linearly, or is nearest to points of a cloud."""
     mesh = shape.source if isinstance(shape, Solid) else as_shape(shape)  # type: ignore[arg-type]
     if not isinstance(mesh, TriangleMesh | PolygonMesh | DigitalSurface | PointCloud):
@@ -470,7 +470,7 @@ def _linear(shape: Shapes, values: NDArray[np.float64]) -> Reach:
     vertices, corners = mesh.vertices, mesh.faces
     faces = FaceTree.of(FaceFeatures.of(vertices, corners))
 
-    def interpolated(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def interpolated(places: Floats) -> Floats:
         found = faces.search(places)
         ids = corners[faces.features.ids[found.faces]]
         return (weights_in(vertices[ids], found.places) * values[ids]).sum(axis=1)
@@ -561,10 +561,7 @@ def _room(shape: Sources, reach: float, resolution: int) -> Grid:
     """A grid around a shape, with room for offsets."""
     shapes: list[Source | Sequence[CurveOrPoints]] = as_list(shape)
     if any(isinstance(part, Curve) for part in shapes):
-        raise SourceError(
-            "a Curve lies on a surface",
-            remedy="pass that surface as the domain",
-        )
+        raise SourceError("a Curve lies on a surface", remedy="pass that surface as the domain")
     bounds = bounds_around(shapes)
     return Grid.around(bounds, resolution, room_around(bounds, reach, ROOM_FOR_OFFSETS))
 
@@ -572,8 +569,7 @@ def _room(shape: Sources, reach: float, resolution: int) -> Grid:
 def _grid(domain: object) -> Grid[Literal[3]]:
     if not isinstance(domain, Grid):
         raise UnsupportedTypeError(
-            f"walls are made on a Grid, not on a {type(domain).__name__}",
-            remedy="leave the domain out, or pass one",
+            f"walls are made on a Grid, not on a {type(domain).__name__}", remedy="leave the domain out, or pass one"
         )
     if domain.dimension != 3:
         raise SourceError(
@@ -592,7 +588,7 @@ def _refuse_thin(grid: Grid[Literal[3]], thickness: float) -> None:
         )
 
 
-def _unsigned_distance(sheet: Shapes, grid: Grid[Literal[3]]) -> NDArray[np.float64]:
+def _unsigned_distance(sheet: Shapes, grid: Grid[Literal[3]]) -> Floats:
     """Exact unsigned distance to a surface, at the nodes."""
     for part in as_list(sheet):
         if area_elements(part).corners.shape[1:] != (3, grid.dimension):

@@ -6,8 +6,9 @@ All are generated, from fixed seeds.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import Floats
 from .grids.grid import Grid
 from .grids.grid_field import GridField
 from .joining import joined_triangles
@@ -160,6 +161,6 @@ def oriented_points(mesh: TriangleMesh, n_points: int, seed: int = 0) -> PointCl
     return PointCloud(points, mesh.face_area_vectors[face])
 
 
-def _barycentric(rng: np.random.Generator, n: int) -> NDArray[np.float64]:
+def _barycentric(rng: np.random.Generator, n: int) -> Floats:
     root, share = np.sqrt(rng.random(n)), rng.random(n)
     return np.stack([1 - root, root * (1 - share), root * share], axis=1)

@@ -12,9 +12,9 @@ from functools import partial, singledispatch
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from .arrays import Floats, Ints
 from .diagnostics import ConvexRounds, Diagnostics, Note, SlopeErrors
 from .direct_integration import DirectIntegration
 from .discretization import Discretization, SourceTerm
@@ -57,15 +57,15 @@ class Nearest:
         For the diagnostics.
     """
 
-    distances: NDArray[np.float64]
-    sides: NDArray[np.int64]
+    distances: Floats
+    sides: Ints
     notes: tuple[Note, ...] = ()
 
 
 @singledispatch
 def nearest(
     domain: Any,
-    values: NDArray[np.float64],
+    values: Floats,
     source: SourceTerm | None,
     given: Any,
     tolerance: float,
@@ -92,13 +92,8 @@ def nearest(
 
 
 def distance_to_nearest(
-    domain: Any,
-    values: NDArray[np.float64],
-    source: SourceTerm | None,
-    given: Any,
-    tolerance: float,
-    progress: Progress | None,
-) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
+    domain: Any, values: Floats, source: SourceTerm | None, given: Any, tolerance: float, progress: Progress | None
+) -> tuple[Floats, tuple[Note, ...]]:
     """Signed distance to the nearest of a source and the zero set, for all domains; and notes.
 
     The source decides the sign where it can, φ elsewhere. Components with neither keep the values of φ.
@@ -153,10 +148,10 @@ class Geodesic:
         self,
         discretization: Discretization,
         elements: LinearElements,
-        values: NDArray[np.float64],
+        values: Floats,
         source: SourceTerm | None,
         progress: Progress | None,
-    ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
+    ) -> tuple[Floats, tuple[Note, ...]]:
         """Distances to the nearest place of the zero set, with the signs of given values.
 
         Parameters
@@ -231,10 +226,10 @@ class Convex:
         self,
         discretization: Discretization,
         elements: LinearElements,
-        values: NDArray[np.float64],
+        values: Floats,
         source: SourceTerm | None,
         progress: Progress | None,
-    ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
+    ) -> tuple[Floats, tuple[Note, ...]]:
         """The maximiser of Eq. 18 of the paper, starting from given values.
 
         Parameters
@@ -287,7 +282,7 @@ class Convex:
             pull = elements.masses * np.sign(phi) / reach
             start = at_most_one(elements.slopes(phi))  # which may be the slopes of rounding alone
 
-            def solve(target: NDArray[np.float64]) -> NDArray[np.float64]:
+            def solve(target: Floats) -> Floats:
                 return factor.solve(pull + elements.divergence(target))
 
             rounds = split_rounds(at_most_one, solve, elements.slopes, start, start, self.relaxation)
@@ -302,12 +297,12 @@ class Convex:
         return np.where(np.isnan(values), np.nan, phi), (ConvexRounds(number, float(residual)),)
 
 
-def at_most_one(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def at_most_one(vectors: Floats) -> Floats:
     """Projection of rows on the unit ball: rows longer than one are scaled to length one."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1.0)
 
 
-def typical_size(sizes: NDArray[np.float64], dimension: int) -> float:
+def typical_size(sizes: Floats, dimension: int) -> float:
     """A length from areas or volumes: a field that varies by less is constant, and has no scale."""
     return float(sizes.mean() ** (1 / dimension))
 
@@ -320,10 +315,10 @@ class Method(Protocol):
         self,
         discretization: Discretization,
         elements: LinearElements,
-        values: NDArray[np.float64],
+        values: Floats,
         source: SourceTerm | None,
         progress: Progress | None,
-    ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
+    ) -> tuple[Floats, tuple[Note, ...]]:
         """Sharpened values at the unknowns, from the old ones, and notes for the diagnostics."""
 
 
@@ -331,8 +326,7 @@ class Method(Protocol):
 def sharpen_field(field: object, source: Any, method: Method | None, progress: Progress | None) -> Field:
     """Sharpen a field; every kind of field registers a function of its own. `sharpen` is the public function."""
     raise UnsupportedTypeError(
-        f"a {type(field).__name__} cannot be sharpened",
-        remedy="pass one that SignedHeatSolver.distance returned",
+        f"a {type(field).__name__} cannot be sharpened", remedy="pass one that SignedHeatSolver.distance returned"
     )
 
 
@@ -340,11 +334,11 @@ def sharpened(
     field: VertexField | TetField,
     discretization: Discretization,
     elements: LinearElements,
-    values: NDArray[np.float64],
+    values: Floats,
     source: Any,
     method: Method | None,
     progress: Progress | None,
-) -> tuple[NDArray[np.float64], Diagnostics]:
+) -> tuple[Floats, Diagnostics]:
     """Sharpened values of a field on a surface or on tets, and diagnostics with the slope errors before and after."""
     if source is not None and method is not None:
         raise UnsupportedTypeError(
@@ -352,16 +346,10 @@ def sharpened(
         )
     method = Geodesic() if method is None else method
     if isinstance(method, type) or not isinstance(method, Method):
-        raise UnsupportedTypeError(
-            f"{method!r} is no method of sharpening",
-            remedy="pass Geodesic() or Convex()",
-        )
+        raise UnsupportedTypeError(f"{method!r} is no method of sharpening", remedy="pass Geodesic() or Convex()")
     finite = np.isfinite(values)
     if not finite.any():
-        raise OutsideError(
-            "the field has no value anywhere",
-            remedy="pass one that a source reaches",
-        )
+        raise OutsideError("the field has no value anywhere", remedy="pass one that a source reaches")
     if not (finite | np.isnan(values)).all():
         raise GeometryError(
             f"the field is infinite at vertex {np.flatnonzero(np.isinf(values))[0]}",
@@ -381,8 +369,8 @@ def sharpened(
 
 
 def timed(
-    run: Callable[[], tuple[NDArray[np.float64], tuple[Note, ...]]], before: Diagnostics, progress: Progress | None
-) -> tuple[NDArray[np.float64], Diagnostics]:
+    run: Callable[[], tuple[Floats, tuple[Note, ...]]], before: Diagnostics, progress: Progress | None
+) -> tuple[Floats, Diagnostics]:
     """The values that a function makes, and the diagnostics with its notes and its seconds."""
     begin = time.perf_counter()
     if progress is not None:

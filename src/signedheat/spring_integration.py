@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from .arrays import Floats
 from .direct_integration import BATCH, DirectIntegration
 from .discretization import Levels, SourceTerm
 from .linear import Factor
@@ -40,7 +40,7 @@ class SpringIntegration(DirectIntegration):
         """λ of `Soft` where none is given, in 1/length."""
         return self.strength
 
-    def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+    def fit(self, divergence: Floats, source: SourceTerm, levels: Levels) -> Floats:
         """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, also over the constants of groups; see Eq. 14.
 
         S is the diagonal matrix of the `springs`, in place of the multipliers of Eq. 14. A group of one sample, whose
@@ -77,20 +77,15 @@ class SpringIntegration(DirectIntegration):
         springs, least = self.springs(source), ANCHOR * float(self.stiffness.diagonal().max())
         return self._pulled_factor(source.interpolation, springs * max(1.0, least / float(springs.sum())))
 
-    def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, NDArray[np.float64]]:
+    def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, Floats]:
         """(r, s) where springs of `fit` hold φ, as means of samples, and (r,) their stiffness."""
         return sparse.eye_array(len(source.weights), format="csr"), self.springs(source)
 
-    def springs(self, source: SourceTerm) -> NDArray[np.float64]:
+    def springs(self, source: SourceTerm) -> Floats:
         """(s,) stiffness of the springs: stiff for samples at vertices, soft for those inside cells."""
         at_vertex = np.diff(source.interpolation.indptr) == 1
         return np.where(at_vertex, PIN * self.stiffness.diagonal().max(), self.strength * source.weights)
 
-    def corrected(
-        self,
-        levels: NDArray[np.float64],
-        solve: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-        source: SourceTerm,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def corrected(self, levels: Floats, solve: Callable[[Floats], Floats], source: SourceTerm) -> tuple[Floats, Floats]:
         """The levels that the linear interpolant of φ is given, and φ."""
         return levels, solve(levels)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import singledispatch
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import Floats
 from .errors import GeometryError, UnsupportedTypeError
 from .foreign import ForeignShape, Represented, converted
 from .surfaces.digital_surface import DigitalSurface
@@ -66,19 +67,19 @@ def transform(
 
 @singledispatch
 def transformed(
-    shape: object, linear: NDArray[np.float64], move: NDArray[np.float64]
+    shape: object, linear: Floats, move: Floats
 ) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh | Represented:
     raise UnsupportedTypeError(f"a {type(shape).__name__} cannot be transformed", remedy="transform what it is made of")
 
 
 @transformed.register
-def _(shape: TriangleMesh, linear: NDArray[np.float64], move: NDArray[np.float64]) -> TriangleMesh:
+def _(shape: TriangleMesh, linear: Floats, move: Floats) -> TriangleMesh:
     faces = shape.faces if np.linalg.det(linear) > 0 else shape.faces[:, ::-1]
     return TriangleMesh(shape.vertices @ linear.T + move, faces)
 
 
 @transformed.register
-def _(shape: PolygonMesh, linear: NDArray[np.float64], move: NDArray[np.float64]) -> PolygonMesh:
+def _(shape: PolygonMesh, linear: Floats, move: Floats) -> PolygonMesh:
     polygons = [list(polygon) for polygon in shape.polygons]
     if np.linalg.det(linear) < 0:
         polygons = [polygon[::-1] for polygon in polygons]
@@ -86,12 +87,12 @@ def _(shape: PolygonMesh, linear: NDArray[np.float64], move: NDArray[np.float64]
 
 
 @transformed.register
-def _(shape: DigitalSurface, linear: NDArray[np.float64], move: NDArray[np.float64]) -> PolygonMesh:
+def _(shape: DigitalSurface, linear: Floats, move: Floats) -> PolygonMesh:
     return transform(shape.squares, np.column_stack([linear, move]))  # type: ignore[return-value]
 
 
 @transformed.register
-def _(shape: PointCloud, linear: NDArray[np.float64], move: NDArray[np.float64]) -> PointCloud:
+def _(shape: PointCloud, linear: Floats, move: Floats) -> PointCloud:
     """Normals become those of the transformed planes, areas those of pieces of them."""
     normals, areas = shape.normals, shape.areas
     if normals is not None:
@@ -104,6 +105,6 @@ def _(shape: PointCloud, linear: NDArray[np.float64], move: NDArray[np.float64])
 
 
 @transformed.register
-def _(shape: TetMesh, linear: NDArray[np.float64], move: NDArray[np.float64]) -> TetMesh:
+def _(shape: TetMesh, linear: Floats, move: Floats) -> TetMesh:
     tets = shape.tets if np.linalg.det(linear) > 0 else shape.tets[:, [1, 0, 2, 3]]
     return TetMesh(shape.vertices @ linear.T + move, tets)

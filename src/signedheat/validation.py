@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Bools, Floats, Ints
 from .errors import GeometryError, SignedHeatError
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -32,7 +33,7 @@ def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
     return array
 
 
-def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.float64]:
+def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Floats:
     """`values` as a new float64 array of any shape; whatever holds anything but real numbers is refused.
 
     Examples
@@ -51,14 +52,14 @@ def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryEr
         raise error(f"{name} must be real numbers, not {_described(array)}", element=name) from None
 
 
-def contiguous(values: object, name: str) -> NDArray[np.float64]:
+def contiguous(values: object, name: str) -> Floats:
     """`values` as a float64 array of any shape, copied only if it is none yet."""
     if isinstance(values, np.ndarray) and values.dtype == np.float64 and not np.ma.isMaskedArray(values):
         return np.ascontiguousarray(values)
     return numbers(values, name)
 
 
-def whole_numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.int64]:
+def whole_numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Ints:
     """`values` as a new int64 array of any shape; whatever holds anything but integers is refused."""
     array = array_of(values, name, error)
     if array.dtype.kind == "O" and array.size and all(isinstance(value, Integral) for value in array.ravel()):
@@ -85,7 +86,7 @@ def _described(array: NDArray[Any]) -> str:
 
 def finite_rows(
     values: object, name: str, columns: int | None = None, error: type[SignedHeatError] = GeometryError
-) -> NDArray[np.float64]:
+) -> Floats:
     """`values` as a read-only float64 array of shape (n, columns), without NaN or infinity."""
     array = numbers(values, name, error)
     if array.ndim != 2 or (columns is not None and array.shape[1] != columns) or array.shape[1] == 0:
@@ -103,7 +104,7 @@ def finite_rows(
 
 def coordinates(
     values: object, name: str, columns: int | None = None, error: type[SignedHeatError] = GeometryError
-) -> NDArray[np.float64]:
+) -> Floats:
     """The same, within what can be computed with: powers of lengths must not leave the range of numbers.
 
     Examples
@@ -118,9 +119,7 @@ def coordinates(
     return array
 
 
-def refuse_extreme(
-    lower: NDArray[np.float64], upper: NDArray[np.float64], name: str, error: type[SignedHeatError] = GeometryError
-) -> None:
+def refuse_extreme(lower: Floats, upper: Floats, name: str, error: type[SignedHeatError] = GeometryError) -> None:
     """Refuse a box that reaches beyond `LARGEST`, or is smaller than `SMALLEST` but no point."""
     with np.errstate(over="ignore"):  # from one end of what can be written to the other
         farthest, extent = float(max(-lower.min(), upper.max())), float((upper - lower).max())
@@ -133,7 +132,7 @@ def refuse_extreme(
         )
 
 
-def query_points(values: object, columns: int) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+def query_points(values: object, columns: int) -> tuple[Floats, tuple[int, ...]]:
     """`values`, of shape (..., columns), as (n, columns) finite positions within `LARGEST`, and the leading shape."""
     points = contiguous(values, "points")
     if points.shape[-1:] != (columns,):
@@ -165,7 +164,7 @@ def shaped(values: NDArray[Scalar], shape: tuple[int, ...]) -> NDArray[Scalar]:
     return values.reshape((*shape, *values.shape[1:]))[()]
 
 
-def refuse_lost_spacing(steps: NDArray[np.float64], first: NDArray[np.float64], last: NDArray[np.float64]) -> None:
+def refuse_lost_spacing(steps: Floats, first: Floats, last: Floats) -> None:
     """Refuse a lattice whose nodes are few digits apart."""
     if (steps < LEAST_STEP * np.maximum(np.abs(first), np.abs(last))).any():
         raise GeometryError(
@@ -214,7 +213,7 @@ def whole_number(value: object, name: str, least: int, error: type[SignedHeatErr
     return int(number)
 
 
-def boolean(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.bool_]:
+def boolean(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Bools:
     """`values` as a boolean array of any shape, not copied; other types than booleans are refused."""
     array = array_of(values, name, error)
     if array.dtype != np.bool_:
@@ -231,7 +230,7 @@ def flag(value: object, name: str) -> bool:
     return bool(value)
 
 
-def positive_steps(values: object, count: int) -> NDArray[np.float64]:
+def positive_steps(values: object, count: int) -> Floats:
     """A spacing, one positive number for all axes or one for each, as one for each."""
     steps = numbers(values, "spacing")
     if steps.shape not in ((), (count,)) or not (np.isfinite(steps).all() and (steps > 0).all()):
@@ -242,7 +241,7 @@ def positive_steps(values: object, count: int) -> NDArray[np.float64]:
     return frozen(np.broadcast_to(steps, count).copy())
 
 
-def element_ids(values: object, name: str, corners: int, n_vertices: int) -> NDArray[np.int64]:
+def element_ids(values: object, name: str, corners: int, n_vertices: int) -> Ints:
     """`values` as a read-only int64 array of shape (m, corners), with all ids within 0 … n_vertices − 1."""
     array = array_of(values, name, GeometryError)
     if array.size == 0:
@@ -263,7 +262,7 @@ def element_ids(values: object, name: str, corners: int, n_vertices: int) -> NDA
     return frozen(ids)
 
 
-def used_bounds(points: NDArray[np.float64], ids: NDArray[np.int64]) -> NDArray[np.float64]:
+def used_bounds(points: Floats, ids: Ints) -> Floats:
     """(2, d) lower and upper corner of the box around the points that are named, column by column: that is fast.
 
     Examples

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Complexes, Floats, Ints
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 
 
@@ -29,7 +30,7 @@ def cotan_matrix(triangles: IntrinsicMesh) -> sparse.csr_matrix:
     return assemble(triangles.corner_vertices, diagonal, -half, triangles.n_vertices)
 
 
-def divergence(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
+def divergence(triangles: IntrinsicMesh, directions: Complexes) -> Floats:
     """b of Eq. 13: with ``C φ = b`` the gradient of φ is closest to a face field Y. ``b_i = ∫ ⟨∇λ_i, Y⟩`` (Sec. 5.5).
 
     The negative of the divergence in the paper, as C is the negative of its Laplacian.
@@ -41,9 +42,7 @@ def divergence(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> 
     return -0.5 * (edges @ np.conj(directions)).imag
 
 
-def assemble(
-    unknowns: NDArray[np.int64], diagonal: NDArray[np.float64], coupling: NDArray[Any], n: int
-) -> sparse.csr_matrix:
+def assemble(unknowns: Ints, diagonal: Floats, coupling: NDArray[Any], n: int) -> sparse.csr_matrix:
     """Upper triangle of the Hermitian matrix that element matrices add up to, with its whole diagonal stored.
 
     `coupling`, (m, 3), is the entry of each element matrix in row k and column k + 1 (cyclically).

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..mesh.components import connected_components
 from .surface_curves import Curve
 from .triangle_mesh import TriangleMesh
@@ -24,9 +24,9 @@ ROUND = 0.15
 class CurveGroups:
     """Groups of open oriented curves."""
 
-    lengths: NDArray[np.float64]  # (g,) of all pieces of each
+    lengths: Floats  # (g,) of all pieces of each
     # (g,) mean length of the pieces of each, by length; of a single piece, which is bent nearly to a circle, less
-    scales: NDArray[np.float64]
+    scales: Floats
 
     @classmethod
     def of(cls, mesh: TriangleMesh, curves: Sequence[Any]) -> CurveGroups:
@@ -48,7 +48,7 @@ class CurveGroups:
         return cls(total, np.where(np.bincount(group) > 1, mean, ROUND * total))
 
 
-def nearest_others(ends: NDArray[np.float64]) -> NDArray[np.int64]:
+def nearest_others(ends: Floats) -> Ints:
     """(2 k, 2) the piece of each of the two ends of k pieces, and that of the end nearest to it but its own other end.
 
     An end that is nearer to its own other end than to any other piece is linked to its own piece.

@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import sparse
 
+from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError
 from ..exchange import Displayed
 from ..linear.conjugate_gradients import conjugate_gradients
@@ -73,9 +74,9 @@ class DigitalSurface(Displayed, Surface):
     (224, 222)
     """
 
-    volume: NDArray[np.bool_]
-    spacing: NDArray[np.float64]
-    origin: NDArray[np.float64]
+    volume: Bools
+    spacing: Floats
+    origin: Floats
     radius: float
 
     def __init__(
@@ -117,7 +118,7 @@ class DigitalSurface(Displayed, Surface):
         return boundary_surfels(self.volume)
 
     @cached_property
-    def vertices(self) -> NDArray[np.float64]:
+    def vertices(self) -> Floats:
         """(n, 3) corners of the faces, where fields live."""
         return frozen(self.origin + (self.surfels.vertices - 0.5) * self.spacing)
 
@@ -127,7 +128,7 @@ class DigitalSurface(Displayed, Surface):
         return len(self.surfels.vertices)
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Floats:
         """(2, 3) lower and upper corner of the box around the surface."""
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
@@ -137,12 +138,12 @@ class DigitalSurface(Displayed, Surface):
         return PolygonMesh(self.vertices, self.surfels.corners)
 
     @cached_property
-    def normals(self) -> NDArray[np.float64]:
+    def normals(self) -> Floats:
         """(m, 3) estimated unit normal of the digitised surface at each face, outward."""
         return frozen(corrected_normals(self.volume, self.surfels, self.spacing, self.radius))
 
     @cached_property
-    def smooth_vertices(self) -> NDArray[np.float64]:
+    def smooth_vertices(self) -> Floats:
         """(n, 3) the vertices moved so that faces are nearly orthogonal to `normals`: what distance is measured on."""
         return frozen(smoothed_corners(self.vertices, self.surfels.corners, self.normals))
 
@@ -161,7 +162,7 @@ class DigitalSurface(Displayed, Surface):
         """The triangles that curves refer to: four per face, in the order of its sides, around a virtual vertex."""
         return self.squares.triangulation
 
-    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def on_triangulation(self, values: Floats) -> Floats:
         """Values at the vertices of `triangulation`, from values at the vertices of the surface.
 
         Parameters
@@ -182,7 +183,7 @@ class DigitalSurface(Displayed, Surface):
         """
         return self.squares.on_triangulation(values)
 
-    def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _triangle_mask(self, face_mask: Bools) -> Bools:
         return self.squares._triangle_mask(face_mask)
 
     def to_pyvista(self) -> pyvista.PolyData:
@@ -223,7 +224,7 @@ MOVED = 1e-4
 """Voxels by which the last step moves vertices at most."""
 
 
-def surface_net(volume: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def surface_net(volume: Bools) -> tuple[Floats, Ints]:
     """Vertices and triangles, outward, of a smooth surface between the voxels of a set and all others.
 
     It is closed and manifold, and passes between the centres of any two neighbours of which one is in the set. Voxels
@@ -249,7 +250,7 @@ def surface_net(volume: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray
     return vertices - 2, faces
 
 
-def _rooms(cells: DualCells, crossings: Crossings) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rooms(cells: DualCells, crossings: Crossings) -> tuple[Floats, Floats]:
     """(v, 3) middle of each piece of the surface in a cell, (v, 1) how far from it the vertex may go along each axis.
 
     Where several pieces share a cell they stay where they are.
@@ -263,7 +264,7 @@ def _rooms(cells: DualCells, crossings: Crossings) -> tuple[NDArray[np.float64],
     return middles, np.where(alone, REACH, 0.0)
 
 
-def _relaxed(quads: NDArray[np.int64], middles: NDArray[np.float64], room: NDArray[np.float64]) -> NDArray[np.float64]:
+def _relaxed(quads: Ints, middles: Floats, room: Floats) -> Floats:
     """(v, 3) places within rooms where a net bends least, by projected accelerated gradients (Beck & Teboulle 2009).
 
     Where a step goes back, acceleration starts again (O'Donoghue & Candès 2015).
@@ -294,9 +295,7 @@ ATTACHMENT = 0.1
 """Weight of staying in place: corners move by averages over 1/√0.1, about 3 voxels, as staircases need."""
 
 
-def smoothed_corners(
-    vertices: NDArray[np.float64], corners: NDArray[np.int64], normals: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def smoothed_corners(vertices: Floats, corners: Ints, normals: Floats) -> Floats:
     """(n, 3) corners p of least ``Σ (n_f · (p_j − p_i))² + ATTACHMENT Σ |p_i − v_i|²``, for the sides ij of squares f.
 
     The sides of squares become orthogonal to the normals, while corners stay near where they were, after Coeurjolly,
@@ -339,15 +338,15 @@ _WIDEST, _NARROWEST = 1e3, 1e-3  # of blurs, in extents of the volume and in vox
 class Surfels:
     """Boundary squares of a set of voxels."""
 
-    corners: NDArray[np.int64]  # (m, 4) vertex ids, counter-clockwise seen from outside
-    vertices: NDArray[np.int64]  # (n, 3) lattice points: corner ``(i, j, k)`` is where voxel ``(i, j, k)`` begins
-    voxels: NDArray[np.int64]  # (m, 3) the voxel inside each surfel
-    axes: NDArray[np.int64]  # (m,) axis to which the surfel is orthogonal
+    corners: Ints  # (m, 4) vertex ids, counter-clockwise seen from outside
+    vertices: Ints  # (n, 3) lattice points: corner ``(i, j, k)`` is where voxel ``(i, j, k)`` begins
+    voxels: Ints  # (m, 3) the voxel inside each surfel
+    axes: Ints  # (m,) axis to which the surfel is orthogonal
     # (m,) +1 where the outward normal points along the positive axis, −1 where along the negative one
-    signs: NDArray[np.int64]
+    signs: Ints
 
 
-def boundary_surfels(volume: NDArray[np.bool_]) -> Surfels:
+def boundary_surfels(volume: Bools) -> Surfels:
     """Surfels of a volume, in order of their voxels; everything beyond the array is outside."""
     voxels, axes, signs = [], [], []
     for axis in range(3):
@@ -377,11 +376,11 @@ def boundary_surfels(volume: NDArray[np.bool_]) -> Surfels:
     return Surfels(ids.reshape(-1, 4), vertices, voxel, along, towards)
 
 
-def count_surfels(volume: NDArray[np.bool_]) -> int:
+def count_surfels(volume: Bools) -> int:
     """Number of boundary squares of a set of voxels, found slice by slice."""
     total = 0
     for axis in range(3):
-        before: NDArray[np.bool_] | bool = False
+        before: Bools | bool = False
         for layer in np.moveaxis(volume, axis, 0):
             total += int(np.count_nonzero(layer != before))
             before = layer
@@ -389,9 +388,7 @@ def count_surfels(volume: NDArray[np.bool_]) -> int:
     return total
 
 
-def corrected_normals(
-    volume: NDArray[np.bool_], surfels: Surfels, spacing: NDArray[np.float64], radius: float
-) -> NDArray[np.float64]:
+def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: float) -> Floats:
     """(m, 3) unit normals: mean area vectors of the surfels around each, by a Gaussian of standard deviation radius/2.
 
     By the divergence theorem that mean is the negative gradient of the blurred volume, which is how it is computed. A

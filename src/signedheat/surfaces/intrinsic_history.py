@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..frozen import Frozen
 from ..mesh.gluing import (
     FLIP,
@@ -35,15 +36,15 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 class Lines(NamedTuple):
     """Straight lines, one row for each face that one of them crosses, in order along each line."""
 
-    owners: NDArray[np.int64]  # (r,) which line
-    faces: NDArray[np.int64]  # (r,) the face crossed
+    owners: Ints  # (r,) which line
+    faces: Ints  # (r,) the face crossed
     # (r, 3) barycentric coordinates of where the line enters and leaves the face
-    starts: NDArray[np.float64]
-    ends: NDArray[np.float64]
+    starts: Floats
+    ends: Floats
     # (r, k, 3) vectors transported along the line, as differences of barycentric coordinates
-    vectors: NDArray[np.float64]
+    vectors: Floats
 
-    def chosen(self, rows: NDArray[np.int64]) -> Lines:
+    def chosen(self, rows: Ints) -> Lines:
         """Some of the rows, in this order."""
         return Lines(self.owners[rows], self.faces[rows], self.starts[rows], self.ends[rows], self.vectors[rows])
 
@@ -56,20 +57,16 @@ class History(Frozen):
     before: IntrinsicMesh
     after: IntrinsicMesh
     # (n, 4) as `gluing.record` writes them
-    steps: NDArray[np.int64]
-    weights: NDArray[np.float64]
+    steps: Ints
+    weights: Floats
 
-    def forward(
-        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64] | None = None
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def forward(self, faces: Ints, barycentric: Floats, vectors: Floats | None = None) -> tuple[Ints, Floats, Floats]:
         """Points of `before`, and vectors (p, k, 3) at them, as points of `after`."""
         faces, barycentric, vectors = copied(faces, barycentric, vectors)
         transfer_forward(self.steps, self.weights, *self._successors, faces, barycentric, vectors)
         return faces, barycentric, vectors
 
-    def backward(
-        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64] | None = None
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def backward(self, faces: Ints, barycentric: Floats, vectors: Floats | None = None) -> tuple[Ints, Floats, Floats]:
         """Points of `after`, and vectors (p, k, 3) at them, as points of `before`."""
         faces, barycentric, vectors = copied(faces, barycentric, vectors)
         n_faces = max(self.before.n_faces, self.after.n_faces)
@@ -83,7 +80,7 @@ class History(Frozen):
         return first, later
 
     @cached_property
-    def new_vertices(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def new_vertices(self) -> tuple[Ints, Floats]:
         """Positions on `before` of the vertices that only `after` has: faces and barycentric coordinates."""
         count = self.after.n_vertices - self.before.n_vertices
         faces, barycentric, _ = self.backward(np.full(count, -1), np.zeros((count, 3)))
@@ -108,15 +105,13 @@ class History(Frozen):
         return straight_lines(self.gluing_after, *self.forward(*edge_middles(self.before)))
 
 
-def copied(
-    faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64] | None
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+def copied(faces: Ints, barycentric: Floats, vectors: Floats | None) -> tuple[Ints, Floats, Floats]:
     """Points and vectors at them, none by default, as kernels may change them."""
     vectors = np.zeros((len(faces), 0, 3)) if vectors is None else np.array(vectors, dtype=np.float64)
     return np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64), vectors
 
 
-def edge_middles(triangles: IntrinsicMesh) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+def edge_middles(triangles: IntrinsicMesh) -> tuple[Ints, Floats, Floats]:
     """Faces and barycentric coordinates of the edges' middle points, and (e, 1, 3) vectors from tail to head."""
     side = triangles.first_halfedges
     faces, k, rows = side // 3, side % 3, np.arange(len(side))
@@ -133,9 +128,7 @@ def for_tracing(triangles: IntrinsicMesh) -> Gluing:
     return gluing._replace(steps=gluing.steps[:0].copy(), weights=gluing.weights[:0].copy())
 
 
-def straight_lines(
-    gluing: Gluing, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
-) -> Lines:
+def straight_lines(gluing: Gluing, faces: Ints, barycentric: Floats, vectors: Floats) -> Lines:
     """Straight lines given by their midpoints and vectors there, of which the first is the whole extent of the line."""
     halves = np.ascontiguousarray(vectors, dtype=np.float64).copy()
     halves[:, 0] *= 0.5
@@ -159,7 +152,7 @@ def straight_lines(
     return lines.chosen(np.delete(rows, middle + 1))
 
 
-def misplaced_lines(triangles: IntrinsicMesh, lines: Lines, lengths: NDArray[np.float64]) -> NDArray[np.int64]:
+def misplaced_lines(triangles: IntrinsicMesh, lines: Lines, lengths: Floats) -> Ints:
     """Ids of lines whose traces are wrong: somewhere not finite, or more than twice as long as they should be.
 
     Triangles that are as thin as rounding turn lines that are traced through them.
@@ -188,7 +181,7 @@ ROUNDING = 1e-10
 
 
 @kernel
-def find_successors(steps: NDArray[np.int64], n_faces: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def find_successors(steps: Ints, n_faces: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """First step that changes each face, and (n, 3) the next that changes each face of a step; −1 if there is none."""
     first = np.full(n_faces, -1, np.int32)
     later = np.full((len(steps), 3), -1, np.int32)
@@ -207,13 +200,13 @@ def find_successors(steps: NDArray[np.int64], n_faces: int) -> tuple[NDArray[np.
 
 @kernel
 def transfer_forward(
-    steps: NDArray[np.int64],
-    weights: NDArray[np.float64],
+    steps: Ints,
+    weights: Floats,
     first: NDArray[np.int32],
     later: NDArray[np.int32],
-    faces: NDArray[np.int64],
-    barycentric: NDArray[np.float64],
-    vectors: NDArray[np.float64],
+    faces: Ints,
+    barycentric: Floats,
+    vectors: Floats,
 ) -> None:
     """Transfer points and vectors at them from the first triangulation of a history to the last; in place.
 
@@ -249,12 +242,7 @@ def transfer_forward(
 
 @kernel
 def transfer_backward(
-    steps: NDArray[np.int64],
-    weights: NDArray[np.float64],
-    n_faces: int,
-    faces: NDArray[np.int64],
-    barycentric: NDArray[np.float64],
-    vectors: NDArray[np.float64],
+    steps: Ints, weights: Floats, n_faces: int, faces: Ints, barycentric: Floats, vectors: Floats
 ) -> None:
     """Transfer points and vectors at them from the last triangulation of a history to the first; in place.
 
@@ -309,7 +297,7 @@ def transfer_backward(
 
 
 @kernel
-def swap_last(w: NDArray[np.float64]) -> None:
+def swap_last(w: Floats) -> None:
     """Exchange the last two entries, as a face that is turned over does with its corners."""
     w[1], w[2] = w[2], w[1]
 
@@ -317,14 +305,14 @@ def swap_last(w: NDArray[np.float64]) -> None:
 @kernel
 def exchange(
     kind: int,
-    c: NDArray[np.float64],
+    c: Floats,
     forward: bool,
-    corners: NDArray[np.int64],
+    corners: Ints,
     start: int,
-    new_corners: NDArray[np.int64],
-    new_start: NDArray[np.int64],
-    w: NDArray[np.float64],
-    vectors: NDArray[np.float64],
+    new_corners: Ints,
+    new_start: Ints,
+    w: Floats,
+    vectors: Floats,
 ) -> int:
     """Transfer one point, and vectors at it, over one step; returns which of the step's new faces contains it."""
     lead = 3 if kind == SPLIT_FACE else 2  # the points before it are on one side of the dependency
@@ -352,13 +340,13 @@ def exchange(
 
 
 @kernel
-def has(corners: NDArray[np.int64], l: int) -> bool:
+def has(corners: Ints, l: int) -> bool:
     """Whether point l of a step is a corner of a face."""
     return corners[0] == l or corners[1] == l or corners[2] == l
 
 
 @kernel
-def shift(x: NDArray[np.float64], c: NDArray[np.float64], lead: int, gone: int, amount: float) -> None:
+def shift(x: Floats, c: Floats, lead: int, gone: int, amount: float) -> None:
     """Move weights along the affine dependency c, so that the one of point `gone` vanishes."""
     for l in range(4):
         x[l] += -amount * c[l] if l < lead else amount * c[l]
@@ -366,7 +354,7 @@ def shift(x: NDArray[np.float64], c: NDArray[np.float64], lead: int, gone: int, 
 
 
 @kernel
-def squared_length(g: Gluing, f: int, v: NDArray[np.float64]) -> tuple[float, float]:
+def squared_length(g: Gluing, f: int, v: Floats) -> tuple[float, float]:
     """Of a vector in a face, and the sum of the sizes of its terms."""
     square, size = 0.0, 0.0
     for k in range(3):
@@ -377,7 +365,7 @@ def squared_length(g: Gluing, f: int, v: NDArray[np.float64]) -> tuple[float, fl
 
 
 @kernel
-def keep_on_edges(w: NDArray[np.float64], v: NDArray[np.float64]) -> None:
+def keep_on_edges(w: Floats, v: Floats) -> None:
     """Let a line that runs along an edge but for rounding run along it: else it may cross to the other side midway."""
     largest = max(abs(v[0]), abs(v[1]), abs(v[2]))
     for k in range(3):
@@ -389,13 +377,13 @@ def keep_on_edges(w: NDArray[np.float64], v: NDArray[np.float64]) -> None:
 def trace_geodesic(
     g: Gluing,
     face: int,
-    barycentric: NDArray[np.float64],
-    vectors: NDArray[np.float64],
+    barycentric: Floats,
+    vectors: Floats,
     forward: bool,
-    out_faces: NDArray[np.int64],
-    out_starts: NDArray[np.float64],
-    out_ends: NDArray[np.float64],
-    out_vectors: NDArray[np.float64],
+    out_faces: Ints,
+    out_starts: Floats,
+    out_ends: Floats,
+    out_vectors: Floats,
     n: int,
 ) -> int:
     """Trace a geodesic from a point along its first vector, or against it, over its length; other vectors are carried.
@@ -466,14 +454,14 @@ def trace_geodesic(
 @kernel
 def trace_both_ways(
     g: Gluing,
-    faces: NDArray[np.int64],
-    barycentric: NDArray[np.float64],
-    vectors: NDArray[np.float64],
-    out_faces: NDArray[np.int64],
-    out_starts: NDArray[np.float64],
-    out_ends: NDArray[np.float64],
-    out_vectors: NDArray[np.float64],
-    owners: NDArray[np.int64],
+    faces: Ints,
+    barycentric: Floats,
+    vectors: Floats,
+    out_faces: Ints,
+    out_starts: Floats,
+    out_ends: Floats,
+    out_vectors: Floats,
+    owners: Ints,
 ) -> int:
     """Trace half of the first vector both ways from every point p; rows of the backward half have owner −1 − p."""
     n = 0

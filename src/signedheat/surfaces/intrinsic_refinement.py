@@ -11,8 +11,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..mesh.gluing import (
     Gluing,
     apex_position,
@@ -40,7 +40,7 @@ PATIENCE = 5000
 
 def refine_all(
     gluing: Gluing, angle: float, coarsest: float, max_vertices: int, progress: Callable[[float], None] | None = None
-) -> tuple[Gluing, NDArray[np.int64], NDArray[np.bool_], bool]:
+) -> tuple[Gluing, Ints, Bools, bool]:
     """Refine a Delaunay triangulation, in place, until no face is thin and then none is large, where that is possible.
 
     Fixed, boundary and nonmanifold edges may be split but are not flipped. Small angles remain where fixed edges meet
@@ -91,7 +91,7 @@ def mean_radius(gluing: Gluing) -> float:
     return float(np.sqrt(4 / 27**0.5 * lay_out(gluing).face_areas.mean())) / gluing.unit
 
 
-def close_faces(gluing: Gluing, agenda: Agenda) -> NDArray[np.bool_]:
+def close_faces(gluing: Gluing, agenda: Agenda) -> Bools:
     """(m,) faces whose shortest side joins vertices that nearly coincide."""
     n_faces = int(gluing.counts[0])
     faces = np.arange(n_faces)
@@ -102,7 +102,7 @@ def close_faces(gluing: Gluing, agenda: Agenda) -> NDArray[np.bool_]:
     return (one >= 0) & (one == other) & (lengths[faces, side] <= agenda.extent[one])
 
 
-def agenda_of(gluing: Gluing) -> tuple[NDArray[np.int64], Agenda]:
+def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
     """The fixed edges, and the work lists of refinement; boundary and nonmanifold edges become fixed."""
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     counts = np.bincount(gluing.edge[: 3 * n_faces], minlength=n_edges)
@@ -153,21 +153,21 @@ class Agenda(NamedTuple):
     that the last face came from; `room` and `halfedges` are work arrays for the search around a new vertex.
     """
 
-    stack: NDArray[np.int64]
-    stacked: NDArray[np.bool_]
-    bins: NDArray[np.int64]
-    next_face: NDArray[np.int64]
-    listed: NDArray[np.bool_]
-    segment: NDArray[np.int64]
-    segment_ends: NDArray[np.int64]
-    segment_length: NDArray[np.float64]
-    on_segment: NDArray[np.int64]
-    narrow: NDArray[np.bool_]
-    group: NDArray[np.int64]
-    extent: NDArray[np.float64]
-    seen: NDArray[np.int64]
-    room: NDArray[np.float64]
-    halfedges: NDArray[np.int64]
+    stack: Ints
+    stacked: Bools
+    bins: Ints
+    next_face: Ints
+    listed: Bools
+    segment: Ints
+    segment_ends: Ints
+    segment_length: Floats
+    on_segment: Ints
+    narrow: Bools
+    group: Ints
+    extent: Floats
+    seen: Ints
+    room: Floats
+    halfedges: Ints
 
 
 class Goal(NamedTuple):
@@ -345,7 +345,7 @@ def sector(g: Gluing, corner: int) -> float:
 
 
 @kernel
-def narrow_vertices(g: Gluing) -> NDArray[np.bool_]:
+def narrow_vertices(g: Gluing) -> Bools:
     """(n,) vertices at which two segments meet at less than 60°, or with a total angle of less than 60°."""
     narrow = np.zeros(g.counts[2], dtype=np.bool_)
     for corner in range(3 * g.counts[0]):
@@ -572,7 +572,7 @@ def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, float, float]:
 
 
 @kernel
-def encroached(g: Gluing, f: int, px: float, py: float, ends: NDArray[np.float64], halfedges: NDArray[np.int64]) -> int:
+def encroached(g: Gluing, f: int, px: float, py: float, ends: Floats, halfedges: Ints) -> int:
     """A segment that p encroaches upon: visible from p, which lies in its diametral circle. −1 if there is none.
 
     p is given in the frame of face f. `ends` and `halfedges` are work arrays for the search.
@@ -617,7 +617,7 @@ NEARNESS = 0.01
 
 
 @kernel
-def root(parent: NDArray[np.int64], a: int) -> int:
+def root(parent: Ints, a: int) -> int:
     """Representative of the group that a vertex belongs to (union–find with path halving)."""
     while parent[a] != a:
         parent[a] = parent[parent[a]]
@@ -626,13 +626,7 @@ def root(parent: NDArray[np.int64], a: int) -> int:
 
 
 @kernel
-def coinciding(
-    tail: NDArray[np.int64],
-    head: NDArray[np.int64],
-    length: NDArray[np.float64],
-    order: NDArray[np.int64],
-    n_vertices: int,
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def coinciding(tail: Ints, head: Ints, length: Floats, order: Ints, n_vertices: int) -> tuple[Ints, Floats]:
     """Group vertices that nearly coincide: the first vertex of the group of each, or −1.
 
     Edges join vertices into ever larger groups, in an order from short to long ones (Kruskal). A group is kept if the

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Complexes, Floats, Ints
 from ..errors import SourceError
 from ..frozen import Frozen
 from ..geodesics.exact_distance import cleared
@@ -36,14 +36,12 @@ class ConformingRefinement(Frozen):
     """Triangles cut so that some curves run along edges."""
 
     triangles: IntrinsicMesh  # after the cuts; old vertices first
-    marked: NDArray[np.bool_]  # (e,) edges along which the curves run
-    parents: NDArray[np.int64]  # (m,) the face, before the cuts, that each face is part of
-    corners: NDArray[np.float64]  # (m, 3, 3) barycentric coordinates of the corners of each face in its parent
+    marked: Bools  # (e,) edges along which the curves run
+    parents: Ints  # (m,) the face, before the cuts, that each face is part of
+    corners: Floats  # (m, 3, 3) barycentric coordinates of the corners of each face in its parent
 
     @classmethod
-    def of(
-        cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments], heights: NDArray[np.float64]
-    ) -> ConformingRefinement:
+    def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments], heights: Floats) -> ConformingRefinement:
         """Cut faces along all segments inside them, and put vertices at all points of the sources.
 
         Faces are put in the order of the heights (n,) of the vertices, so that no later choice hangs on the order that
@@ -63,9 +61,7 @@ class ConformingRefinement(Frozen):
         corners = np.take_along_axis(np.broadcast_to(corners, (len(faces), 3, 3))[faces], turns[:, :, None], axis=1)
         return cls(finer, marked[edges], parents[faces], corners)
 
-    def push_forward(
-        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def push_forward(self, faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
         """Points, and vectors (p, k, 3) at them, of the faces before the cuts, in the faces after."""
         which, child = members_of(*grouped(self.parents, int(self.parents.max()) + 1), faces)
         to_child = np.linalg.inv(self.corners[child])
@@ -73,16 +69,12 @@ class ConformingRefinement(Frozen):
         best = np.lexsort([-weights.min(axis=1), which])[np.searchsorted(which, np.arange(len(faces)))]
         return child[best], weights[best], np.einsum("pvk,pkl->pvl", vectors, to_child[best])
 
-    def pull_back(
-        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def pull_back(self, faces: Ints, barycentric: Floats) -> tuple[Ints, Floats]:
         """Points of the faces after the cuts, in the faces before."""
         return self.parents[faces], np.einsum("pk,pkl->pl", barycentric, self.corners[faces])
 
 
-def in_order(
-    triangles: IntrinsicMesh, heights: NDArray[np.float64]
-) -> tuple[IntrinsicMesh, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def in_order(triangles: IntrinsicMesh, heights: Floats) -> tuple[IntrinsicMesh, Ints, Ints, Ints]:
     """Triangles with faces, their corners and edges in the order of the heights (m, 3) of the corners.
 
     Each face begins at its lowest corner. Also the number that each edge (e,) and face (m,) had, and each corner (m,
@@ -104,18 +96,14 @@ def in_order(
     return IntrinsicMesh(corners, positions, table, triangles.n_vertices), edges, faces, turns
 
 
-def barycentric_of(
-    triangles: IntrinsicMesh, faces: NDArray[np.int64], points: NDArray[np.complex128]
-) -> NDArray[np.float64]:
+def barycentric_of(triangles: IntrinsicMesh, faces: Ints, points: Complexes) -> Floats:
     """(n, k, 3) barycentric coordinates of points in face layouts, k to each face."""
     return np.stack([np.ones_like(points.real), *(np.zeros_like(points.real),) * 2], axis=-1) + differences_of(
         triangles, faces, points - triangles.corner_positions[faces, :1]
     )
 
 
-def differences_of(
-    triangles: IntrinsicMesh, faces: NDArray[np.int64], vectors: NDArray[np.complex128]
-) -> NDArray[np.float64]:
+def differences_of(triangles: IntrinsicMesh, faces: Ints, vectors: Complexes) -> Floats:
     """(n, k, 3) vectors in face layouts as differences of barycentric coordinates, k to each face."""
     q = triangles.corner_positions[faces]
     u, v = (q[:, 1] - q[:, 0])[:, None], (q[:, 2] - q[:, 0])[:, None]
@@ -186,13 +174,7 @@ def transfer_segments(
     )
 
 
-def _joined(
-    triangles: IntrinsicMesh,
-    points: LocatedPoints,
-    faces: NDArray[np.int64],
-    owners: NDArray[np.int64],
-    nodes: NDArray[np.int64],
-) -> NDArray[np.int64]:
+def _joined(triangles: IntrinsicMesh, points: LocatedPoints, faces: Ints, owners: Ints, nodes: Ints) -> Ints:
     """(r, 2) the points that pieces of segments run between: each from where the last one ended, or from a node.
 
     Shapes: `faces`, `owners` (r,), `nodes` (s, 2).
@@ -209,9 +191,7 @@ def _joined(
     return joined
 
 
-def in_faces(
-    triangles: IntrinsicMesh, source: CurveSegments
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128]]:
+def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[Ints, Floats, Floats, Complexes]:
     """Face, start, end (barycentric) and normal in the layout of the face of every segment, along edges or not.
 
     For a segment along an edge it is the face of the edge with the largest area.
@@ -234,9 +214,7 @@ def in_faces(
     return faces, starts, barycentric_in(triangles, faces, source.nodes[source.ends[:, 1]]), directions
 
 
-def _snapped(
-    faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+def _snapped(faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
     """Points within rounding error of an edge moved onto it, and vectors within rounding error of its direction too."""
     near = barycentric < SNAP
     weights = np.where(near, 0.0, barycentric)
@@ -251,9 +229,7 @@ LEAST = 1e-12
 """Values that are smaller, relative to the largest, count as zero."""
 
 
-def level_lines(
-    history: History, refinement: ConformingRefinement, values: NDArray[np.float64]
-) -> list[tuple[NDArray[np.int64], NDArray[np.float64], bool]]:
+def level_lines(history: History, refinement: ConformingRefinement, values: Floats) -> list[tuple[Ints, Floats, bool]]:
     """The zero set of a function that is linear on the triangles after a history, on those before the refinement.
 
     Every segment is straight on an intrinsic triangle, and is traced across the faces of the mesh below. The triangles

@@ -15,8 +15,9 @@ from numbers import Real
 from typing import TYPE_CHECKING, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError, SourceError
 from ..exchange import Displayed
 from ..foreign import ForeignShape, converted
@@ -78,10 +79,10 @@ class IntrinsicTriangulation(Displayed, Frozen):
 
     mesh: TriangleMesh
     triangles: IntrinsicMesh
-    marked: NDArray[np.bool_]
+    marked: Bools
     goal: float
     complete: bool
-    close: NDArray[np.bool_] = field(repr=False)
+    close: Bools = field(repr=False)
     base: IntrinsicMesh = field(repr=False)
     refinement: ConformingRefinement = field(repr=False)
     history: History = field(repr=False)
@@ -97,18 +98,18 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return self.triangles.n_faces
 
     @property
-    def faces(self) -> NDArray[np.int64]:
+    def faces(self) -> Ints:
         """(m, 3) vertex ids. These do not determine the edges of a face: see `triangles`."""
         return self.triangles.corner_vertices
 
     @cached_property
-    def vertices(self) -> NDArray[np.float64]:
+    def vertices(self) -> Floats:
         """(n, 3) positions in space of the vertices, all of which lie on the mesh."""
         faces, weights = self.vertex_places
         return frozen(self.in_space(faces, weights))
 
     @cached_property
-    def vertex_places(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def vertex_places(self) -> tuple[Ints, Floats]:
         """(n,) face of the mesh, and (n, 3) barycentric coordinates in it, of every vertex; face −1 where unused."""
         old = self.mesh.faces
         faces, weights = np.full(self.mesh.n_vertices, -1), np.zeros((self.mesh.n_vertices, 3))
@@ -122,13 +123,13 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return np.concatenate([faces, put[0], new[0]]), np.concatenate([weights, put[1], new[1]])
 
     @cached_property
-    def corner_angles(self) -> NDArray[np.float64]:
+    def corner_angles(self) -> Floats:
         """(m, 3) angles at the corners, in radians."""
         leaving = self.triangles.edge_vectors
         return np.angle(-np.conj(leaving) * np.roll(leaving, 1, axis=1))
 
     @cached_property
-    def thin_faces(self) -> NDArray[np.int64]:
+    def thin_faces(self) -> Ints:
         """(k,) faces with an angle below the goal."""
         return np.flatnonzero(self.corner_angles.min(axis=1) < np.radians(self.goal) - 1e-9)
 
@@ -150,7 +151,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
             f"no angle below {self.goal:g}° but in {len(self.thin_faces)} of {self.n_faces} faces: {', '.join(reasons)}"
         )
 
-    def in_space(self, faces: NDArray[np.int64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
+    def in_space(self, faces: Ints, barycentric: Floats) -> Floats:
         """Positions of points that are given on the mesh.
 
         Parameters
@@ -177,7 +178,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         positions[lost] = self.mesh.vertices[lost]
         return positions
 
-    def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[Ints, Floats]:
         """Faces and barycentric coordinates, on the triangulation, of points given by those on the mesh.
 
         Parameters
@@ -217,9 +218,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
             )
         return self._forward(faces, barycentric, np.zeros((len(faces), 0, 3)))[:2]
 
-    def gradient(
-        self, values: NDArray[np.float64], faces: NDArray[np.int64], barycentric: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def gradient(self, values: Floats, faces: Ints, barycentric: Floats) -> Floats:
         """Gradients in space of a function that is linear on these triangles.
 
         Parameters
@@ -245,9 +244,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         """
         return self.gradient_of_corners(values[self.faces], faces, barycentric)
 
-    def gradient_of_corners(
-        self, corners: NDArray[np.float64], faces: NDArray[np.int64], barycentric: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def gradient_of_corners(self, corners: Floats, faces: Ints, barycentric: Floats) -> Floats:
         """Gradients in space of a function that may jump between these triangles.
 
         Parameters
@@ -277,15 +274,13 @@ class IntrinsicTriangulation(Displayed, Frozen):
         rises = np.einsum("psk,pk->ps", moves, corners[found])
         return gradients_along(np.einsum("psk,pkd->psd", sides, self.mesh.vertices[self.mesh.faces[faces]]), rises)
 
-    def _forward(
-        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def _forward(self, faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
         """Points of the mesh, and vectors (p, k, 3) at them, on the triangulation."""
         below = self.refinement.push_forward(faces, barycentric, vectors)
         found, weights, moved = self.history.forward(below[0], np.maximum(below[1], 0.0), below[2])
         return found, weights / weights.sum(axis=1, keepdims=True), moved
 
-    def level_set(self, values: NDArray[np.float64], level: float = 0.0) -> list[Curve]:
+    def level_set(self, values: Floats, level: float = 0.0) -> list[Curve]:
         """Level set of a function that is linear on these triangles, as curves on the mesh.
 
         Larger values are to its left; values equal to the level count as larger. On inconsistently oriented meshes
@@ -327,7 +322,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         curves = [Curve(faces, np.maximum(weights, 0.0), closed=closed) for faces, weights, closed in lines]
         return without_repeats(self.mesh, curves)
 
-    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def on_triangulation(self, values: Floats) -> Floats:
         """Values at the vertices of `triangulation`, from values at the vertices of the triangles.
 
         Parameters
@@ -349,7 +344,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         """
         return values
 
-    def edge_lines(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def edge_lines(self) -> tuple[Ints, Floats, Floats]:
         """Edges as polylines on the mesh.
 
         Returns

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..mesh.segment_chains import assemble_polylines, leaving
 from ..mesh.surface_points import SNAP, barycentric_on_edges, crossed_sides
 from ..mesh.triangles import Triangles, area_vectors
@@ -18,7 +18,7 @@ puts next to it, it crosses edges up to 1e-5 of that apart. Of 22,000 steps of c
 between 3e-6 and 3e-5, and 15 between 3e-5 and 1e-3."""
 
 
-def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> list[Curve]:
+def level_set(mesh: Triangles, values: Floats, level: float) -> list[Curve]:
     """Level set of a piecewise linear function by marching triangles, with larger values to the left.
 
     Values equal to the level count as larger, so that every face is crossed along one segment or not at all; loops that
@@ -71,7 +71,7 @@ def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
     return found
 
 
-def snapped(values: NDArray[np.float64], ends: NDArray[np.int64], level: float) -> NDArray[np.float64]:
+def snapped(values: Floats, ends: Ints, level: float) -> Floats:
     """Values; those that differ from a level by rounding only are set to that level."""
     with np.errstate(invalid="ignore"):  # values may be infinite
         steps = np.abs(values[ends[:, 0]] - values[ends[:, 1]])
@@ -81,7 +81,7 @@ def snapped(values: NDArray[np.float64], ends: NDArray[np.int64], level: float) 
     return np.where(np.abs(values - level) <= SNAP * steepest, level, values)
 
 
-def gradient_directions(mesh: Triangles, values: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def gradient_directions(mesh: Triangles, values: Floats, faces: Ints) -> Floats:
     """(k, 3) gradients of a piecewise linear function on some faces, up to a positive factor each."""
     corners = mesh.vertices[mesh.faces[faces]]
     opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
@@ -92,7 +92,7 @@ def gradient_directions(mesh: Triangles, values: NDArray[np.float64], faces: NDA
     return np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
 
 
-def region_boundary(mesh: Triangles, mask: NDArray[np.bool_]) -> list[Curve]:
+def region_boundary(mesh: Triangles, mask: Bools) -> list[Curve]:
     """Curves along the edges between the faces of a region and all others, with the region to the left."""
     inside = np.bincount(mesh.edges.face_edges.ravel(), np.repeat(mask, 3), len(mesh.edges.vertices))
     between = (inside > 0) & (inside < mesh.edges.face_counts)
@@ -104,7 +104,7 @@ def boundary_curves(mesh: Triangles) -> list[Curve]:
     return along_sides(mesh, (mesh.edges.face_counts == 1)[mesh.edges.face_edges])
 
 
-def along_sides(mesh: Triangles, chosen: NDArray[np.bool_]) -> list[Curve]:
+def along_sides(mesh: Triangles, chosen: Bools) -> list[Curve]:
     """Curves along chosen sides of faces, in the direction in which the face is to the left."""
     faces, sides = np.nonzero(chosen)
     following = (sides + 1) % 3
@@ -122,7 +122,7 @@ def along_sides(mesh: Triangles, chosen: NDArray[np.bool_]) -> list[Curve]:
     return curves
 
 
-def inward(mesh: Triangles, faces: NDArray[np.int64], sides: NDArray[np.int64]) -> NDArray[np.float64]:
+def inward(mesh: Triangles, faces: Ints, sides: Ints) -> Floats:
     """(k, 3) directions in faces, orthogonal to one of their sides, inward."""
     corners = mesh.vertices[mesh.faces[faces]]
     row = np.arange(len(faces))

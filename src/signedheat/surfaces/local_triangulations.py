@@ -21,6 +21,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.components import connected_components, grouped, members_of
 from ..mesh.ear_clipping import cut_into_ears
@@ -57,16 +58,13 @@ _CHUNK = 65536
 class LocalTriangulations:
     """Triangles on points."""
 
-    faces: NDArray[np.int64]  # (m, 3) point ids, oriented alike as far as the surface allows
+    faces: Ints  # (m, 3) point ids, oriented alike as far as the surface allows
     # (n, 3) unit normals, on the side from which the faces at each point run counter-clockwise
-    normals: NDArray[np.float64]
+    normals: Floats
 
 
 def local_triangulations(
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    n_neighbors: int = 30,
-    given: NDArray[np.float64] | None = None,
+    points: Floats, normals: Floats, n_neighbors: int = 30, given: Floats | None = None
 ) -> LocalTriangulations:
     """Triangulate points sampled from an unknown surface, in O(n log n) time.
 
@@ -91,7 +89,7 @@ def local_triangulations(
     return LocalTriangulations(np.concatenate([faces, hole_fillings(points, oriented, faces)]), oriented)
 
 
-def joined_triangles(planes: TangentPlanes) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def joined_triangles(planes: TangentPlanes) -> tuple[Ints, Ints]:
     """Triangles on the points of each side, joined where both sides end; and all that were proposed."""
     points, everywhere = planes.points, np.arange(len(planes.points))
     beside = ~planes.opposed(everywhere, planes.neighbors)
@@ -109,7 +107,7 @@ def joined_triangles(planes: TangentPlanes) -> tuple[NDArray[np.int64], NDArray[
     return faces, candidates[well_shaped_triangles(points, candidates, planes.reach)[0]]
 
 
-def islands(planes: TangentPlanes, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
+def islands(planes: TangentPlanes, faces: Ints) -> Bools:
     """(n,) points joined by faces to fewer others than a neighbourhood has, and next to points of another side."""
     n, k = planes.neighbors.shape
     tail, head = edge_table(faces).vertices.T
@@ -126,16 +124,16 @@ def islands(planes: TangentPlanes, faces: NDArray[np.int64]) -> NDArray[np.bool_
 class TangentPlanes:
     """Tangent planes at points, into which their neighbours are unfolded."""
 
-    points: NDArray[np.float64]  # (n, 3) positions
-    normals: NDArray[np.float64]  # (n, 3) unit normals of the planes
-    axes: NDArray[np.float64]  # (n, 2, 3) two axes in each plane
-    outward: NDArray[np.float64]  # (n, 3) unit vectors in the planes, away from the neighbours on the same side
-    neighbors: NDArray[np.int64]  # (n, k) ids of the nearest points, where those with other normals count as farther
-    reach: NDArray[np.float64]  # (n,) distance to the last of them, counted so
-    flat: NDArray[np.float64]  # (n,) height over the plane up to which points lie in it
+    points: Floats  # (n, 3) positions
+    normals: Floats  # (n, 3) unit normals of the planes
+    axes: Floats  # (n, 2, 3) two axes in each plane
+    outward: Floats  # (n, 3) unit vectors in the planes, away from the neighbours on the same side
+    neighbors: Ints  # (n, k) ids of the nearest points, where those with other normals count as farther
+    reach: Floats  # (n,) distance to the last of them, counted so
+    flat: Floats  # (n,) height over the plane up to which points lie in it
 
     @classmethod
-    def of(cls, points: NDArray[np.float64], normals: NDArray[np.float64], n_neighbors: int) -> TangentPlanes:
+    def of(cls, points: Floats, normals: Floats, n_neighbors: int) -> TangentPlanes:
         """Fit planes to the neighbours on the same side: normals that come with scans often belong to another mesh, and
         fit worse.
         """
@@ -143,7 +141,7 @@ class TangentPlanes:
         nearest = min(NEAREST, many)
         tree = scipy.spatial.cKDTree(points)
 
-        def fitted(rows: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
+        def fitted(rows: Floats) -> tuple[NDArray[Any], ...]:
             some, own = rows[:, :3], rows[:, 3:]
             distances, near = tree.query(some, k=many + 1)
             spacing = point_spacing(distances[:, nearest], nearest)
@@ -163,17 +161,17 @@ class TangentPlanes:
         outward = unit(away - (away * axis).sum(axis=1)[:, None] * axis)
         return cls(points, axis, axes[:, :2], outward, neighbors, reach, flat)
 
-    def opposed(self, here: NDArray[np.int64], there: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def opposed(self, here: Ints, there: Ints) -> Bools:
         """(m, k) whether points (m, k) lie on the other side of a plate than others (m,)."""
 
-        def found(ids: NDArray[np.int64]) -> tuple[NDArray[np.bool_]]:
+        def found(ids: Ints) -> tuple[Bools]:
             first, rest = ids[:, :1], ids[:, 1:]
             offsets = self.points[rest] - self.points[first]
             return (turned_alike(offsets, self.normals[first], self.normals[rest], self.flat[first])[1],)
 
         return in_chunks(found, np.column_stack([here, there]))[0]
 
-    def unfolded(self, here: NDArray[np.int64], there: NDArray[np.int64]) -> NDArray[np.float64]:
+    def unfolded(self, here: Ints, there: Ints) -> Floats:
         """(m, 2) places of points (m,) in the planes of others (m,).
 
         A point is projected along the mean of both normals, and what is then seen is turned into the plane. On the
@@ -181,7 +179,7 @@ class TangentPlanes:
         them leads away over the edge.
         """
 
-        def places(pairs: NDArray[np.int64]) -> tuple[NDArray[np.float64]]:
+        def places(pairs: Ints) -> tuple[Floats]:
             here, there = pairs.T
             offset, normal = self.points[there] - self.points[here], self.normals[here]
             other, opposed = turned_alike(offset, normal, self.normals[there], self.flat[here])
@@ -195,12 +193,7 @@ class TangentPlanes:
         return in_chunks(places, np.column_stack([here, there]))[0]
 
 
-def turned_alike(
-    offsets: NDArray[np.float64],
-    normal: NDArray[np.float64],
-    others: NDArray[np.float64],
-    flat: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def turned_alike(offsets: Floats, normal: Floats, others: Floats, flat: Floats) -> tuple[Floats, Bools]:
     """Normals (…, 3) of other points, and whether (…,) they lie on the other side of a plate.
 
     On the same side a normal may be turned by mistake, and is turned back: where the other point lies in the tangent
@@ -212,17 +205,12 @@ def turned_alike(
     return np.where(same[..., None], -others, others), contrary & ~same
 
 
-def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def dot(a: Floats, b: Floats) -> Floats:
     """Scalar products of vectors (…, 3)."""
     return np.asarray(np.einsum("...d,...d->...", a, b))
 
 
-def principal_axes(
-    offsets: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    reach: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def principal_axes(offsets: Floats, weights: Floats, normals: Floats, reach: Floats) -> Floats:
     """(n, 3, 3) principal axes of each row of (n, k, 3) offsets with (n, k) weights, longest first; the last one is
     pulled towards normals (n, 3).
     """
@@ -235,9 +223,7 @@ def principal_axes(
     return np.stack([first, second, np.cross(first, second)], axis=1)
 
 
-def proposed_triangles(
-    planes: TangentPlanes, centers: NDArray[np.int64], neighbors: NDArray[np.int64], used: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, used: Bools) -> tuple[Ints, Ints]:
     """(m, 3) triangles that points (c,) propose among their neighbours (c, k) that are used, and (m,) votes for each.
 
     Each triangle is there once, its corners in increasing order.
@@ -264,9 +250,7 @@ def proposed_triangles(
     return found[order], np.bincount(number)[order]
 
 
-def accepted_triangles(
-    planes: TangentPlanes, proposals: Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]]
-) -> NDArray[np.int64]:
+def accepted_triangles(planes: TangentPlanes, proposals: Sequence[tuple[Ints, Ints]]) -> Ints:
     """Well-shaped triangles that overlap no better one: of earlier proposals, then with more votes, then rounder."""
     triangles = np.concatenate([some for some, _ in proposals])
     votes = np.concatenate([some for _, some in proposals])
@@ -277,9 +261,7 @@ def accepted_triangles(
     return nonoverlapping_triangles(planes, triangles[once[np.lexsort((circumradii, -votes[once], rank[once]))]])
 
 
-def well_shaped_triangles(
-    points: NDArray[np.float64], triangles: NDArray[np.int64], reach: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def well_shaped_triangles(points: Floats, triangles: Ints, reach: Floats) -> tuple[Ints, Floats]:
     """Ids of triangles with area whose circumradius is within the reach of all their corners, and the radii."""
     a, b, c = points[triangles].transpose(1, 0, 2)
     u, v, w = b - a, c - b, a - c
@@ -290,7 +272,7 @@ def well_shaped_triangles(
     return keep, product[keep] / (2 * twice_area[keep])
 
 
-def nonoverlapping_triangles(planes: TangentPlanes, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+def nonoverlapping_triangles(planes: TangentPlanes, triangles: Ints) -> Ints:
     """The triangles, in the given order, that overlap no earlier one around any of their corners.
 
     Two triangles overlap if the sectors that they occupy in the tangent plane of a common corner do.
@@ -307,9 +289,7 @@ def nonoverlapping_triangles(planes: TangentPlanes, triangles: NDArray[np.int64]
     return triangles[accept_apart(triangles, starts, widths, len(planes.points))]
 
 
-def split_at_points_left(
-    points: NDArray[np.float64], faces: NDArray[np.int64], candidates: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def split_at_points_left(points: Floats, faces: Ints, candidates: Ints) -> Ints:
     """The triangles, the nearest to each point that has candidates but no triangle split in three there.
 
     Tangent planes around such a point lie so differently that each triangle proposed at it overlaps others. Points
@@ -324,12 +304,7 @@ def split_at_points_left(
     return faces
 
 
-def aligned(
-    axes: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    given: NDArray[np.float64],
-) -> NDArray[np.int64]:
+def aligned(axes: Floats, faces: Ints, normals: Floats, given: Floats) -> Ints:
     """(n,) signs that make axes agree with those of their neighbours and with normals.
 
     Each connected component is then turned to the side to which most of the given normals point.
@@ -346,7 +321,7 @@ def aligned(
     return np.where(preference < 0, -1, 1)[parts] * signs
 
 
-def facing(planes: TangentPlanes, normals: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def facing(planes: TangentPlanes, normals: Floats, faces: Ints) -> Ints:
     """The faces, turned to be counter-clockwise, unfolded into the planes of their corners, as seen from where normals
     along those of the planes point.
     """
@@ -364,7 +339,7 @@ TOUCHING = 1e-7  # radians by which the sectors of two triangles at a corner may
 
 
 @compiled
-def voronoi_fans(places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
     """Delaunay neighbours of the origin among the points of each row, counter-clockwise.
 
     The Voronoi cell of the origin starts as a square, to ±1, and is cut by the bisectors of its neighbours, nearest
@@ -423,9 +398,7 @@ def voronoi_fans(places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArra
 
 
 @compiled
-def accept_apart(
-    triangles: NDArray[np.int64], starts: NDArray[np.float64], widths: NDArray[np.float64], n_points: int
-) -> NDArray[np.bool_]:
+def accept_apart(triangles: Ints, starts: Floats, widths: Floats, n_points: int) -> Bools:
     """(m,) triangles whose sector overlaps that of no triangle accepted earlier, at any of their three corners.
 
     At corner k of triangle f the sector goes from angle ``starts[f, k]`` counter-clockwise by ``widths[f, k]``.
@@ -457,9 +430,7 @@ def accept_apart(
 MOST_SIDES = 12
 
 
-def hole_fillings(
-    points: NDArray[np.float64], normals: NDArray[np.float64], faces: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
     """Triangles that fill holes of at most `MOST_SIDES` sides.
 
     A boundary loop is a hole if the faces lie outside it: an outer boundary, however short, is left open. An ear that
@@ -490,9 +461,7 @@ def hole_fillings(
     return np.array(fillings, dtype=np.int64).reshape(-1, 3)
 
 
-def next_around_gap(
-    points: NDArray[np.float64], normals: NDArray[np.float64], tails: NDArray[np.int64], heads: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def next_around_gap(points: Floats, normals: Floats, tails: Ints, heads: Ints) -> Ints:
     """(b,) boundary edge that follows each one around the gap to its right, or −1.
 
     Where several leave its head, it is the first one counter-clockwise from the reversed edge: faces lie to the left.
@@ -509,7 +478,7 @@ def next_around_gap(
     return following
 
 
-def _loop_from(start: int, following: NDArray[np.int64]) -> list[int]:
+def _loop_from(start: int, following: Ints) -> list[int]:
     """The boundary edges of the loop through one of them; empty if they do not close."""
     loop = [start]
     while len(loop) <= MOST_SIDES:
@@ -523,7 +492,7 @@ def _loop_from(start: int, following: NDArray[np.int64]) -> list[int]:
 
 
 def _ears(
-    points: NDArray[np.float64], normals: NDArray[np.float64], loop: list[int], existing: set[tuple[int, int]]
+    points: Floats, normals: Floats, loop: list[int], existing: set[tuple[int, int]]
 ) -> list[tuple[int, int, int]]:
     """Triangles that fill a loop of vertices, counter-clockwise around the hole; none if it is not a hole.
 

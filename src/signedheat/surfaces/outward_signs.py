@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.signed_graph import Links, signs_of
 from .local_triangulations import FLAT, turned_alike
@@ -67,14 +67,12 @@ class OutwardSigns:
         Share of the weights of links that the signs agree with, less the share that they contradict.
     """
 
-    signs: NDArray[np.float64]
+    signs: Floats
     sided: bool
     coherence: float
 
 
-def outward_normals(
-    points: NDArray[np.float64], given: NDArray[np.float64] | None = None
-) -> tuple[NDArray[np.float64], PlaneFits, OutwardSigns]:
+def outward_normals(points: Floats, given: Floats | None = None) -> tuple[Floats, PlaneFits, OutwardSigns]:
     """Normals at (n, 3) distinct points, outwards together: the given ones, some of them turned, or fitted ones."""
     if given is None:
         fits, found = fitted_outward(points)
@@ -85,9 +83,7 @@ def outward_normals(
     return given * found.signs[:, None], fits, found
 
 
-def kept_on_thin_sheets(
-    points: NDArray[np.float64], given: NDArray[np.float64], signs: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
     """Signs of given normals (n, 3), which stay on thin sheets as they are given if they fit each other there.
 
     Balls between the sides of a sheet thinner than points are apart are flat, and no evidence. Normals fit each other
@@ -107,7 +103,7 @@ def kept_on_thin_sheets(
     return np.where(thin, -1.0 if inverted else 1.0, signs)
 
 
-def fitted_outward(points: NDArray[np.float64]) -> tuple[PlaneFits, OutwardSigns]:
+def fitted_outward(points: Floats) -> tuple[PlaneFits, OutwardSigns]:
     """Planes near (n, 3) distinct points, and signs that turn their normals outwards.
 
     In noise, neighbourhoods too small fit planes to it, and too large ones to several sheets at once: either way the
@@ -123,9 +119,7 @@ def fitted_outward(points: NDArray[np.float64]) -> tuple[PlaneFits, OutwardSigns
     return next(one for one in tried if one[1].coherence >= best - WORSE)
 
 
-def outward_signs(
-    fits: PlaneFits, axes: NDArray[np.float64], given: bool = False, groups: NDArray[np.int64] | None = None
-) -> OutwardSigns:
+def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False, groups: Ints | None = None) -> OutwardSigns:
     """Signs that turn axes outwards.
 
     Shapes: `axes` (n, 3), `groups` (n,).
@@ -161,15 +155,13 @@ def outward_signs(
     return OutwardSigns(signs, sided, coherence)
 
 
-def _lone(places: NDArray[np.float64], reaches: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _lone(places: Floats, reaches: Floats) -> Bools:
     """(n,) points that are far from those next to them, compared with these: outliers."""
     near = scipy.spatial.cKDTree(places).query(places, k=min(NEARBY + 1, len(places)), workers=-1)[1]
     return reaches > LONE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
 
 
-def _followed(
-    places: NDArray[np.float64], normals: NDArray[np.float64], others: NDArray[np.float64], axes: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _followed(places: Floats, normals: Floats, others: Floats, axes: Floats) -> Floats:
     """Signs of axes at other places that agree with the normals around them."""
     distances, near = scipy.spatial.cKDTree(places).query(others, k=min(6, len(places)), workers=-1)
     distances, near = distances.reshape(len(others), -1), near.reshape(len(others), -1)
@@ -178,14 +170,12 @@ def _followed(
     return np.where((weights * cosines * np.abs(cosines)).sum(axis=1) >= 0, 1.0, -1.0)
 
 
-def _shared(signs: NDArray[np.float64], groups: NDArray[np.int64]) -> NDArray[np.float64]:
+def _shared(signs: Floats, groups: Ints) -> Floats:
     """Signs of the majority of each group."""
     return np.where(np.bincount(groups, signs) >= 0, 1.0, -1.0)[groups]
 
 
-def sign_links(
-    places: NDArray[np.float64], axes: NDArray[np.float64], reaches: NDArray[np.float64], noisy: bool = False
-) -> tuple[Links, bool]:
+def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = False) -> tuple[Links, bool]:
     """Links between the signs of axes, from balls and from neighbours; and whether there were balls.
 
     One node past the points is the outside, whose sign is 1. Points in a plane have no tets: then there are links
@@ -216,12 +206,12 @@ def sign_links(
     return Links.joined(near, balls, _hull_links(places, axes, tets)), True
 
 
-def _confidence(cosines: NDArray[np.float64]) -> NDArray[np.float64]:
+def _confidence(cosines: Floats) -> Floats:
     """Signed fourth power of cosines, zero below `STEEPEST`."""
     return np.where(np.abs(cosines) > STEEPEST, np.sign(cosines) * cosines**4, 0.0)
 
 
-def _ball_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: NDArray[np.int64]) -> Links:
+def _ball_links(places: Floats, axes: Floats, tets: Ints) -> Links:
     corners = places[tets]
     u, v, w = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
     uu, vv, ww = ((side * side).sum(axis=1, keepdims=True) for side in (u, v, w))
@@ -241,7 +231,7 @@ def _ball_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: ND
     return Links(tails, heads, weights[linked])
 
 
-def _hull_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: scipy.spatial.Delaunay) -> Links:
+def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> Links:
     """Links with the outside, from the faces of the hull: flat tets behind them do not tell the inner side."""
     tet, opposite = np.nonzero(tets.neighbors < 0)
     faces = tets.simplices[tet[:, None], (opposite[:, None] + [1, 2, 3]) % 4].astype(np.int64)
@@ -253,7 +243,7 @@ def _hull_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: sc
     return Links(faces.ravel(), np.full(faces.size, len(places)), weights.ravel())
 
 
-def _neighbor_links(places: NDArray[np.float64], axes: NDArray[np.float64], weight: float) -> Links:
+def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
     """Neighbours compared as if on a circle: one axis reflected in the plane midway is the other."""
     n, k = len(places), min(NEARBY, len(places) - 1)
     neighbors = scipy.spatial.cKDTree(places).query(places, k=k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
@@ -266,7 +256,7 @@ def _neighbor_links(places: NDArray[np.float64], axes: NDArray[np.float64], weig
     return Links(tails, heads, weight * _confidence(cosines))
 
 
-def spread_out(points: NDArray[np.float64], radii: NDArray[np.float64]) -> NDArray[np.int64]:
+def spread_out(points: Floats, radii: Floats) -> Ints:
     """Ids of points, none within the radius of an earlier one, and every point within that of one of them.
 
     Examples
@@ -286,9 +276,7 @@ def spread_out(points: NDArray[np.float64], radii: NDArray[np.float64]) -> NDArr
 
 
 @compiled
-def _keep_first(
-    ids: NDArray[np.int64], ends: NDArray[np.int64], near: NDArray[np.int64], free: NDArray[np.bool_]
-) -> None:
+def _keep_first(ids: Ints, ends: Ints, near: Ints, free: Bools) -> None:
     for i in range(len(ids)):
         if free[ids[i]]:
             for k in range(ends[i], ends[i + 1]):

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.unit_vectors import axes_across
 from ..parallel import in_chunks
@@ -38,21 +38,20 @@ ON_QUADRIC = 24
 """Neighbours to which a quadric is fitted."""
 _TRIAL_HEIGHTS = (0.5, 0.5, 0.5)
 _TRIED = 2000
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneFits:
     """Planes near points."""
 
-    axes: NDArray[np.float64]  # (n, 3) unit normals, up to sign
-    places: NDArray[np.float64]  # (n, 3) the points themselves; where they are noisy, the nearest points of the planes
-    reaches: NDArray[np.float64]  # (n,) distance to the last neighbour used
+    axes: Floats  # (n, 3) unit normals, up to sign
+    places: Floats  # (n, 3) the points themselves; where they are noisy, the nearest points of the planes
+    reaches: Floats  # (n,) distance to the last neighbour used
     n_neighbors: int  # size of the neighbourhoods
     noisy: bool  # whether the points lie around the surface rather than on it
 
 
-def fit_planes(points: NDArray[np.float64], n_neighbors: int | None = None) -> PlaneFits:
+def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
     """Fit a plane near each of (n, 3) distinct points.
 
     Without noise the neighbourhoods are small, and sheets that lie close together, or meet in an edge, stay apart:
@@ -68,7 +67,7 @@ def fit_planes(points: NDArray[np.float64], n_neighbors: int | None = None) -> P
     return PlaneFits(axes, places, reaches, size, noisy)
 
 
-def noisy_sizes(points: NDArray[np.float64], normals: NDArray[np.float64] | None = None) -> list[int]:
+def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
     """Sizes of neighbourhoods in which planes can be fitted in spite of noise, from the least; without noise none.
 
     Estimated from at most 2,000 of the points. With normals, from neighbours on the same side: the other side of a thin
@@ -96,18 +95,18 @@ def noisy_sizes(points: NDArray[np.float64], normals: NDArray[np.float64] | None
     return [k for k, error in zip(sizes, errors, strict=True) if error < ANGLE_ERROR] or sizes[-1:]
 
 
-def noise_scale(points: NDArray[np.float64], normals: NDArray[np.float64] | None = None) -> int | None:
+def noise_scale(points: Floats, normals: Floats | None = None) -> int | None:
     """Size of neighbourhoods that noise calls for where normals are given; without noise none."""
     sizes = noisy_sizes(points, normals)
     return sizes[min(2, len(sizes) - 1)] if sizes else None
 
 
-def point_spacing(distances: NDArray[np.float64], k: int) -> NDArray[np.float64]:
+def point_spacing(distances: Floats, k: int) -> Floats:
     """Distance between points, from that to the k-th neighbour: in a plane, k lie in a circle of k squared spacings."""
     return distances / np.sqrt(k / np.pi)
 
 
-def share_of_two_sides(points: NDArray[np.float64], normals: NDArray[np.float64]) -> float:
+def share_of_two_sides(points: Floats, normals: Floats) -> float:
     """Share of points whose neighbours with similar normals are rather those of both sides of a plate that is thinner
     than they are apart: they lie at two heights over a quadric. Estimated from at most 2,000 points.
 
@@ -122,7 +121,7 @@ def share_of_two_sides(points: NDArray[np.float64], normals: NDArray[np.float64]
     k = min(ON_QUADRIC, len(points) - 1)
     tree = scipy.spatial.cKDTree(points)
 
-    def found(tried: NDArray[np.int64]) -> tuple[NDArray[np.bool_]]:
+    def found(tried: Ints) -> tuple[Bools]:
         distances, near = tree.query(points[tried], k=k + 1)
         offsets, normal = points[near] - points[tried, None], normals[tried]
         weights = np.exp(-((distances / distances[:, -1:]) ** 2)) * (np.einsum("nkd,nd->nk", normals[near], normal) > 0)
@@ -141,16 +140,16 @@ def share_of_two_sides(points: NDArray[np.float64], normals: NDArray[np.float64]
 
 
 def planes_near(
-    points: NDArray[np.float64],
+    points: Floats,
     tree: scipy.spatial.cKDTree,
-    chosen: NDArray[np.int64],
+    chosen: Ints,
     n_neighbors: int,
     heights: tuple[float, ...],
     n_starts: int = 5,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Axes, centres, reaches and deviations of planes near chosen points."""
 
-    def fit(some: NDArray[np.int64]) -> tuple[Floats, Floats, Floats, Floats]:
+    def fit(some: Ints) -> tuple[Floats, Floats, Floats, Floats]:
         distances, neighbors = tree.query(tree.data[some], k=n_neighbors + 1)
         neighbors[:, 0] = some
         axes, centers, deviations = np.zeros((len(some), 3)), points[some], np.zeros(len(some))
@@ -254,7 +253,7 @@ def weigh_by_height(offsets: Floats, near: Floats, axis: Floats, base: Floats, h
 @compiled
 def robust_planes(
     points: Floats,
-    neighbors: NDArray[np.int64],
+    neighbors: Ints,
     distances: Floats,
     heights: Floats,
     on_surface: bool,

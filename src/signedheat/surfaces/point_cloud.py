@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats, Ints
 from ..errors import GeometryError, InexactWarning, warn_user
 from ..exchange import Elements, Exchangeable
 from ..mesh.welding import same_rows
@@ -74,9 +75,9 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
     array([0., 0., 1.])
     """
 
-    points: NDArray[np.float64]
-    normals: NDArray[np.float64] | None
-    areas: NDArray[np.float64] | None
+    points: Floats
+    normals: Floats | None
+    areas: Floats | None
     n_neighbors: int
     _has_faces = False
 
@@ -124,12 +125,12 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         return len(self.points)
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Floats:
         """(2, d) lower and upper corner of the box around the points."""
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
 
     @cached_property
-    def representatives(self) -> NDArray[np.int64]:
+    def representatives(self) -> Ints:
         """(n,) first point that coincides with each point, within a ten-millionth of the size of the cloud."""
         lower, upper = self.bounds
         cell = 1e-7 * max(float((upper - lower).max()), np.finfo(float).tiny)
@@ -137,7 +138,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         return frozen(same_rows(cells.astype(np.int64)))
 
     @cached_property
-    def _distinct(self) -> tuple[NDArray[np.int64], LocalTriangulations]:
+    def _distinct(self) -> tuple[Ints, LocalTriangulations]:
         """Ids of the distinct points, sorted by coordinates, and their local triangulations."""
         if self.points.shape[1] != 3:
             raise GeometryError(
@@ -186,7 +187,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         ids, found = self._distinct
         return TriangleMesh(self.points, ids[found.faces])
 
-    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def on_triangulation(self, values: Floats) -> Floats:
         """Values at the vertices of `triangulation`, from values at the vertices of the cloud.
 
         Parameters
@@ -209,14 +210,14 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         return values
 
     @cached_property
-    def surface_normals(self) -> NDArray[np.float64]:
+    def surface_normals(self) -> Floats:
         """(n, 3) unit normals, estimated from neighbours, on the side from which `triangulation` is oriented."""
         ids, found = self._distinct
         normals = np.empty_like(self.points)
         normals[ids] = found.normals
         return frozen(normals[self.representatives])
 
-    def _triangulation_vertices(self, vertices: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _triangulation_vertices(self, vertices: Ints) -> Ints:
         exists = (vertices >= 0) & (vertices < self.n_points)
         return np.where(exists, self.representatives[np.where(exists, vertices, 0)], vertices)
 
@@ -224,7 +225,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         return f"PointCloud({self.n_points} points, {'with' if self.normals is not None else 'without'} normals)"
 
 
-def edges_turned(points: NDArray[np.float64], normals: NDArray[np.float64], faces: NDArray[np.int64]) -> int:
+def edges_turned(points: Floats, normals: Floats, faces: Ints) -> int:
     """Number of edges next to another side across which triangles face opposite ways. Surfaces with one side have such
     edges, too, but no other side is near.
     """
@@ -237,6 +238,6 @@ def edges_turned(points: NDArray[np.float64], normals: NDArray[np.float64], face
     return int(over.any(axis=(1, 2)).sum())
 
 
-def _same_length(values: NDArray[np.float64], points: NDArray[np.float64], name: str) -> None:
+def _same_length(values: Floats, points: Floats, name: str) -> None:
     if len(values) != len(points):
         raise GeometryError(f"there are {len(points)} points, but {len(values)} {name}", element=name)

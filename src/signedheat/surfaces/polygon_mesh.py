@@ -14,9 +14,10 @@ from functools import cached_property
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import sparse
 
+from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError
 from ..exchange import Elements, Exchangeable
 from ..mesh.components import sums_of
@@ -26,7 +27,7 @@ from ..validation import array_of, coordinates, frozen, used_bounds, whole_numbe
 from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh
 
-Polygons = Sequence[Sequence[int] | NDArray[np.int64]] | NDArray[np.int64]
+Polygons = Sequence[Sequence[int] | Ints] | Ints
 """Vertex ids of each polygon."""
 
 
@@ -54,9 +55,9 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
     array([[0., 0., 1.]])
     """
 
-    vertices: NDArray[np.float64]
-    corners: NDArray[np.int64]
-    offsets: NDArray[np.int64]
+    vertices: Floats
+    corners: Ints
+    offsets: Ints
 
     def __init__(self, vertices: ArrayLike, polygons: Polygons) -> None:
         positions = coordinates(vertices, "vertices", 3)
@@ -73,8 +74,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         if (counts < 3).any():
             first = int(np.argmax(counts < 3))
             raise GeometryError(
-                f"polygon {first} has {counts[first]} corners, and needs at least 3",
-                element=f"polygon {first}",
+                f"polygon {first} has {counts[first]} corners, and needs at least 3", element=f"polygon {first}"
             )
         corners = whole_numbers(list(itertools.chain.from_iterable(polygons)), "polygons")
         if corners.ndim != 1:
@@ -110,35 +110,35 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         return len(self.offsets) - 1
 
     @property
-    def polygons(self) -> list[NDArray[np.int64]]:
+    def polygons(self) -> list[Ints]:
         """Vertex ids of each polygon."""
         return np.split(self.corners, self.offsets[1:-1])
 
     @cached_property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Floats:
         """(2, 3) lower and upper corner of the bounding box of the polygons, without unreferenced vertices."""
         return used_bounds(self.vertices, self.corners)
 
     @cached_property
-    def corner_polygons(self) -> NDArray[np.int64]:
+    def corner_polygons(self) -> Ints:
         """Polygon of each entry of `corners`."""
         return np.repeat(np.arange(self.n_polygons), np.diff(self.offsets))
 
     @cached_property
-    def next_corners(self) -> NDArray[np.int64]:
+    def next_corners(self) -> Ints:
         """Vertex that follows each entry of `corners` around its polygon."""
         following = np.roll(self.corners, -1)
         following[self.offsets[1:] - 1] = self.corners[self.offsets[:-1]]
         return following
 
     @cached_property
-    def polygon_centroids(self) -> NDArray[np.float64]:
+    def polygon_centroids(self) -> Floats:
         """(p, 3) mean of each polygon's corners."""
         sums = np.add.reduceat(self.vertices[self.corners], self.offsets[:-1], axis=0)
         return sums / np.diff(self.offsets)[:, None]
 
     @cached_property
-    def polygon_area_vectors(self) -> NDArray[np.float64]:
+    def polygon_area_vectors(self) -> Floats:
         """(p, 3) vector areas, which depend on the boundary of the polygon only, planar or not."""
         center = self.polygon_centroids[self.corner_polygons]
         a, b = self.vertices[self.corners] - center, self.vertices[self.next_corners] - center
@@ -155,7 +155,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         refinement = self.refinement
         return TriangleMesh(np.concatenate([self.vertices, refinement.virtual_vertices]), refinement.faces)
 
-    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def on_triangulation(self, values: Floats) -> Floats:
         """Values at the vertices of `triangulation`, from values at the vertices of the mesh.
 
         Parameters
@@ -176,7 +176,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         """
         return self.refinement.prolongation @ values
 
-    def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _triangle_mask(self, face_mask: Bools) -> Bools:
         check_mask(face_mask, self.n_polygons)
         return face_mask[self.refinement.face_polygons]
 
@@ -192,17 +192,15 @@ class VirtualRefinement:
     """Triangles that subdivide polygons."""
 
     # (m, 3) vertex ids; virtual vertices follow the given ones. Polygon after polygon, side after side.
-    faces: NDArray[np.int64]
-    face_polygons: NDArray[np.int64]  # (m,) polygon that each triangle is part of
-    virtual_vertices: NDArray[np.float64]  # (q, 3) positions
+    faces: Ints
+    face_polygons: Ints  # (m,) polygon that each triangle is part of
+    virtual_vertices: Floats  # (q, 3) positions
     # (n + q, n) P: identity on the given vertices; each virtual vertex is an affine combination of the corners of its
     # polygon
     prolongation: sparse.csr_matrix
 
 
-def virtual_refinement(
-    vertices: NDArray[np.float64], corners: NDArray[np.int64], offsets: NDArray[np.int64]
-) -> VirtualRefinement:
+def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> VirtualRefinement:
     """Subdivide polygons into triangles; polygon k has the vertices ``corners[offsets[k]:offsets[k + 1]]``.
 
     Triangles are not subdivided, so that results on triangle meshes are those of the triangles. A polygon so far from
@@ -265,12 +263,8 @@ def virtual_refinement(
 
 
 def virtual_vertices(
-    vertices: NDArray[np.float64],
-    tails: NDArray[np.int64],
-    heads: NDArray[np.int64],
-    polygons: NDArray[np.int64],
-    n_polygons: int,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    vertices: Floats, tails: Ints, heads: Ints, polygons: Ints, n_polygons: int
+) -> tuple[Floats, Floats]:
     """The points that minimise Σ |fan triangle|², and their affine weights of least norm.
 
     Twice the area vector of the triangle of side ``a → b`` and apex x is ``a × b + (b − a) × x``, linear in x: three
@@ -291,16 +285,14 @@ def virtual_vertices(
     return mean + sums_of(weights[:, None] * a, polygons, n_polygons), weights
 
 
-def _cut(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
+def _cut(polygon: Floats) -> Ints:
     """(k − 2, 3) corners of the triangles of a polygon cut along diagonals."""
     center = np.broadcast_to(polygon.mean(axis=0), polygon.shape)
     normal = area_vectors(np.stack([polygon, np.roll(polygon, -1, axis=0), center], axis=1)).sum(axis=0)
     return np.sort(cut_into_ears(polygon, normal), axis=1)
 
 
-def _without_repeats(
-    corners: NDArray[np.int64], offsets: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _without_repeats(corners: Ints, offsets: Ints) -> tuple[Ints, Ints]:
     """Corners that differ from the one before them in their polygon, and the polygon of each."""
     polygons = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     before = np.roll(corners, 1)
@@ -309,7 +301,7 @@ def _without_repeats(
     return corners[differs], polygons[differs]
 
 
-def _solve_symmetric(matrices: NDArray[np.float64], loads: NDArray[np.float64]) -> NDArray[np.float64]:
+def _solve_symmetric(matrices: Floats, loads: Floats) -> Floats:
     """Nearly minimum-norm solutions of semidefinite systems: a flat polygon does not determine x along its normal."""
     size = np.trace(matrices, axis1=1, axis2=2)
     held = matrices + (1e-11 * np.where(size > 0, size, 1))[:, None, None] * np.eye(3)

@@ -7,8 +7,8 @@ from functools import singledispatch
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import SourceError
 from ..geodesics.shortest_paths import join
 from ..mesh.curve_segments import CurveSegments, carried_left, given_directions, loses_orientation
@@ -16,7 +16,7 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import barycentric_in, edges_between, locate_points, shared_faces, unique_points
 from .surface_curves import Curve, CurveOrPoints, SurfacePoints
 
-Positions: TypeAlias = NDArray[np.float64] | None
+Positions: TypeAlias = Floats | None
 
 
 @singledispatch
@@ -90,8 +90,7 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, numb
     elif source.normals is not None and source.oriented:
         if positions is None:
             raise SourceError(
-                f"{name} has normals in space, but this surface has no positions",
-                remedy="leave the normals out",
+                f"{name} has normals in space, but this surface has no positions", remedy="leave the normals out"
             )
         vectors = np.abs(steps) * given_directions(triangles, positions, faces, edges, source.normals[segment], name)
     return CurveSegments(located[first], ends, faces, edges, vectors, source.oriented)

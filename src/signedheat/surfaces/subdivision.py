@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections import defaultdict
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from ..arrays import Floats, Ints
 from ..errors import GeometryError
 from ..mesh.surface_points import EDGE, VERTEX, LocatedPoints, locate_points
 from .intrinsic_history import misplaced_lines
@@ -50,8 +50,7 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     """
     if not isinstance(triangulation, IntrinsicTriangulation):
         raise GeometryError(
-            f"a {type(triangulation).__name__} is no IntrinsicTriangulation",
-            remedy="see intrinsic_delaunay",
+            f"a {type(triangulation).__name__} is no IntrinsicTriangulation", remedy="see intrinsic_delaunay"
         )
     triangles, n = triangulation.triangles, triangulation.n_vertices
     polygons, _, where = subdivided(triangulation)
@@ -68,7 +67,7 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     return PolygonMesh(np.concatenate([triangulation.vertices, positions(triangulation, where)]), polygons), matrix
 
 
-def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], NDArray[np.int64], LocatedPoints]:
+def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], Ints, LocatedPoints]:
     """The polygons, the triangle that each lies in, and the points at which edges of the mesh cross intrinsic edges.
 
     Corners of polygons are vertices of the triangulation, or, from n_vertices on, crossings in order.
@@ -142,7 +141,7 @@ def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
     return [*parts, [corner for corner, is_left in zip(outline, alive, strict=True) if is_left]]
 
 
-def positions(triangulation: IntrinsicTriangulation, places: LocatedPoints) -> NDArray[np.float64]:
+def positions(triangulation: IntrinsicTriangulation, places: LocatedPoints) -> Floats:
     """(p, 3) positions in space of points of the triangulation."""
     found = triangulation.history.backward(places.faces, places.barycentric)
     return triangulation.in_space(*triangulation.refinement.pull_back(*found[:2]))

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Bools, Floats, Ints
 from ..errors import SourceError
 from ..frozen import Frozen
 from ..geodesics.shortest_paths import join
@@ -35,7 +36,7 @@ class Surface(Frozen):
         """Number of values that a field on the surface has."""
         return self.triangulation.n_vertices
 
-    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def on_triangulation(self, values: Floats) -> Floats:
         """Values at the vertices of `triangulation`, from values at the vertices of the domain."""
         raise NotImplementedError
 
@@ -96,7 +97,7 @@ class Surface(Frozen):
         """
         return SurfacePoints(*self._at_vertices(vertices, "point"))
 
-    def positions(self, points: Curve | SurfacePoints) -> NDArray[np.float64]:
+    def positions(self, points: Curve | SurfacePoints) -> Floats:
         """Positions in space of the points of a curve, or of isolated points.
 
         Parameters
@@ -244,23 +245,23 @@ class Surface(Frozen):
         """
         return boundary_curves(self.triangulation)
 
-    def _at_vertices(self, vertices: ArrayLike, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def _at_vertices(self, vertices: ArrayLike, name: str) -> tuple[Ints, Floats]:
         ids = self._triangulation_vertices(np.atleast_1d(array_of(vertices, f"vertex ids of a {name}", SourceError)))
         mesh = self.triangulation
         corners = corners_at(mesh.faces, ids, mesh.n_vertices, name)
         return corners // 3, np.eye(3)[corners % 3]
 
-    def _triangulation_vertices(self, vertices: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _triangulation_vertices(self, vertices: Ints) -> Ints:
         """Vertices of `triangulation` that are vertices of the domain."""
         return vertices
 
-    def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _triangle_mask(self, face_mask: Bools) -> Bools:
         """Faces of `triangulation` that belong to faces of the domain."""
         check_mask(face_mask, self.triangulation.n_faces)
         return face_mask
 
 
-def check_mask(face_mask: NDArray[np.bool_], n_faces: int) -> None:
+def check_mask(face_mask: Bools, n_faces: int) -> None:
     """Raise `SourceError` unless there is one boolean per face."""
     if face_mask.shape != (n_faces,) or face_mask.dtype != bool:
         raise SourceError(
@@ -285,7 +286,7 @@ class PlaceableTriangles(Triangles, Protocol):
         """The same triangles, with one vertex for those of rims at one place."""
 
     @property
-    def edge_lengths(self) -> NDArray[np.float64]:
+    def edge_lengths(self) -> Floats:
         """(e,) lengths of the edges."""
 
     @property
@@ -300,8 +301,7 @@ def projected_curve(
     points = coordinates(points, "points of the polyline", 3, SourceError)
     if len(points) < 2:
         raise SourceError(
-            f"a polyline needs at least two points, not {len(points)}",
-            remedy="for isolated points use points_at",
+            f"a polyline needs at least two points, not {len(points)}", remedy="for isolated points use points_at"
         )
     faces, weights, distances = closest_points(mesh, points)
     if max_distance is None:
@@ -323,9 +323,7 @@ def projected_curve(
     return Curve(located.faces[order], located.barycentric[order], closed=closed, oriented=oriented)
 
 
-def closest_points(
-    mesh: PlaceableTriangles, points: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+def closest_points(mesh: PlaceableTriangles, points: Floats) -> tuple[Ints, Floats, Floats]:
     """Face, barycentric coordinates and distance of the closest point on a mesh, for each of (n, 3) points."""
     faces, weights = mesh.search_tree.nearest(points)
     found = np.einsum("ik,ikj->ij", weights, mesh.vertices[mesh.faces[faces]])

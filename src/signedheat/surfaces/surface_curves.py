@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats, Ints
 from ..errors import SourceError
 from ..frozen import Frozen
 from ..validation import array_of, finite_rows, flag, frozen, whole_numbers
@@ -54,11 +55,11 @@ class Curve(Frozen):
     [0.0, 0.5, 0.5]
     """
 
-    faces: NDArray[np.int64]
-    barycentric: NDArray[np.float64]
+    faces: Ints
+    barycentric: Floats
     closed: bool = False
     oriented: bool = True
-    normals: NDArray[np.float64] | None = None
+    normals: Floats | None = None
 
     def __init__(
         self,
@@ -71,8 +72,7 @@ class Curve(Frozen):
         ids, weights = surface_points(faces, barycentric, "curve")
         if len(ids) < 2:
             raise SourceError(
-                f"a curve needs at least two points, not {len(ids)}",
-                remedy="use SurfacePoints for isolated points",
+                f"a curve needs at least two points, not {len(ids)}", remedy="use SurfacePoints for isolated points"
             )
         closed, oriented = flag(closed, "closed"), flag(oriented, "oriented")
         vars(self).update(faces=ids, barycentric=weights, closed=closed, oriented=oriented)
@@ -142,8 +142,8 @@ class SurfacePoints(Frozen):
     SurfacePoints(1 points)
     """
 
-    faces: NDArray[np.int64]
-    barycentric: NDArray[np.float64]
+    faces: Ints
+    barycentric: Floats
 
     def __init__(self, faces: ArrayLike, barycentric: ArrayLike) -> None:
         ids, weights = surface_points(faces, barycentric, "point source")
@@ -168,9 +168,7 @@ ElementList: TypeAlias = Sequence[tuple[int, Sequence[float]]]
 """A curve in the format of potpourri3d: vertices (id, []), edges (id, [t]) and faces (id, [u, v]) in order."""
 
 
-def surface_points(
-    faces: ArrayLike, barycentric: ArrayLike, name: str
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def surface_points(faces: ArrayLike, barycentric: ArrayLike, name: str) -> tuple[Ints, Floats]:
     """Read-only face ids and barycentric coordinates, checked as far as possible without the surface."""
     ids = np.atleast_1d(array_of(faces, f"face ids of a {name}", SourceError))
     if ids.size == 0:

@@ -9,9 +9,9 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Bools, Complexes, Floats, Ints
 from ..cache import LastUsed, fingerprint
 from ..diagnostics import EdgesLengthened, LargeAngles, Note, PointsLeftOut, VerticesAdded
 from ..direct_integration import DirectIntegration, refuse_contradictions
@@ -64,9 +64,9 @@ class SurfaceDiscretization:
 
     domain: Any
     triangles: IntrinsicMesh
-    restriction: NDArray[np.int64] | None = None
+    restriction: Ints | None = None
     transfer: Callable[[Any], Any] | None = None
-    positions: NDArray[np.float64] | None = None
+    positions: Floats | None = None
     triangulation: IntrinsicTriangulation | None = None
     spacing: float = math.nan
     notes: tuple[Note, ...] = ()
@@ -95,7 +95,7 @@ class SurfaceDiscretization:
         return cotan_matrix(self.triangles)
 
     @cached_property
-    def vertex_order(self) -> NDArray[np.int64]:
+    def vertex_order(self) -> Ints:
         """Fill-reducing order of the vertices, from which that of the edges follows."""
         return elimination_order(self.stiffness)
 
@@ -142,17 +142,17 @@ class SurfaceDiscretization:
         """X₀ (Eq. 11, Eq. 19) and the rows that interpolate φ along the sources (Eq. 14)."""
         return surface_source(self.triangles, sources, diffusion, self.spacing)
 
-    def diffuse(self, source: Any) -> list[NDArray[np.complex128]]:
+    def diffuse(self, source: Any) -> list[Complexes]:
         """Solve ``(M + tL) X = X₀`` (Eq. 12): one vector per edge, in stages (see `VectorHeat`)."""
         return self.diffuse_many([source])[0]
 
-    def diffuse_many(self, sources: Sequence[Any]) -> list[list[NDArray[np.complex128]]]:
+    def diffuse_many(self, sources: Sequence[Any]) -> list[list[Complexes]]:
         """Solve Eq. 12 for several sources at once, of the same t, and all of them to be extrapolated or none."""
         time, order = sources[0].time, self.triangles.edges.elimination_order
         heat = self._heats(time, lambda: VectorHeat(self.triangles, time, order(self.vertex_order)))
         return heat.solve([source.vectors for source in sources], changes=2 if sources[0].extrapolated else 0)
 
-    def to_cells(self, stages: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
+    def to_cells(self, stages: list[Complexes]) -> Complexes:
         """(m,) three times the mean of X over the edges of each face (Sec. 6), in its layout; extrapolated if wanted.
 
         Each face takes it from the last stage in which all of its edges are known.
@@ -163,11 +163,11 @@ class SurfaceDiscretization:
             sums = np.where(np.isnan(later), sums, later)
         return extrapolated(sums) if sums.shape[1] > 1 else sums[:, 0]
 
-    def divergence(self, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
+    def divergence(self, directions: Complexes) -> Floats:
         """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
         return divergence(self.triangles, directions)
 
-    def reached_by(self, vectors: sparse.csr_array) -> NDArray[np.bool_]:
+    def reached_by(self, vectors: sparse.csr_array) -> Bools:
         """(n_vertices,) which vertices have a face in a component with a source: vectors diffuse across edges only."""
         parts = self.triangles.face_components
         if not parts.any():
@@ -244,7 +244,7 @@ class SurfaceIntegration(SpringIntegration):
         """Factor of C with φ held at zero along the source, as stiffly at every sample."""
         return self._pulled_factor(source.interpolation, DirectIntegration.springs(self, source))
 
-    def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, NDArray[np.float64]]:
+    def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, Floats]:
         """Springs all along segments, so that more points on them change nothing; at vertices, and isolated points.
 
         What is linear along a segment has the same square there as at its two Gauss points.
@@ -261,7 +261,7 @@ class SurfaceIntegration(SpringIntegration):
         places = sparse.csr_matrix((*entries, starts), shape=(len(starts) - 1, n))
         return places, np.concatenate([np.repeat(0.5 * self.strength * lengths, 2), springs[points]])
 
-    def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+    def fit(self, divergence: Floats, source: SourceTerm, levels: Levels) -> Floats:
         """Impose levels: exactly along edges, to some hundredths of h across faces (Eq. 14)."""
         if (np.diff(source.interpolation.indptr) == 1).all():
             return self.fit_exactly(divergence, source, levels)

@@ -11,8 +11,8 @@ from itertools import chain
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..diagnostics import GeodesicWindows, SharpenedToCurves
 from ..discretization import SourceTerm, discretize
 from ..errors import GeometryError, InexactWarning, SourceError, UnsupportedTypeError, warn_user
@@ -74,7 +74,7 @@ def _(
     return replace(field, values=values, diagnostics=diagnostics)
 
 
-def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[np.float64]:
+def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> Floats:
     """Values at the vertices of the surface's triangles; averages of neighbours at those that the domain lacks."""
     n = surface.triangles.n_vertices
     values = np.asarray(field.values)
@@ -97,7 +97,7 @@ def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[
 @nearest.register
 def _(
     surface: SurfaceDiscretization,
-    values: NDArray[np.float64],
+    values: Floats,
     source: SourceTerm | None,
     given: CurvesAndPoints | None,
     tolerance: float,
@@ -113,11 +113,7 @@ def _(
 
 
 def nearest_zero(
-    surface: SurfaceDiscretization,
-    values: NDArray[np.float64],
-    source: SourceTerm | None,
-    tolerance: float,
-    report: Report | None,
+    surface: SurfaceDiscretization, values: Floats, source: SourceTerm | None, tolerance: float, report: Report | None
 ) -> Nearest:
     """The nearest of the zero set of φ, and of the unoriented curves and points that φ was computed from."""
     unsided = [part for part in source.parts if not part.oriented] if isinstance(source, SurfaceSource) else []
@@ -150,7 +146,7 @@ class CurvesThere:
     """The curves on the triangles of a surface, and exact distance to them."""
 
     placed: PlacedSegments  # all of them
-    distance: NDArray[np.float64]  # (n,) of every vertex to them
+    distance: Floats  # (n,) of every vertex to them
     sides: CurveSides  # those of the oriented ones
     windows: int  # a measure of the work
 
@@ -166,7 +162,7 @@ class CurvesThere:
 
 def nearest_curve(
     triangles: IntrinsicMesh,
-    values: NDArray[np.float64],
+    values: Floats,
     parts: Sequence[CurveSegments],
     spacing: float,
     tolerance: float,
@@ -212,7 +208,7 @@ def nearest_curve(
 
 def missing_parts(
     triangles: IntrinsicMesh,
-    values: NDArray[np.float64],
+    values: Floats,
     parts: Sequence[CurveSegments],
     there: CurvesThere,
     spacing: float,
@@ -243,9 +239,7 @@ def missing_parts(
     return zero_line(triangles, values, apart), counts
 
 
-def without_false_zeros(
-    triangles: IntrinsicMesh, values: NDArray[np.float64], near: NDArray[np.bool_], sided: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def without_false_zeros(triangles: IntrinsicMesh, values: Floats, near: Bools, sided: Ints) -> Floats:
     """Values with NaN along those parts of the zero set that are due to unoriented sources.
 
     φ is zero at such a source only on average, so it may change sign around it. A connected part of the zero set that
@@ -284,13 +278,13 @@ class CurveSides:
     """The sides of the vertices of a surface, as far as oriented curves decide them."""
 
     # (n,) 1 or −1 in regions that the curves bound from one side only, without a free end in it; 0 elsewhere
-    regions: NDArray[np.int64]
+    regions: Ints
     # (n,) the side of the nearest segment among those in the faces at a vertex; 0 where there is none, and near free
     # ends
-    nearby: NDArray[np.int64]
-    reach: NDArray[np.float64]  # (n,) distance to that segment; inf where there is none
+    nearby: Ints
+    reach: Floats  # (n,) distance to that segment; inf where there is none
     # (k,) nodes at which curves end, away from the boundary of the surface, or run head to head
-    free_ends: NDArray[np.int64]
+    free_ends: Ints
 
 
 def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
@@ -318,7 +312,7 @@ def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
     return CurveSides(np.where(on_curve, 0, side[region]), np.where(on_curve, 0, nearby), reach, ends)
 
 
-def free_ends(triangles: IntrinsicMesh, placed: PlacedSegments) -> NDArray[np.int64]:
+def free_ends(triangles: IntrinsicMesh, placed: PlacedSegments) -> Ints:
     """Nodes at which more segments of oriented curves begin than end, or fewer: the boundary of the chain of segments.
 
     Ends at the boundary of the surface do not count.
@@ -337,9 +331,7 @@ def free_ends(triangles: IntrinsicMesh, placed: PlacedSegments) -> NDArray[np.in
     return np.flatnonzero((surplus != 0) & ~outer)
 
 
-def nearest_sides(
-    triangles: IntrinsicMesh, placed: PlacedSegments, ends: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def nearest_sides(triangles: IntrinsicMesh, placed: PlacedSegments, ends: Ints) -> tuple[Ints, Floats]:
     """Side of the nearest oriented segment in the faces at each vertex, and the distance to it.
 
     Of segments that meet at the nearest point, the one that is seen most from the front decides the side.

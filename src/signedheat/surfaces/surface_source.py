@@ -8,9 +8,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, csr_matrix, vstack
 
+from ..arrays import Bools, Complexes, Floats, Ints
 from ..errors import CancellingNormalsError, SourceError
 from ..frozen import Frozen
 from ..mesh.components import connected_components
@@ -36,9 +36,9 @@ class SurfaceSource(Frozen):
     time: float  # t of Eq. 12.
     # (s, n_vertices) row i interpolates φ at sample i; samples are the distinct points of every source
     interpolation: csr_matrix
-    weights: NDArray[np.float64]  # (s,) length of curve that belongs to each sample; h for isolated points
-    components: NDArray[np.int64]  # (s,) connected component of the union of all sources, numbered by first appearance
-    source_ids: NDArray[np.int64]  # (s,) source that each sample belongs to
+    weights: Floats  # (s,) length of curve that belongs to each sample; h for isolated points
+    components: Ints  # (s,) connected component of the union of all sources, numbered by first appearance
+    source_ids: Ints  # (s,) source that each sample belongs to
     oriented: bool  # whether any source is oriented; if none is, φ is an unsigned distance
     # the triangles that the sources are lowered to; the first vertices are those of the domain's own triangles
     triangles: IntrinsicMesh
@@ -46,7 +46,7 @@ class SurfaceSource(Frozen):
     extrapolated: bool = False  # whether directions are to be extrapolated in t
 
     @cached_property
-    def ending(self) -> NDArray[np.bool_]:
+    def ending(self) -> Bools:
         """(m,) faces of those connected parts of the surface in which an oriented curve ends.
 
         Ends at the boundary and at nonmanifold edges, where three curves may meet, do not count.
@@ -73,11 +73,7 @@ class SurfaceSource(Frozen):
 
 
 def surface_source(
-    triangles: IntrinsicMesh,
-    sources: Sequence[Any],
-    diffusion: float,
-    spacing: float,
-    positions: NDArray[np.float64] | None = None,
+    triangles: IntrinsicMesh, sources: Sequence[Any], diffusion: float, spacing: float, positions: Floats | None = None
 ) -> SurfaceSource:
     """Lower sources to an intrinsic mesh, whose faces they refer to; ``t = diffusion · spacing²``.
 
@@ -88,10 +84,7 @@ def surface_source(
     groups = segments_of_each(sources, triangles, positions)
     parts = [part for group in groups for part in group]
     if not parts or not all(groups):
-        raise SourceError(
-            "there is no source",
-            remedy="pass at least one curve or point, and no empty lists",
-        )
+        raise SourceError("there is no source", remedy="pass at least one curve or point, and no empty lists")
     if not all(part.is_conforming for part in parts):
         raise SourceError("unoriented curves inside faces must be embedded in the triangles first", element="curves")
     vectors = oriented_vectors(triangles, [p for p in parts if p.oriented])
@@ -167,7 +160,7 @@ def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments],
     return sums + from_faces(triangles, faces, arcs)
 
 
-def vertex_point_vectors(triangles: IntrinsicMesh, vertices: NDArray[np.int64]) -> csr_array:
+def vertex_point_vectors(triangles: IntrinsicMesh, vertices: Ints) -> csr_array:
     """App. A.1, Eq. 19: the corner of angle α at a vertex contributes i d (1 − e^{iα}) / Θ to the edges of its face.
 
     d is the direction of the first edge of the corner, counter-clockwise, and Θ the total angle at the vertex.
@@ -202,48 +195,46 @@ def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr
     return scatter(triangles.n_edges, triangles.edges.face_edges[faces], in_frames)
 
 
-def from_faces(triangles: IntrinsicMesh, faces: NDArray[np.int64], vectors: NDArray[np.complex128]) -> csr_array:
+def from_faces(triangles: IntrinsicMesh, faces: Ints, vectors: Complexes) -> csr_array:
     """(1, e) sums of face vectors over the three edges of each face."""
     in_frames = triangles.in_edge_frames(vectors[:, None], faces)
     return scatter(triangles.n_edges, triangles.edges.face_edges[faces], in_frames)
 
 
-def scatter(n: int, index: NDArray[np.int64], values: NDArray[np.complex128]) -> csr_array:
+def scatter(n: int, index: Ints, values: Complexes) -> csr_array:
     """(1, n) sparse sums of values with the same index."""
     flat = index.ravel()
     return csr_array((values.ravel(), (np.zeros(len(flat), dtype=np.int64), flat)), shape=(1, n), dtype=np.complex128)
 
 
-def line_elements(part: CurveSegments, spacing: float) -> NDArray[np.float64]:
+def line_elements(part: CurveSegments, spacing: float) -> Floats:
     """(s,) half the length of the segments that meet at each node; `spacing` at isolated points."""
     if len(part.ends) == 0:
         return np.full(len(part.nodes), spacing)
     return np.bincount(part.ends.ravel(), np.repeat(0.5 * part.lengths, 2), len(part.nodes)).astype(np.float64)
 
 
-def joined(parts: Sequence[CurveSegments]) -> tuple[LocatedPoints, NDArray[np.int64]]:
+def joined(parts: Sequence[CurveSegments]) -> tuple[LocatedPoints, Ints]:
     """The distinct points of all sources, and the two at the ends of every segment."""
     nodes = concatenated([p.nodes for p in parts])
     first, who = unique_points(nodes)
     return nodes[first], ends_among(parts, who)
 
 
-def ends_among(parts: Sequence[CurveSegments], who: NDArray[np.int64]) -> NDArray[np.int64]:
+def ends_among(parts: Sequence[CurveSegments], who: Ints) -> Ints:
     """(k, 2) points at the ends of every segment, from the number of each node's point."""
     offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
-    ends: NDArray[np.int64] = np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])
+    ends: Ints = np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])
     return who[ends]
 
 
-def connected(parts: Sequence[CurveSegments]) -> NDArray[np.int64]:
+def connected(parts: Sequence[CurveSegments]) -> Ints:
     """(s,) connected component of every node, over all sources, in order of first appearance."""
     first, who = unique_points(concatenated([p.nodes for p in parts]))
     return connected_components(len(first), *ends_among(parts, who).T)[who]
 
 
-def free_end_arcs(
-    triangles: IntrinsicMesh, edges: NDArray[np.int64], vertices: NDArray[np.int64], least: float
-) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
+def free_end_arcs(triangles: IntrinsicMesh, edges: Ints, vertices: Ints, least: float) -> tuple[Ints, Complexes]:
     """Vectors that point away from the free ends of curves, integrated over the half disk of directions behind each.
 
     Directions are given by their angle from the curve, measured the shortest way around the vertex. Behind the end are
@@ -288,9 +279,7 @@ def free_end_arcs(
     return np.concatenate(faces), np.concatenate(vectors)
 
 
-def angles_from(
-    spoke: int, right: NDArray[np.int64], left: NDArray[np.int64], angle: NDArray[np.float64], n_spokes: int
-) -> NDArray[np.float64]:
+def angles_from(spoke: int, right: Ints, left: Ints, angle: Floats, n_spokes: int) -> Floats:
     """(n_spokes,) angle from one spoke (edge at a vertex) to all others, the shortest way around; inf if not connected.
 
     Corner k lies between spokes ``right[k]`` and ``left[k]``, and has the angle ``angle[k]``.

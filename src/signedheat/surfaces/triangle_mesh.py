@@ -7,8 +7,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats, Ints
 from ..exchange import Elements, Exchangeable
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.intrinsic_mesh import MARGIN, IntrinsicMesh, laid_out
@@ -45,8 +46,8 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     array([0.5])
     """
 
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    vertices: Floats
+    faces: Ints
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         positions = coordinates(vertices, "vertices", 3)
@@ -71,7 +72,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
         return len(self.faces)
 
     @cached_property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Floats:
         """(2, 3) lower and upper corner of the bounding box of the faces, without unreferenced vertices."""
         return used_bounds(self.vertices, self.faces)
 
@@ -81,17 +82,17 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
         return edge_table(self.faces)
 
     @cached_property
-    def face_area_vectors(self) -> NDArray[np.float64]:
+    def face_area_vectors(self) -> Floats:
         """(m, 3) area times unit normal."""
         return area_vectors(self.vertices[self.faces])
 
     @cached_property
-    def face_areas(self) -> NDArray[np.float64]:
+    def face_areas(self) -> Floats:
         """(m,) areas."""
         return np.linalg.norm(self.face_area_vectors, axis=1)
 
     @cached_property
-    def edge_lengths(self) -> NDArray[np.float64]:
+    def edge_lengths(self) -> Floats:
         """(e,) lengths, in the order of `edges`."""
         tail, head = self.edges.vertices.T
         return np.linalg.norm(self.vertices[head] - self.vertices[tail], axis=1)
@@ -118,7 +119,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
         """The triangles that curves refer to: the mesh itself."""
         return self
 
-    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def on_triangulation(self, values: Floats) -> Floats:
         """Values at the vertices of `triangulation`, from values at the vertices of the mesh.
 
         Parameters

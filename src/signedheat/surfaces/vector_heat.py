@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csr_array
 
+from ..arrays import Bools, Complexes, Floats, Ints
 from ..geodesics.exact_distance import distances_along_edges
 from ..linear import Factor, factorize
 from ..linear.restarts import Stage, restart, scaled
@@ -38,7 +38,7 @@ class VectorHeat:
 
     triangles: IntrinsicMesh
     time: float
-    order: NDArray[np.int64]
+    order: Ints
 
     @cached_property
     def factor(self) -> Factor:
@@ -48,12 +48,12 @@ class VectorHeat:
         return factorize(matrix, order=(len(parts) * self.order[:, None] + parts).ravel(), reused=True)
 
     @cached_property
-    def mass(self) -> NDArray[np.float64]:
+    def mass(self) -> Floats:
         """(n_edges,) the diagonal of M. |X| is at most |X₀| divided by its least entry."""
         thirds = np.repeat(self.triangles.face_areas / 3.0, 3)
         return np.bincount(self.triangles.edges.face_edges.ravel(), thirds).astype(np.float64)
 
-    def solve(self, sources: Sequence[csr_array], changes: int = 0) -> list[list[NDArray[np.complex128]]]:
+    def solve(self, sources: Sequence[csr_array], changes: int = 0) -> list[list[Complexes]]:
         """X for each X₀, in stages, each up to a positive factor, NaN between the source and the stage's border."""
         starts = np.zeros((self.triangles.n_edges, len(sources), 1 + changes), dtype=np.complex128)
         for k, source in enumerate(sources):
@@ -61,15 +61,13 @@ class VectorHeat:
         together = self._solve(starts)
         return [[s.values for s in self._restarted(starts[:, k], together[:, k])] for k in range(len(sources))]
 
-    def _restarted(self, start: NDArray[np.complex128], values: NDArray[np.complex128]) -> list[Stage]:
-        def solve(loads: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def _restarted(self, start: Complexes, values: Complexes) -> list[Stage]:
+        def solve(loads: Complexes) -> Complexes:
             return self._solve(loads[:, None])[:, 0]
 
         return restart(solve, self._border_forces, start, Stage(values, 0.0), float(self.mass.min()))
 
-    def _border_forces(
-        self, columns: NDArray[np.complex128], faint: NDArray[np.bool_]
-    ) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
+    def _border_forces(self, columns: Complexes, faint: Bools) -> tuple[Bools, Complexes]:
         """What `_solve` undoes, applied to columns, at the edges of faces that are faint in part."""
         edges = self.triangles.edges.face_edges
         of_face = faint[edges]
@@ -81,7 +79,7 @@ class VectorHeat:
             forces[k] -= self.mass * columns[:, k - 1]
         return border, np.stack(forces, axis=1)
 
-    def _solve(self, loads: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def _solve(self, loads: Complexes) -> Complexes:
         """(n_edges, k, c) ``(M + tL) X_j = X₀_j + M X_{j-1}`` along the last axis, for each of k columns."""
         solution = np.empty_like(loads)
         for j in range(loads.shape[2]):
@@ -89,7 +87,7 @@ class VectorHeat:
             solution[:, :, j] = self._solve_columns(pushed)
         return solution
 
-    def _solve_columns(self, columns: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def _solve_columns(self, columns: Complexes) -> Complexes:
         if self.factor.n == len(columns):
             return self.factor.solve(columns)
         pairs = np.stack([columns.real, columns.imag], axis=1).reshape(2 * len(columns), -1)
@@ -97,7 +95,7 @@ class VectorHeat:
         return solution[0::2] + 1j * solution[1::2]
 
 
-def extrapolated(columns: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def extrapolated(columns: Complexes) -> Complexes:
     """(m,) directions without the errors of Y that go like the `EXPONENTS` of t, from (m, 3) columns X, R X and R² X.
 
     With ``D = t d/dt``, Richardson's extrapolation in the limit of equal times is ``Π (1 − D/e) Y`` over the exponents
@@ -140,9 +138,7 @@ def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matr
     return _real_form(triangles, diagonal, factor)
 
 
-def vector_heat_forces(
-    triangles: IntrinsicMesh, time: float, vectors: NDArray[np.complex128], faces: NDArray[np.int64]
-) -> NDArray[np.complex128]:
+def vector_heat_forces(triangles: IntrinsicMesh, time: float, vectors: Complexes, faces: Ints) -> Complexes:
     """``(M + t L) X`` of Eq. 12, summed over some faces only: complete at edges all of whose faces are among them."""
     diagonal, factor = _local_entries(triangles, time, faces)
     x = triangles.in_face_frames(vectors, faces)
@@ -152,9 +148,7 @@ def vector_heat_forces(
     return sums
 
 
-def _local_entries(
-    triangles: IntrinsicMesh, time: float, faces: NDArray[np.int64] | slice
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _local_entries(triangles: IntrinsicMesh, time: float, faces: Ints | slice) -> tuple[Floats, Floats]:
     """(m, 3) diagonal entries of M + tL; (m, 3) entries between each edge and the next, before the turn of Eq. 8."""
     cot = triangles.corner_cotangents[faces]
     following = np.roll(cot, -1, axis=1)  # at the corner that edge k shares with edge k + 1
@@ -231,13 +225,13 @@ def nonmanifold_frames(
     return turned, [[mirrored(part, changed) for part in group] for group in groups]
 
 
-def mirrored(part: CurveSegments, changed: NDArray[np.bool_]) -> CurveSegments:
+def mirrored(part: CurveSegments, changed: Bools) -> CurveSegments:
     """The segments, with the vectors on edges whose frames have changed reflected."""
     here = (part.edges >= 0) & changed[part.edges]
     return replace(part, vectors=np.where(here, np.conj(part.vectors), part.vectors)) if here.any() else part
 
 
-def _distances(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.float64]:
+def _distances(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> Floats:
     """(n_vertices,) distance of every vertex from the sources along edges, from the corners of their faces on."""
     nodes = concatenated([part.nodes for part in parts])
     corners = triangles.corner_positions[nodes.faces]

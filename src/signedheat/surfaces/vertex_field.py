@@ -8,8 +8,9 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, Generic, cast, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats, Ints
 from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
 from ..errors import OutsideError
@@ -76,7 +77,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     """
 
     domain: Surface
-    values: NDArray[np.float64]
+    values: Floats
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
     source: SourceTerm | None = field(default=None, repr=False)
     finer: VertexField[IntrinsicTriangulation] | None = field(default=None, repr=False)
@@ -84,7 +85,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     def __post_init__(self) -> None:
         array_of(self.values, "values")
 
-    def __call__(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
+    def __call__(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
         """φ at points of the surface, linear between vertices.
 
         Parameters
@@ -115,7 +116,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
             return cast("VertexField[SurfaceDomain]", self)
         return cast("VertexField[SurfaceDomain]", finer)
 
-    def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
+    def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
         """∇φ in space at points, in the triangles on which φ is linear.
 
         Parameters
@@ -143,7 +144,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return shaped(self.face_gradients[faces], shape)
 
     @cached_property
-    def face_gradients(self) -> NDArray[np.float64]:
+    def face_gradients(self) -> Floats:
         """(m, 3) ∇φ on the faces of the domain's triangulation, in space; of length about 1, since φ is a distance.
 
         Of φ between the vertices of the domain: where it was computed on finer triangles, `gradient` is more accurate.
@@ -193,7 +194,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
             )
         return field.domain.level_set(field.values, level)
 
-    def with_values(self, values: NDArray[np.float64]) -> VertexField[Surface]:
+    def with_values(self, values: Floats) -> VertexField[Surface]:
         """Other values on the same surface, without what belongs to these.
 
         Parameters
@@ -248,7 +249,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         values[: len(result.values)] = result.values
         return replace(result, finer=VertexField(domain, values))
 
-    def _at_vertices_of(self, domain: IntrinsicTriangulation) -> NDArray[np.float64]:
+    def _at_vertices_of(self, domain: IntrinsicTriangulation) -> Floats:
         """φ at the vertices of an intrinsic triangulation of the mesh; NaN at those that no face has."""
         if self.finest.domain is domain:
             return self.finest.values
@@ -371,9 +372,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
             return VertexField(mesh, self.values[: mesh.n_vertices], self.diagnostics, self.source)
         return cast("VertexField[EmbeddedSurface]", self)
 
-    def _at(
-        self, points: Curve | SurfacePoints | ArrayLike
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], tuple[int, ...]]:
+    def _at(self, points: Curve | SurfacePoints | ArrayLike) -> tuple[Ints, Floats, tuple[int, ...]]:
         """(n,) faces of points and (n, 3) barycentric coordinates in them, and the shape that the points have."""
         mesh = self._embedded.domain.triangulation
         if isinstance(points, (Curve, SurfacePoints)):

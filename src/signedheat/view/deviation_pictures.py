@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..foreign import elements
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..io.ply import write_ply
@@ -34,7 +35,7 @@ def save_deviation(found: Deviation, path: PathLike) -> None:
             np.savetxt(temporary, rows, "%.9g", ",", header=f"{names},nearest_x,nearest_y,nearest_z", comments="")
 
 
-def colors(values: NDArray[np.float64], found: Deviation) -> NDArray[np.uint8]:
+def colors(values: Floats, found: Deviation) -> NDArray[np.uint8]:
     """(n, 3) colours of deviations: blue below the part, light on it, orange above."""
     stops = np.array([[int(color[at : at + 2], 16) for at in (1, 3, 5)] for color in INSIDE_TO_OUTSIDE])
     places = np.linspace(-found.extreme or -1.0, found.extreme or 1.0, len(stops))

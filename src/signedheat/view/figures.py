@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..packages import lazy_module, require
 
@@ -88,7 +88,7 @@ def signed_square(values: Any) -> Any:
     return np.sign(values) * np.square(values)
 
 
-def isolines_between(low: float, high: float, most: int = 16) -> tuple[NDArray[np.float64], float]:
+def isolines_between(low: float, high: float, most: int = 16) -> tuple[Floats, float]:
     """Levels between two values, without zero, about `most` of them; and the step between them, a round number.
 
     Examples
@@ -110,7 +110,7 @@ def round_step(width: float) -> float:
     return float(power * min((1, 2, 5, 10), key=lambda digit: abs(np.log(width / power / digit))))
 
 
-def legible(ticks: NDArray[np.float64], low: float, high: float) -> list[float]:
+def legible(ticks: Floats, low: float, high: float) -> list[float]:
     """Zero, and ticks that are far enough from the previous one in the root of distance.
 
     Examples
@@ -132,7 +132,7 @@ def legible(ticks: NDArray[np.float64], low: float, high: float) -> list[float]:
 
 
 def add_color_bar(
-    figure: Figure | SubFigure, axes: Sequence[Axes], colors: ScalarMappable, isolines: NDArray[np.float64], step: float
+    figure: Figure | SubFigure, axes: Sequence[Axes], colors: ScalarMappable, isolines: Floats, step: float
 ) -> None:
     """A colour bar that spans the isolines, with round numbers on both sides of zero."""
     bar = figure.colorbar(colors, ax=list(axes), shrink=0.85, pad=0.015)

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..frozen import read_only
 from ..search.stabbing_lines import crossings_at_pixels
 
@@ -38,14 +38,14 @@ class Camera:
         Size of the picture in pixels.
     """
 
-    frame: NDArray[np.float64]
-    lower: NDArray[np.float64]
+    frame: Floats
+    lower: Floats
     scale: float
     width: int
     height: int
 
     @classmethod
-    def around(cls, points: NDArray[np.float64], direction: NDArray[np.float64], up: int = 2) -> Camera:
+    def around(cls, points: Floats, direction: Floats, up: int = 2) -> Camera:
         """Camera that views points from a direction, with axis `up` pointing up, so that they fill the picture."""
         frame = looking(direction, up)
         seen = points @ frame[:2].T
@@ -54,19 +54,19 @@ class Camera:
         width, height = (np.ceil((upper - lower) * scale).astype(int) + 2 * MARGIN).tolist()
         return cls(frame, lower, scale, width, height)
 
-    def pixels(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def pixels(self, points: Floats) -> Floats:
         """(n, 3) column, row and depth of points in space; larger depths are nearer."""
         seen = points @ self.frame.T
         return np.column_stack([(seen[:, :2] - self.lower) * self.scale + MARGIN, seen[:, 2] * self.scale])
 
-    def shades(self, area_vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    def shades(self, area_vectors: Floats) -> Floats:
         """(m,) brightness of faces, from 0.45 to 1, the same for both sides of a face."""
         normals = area_vectors @ self.frame.T
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
         return 0.45 + 0.55 * np.abs(normals @ LIGHT)
 
 
-def looking(direction: NDArray[np.float64], up: int = 2) -> NDArray[np.float64]:
+def looking(direction: Floats, up: int = 2) -> Floats:
     """(3, 3) axes right, up and towards the eye, for a direction towards the eye.
 
     Examples
@@ -81,15 +81,13 @@ def looking(direction: NDArray[np.float64], up: int = 2) -> NDArray[np.float64]:
     return np.stack([right, np.cross(towards, right), towards]) + 0.0
 
 
-def oblique(elevation: float, azimuth: float, up: int = 2) -> NDArray[np.float64]:
+def oblique(elevation: float, azimuth: float, up: int = 2) -> Floats:
     """Direction to the eye from elevation and azimuth in degrees: above the plane across axis `up`, and around it."""
     e, a = np.radians([elevation, azimuth])
     return np.roll([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], up - 2)
 
 
-def rasterize(
-    corners: NDArray[np.float64], values: NDArray[np.float64], width: int, height: int
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+def rasterize(corners: Floats, values: Floats, width: int, height: int) -> tuple[Floats, Ints, Floats]:
     """Draw triangles (m, 3, 3), given in pixels and depth, with values (m, 3) at their corners.
 
     Returns

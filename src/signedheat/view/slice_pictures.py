@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import GeometryError
 from ..grids.grid import Grid
 from ..grids.grid_field import GridField
@@ -147,7 +148,7 @@ def draw_line(line: Polyline, axes: Axes) -> None:
     axes.plot(*points.T, color="#d4145a", linewidth=2.0, zorder=3)
 
 
-def _look(field: GridField) -> tuple[ScalarMappable, NDArray[np.float64], float]:
+def _look(field: GridField) -> tuple[ScalarMappable, Floats, float]:
     """Colours, isolines and the step between them, shared by all panels of a picture."""
     low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
     return distance_colors(low, high), *isolines_between(low, high)
@@ -155,11 +156,11 @@ def _look(field: GridField) -> tuple[ScalarMappable, NDArray[np.float64], float]
 
 def _draw_panel(
     panel: Axes,
-    u: NDArray[np.float64],
-    v: NDArray[np.float64],
-    values: NDArray[np.float64],
+    u: Floats,
+    v: Floats,
+    values: Floats,
     colors: ScalarMappable,
-    isolines: NDArray[np.float64],
+    isolines: Floats,
     levels: Sequence[float],
     trusted: NDArray[np.float32] | None = None,
 ) -> None:
@@ -185,15 +186,11 @@ def _draw_panel(
 
 
 def level_pieces(
-    u: NDArray[np.float64],
-    v: NDArray[np.float64],
-    values: NDArray[np.float64],
-    level: float,
-    trusted: NDArray[np.float32] | None = None,
-) -> dict[str, list[NDArray[np.float64]]]:
+    u: Floats, v: Floats, values: Floats, level: float, trusted: NDArray[np.float32] | None = None
+) -> dict[str, list[Floats]]:
     """Lines of a level on a plane: solid on the shape, dashed on its completion."""
     spacing = np.array([u[1] - u[0], v[1] - v[0]])
-    pieces: dict[str, list[NDArray[np.float64]]] = {"solid": [], "dashed": []}
+    pieces: dict[str, list[Floats]] = {"solid": [], "dashed": []}
     for line, _ in level_lines(values, np.zeros(2), np.ones(2), level):
         places = line * spacing + [u[0], v[0]]
         there = np.ones(len(line), dtype=bool)
@@ -207,7 +204,7 @@ def level_pieces(
     return pieces
 
 
-def cross_section(mesh: TriangleMesh, axis: int, position: float) -> NDArray[np.float64]:
+def cross_section(mesh: TriangleMesh, axis: int, position: float) -> Floats:
     """Intersection of a mesh with a plane across an axis.
 
     Returns

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats
 from ..curves.piecewise_field import PiecewiseField
 from ..foreign import ForeignShape, as_shape
 from ..io.files import PathLike
@@ -63,13 +63,7 @@ def draw_shape(shape: Shape | ForeignShape, axes: Axes, view: tuple[float, float
     axes.imshow(np.where((face >= 0)[..., None], colors[face], 1.0), origin="lower", interpolation="antialiased")
 
 
-def draw_points(
-    points: NDArray[np.float64],
-    axes: Axes,
-    direction: NDArray[np.float64],
-    up: int = 2,
-    colors: NDArray[np.float64] | None = None,
-) -> None:
+def draw_points(points: Floats, axes: Axes, direction: Floats, up: int = 2, colors: Floats | None = None) -> None:
     """Draw points into axes from far to near, in (n, 4) colours or in a blue that darkens with nearness."""
     some = slice(None, None, max(1, len(points) // MOST_POINTS))
     pixels = Camera.around(points[some], direction, up).pixels(points[some])
@@ -148,7 +142,7 @@ def draw_surface(
     axes: Axes,
     sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]] = (),
     n_contours: int = 20,
-    view: NDArray[np.float64] | None = None,
+    view: Floats | None = None,
     up: int = 2,
     colors: ScalarMappable | None = None,
 ) -> None:
@@ -181,7 +175,7 @@ def draw_surface(
         add_color_bar(axes.figure, [axes], scale, spanned, step)
 
 
-def _own_and_painted(field: VertexField | PiecewiseField) -> tuple[TriangleMesh, Any, NDArray[np.float64]]:
+def _own_and_painted(field: VertexField | PiecewiseField) -> tuple[TriangleMesh, Any, Floats]:
     """The triangles to which sources refer, and those on which φ is linear with the values at their vertices."""
     domain = field.domain
     own = domain.mesh if isinstance(domain, IntrinsicTriangulation) else domain.triangulation
@@ -190,7 +184,7 @@ def _own_and_painted(field: VertexField | PiecewiseField) -> tuple[TriangleMesh,
     return own, surface.triangulation, surface.on_triangulation(painted.values)
 
 
-def darken(image: NDArray[np.float64], phi: NDArray[np.float64], covered: NDArray[np.bool_], step: float) -> None:
+def darken(image: Floats, phi: Floats, covered: Bools, step: float) -> None:
     """Darken the pixels of isolines at multiples of a step, one pixel wide, and of a heavier one at zero."""
     for spacing, width, strength in ((step, 0.6, 0.55), (np.inf, 1.4, 0.9)):
         level = phi / spacing if np.isfinite(spacing) else phi
@@ -202,7 +196,7 @@ def darken(image: NDArray[np.float64], phi: NDArray[np.float64], covered: NDArra
         image[smooth] *= (1 - strength * cover[smooth])[:, None]
 
 
-def draw_source(axes: Axes, item: Any, mesh: Any, camera: Camera, depth: NDArray[np.float64]) -> None:
+def draw_source(axes: Axes, item: Any, mesh: Any, camera: Camera, depth: Floats) -> None:
     """Draw the visible parts of a source."""
     points = np.einsum("ik,ikj->ij", item.barycentric, mesh.vertices[mesh.faces[item.faces]])
     if isinstance(item, Curve) and item.closed:
@@ -218,7 +212,7 @@ def draw_source(axes: Axes, item: Any, mesh: Any, camera: Camera, depth: NDArray
         axes.plot(*pixels[visible].T, "o", color="#ffd83b", markeredgecolor="black", markersize=6)
 
 
-def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> NDArray[np.float64]:
+def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> Floats:
     """A direction from which most of the sources are visible; for flat surfaces, along their normals."""
     normals = [mesh.face_area_vectors[s.faces] for s in sources]
     mean = np.zeros(3)
@@ -231,7 +225,7 @@ def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> N
         return mean / np.linalg.norm(mean) + 0.2 * direction
     extents = np.ptp(mesh.bounds, axis=0)
     if not normals or extents.min() < 1e-3 * extents.max():
-        total: NDArray[np.float64] = mesh.face_area_vectors.sum(axis=0)
+        total: Floats = mesh.face_area_vectors.sum(axis=0)
         if np.linalg.norm(total) > 0.5 * mesh.face_areas.sum():
             return total
     return direction
