@@ -51,7 +51,6 @@ FEATURES: dict[str, tuple[str, ...]] = {
         "geodesics.geodesic_windows",
         "geodesics.heap_kernels",
         "geodesics.shortest_paths",
-        "tets.any_angle",
     ),
     "curves that are completed": (
         "curves.curve_distance",

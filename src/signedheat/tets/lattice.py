@@ -27,18 +27,15 @@ from ..validation import finite_number, refuse_extreme
 from .tet_mesh import TetMesh
 
 FINEST = 1e9
-"""Largest resolution; memory ends before."""
+"""Largest resolution that is accepted; memory runs out before."""
 LEAST_GRADING = 2.7
 """Below this, neighbouring leaves could differ by more than a factor of two in size: g/2 must exceed √3·¾."""
-
 MOST_TETS = 50_000_000
-"""More are no use: distance on them would need over 70 GB."""
-
+"""Largest number of tets: distance on more would need over 70 GB."""
 CELLS = 2.7
-"""Cells of all levels, over two gradings of them on either side of each square of surface. Measured: 2.4 to 2.8."""
-
+"""Cells of all levels, relative to those of the finest level within one grading of the surface; measured 2.4 to 2.8."""
 BYTES_PER_TET = 350
-"""Peak of meshing; distance takes more. Measured."""
+"""Measured peak memory of meshing; distance takes more."""
 
 
 def tetrahedralize(
@@ -123,25 +120,25 @@ def tetrahedralize(
 
 
 def sample_points(shape: Shape, spacing: float) -> Floats:
-    """Points on a shape such that no point of it is farther than `spacing` from one of them."""
+    """Return points on a shape such that no point of it is farther than `spacing` from one of them."""
     if isinstance(shape, PointCloud):
         return shape.points
     triangles = area_elements(shape).corners
     sides = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
     pieces = np.maximum(np.ceil(sides / spacing), 1).astype(np.int64)
-    found = []
+    points = []
     for k in np.unique(pieces):
         i, j = np.meshgrid(np.arange(k + 1), np.arange(k + 1), indexing="ij")
         i, j = i[i + j <= k], j[i + j <= k]
         weights = np.stack([i, j, k - i - j], axis=1) / k
-        found.append(np.einsum("wc,mcd->mwd", weights, triangles[pieces == k]).reshape(-1, 3))
-    return np.concatenate(found)
+        points.append(np.einsum("wc,mcd->mwd", weights, triangles[pieces == k]).reshape(-1, 3))
+    return np.concatenate(points)
 
 
 def _refuse_too_many(least: float, expected: float, resolution: float, power: int) -> None:
-    """Refuse a lattice of at least so many tets if these do not fit into memory, and name a resolution of which all do.
+    """Refuse a lattice whose least number of tets does not fit into memory, and name a resolution that does.
 
-    The number that is expected grows with a power of the resolution.
+    The `expected` number grows with the given `power` of the resolution.
     """
 
     def lower(fitting: int) -> str:
@@ -159,10 +156,10 @@ def _refuse_too_many(least: float, expected: float, resolution: float, power: in
 def _octree(
     samples: Any, origin: Floats, spacing: float, counts: Ints, depth: int, grading: float, resolution: float
 ) -> tuple[Ints, Ints]:
-    """Lower corners and sizes of the leaves, in half cells of the finest level.
+    """Return lower corners and sizes of the leaves, in half cells of the finest level.
 
-    The distance to the samples is Lipschitz with constant one, so no leaf has a neighbour that was split twice more:
-    the tree needs no balancing.
+    The distance to the samples is Lipschitz with constant one, so no leaf has a neighbour that was split twice more,
+    and the tree needs no balancing.
     """
     size = 2 ** (depth + 1)
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3) * size
@@ -183,7 +180,7 @@ def _octree(
 
 
 def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
-    """Points, in half cells of the finest level, and tets that join the centres of leaves that share a face."""
+    """Return points, in half cells of the finest level, and the tets that join the centres of leaves sharing a face."""
     stride = np.array([(upper[1] + 1) * (upper[2] + 1), upper[2] + 1, 1])
     leaves = np.sort((corners * 32 + np.log2(sizes).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
 
@@ -227,5 +224,5 @@ def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
 
 
 def _contains(sorted_keys: Ints, keys: Ints) -> Bools:
-    found = np.minimum(np.searchsorted(sorted_keys, keys), len(sorted_keys) - 1)
-    return sorted_keys[found] == keys
+    """Return whether each key is among sorted ones."""
+    return sorted_keys[np.minimum(np.searchsorted(sorted_keys, keys), len(sorted_keys) - 1)] == keys

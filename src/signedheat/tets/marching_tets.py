@@ -10,7 +10,7 @@ from ..mesh.components import connected_components
 from ..mesh.tet_shapes import TetShapes, face_table
 
 CLEARANCE = 1e-3
-"""Crossings stay this fraction of an edge away from its ends, so that no two vertices of a surface coincide."""
+"""Least distance of crossings from the ends of edges, relative to these, so that no two vertices coincide."""
 
 # By the bits of a mask of the corners below the level: an even permutation that puts these first, and their number.
 _ORDERS = np.zeros((16, 4), dtype=np.int64)
@@ -36,7 +36,7 @@ _LIDS = {
 
 
 def closed_level_set(mesh: TetShapes, values: Floats, gradients: Floats, level: float) -> tuple[Floats, Ints]:
-    """Vertices and triangles of the surface that separates mesh vertices below a level from the others.
+    """Return vertices and triangles of the surface that separates mesh vertices below a level from the others.
 
     Normals point to the greater values. Vertices of the surface lie where φ takes the level, to second order, by its
     values and gradients at the ends of edges. Where the surface meets the boundary of the mesh it is closed along the
@@ -61,7 +61,7 @@ def closed_level_set(mesh: TetShapes, values: Floats, gradients: Floats, level: 
 
 
 def level_triangles(vertices: Floats, tets: Ints, values: Floats, level: float) -> tuple[Floats, Ints, Ints]:
-    """The level set of the linear interpolant, open at the boundary: positions (n, 3), triangles (k, 3), tets (k,)."""
+    """Return the level set of the linear interpolant, open at the boundary: positions, triangles, tet of each."""
     finite = np.flatnonzero(~np.isnan(values[tets]).any(axis=1))
     keys, owners = _triangles(tets[finite], (values < level)[tets[finite]], len(vertices), _CUTS)
     return *_crossings(vertices, values, np.zeros_like(vertices), level, keys, 0.0), finite[owners]
@@ -70,7 +70,7 @@ def level_triangles(vertices: Floats, tets: Ints, values: Floats, level: float) 
 def _crossings(
     vertices: Floats, values: Floats, gradients: Floats, level: float, keys: Ints, clearance: float
 ) -> tuple[Floats, Ints]:
-    """Positions at which edges take the level, and the index of the position of each key.
+    """Return the positions at which edges take the level, and the index of the position of each key.
 
     A key is ``smaller · n + larger`` vertex id of an edge. At the fraction s of an edge e from a to b, φ is
     ``(1 − s) φ_a + s φ_b + ½ s (1 − s) (∇φ_a − ∇φ_b)·e``.
@@ -88,7 +88,7 @@ def _crossings(
 def _triangles(
     elements: Ints, below: Bools, n: int, table: dict[int, list[list[tuple[int, int]]]]
 ) -> tuple[Ints, Ints]:
-    """(k, 3) triangles whose corners are ``smaller · n + larger`` vertex id of their edge, and (k,) their elements."""
+    """Return triangles by the keys of their corners (see `_crossings`), and the element of each."""
     corners = elements.shape[1]
     masks = below @ (1 << np.arange(corners))
     if corners == 4:
@@ -96,19 +96,19 @@ def _triangles(
     else:
         orders = np.array([[0, 1, 2], [0, 1, 2], [1, 2, 0], [0, 1, 2], [2, 0, 1], [2, 0, 1], [1, 2, 0], [0, 1, 2]])
         counts = _COUNTS[:8]
-    found, owners = [], []
+    keys, owners = [], []
     for count, triangles in table.items():
         chosen = np.flatnonzero(counts[masks] == count)
         ordered = np.take_along_axis(elements[chosen], orders[masks[chosen]], axis=1)
         for triangle in triangles:
             ends = [(ordered[:, a], ordered[:, b]) for a, b in triangle]
-            found.append(np.stack([np.minimum(a, b) * n + np.maximum(a, b) for a, b in ends], axis=1))
+            keys.append(np.stack([np.minimum(a, b) * n + np.maximum(a, b) for a, b in ends], axis=1))
             owners.append(chosen)
-    return np.concatenate(found), np.concatenate(owners)
+    return np.concatenate(keys), np.concatenate(owners)
 
 
 def manifold(positions: Floats, triangles: Ints) -> tuple[Floats, Ints]:
-    """A closed oriented surface made manifold: vertices and edges at which it touches itself are split.
+    """Make a closed oriented surface manifold: split vertices and edges at which it touches itself.
 
     Every halfedge is paired with one that runs in the opposite direction; corners that meet across a pair share a
     vertex.

@@ -60,7 +60,7 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
 
 
 def _box_around(shape: Any, resolution: int, padding: float | None) -> tuple[Floats, Floats, float]:
-    """Lower and upper corner of the padded bounding box of a shape, and the target edge length."""
+    """Return the corners of the padded bounding box of a shape, and the target edge length."""
     lower, upper = bounds_around([shape])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
@@ -72,7 +72,7 @@ def _box_around(shape: Any, resolution: int, padding: float | None) -> tuple[Flo
 
 
 def box_walls(lower: Floats, upper: Floats, counts: Ints) -> tuple[Floats, NDArray[np.int32]]:
-    """Triangulated box: vertices, and faces from `counts` rectangles along x, y and z, each cut into two triangles."""
+    """Return vertices and triangles of a box, from `counts` rectangles along x, y and z, each cut in two."""
     stride = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
     faces = []
     for axis in range(3):

@@ -1,4 +1,4 @@
-"""Clipping of oriented triangles against the tets that they cross, and location of points in tets.
+"""Clipping of oriented triangles against the tets that they cross, location of points in tets, and lines of sight.
 
 A source in space need not conform to the mesh. Every triangle is clipped to one convex polygon in each tet that it
 crosses; the area vectors of the polygons add up to that of the triangle. A polygon that lies in a face of the mesh is
@@ -18,74 +18,40 @@ from ..mesh.tet_shapes import TetShapes
 from ..parallel import CHUNK, in_chunks
 
 FLAT = 1e-10
-"""Tets whose volume, over the cube of the longest edge, is below this contain no part of a source."""
+"""Tets whose volume, relative to the cube of the longest edge, is below this contain no part of a source."""
 TOUCHING = 1e-9
 """Distance, relative to the size of a face, within which a point counts as lying in its plane."""
+GRAZING = 1e-6
+"""Length, relative to the size of the tets, by which a line of sight may lie outside the mesh."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClippedPolygons:
-    """Convex polygons, each the part of a source in one tet.
+    """Convex polygons, each the part of a source in one tet."""
 
-    Attributes
-    ----------
-    tets : (p,) int
-        Tet that each polygon lies in.
-    parents : (p,) int
-        Triangle or point of the source that it is part of.
-    area_vectors : (p, 3) float
-        Area times normal.
-    areas : (p,) float
-        Areas.
-    barycentric : (p, 4) float
-        Barycentric coordinates of its centroid in the tet.
-    in_face : (p,) int
-        Corner opposite to the face that it lies in, −1 in the interior of the tet.
-    """
-
-    tets: Ints
-    parents: Ints
-    area_vectors: Floats
-    areas: Floats
-    barycentric: Floats
-    in_face: Ints
+    tets: Ints  # (p,) the tet that each lies in
+    parents: Ints  # (p,) the triangle or point of the source that each is part of
+    area_vectors: Floats  # (p, 3) area times normal
+    areas: Floats  # (p,)
+    barycentric: Floats  # (p, 4) coordinates of each centroid in its tet
+    in_face: Ints  # (p,) the corner opposite the face that it lies in, −1 in the interior of the tet
 
 
 class Planes(NamedTuple):
-    """The planes of the faces of a mesh, the same to the last bit for all tets that share a face.
+    """The planes of the faces of a mesh, the same to the last bit for all tets that share a face."""
 
-    Attributes
-    ----------
-    tet_faces : (m, 4) int
-        Face opposite each corner of each tet.
-    normals : (f, 3) float
-        Unit normals, out of the first tet; zero for faces without area.
-    offsets : (f,) float
-        Value of ``normal · x`` on the plane, with x relative to `center`.
-    tolerances : (f,) float
-        Distance within which a point counts as lying in the plane.
-    signs : (m, 4) float
-        +1 where the normal points out of the tet, −1 where into it.
-    shares : (f,) float
-        One over the number of tets at the face that are not flat.
-    solid : (m,) bool
-        Tets that are not flat, and can contain polygons.
-    center : (3,) float
-        Centre of the mesh; coordinates are taken relative to it to reduce rounding errors.
-    """
-
-    tet_faces: Ints
-    normals: Floats
-    offsets: Floats
-    tolerances: Floats
-    signs: Floats
-    shares: Floats
-    solid: Bools
-    center: Floats
+    tet_faces: Ints  # (m, 4) the face opposite each corner of each tet
+    normals: Floats  # (f, 3) unit normals, out of the first tet; zero for faces without area
+    offsets: Floats  # (f,) value of ``normal · x`` on the plane, with x relative to `center`
+    tolerances: Floats  # (f,) distance within which a point counts as lying in the plane
+    signs: Floats  # (m, 4) +1 where the normal points out of the tet, −1 where it points into it
+    shares: Floats  # (f,) one over the number of tets at the face that are not flat
+    solid: Bools  # (m,) whether each tet has a volume, and can contain polygons
+    center: Floats  # (3,) centre of the mesh: coordinates relative to it have smaller rounding errors
 
     @classmethod
     def of(cls, mesh: TetShapes) -> Planes:
-        """The planes of the faces of a tet mesh."""
+        """Compute the planes of the faces of a tet mesh."""
         faces = mesh.faces
         center = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
         points = mesh.vertices - center
@@ -118,20 +84,20 @@ def clip_triangles(mesh: TetShapes, planes: Planes, triangles: Floats) -> Clippe
     >>> clip_triangles(mesh, Planes.of(mesh), across).area_vectors
     array([[0.   , 0.   , 0.125]])
     """
-    found = []
-    for begin in range(0, max(len(triangles), 1), CHUNK):  # most of what is near lies outside
-        some = triangles[begin : begin + CHUNK]
-        starts, tets = mesh.search_tree.meeting(some, _slack(mesh))
-        parents = np.repeat(np.arange(len(some)), np.diff(starts))
-        vectors, areas, centers, in_face = _clip(planes, some - planes.center, parents, tets)
+    parts = []
+    for begin in range(0, max(len(triangles), 1), CHUNK):  # most tets near a triangle contain no part of it
+        chunk = triangles[begin : begin + CHUNK]
+        starts, tets = mesh.search_tree.meeting(chunk, _slack(mesh))
+        parents = np.repeat(np.arange(len(chunk)), np.diff(starts))
+        vectors, areas, centers, in_face = _clip(planes, chunk - planes.center, parents, tets)
         kept = areas > 0
-        found.append([a[kept] for a in (tets, parents + begin, vectors, areas, centers, in_face)])
-    tets, parents, vectors, areas, centers, in_face = (np.concatenate(a) for a in zip(*found, strict=True))
+        parts.append([column[kept] for column in (tets, parents + begin, vectors, areas, centers, in_face)])
+    tets, parents, vectors, areas, centers, in_face = (np.concatenate(column) for column in zip(*parts, strict=True))
     return ClippedPolygons(tets, parents, vectors, areas, barycentric(mesh, tets, centers + planes.center), in_face)
 
 
 def containing_tets(mesh: TetShapes, planes: Planes, points: Floats) -> Ints:
-    """(k,) a tet that contains each point, −1 outside the mesh.
+    """Return (k,) a tet that contains each point, −1 outside the mesh.
 
     Examples
     --------
@@ -140,22 +106,22 @@ def containing_tets(mesh: TetShapes, planes: Planes, points: Floats) -> Ints:
     array([ 0, -1])
     """
 
-    def found(some: Floats) -> tuple[Ints]:
-        near = mesh.search_tree.meeting(np.repeat(some[:, None], 3, axis=1), slack)
-        return (_locate(planes, some - planes.center, *near),)
+    def located(chunk: Floats) -> tuple[Ints]:
+        near = mesh.search_tree.meeting(np.repeat(chunk[:, None], 3, axis=1), slack)
+        return (_locate(planes, chunk - planes.center, *near),)
 
     slack = _slack(mesh)
-    return in_chunks(found, points)[0]
+    return in_chunks(located, points)[0]
 
 
 def _slack(mesh: TetShapes) -> Floats:
-    """(3,) how far beyond its box a tet is looked for: rounding may put a point there."""
+    """Return (3,) how far beyond its box a tet is searched for, since rounding may put a point there."""
     lower, upper = mesh.search_tree.bounds[1].reshape(2, 3)
     return 1e-9 * (upper - lower)
 
 
 def barycentric(mesh: TetShapes, tets: Ints, points: Floats) -> Floats:
-    """(k, 4) barycentric coordinates of points in given tets, clamped to be nonnegative, each row with sum one."""
+    """Return (k, 4) barycentric coordinates of points in given tets, clamped to be nonnegative, with sum one."""
     from_corner = points[:, None] - mesh.vertices[mesh.tets[tets][:, [1, 0, 0, 0]]]  # on the face opposite each corner
     inward = -np.einsum("pki,pki->pk", mesh.area_vectors[tets], from_corner)
     inward = np.maximum(inward / np.maximum(np.abs(inward).max(axis=1, keepdims=True), np.finfo(float).tiny), 0)
@@ -166,7 +132,7 @@ def barycentric(mesh: TetShapes, tets: Ints, points: Floats) -> Floats:
 
 @compiled
 def beyond(planes: Planes, tet: int, k: int, x: float, y: float, z: float) -> float:
-    """Signed distance by which a point, relative to the centre, lies outside the face opposite corner k of a tet."""
+    """Return by how much a point, relative to the centre, lies outside the face opposite corner k of a tet."""
     f = planes.tet_faces[tet, k]
     height = planes.normals[f, 0] * x + planes.normals[f, 1] * y + planes.normals[f, 2] * z - planes.offsets[f]
     return planes.signs[tet, k] * height
@@ -174,7 +140,7 @@ def beyond(planes: Planes, tet: int, k: int, x: float, y: float, z: float) -> fl
 
 @compiled
 def _locate(planes: Planes, points: Floats, starts: Ints, near: Ints) -> Ints:
-    found = np.full(len(points), -1, dtype=np.int64)
+    tets = np.full(len(points), -1, dtype=np.int64)
     for p in range(len(points)):
         deepest = -np.inf
         for t in near[starts[p] : starts[p + 1]]:
@@ -184,15 +150,15 @@ def _locate(planes: Planes, points: Floats, starts: Ints, near: Ints) -> Ints:
             for c in range(4):
                 out = beyond(planes, t, c, points[p, 0], points[p, 1], points[p, 2])
                 inside = min(inside, planes.tolerances[planes.tet_faces[t, c]] - out)
-            if inside >= 0.0 and (inside > deepest or (inside == deepest and t < found[p])):
+            if inside >= 0.0 and (inside > deepest or (inside == deepest and t < tets[p])):
                 deepest = inside
-                found[p] = t
-    return found
+                tets[p] = t
+    return tets
 
 
 @compiled
 def _clip(planes: Planes, triangles: Floats, parents: Ints, tets: Ints) -> tuple[Floats, Floats, Floats, Ints]:
-    """Area vector, area and centroid of what of a triangle lies in a tet, and the face of the tet that it lies in."""
+    """Return area vector, area and centroid of each triangle's part in a tet, and the face of the tet it lies in."""
     area_vectors, centers = np.zeros((len(tets), 3)), np.zeros((len(tets), 3))
     areas, in_face = np.zeros(len(tets)), np.full(len(tets), -1)
     polygon, other, heights, normal = np.empty((8, 3)), np.empty((8, 3)), np.empty(8), np.empty(3)
@@ -228,7 +194,7 @@ def _clip(planes: Planes, triangles: Floats, parents: Ints, tets: Ints) -> tuple
 def _cut(
     planes: Planes, tet: int, corner: int, polygon: Floats, n: int, other: Floats, heights: Floats
 ) -> tuple[int, bool]:
-    """Clip a polygon to the inner side of a face of a tet. Also whether the whole polygon lies in the face's plane.
+    """Clip a polygon to the inner side of a face of a tet; return its size, and whether it lies in the face's plane.
 
     Heights and crossings are the same, to the last bit, for the tets on both sides of the plane.
     """
@@ -260,7 +226,7 @@ def _cut(
 
 @compiled
 def _measure(polygon: Floats, n: int, normal: Floats, area_vector: Floats, center: Floats) -> float:
-    """Area vector and centroid of a convex polygon; returns its area, negative if rounding has turned it over."""
+    """Write area vector and centroid of a convex polygon; return its area, negative if rounding has turned it over."""
     area_vector[:] = 0.0
     center[:] = 0.0
     total = 0.0
@@ -281,3 +247,35 @@ def _measure(polygon: Floats, n: int, normal: Floats, area_vector: Floats, cente
         for axis in range(3):
             center[axis] /= total
     return total
+
+
+@compiled
+def stays_inside(
+    planes: Planes, neighbors: Ints, tet: int, x: float, y: float, z: float, u: float, w: float, t: float, slack: float
+) -> bool:
+    """Return whether the segment from (x, y, z), in a tet, to (u, w, t), in the mesh, lies in the mesh."""
+    for _ in range(len(neighbors)):
+        leave, at = -1, np.inf
+        for k in range(4):
+            there = beyond(planes, tet, k, u, w, t)
+            if there > slack:
+                here = beyond(planes, tet, k, x, y, z)
+                if there > here and -here / (there - here) < at:
+                    leave, at = k, -here / (there - here)
+        if leave < 0:
+            return True
+        tet = neighbors[tet, leave]
+        if tet < 0:
+            return False
+    return False
+
+
+@compiled
+def visible(planes: Planes, neighbors: Ints, starts: Floats, targets: Floats, slack: float) -> Bools:
+    """Return (m,) whether the segment from a point in each tet to its target stays in the mesh, up to a length."""
+    seen = np.empty(len(starts), dtype=np.bool_)
+    for tet in range(len(starts)):
+        x, y, z = starts[tet]
+        u, w, t = targets[tet]
+        seen[tet] = stays_inside(planes, neighbors, tet, x, y, z, u, w, t, slack)
+    return seen

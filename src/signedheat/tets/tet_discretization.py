@@ -15,31 +15,30 @@ from ..arrays import Bools, Floats, Ints
 from ..cache import LastUsed
 from ..direct_integration import STIFFEST
 from ..discretization import DiffusesEach, Levels, SourceTerm, discretize
-from ..linear import upper_triangle
-from ..linear.incomplete_cholesky import from_first
-from ..linear.restarts import Stage
+from ..linear import Factor, factorize, upper_triangle
+from ..linear.incomplete_cholesky import IncompleteCholesky, from_first, outward_order
+from ..linear.restarts import Stage, matrix_forces, solve_with_restarts
 from ..memory import refuse_beyond_memory
+from ..mesh.unit_vectors import unit
 from ..spring_integration import SpringIntegration
-from .heat_system import HeatSystem, bend_around_corners
-from .tet_clipping import Planes
+from .tet_clipping import GRAZING, Planes, visible
 from .tet_mesh import TetMesh
 from .tet_source import TetSource, tet_source
-from .visibility import GRAZING, visible
 
 DIRECT_FACES = 20_000
-"""Up to this number of faces step 1 is factorised, in O(n²) time; conjugate gradients take O(n⁴ᐟ³)."""
+"""Number of faces up to which step 1 is factorised, in O(n²) time; conjugate gradients take O(n⁴ᐟ³)."""
 DIRECT_VERTICES = 40_000
-"""Up to this number of vertices step 3 is factorised."""
+"""Number of vertices up to which step 3 is factorised."""
 DIRECTION_ERROR = 1e-3
 """Componentwise residual at which conjugate gradients stop: directions are then right to about 0.01°."""
 SPRINGS = 30.0
 """Strength of the springs that impose levels, times the mean edge length."""
 BYTES_PER_TET, BYTES_PER_FACTORED = 1750, 2900
-"""Peak for each tet, by conjugate gradients and by factorisation. Measured."""
+"""Measured peak memory for each tet, by conjugate gradients and by factorisation."""
 
 
 def memory_estimate(n_tets: int) -> float:
-    """Bytes that a first distance on so many tets takes at the most.
+    """Estimate the peak memory, in bytes, of a first distance on a mesh of this many tets.
 
     Examples
     --------
@@ -52,18 +51,10 @@ def memory_estimate(n_tets: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class TetDiscretization(DiffusesEach):
-    """The discretisation of a tet mesh.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-        The domain.
-    direct : bool
-        Whether to factorise the system of step 1, instead of solving it by conjugate gradients.
-    """
+    """The discretisation of a tet mesh."""
 
     mesh: TetMesh
-    direct: bool
+    direct: bool  # whether the system of step 1 is factorised; it is solved by conjugate gradients otherwise
     _heats: LastUsed[float, HeatSystem] = field(default_factory=lambda: LastUsed(3), init=False, repr=False)
 
     @cached_property
@@ -80,10 +71,9 @@ class TetDiscretization(DiffusesEach):
 
     @cached_property
     def unknowns(self) -> Ints:
-        """(m, 4) unknown of φ at each corner of each tet.
+        """(m, 4) unknown of φ at each corner of each tet; a vertex of several parts has one unknown for each.
 
-        Heat flows through faces only. Parts of the mesh that meet in an edge or a vertex only are separate domains, and
-        a vertex of several parts has one unknown for each.
+        Heat flows through faces only, so parts of the mesh that meet in an edge or a vertex only are separate domains.
         """
         parts = self.mesh.parts
         keys = self.mesh.tets * (parts.max() + 1) + parts[:, None]
@@ -107,15 +97,20 @@ class TetDiscretization(DiffusesEach):
         return np.nan_to_num(self.mesh.geometry.mean_gradients(values, self.unknowns, self.n_unknowns))
 
     def adapt(self, sources: Sequence[Any]) -> tuple[TetDiscretization, Sequence[Any]]:
-        """The discretisation itself: sources need not conform to the tets."""
+        """Return the discretisation itself, since sources need not conform to the tets."""
         return self, sources
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> TetSource:
-        """X₀ (Sec. 8.1; Eq. 11 in space) and the rows that average φ over the sources (Eq. 14)."""
+        """Compute X₀ (Sec. 8.1; Eq. 11 in space) and the rows that average φ over the sources (Eq. 14)."""
         return tet_source(self.mesh, self.planes, self.unknowns, sources, diffusion, self.spacing)
 
     def diffuse(self, source: TetSource) -> Floats:
-        """Solve ``(M + tL) X = X₀`` (Eq. 12): one vector per face, averaged in the tets (App. B.2)."""
+        """Solve ``(M + tL) X = X₀`` (Eq. 12) for one vector per face, and average it in the tets (App. B.2).
+
+        Diffusion in flat space carries vectors along without turning them. Where the straight line to the source leaves
+        the domain, the shortest way to it is bent, and its direction is that in which undirected heat falls (Crane et
+        al. 2013); its sign is that of the place from which this heat has come.
+        """
         heat = self._heats(source.time, lambda: self._heat_system(source.time))
         if self._is_convex:
             return self._in_tets(heat.solve(source.vectors))[0]
@@ -123,17 +118,19 @@ class TetDiscretization(DiffusesEach):
         means, gradients, factors = self._in_tets(heat.solve(loads))
         with np.errstate(divide="ignore"):
             heights = np.log(np.maximum(means[:, 3], 0)) + factors
-        neighbors = self.mesh.faces.neighbors
-        return bend_around_corners(means[:, :3], -gradients, heights, neighbors, self._straight(source))
+        straight, vectors, falling = self._straight(source), means[:, :3], -gradients
+        roots = uphill_roots(heights, self.mesh.faces.neighbors, straight)
+        side = np.sign(np.einsum("ij,ij->i", unit(vectors), falling))[roots]
+        return np.where(straight[:, None], vectors, side[:, None] * falling)
 
     def _heat_system(self, time: float) -> HeatSystem:
-        """M + tL of Eq. 12, from the Laplacian of Eq. 21 and the mass of Eq. 23, lumped."""
+        """Return M + tL of Eq. 12, from the Laplacian of Eq. 21 and the mass of Eq. 23, lumped."""
         matrix, mass = self._laplacian * time, self.mesh.geometry.face_mass()
         matrix.setdiag(matrix.diagonal() + mass)
-        return HeatSystem(matrix, self.direct, DIRECTION_ERROR)
+        return HeatSystem(matrix, self.direct)
 
     def _in_tets(self, stages: list[Stage]) -> tuple[Floats, Floats, Floats]:
-        """Means of X in the tets, positive multiples of the gradient of its last column, and logarithms of its scale.
+        """Return means of X in the tets, multiples of the gradient of its last column, and logarithms of its scale.
 
         Each tet takes them from the last stage in which all its four faces are known.
         """
@@ -149,7 +146,7 @@ class TetDiscretization(DiffusesEach):
         return means, gradients, factors
 
     def _straight(self, source: TetSource) -> Bools:
-        """(m,) tets that the source reaches along a straight line."""
+        """Return (m,) whether the source reaches each tet along a straight line."""
         planes, centers = self.planes, self.mesh.tet_barycenters
         nearest = source.centers[scipy.spatial.cKDTree(source.centers).query(centers)[1]]
         begins, ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
@@ -160,7 +157,7 @@ class TetDiscretization(DiffusesEach):
         return self.mesh.geometry.face_laplacian()
 
     def to_cells(self, vectors: Floats) -> Floats:
-        """X at the tets: `diffuse` has averaged it already."""
+        """Return X at the tets, where `diffuse` has averaged it already."""
         return vectors
 
     @cached_property
@@ -173,22 +170,67 @@ class TetDiscretization(DiffusesEach):
         return bool(self.mesh.tet_volumes.sum() >= (1 - 1e-9) * hull.volume)
 
     def divergence(self, directions: Floats) -> Floats:
-        """b, the right-hand side of ``C φ = b`` (Eq. 13, Eq. 22)."""
+        """Compute b, the right-hand side of ``C φ = b`` (Eq. 13, Eq. 22)."""
         return self.mesh.geometry.divergence(directions, self.unknowns, self.n_unknowns)
 
     @cached_property
     def vertices(self) -> Ints:
-        """(n,) vertex of the mesh that each unknown belongs to."""
+        """(n,) the vertex of the mesh that each unknown belongs to."""
         vertices = np.empty(self.n_unknowns, dtype=np.int64)
         vertices[self.unknowns] = self.mesh.tets
         return vertices
 
     def at_vertices(self, values: Floats) -> Floats:
-        """(n_vertices,) values at the vertices: means over the unknowns of each, NaN where none has a value."""
+        """Return (n_vertices,) means of values over the unknowns of each vertex, NaN where none has a value."""
         finite = np.flatnonzero(~np.isnan(values))
         vertices, n = self.vertices[finite], self.mesh.n_vertices
         counts, sums = np.bincount(vertices, minlength=n), np.bincount(vertices, values[finite], n)
         return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class HeatSystem:
+    """Step 1, ``(M + tL) X = X₀``, for right-hand sides that X decays away from."""
+
+    matrix: sparse.csr_matrix  # (n, n) M + tL, whole
+    direct: bool  # whether it is factorised; it is solved by conjugate gradients otherwise
+
+    @cached_property
+    def factor(self) -> Factor:
+        """The factor of the matrix."""
+        return factorize(self.matrix)
+
+    def solve(self, loads: Floats) -> list[Stage]:
+        """Solve for columns (n, k), in stages: X underflows a few hundred cells away from the loads."""
+        size = float(self.matrix.diagonal().mean())
+        return solve_with_restarts(self._solve, matrix_forces(self.matrix), loads, size)
+
+    def _solve(self, loads: Floats) -> Floats:
+        if self.direct:
+            return self.factor.solve(loads)
+        order = outward_order(self.matrix, np.flatnonzero(loads.any(axis=1)))
+        return IncompleteCholesky.of(self.matrix, order).solve(loads, relative=0.0, componentwise=DIRECTION_ERROR)
+
+
+def uphill_roots(heights: Floats, neighbors: Ints, settled: Bools) -> Ints:
+    """Return (m,) the settled tet, or the local maximum, that steepest ascent from tet to tet leads to.
+
+    Examples
+    --------
+    >>> chain = np.array([[1, -1, -1, -1], [0, 2, -1, -1], [1, -1, -1, -1]])
+    >>> uphill_roots(np.array([3.0, 2.0, 1.0]), chain, np.array([True, False, False])).tolist()
+    [0, 0, 0]
+    """
+    own = np.arange(len(heights))
+    around = np.where(neighbors >= 0, heights[neighbors], -np.inf)
+    best = around.argmax(axis=1)
+    higher = ~settled & (around[own, best] > heights)
+    roots = np.where(higher, neighbors[own, best], own)
+    while True:  # every round doubles the length of the paths followed
+        further = roots[roots]
+        if (further == roots).all():
+            return roots
+        roots = further
 
 
 @discretize.register
@@ -203,27 +245,22 @@ def _(domain: TetMesh) -> TetDiscretization:
 
 
 def lowered_tets(mesh: TetMesh) -> TetDiscretization:
-    """A tet mesh as the three steps see it, whether distance on it fits into memory or not."""
+    """Return the discretisation of a mesh, without checking whether distance on it fits into memory."""
     return TetDiscretization(mesh, direct=len(mesh.faces.vertices) <= DIRECT_FACES)
 
 
 @dataclass(frozen=True, eq=False)
 class TetIntegration(SpringIntegration):
-    """As `SpringIntegration`, and levels are corrected for the curvature of φ.
+    """`SpringIntegration` whose levels at the samples are corrected for the curvature of φ.
 
-    The level at samples is corrected, because the linear interpolant of a curved function differs from it. The
-    difference is known to second order from the gradients at the corners, once there is a first φ.
-
-    Parameters
-    ----------
-    gradients : callable
-        From φ at the unknowns to (n, 3) gradients there.
+    The linear interpolant of a curved function differs from it. The difference is known to second order from the
+    gradients at the corners, once there is a first φ.
     """
 
-    gradients: Callable[[Floats], Floats] = np.zeros_like
+    gradients: Callable[[Floats], Floats] = np.zeros_like  # from φ at the unknowns to (n, 3) gradients there
 
     def corrected(self, levels: Floats, solve: Callable[[Floats], Floats], source: SourceTerm) -> tuple[Floats, Floats]:
-        """Levels less the quadratic correction of a first φ, and the φ with these."""
+        """Return the levels minus the quadratic correction of a first φ, and the φ with these levels."""
         values = levels - self._quadratic_correction(solve(levels), source)
         return values, solve(values)
 
@@ -243,6 +280,6 @@ class TetIntegration(SpringIntegration):
         return super()._at_samples(values, source) + self._quadratic_correction(values, source)
 
     def _quadratic_correction(self, values: Floats, source: SourceTerm) -> Floats:
-        """(s,) φ minus its linear interpolant, on the source."""
+        """Return (s,) φ minus its linear interpolant, on the source."""
         assert isinstance(source, TetSource)
         return source.quadratic_correction @ self.gradients(np.nan_to_num(values)).ravel()

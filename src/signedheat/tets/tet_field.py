@@ -142,7 +142,7 @@ class TetField(Displayed, Combinable, Frozen):
         return self.mesh.geometry.gradients(self.values[self.mesh.tets])
 
     def contour(self, level: float = 0.0) -> TriangleMesh:
-        """The surface φ = level: closed, manifold, with normals pointing to greater φ.
+        """Extract the surface φ = level: closed, manifold, with normals pointing to greater φ.
 
         Where the surface leaves the mesh, it is closed along the boundary of the mesh.
 
@@ -171,7 +171,7 @@ class TetField(Displayed, Combinable, Frozen):
         return TriangleMesh(*closed_level_set(self.mesh.geometry, self.values, self._vertex_gradients, level))
 
     def offset(self, distance: float) -> TriangleMesh:
-        """The offset of the shape at a signed distance: `contour`, but refused if the mesh is too small for it.
+        """Offset the shape by a signed distance: `contour`, but refused if the mesh is too small for it.
 
         Parameters
         ----------
@@ -281,9 +281,9 @@ class TetField(Displayed, Combinable, Frozen):
         return TriangleTree.of(self.mesh.vertices[self.mesh.boundary.faces])
 
     def _place(self, points: Floats) -> tuple[Ints, Floats, Floats]:
-        """(k, 4) vertices and weights that interpolate at each point, or at the closest point of the mesh, and offsets.
+        """Return (k, 4) vertices and weights that interpolate at the closest point of the mesh, and the way from there.
 
-        The offset is the vector (k, 3) from the closest point of the mesh to the point, zero inside the mesh.
+        The way (k, 3) is zero for points inside the mesh.
         """
         tets = containing_tets(self.mesh.geometry, self._planes, points)
         inside, outside = np.flatnonzero(tets >= 0), np.flatnonzero(tets < 0)

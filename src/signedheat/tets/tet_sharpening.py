@@ -1,18 +1,27 @@
-"""Sharpening on tets: distance to faces and to the zero set along straight lines, which bend around the boundary."""
+"""Sharpening on tets: distance to faces and to the zero set along straight lines, which bend around the boundary.
+
+Where the segment from a vertex to the nearest point of the surface lies in the mesh, its length is the distance.
+Elsewhere shortest paths bend at the boundary of the mesh. They are found vertex by vertex, in order of distance: each
+vertex takes over from a neighbour the triangle, or the bend, that the neighbour's path starts from, if that is visible
+from the vertex too; otherwise the path bends at the neighbour (any-angle search, Nash et al. 2007). Bending at vertices
+only, instead of anywhere on an edge, costs a length of second order.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..compiled import compiled
 from ..diagnostics import Note, RoundCorners, SharpenedToShape
 from ..discretization import SourceTerm
 from ..errors import SourceError
 from ..foreign import SurfaceShape, as_shapes
-from ..geodesics.heap_kernels import Queue
+from ..geodesics.heap_kernels import Queue, pop, push
 from ..jobs import run_cancellable
 from ..joining import joined_triangles
 from ..kinds import Shapes
@@ -21,27 +30,25 @@ from ..mesh.components import grouped
 from ..progress import Progress
 from ..search.face_features import FaceFeatures
 from ..search.face_tree import FaceTree
-from ..search.nearest_triangles import TriangleTree
+from ..search.nearest_triangles import TriangleTree, foot_on_triangle
 from ..sharpening_methods import Method, Nearest, nearest, sharpen_field, sharpened
 from ..surfaces.point_cloud import PointCloud
-from .any_angle import any_angle_distance
 from .marching_tets import level_triangles
-from .tet_clipping import barycentric
+from .tet_clipping import GRAZING, Planes, barycentric, beyond, stays_inside
 from .tet_discretization import TetDiscretization, lowered_tets
 from .tet_field import TetField
-from .visibility import GRAZING
 
 NEAR = 2.0
-"""Mean edges from a face within which its side decides the sign."""
+"""Distance from a face, in mean edges, within which the face's side decides the sign."""
 FAR = 1.5
-"""Mean edges: the zero set farther than that from any face completes the shape."""
+"""Distance from all faces, in mean edges, beyond which the zero set completes the shape."""
 LARGEST_BEND = 1.0
-"""Limit on the quadratic correction of the zero set, relative to h; at creases of φ the correction has no meaning."""
+"""Limit of the quadratic correction of the zero set, relative to h; at creases of φ the correction has no meaning."""
 
 
 @sharpen_field.register
 def _(field: TetField, source: Shapes | None, method: Method | None, progress: Progress | None) -> TetField:
-    lowered = lowered_tets(field.mesh)  # of which nothing is solved
+    lowered = lowered_tets(field.mesh)  # nothing is solved on it
     elements = LinearElements.on_tets(field.mesh.geometry, lowered.unknowns, lowered.n_unknowns)
     given = None if source is None else as_shapes(source)
     values = field.values[lowered.vertices]
@@ -58,40 +65,40 @@ def _(
     tolerance: float,
     report: Callable[[], None] | None,
 ) -> Nearest:
-    """Any-angle distance in space, around the boundary of the mesh, to faces given and the zero set where none is.
+    """Measure any-angle distance to the given faces, and to the zero set farther than `FAR` from all of them.
 
-    The zero set counts farther than `FAR` mean edges from all faces. Within `NEAR` mean edges of a face its side
-    decides the sign, where the shape is closed and consistent around the nearest place.
+    Within `NEAR` of a face its side decides the sign, where the shape is closed and consistent around the nearest
+    place.
     """
     points = lowered.mesh.vertices[lowered.vertices] - lowered.planes.center
     positions, corners, owners = level_triangles(points, lowered.unknowns, values, 0.0)
     sides = np.zeros(len(values), dtype=np.int64)
     notes: tuple[Note, ...] = ()
-    features = None if given is None else faces_of(given, lowered.planes.center)
-    if features is None:
-        surface = Surface(positions, corners, owners)
-    else:
-        tree, n_faces = FaceTree.of(features), len(features.rows)
-        missing = tree.distances(positions[corners].mean(axis=1)) > FAR * lowered.spacing
-        surface = Surface(
-            np.concatenate([features.vertices, positions]),
-            np.concatenate([features.faces, corners[missing] + len(features.vertices)]),
-            np.concatenate([np.full(n_faces, -1), owners[missing]]),
-        )
-        notes = (SharpenedToShape(float(missing.mean()) if len(missing) else 0.0),)
-    if not len(surface.corners):
-        return Nearest(np.full(len(values), np.inf), sides)
-    found = run_cancellable(lambda: distance_around(lowered, points, values, surface), report)
+    features = None if given is None else _faces_of(given, lowered.planes.center)
     if features is not None:
-        near = tree.search(points)
+        face_tree, n_faces = FaceTree.of(features), len(features.rows)
+        missing = face_tree.distances(positions[corners].mean(axis=1)) > FAR * lowered.spacing
+        corners = np.concatenate([features.faces, corners[missing] + len(features.vertices)])
+        owners = np.concatenate([np.full(n_faces, -1), owners[missing]])
+        positions = np.concatenate([features.vertices, positions])
+        notes = (SharpenedToShape(float(missing.mean()) if len(missing) else 0.0),)
+    if not len(corners):
+        return Nearest(np.full(len(values), np.inf), sides)
+
+    def measured() -> tuple[Floats, Ints, int]:
+        return _distance_around(lowered, points, values, positions, corners, owners)
+
+    distances, triangles, hidden = run_cancellable(measured, report)
+    if features is not None:
+        near = face_tree.search(points)
         decided = near.regular & (near.distances < NEAR * lowered.spacing)
-        decided &= (found.nearest < n_faces) & (found.distances <= near.distances * (1 + 1e-9))
+        decided &= (triangles < n_faces) & (distances <= near.distances * (1 + 1e-9))
         sides[decided] = np.where(near.cosines < 0, -1, 1)[decided]
-    return Nearest(found.distances, sides, (RoundCorners(found.hidden), *notes))
+    return Nearest(distances, sides, (RoundCorners(hidden), *notes))
 
 
-def faces_of(shapes: Sequence[SurfaceShape], center: Floats) -> FaceFeatures | None:
-    """The faces of some shapes around a centre; None if none has any extent."""
+def _faces_of(shapes: Sequence[SurfaceShape], center: Floats) -> FaceFeatures | None:
+    """Return the faces of some shapes, relative to a centre; None if no face has any extent."""
     meshes = [shape for shape in shapes if not isinstance(shape, PointCloud)]
     if len(meshes) != len(shapes):
         raise SourceError("fields on tets are sharpened to faces, and points have none", element="shape")
@@ -99,77 +106,164 @@ def faces_of(shapes: Sequence[SurfaceShape], center: Floats) -> FaceFeatures | N
     return features if len(features.rows) else None
 
 
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """Triangles that distance on tets is measured to.
+class Vertices(NamedTuple):
+    """The unknowns of φ as vertices of the tets."""
 
-    Attributes
-    ----------
-    positions : (p, 3) float
-        Around the centre of the mesh.
-    corners : (k, 3) int
-        Of the triangles; corners that coincide have the same id.
-    owners : (k,) int
-        The tet that each triangle lies in; −1 for such as lie in several.
-    """
-
-    positions: Floats
-    corners: Ints
-    owners: Ints
+    points: Floats  # (n, 3) positions relative to the centre of the mesh, as those of `Planes` are
+    tets: Ints  # (m, 4) the vertices of each tet
+    neighbors: Ints  # (m, 4) the tet beyond each face, or −1
+    # (n + 1,) and (4 m,): where the tets at each vertex begin in the second, and these tets
+    first_tet: Ints
+    tets_at: Ints
 
 
-@dataclass(frozen=True, eq=False)
-class Reached:
-    """Distances to a surface, without sign: see `any_angle_distance`."""
+class Surface(NamedTuple):
+    """The triangles that distance is measured to."""
 
-    distances: Floats
-    nearest: Ints
-    points: Floats
-    hidden: int
+    rows: Floats  # (k, 16) see `triangle_rows`, relative to the centre of the mesh
+    corners: Ints  # (k, 3) vertex ids; corners at one place have the same id
+    # where the triangles at each of these ids begin in the second, and these triangles
+    first_triangle: Ints
+    triangles_at: Ints
+    owners: Ints  # (k,) the tet that each triangle lies in; −1 for triangles that lie in several
 
 
-def distance_around(lowered: TetDiscretization, points: Floats, values: Floats, surface: Surface) -> Reached:
-    """Any-angle distance of all points with a value from a surface, of which triangles in one tet are φ's zero set.
+def _distance_around(
+    lowered: TetDiscretization, points: Floats, values: Floats, positions: Floats, corners: Ints, owners: Ints
+) -> tuple[Floats, Ints, int]:
+    """Return any-angle distances of all points with a value, the nearest triangles, and how many points see none.
 
-    A curved φ does not vanish where its linear interpolant does. The difference is known to second order from the
-    gradients at the corners of the tet: ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k)``.
+    Triangles that lie in one tet are those of φ's zero set. A curved φ does not vanish where its linear interpolant
+    does. The difference is known to second order from the gradients at the corners of the tet:
+    ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k)``.
     """
     mesh, planes, unknowns = lowered.mesh, lowered.planes, lowered.unknowns
-    triangles = surface.positions[surface.corners]
-    tree = TriangleTree.of(triangles)
-    nearest, _ = tree.nearest(points)
-    nearest[np.isnan(values)] = -1
-    tets_at = by_element(unknowns, len(values), 4)
-    triangles_at = by_element(surface.corners, len(surface.positions), 3)
-    queue = Queue.empty(len(points))
+    tree = TriangleTree.of(positions[corners])
+    triangles, _ = tree.nearest(points)
+    triangles[np.isnan(values)] = -1
+    vertices = Vertices(points, unknowns, mesh.faces.neighbors, *_rows_with(unknowns, len(values)))
+    surface = Surface(tree.rows, corners, *_rows_with(corners, len(positions)), owners)
     slack = GRAZING * lowered.spacing
-    distance, nearest, found, hidden = any_angle_distance(
-        planes,
-        mesh.faces.neighbors,
-        unknowns,
-        points,
-        *tets_at,
-        tree.rows,
-        surface.corners,
-        *triangles_at,
-        surface.owners,
-        nearest,
-        slack,
-        queue,
-    )
-    curved = np.flatnonzero(np.isfinite(distance) & (surface.owners[nearest] >= 0))
-    tets, places = surface.owners[nearest[curved]], found[curved]
+    distances, places, hidden = _any_angle(planes, vertices, surface, triangles, slack, Queue.empty(len(points)))
+    curved = np.flatnonzero(np.isfinite(distances) & (owners[triangles] >= 0))
+    tets, places = owners[triangles[curved]], places[curved]
     weights = barycentric(mesh.geometry, tets, places + planes.center)
     gradients = mesh.geometry.mean_gradients(np.nan_to_num(values), unknowns, len(values))[unknowns[tets]]
     slope = np.linalg.norm(np.einsum("pk,pki->pi", weights, gradients), axis=1)
     rise = 0.5 * np.einsum("pk,pki,pki->p", weights, gradients, places[:, None] - points[unknowns[tets]])
     most = LARGEST_BEND * lowered.spacing
     bend = np.clip(rise / np.where(slope > 0, slope, np.inf), -most, most)
-    distance[curved] = np.maximum(distance[curved] + np.copysign(1.0, values[curved]) * bend, 0.0)
-    return Reached(distance, nearest, found, int(hidden))
+    distances[curved] = np.maximum(distances[curved] + np.copysign(1.0, values[curved]) * bend, 0.0)
+    return distances, triangles, hidden
 
 
-def by_element(ids: Ints, n: int, width: int) -> tuple[Ints, Ints]:
-    """Inverse index: where the rows that contain each of n ids begin, and these rows, `width` ids to a row."""
+def _rows_with(ids: Ints, n: int) -> tuple[Ints, Ints]:
+    """Return where the rows that contain each of n ids begin, and these rows."""
     starts, places = grouped(ids.ravel(), n)
-    return starts, places // width
+    return starts, places // ids.shape[1]
+
+
+@compiled
+def _any_angle(
+    planes: Planes, vertices: Vertices, surface: Surface, nearest: Ints, slack: float, queue: Queue
+) -> tuple[Floats, Floats, int]:
+    """Return the distance of each vertex, where its path starts on the surface, and how many do not see that place.
+
+    `nearest`, (n,), holds the triangle nearest to each vertex regardless of visibility, −1 for vertices that have no
+    distance; those that paths start from replace them. Distance is inf where no surface is connected. Lines may lie
+    outside the mesh by `slack`; the `queue` is an empty one of the vertices.
+    """
+    points, tets, _, first_tet, tets_at = vertices
+    n = len(points)
+    distance = np.full(n, np.inf)
+    bend, places = np.full(n, -1), np.zeros((n, 3))
+    known = np.zeros(n, dtype=np.bool_)
+    for v in range(n):
+        if nearest[v] >= 0:
+            x, y, z = points[v]
+            square, _, places[v, 0], places[v, 1], places[v, 2] = foot_on_triangle(surface.rows, nearest[v], x, y, z)
+            if _sees(planes, vertices, v, places[v], slack):
+                distance[v], known[v] = np.sqrt(square), True
+    for i in range(len(surface.rows)):  # a triangle in a tet is visible from the tet's corners, if not nearest to them
+        for k in range(4):
+            v = tets[surface.owners[i], k]
+            if surface.owners[i] >= 0 and not known[v] and nearest[v] >= 0:
+                x, y, z = points[v]
+                square, _, a, b, c = foot_on_triangle(surface.rows, i, x, y, z)
+                if square < distance[v] ** 2:
+                    distance[v], nearest[v] = np.sqrt(square), i
+                    places[v, 0], places[v, 1], places[v, 2] = a, b, c
+                    push(queue, v, distance[v])
+    hidden = 0
+    for v in range(n):
+        if not known[v] and nearest[v] >= 0:
+            hidden += 1
+            for i in range(first_tet[v], first_tet[v + 1]):
+                for k in range(4):
+                    u = tets[tets_at[i], k]
+                    if known[u]:
+                        push(queue, u, distance[u])
+    done = np.zeros(n, dtype=np.bool_)
+    while queue.size[0] > 0:
+        u = pop(queue)
+        done[u] = True
+        for i in range(first_tet[u], first_tet[u + 1]):
+            for k in range(4):
+                v = tets[tets_at[i], k]
+                if known[v] or done[v] or nearest[v] < 0:
+                    continue
+                x, y, z = points[v]
+                if bend[u] >= 0:
+                    via, triangle, place, length = bend[u], nearest[u], places[u], distance[bend[u]]
+                    target = points[via]
+                else:
+                    triangle, place = _nearest_around(surface, nearest[u], x, y, z)
+                    via, length, target = -1, 0.0, place
+                length += _length(target, x, y, z)
+                if length >= distance[v]:
+                    continue
+                if not _sees(planes, vertices, v, target, slack):
+                    via, triangle, place, length = u, nearest[u], places[u], distance[u] + _length(points[u], x, y, z)
+                if length < distance[v]:
+                    distance[v], bend[v], nearest[v] = length, via, triangle
+                    for d in range(3):
+                        places[v, d] = place[d]
+                    push(queue, v, length)
+    return distance, places, hidden
+
+
+@compiled
+def _sees(planes: Planes, vertices: Vertices, v: int, target: Floats, slack: float) -> bool:
+    """Return whether the segment from vertex v to a target in the mesh lies in the mesh."""
+    x, y, z = vertices.points[v]
+    u, w, t = target
+    tet, least = -1, np.inf
+    for i in range(vertices.first_tet[v], vertices.first_tet[v + 1]):  # the tet that the segment starts into
+        worst = -np.inf
+        for k in range(4):
+            if vertices.tets[vertices.tets_at[i], k] != v:
+                worst = max(worst, beyond(planes, vertices.tets_at[i], k, u, w, t))
+        if worst < least:
+            tet, least = vertices.tets_at[i], worst
+    if least > slack:
+        return False
+    return stays_inside(planes, vertices.neighbors, tet, x, y, z, u, w, t, slack)
+
+
+@compiled
+def _nearest_around(surface: Surface, triangle: int, x: float, y: float, z: float) -> tuple[int, Floats]:
+    """Return the triangle nearest to (x, y, z) of those that share a corner with a triangle, and its nearest point."""
+    least, closest, place = np.inf, triangle, np.zeros(3)
+    for c in range(3):
+        corner = surface.corners[triangle, c]
+        for i in range(surface.first_triangle[corner], surface.first_triangle[corner + 1]):
+            square, _, u, v, w = foot_on_triangle(surface.rows, surface.triangles_at[i], x, y, z)
+            if square < least:
+                least, closest = square, surface.triangles_at[i]
+                place[0], place[1], place[2] = u, v, w
+    return closest, place
+
+
+@compiled
+def _length(point: Floats, x: float, y: float, z: float) -> float:
+    return np.sqrt((point[0] - x) ** 2 + (point[1] - y) ** 2 + (point[2] - z) ** 2)

@@ -1,4 +1,4 @@
-"""Shapes in space, lowered to a tet mesh: X₀ of Eq. 12 (Sec. 8.1), and the rows A of Eq. 14 that average φ on them."""
+"""Shapes in space as sources on a tet mesh: X₀ of Eq. 12 (Sec. 8.1), and the rows A of Eq. 14 that average φ."""
 
 from __future__ import annotations
 
@@ -25,61 +25,33 @@ WHOLE = 1 - 1e-6
 
 @dataclass(frozen=True, eq=False)
 class TetSource(Frozen):
-    """Sources lowered to a tet mesh.
+    """Sources on a tet mesh; a patch is all clipped polygons that are nearest to one vertex.
 
-    Attributes
-    ----------
-    vectors : (f, 3) float
-        X₀ at the faces.
-    strengths : (f,) float
-        The scalar source: areas without their normals, as for an unsigned distance.
-    centers : (p, 3) float
-        Centroids of the clipped polygons of the source.
-    time : float
-        t of Eq. 12.
-    interpolation : (s, n) sparse
-        Row i averages φ over patch i of the source: the clipped polygons that are nearest to one vertex. Where the
-        source conforms to faces of the mesh, the patch is the vertex itself.
-    quadratic_correction : (s, 3n) sparse
-        What makes `interpolation` exact for quadratic φ: maps the gradients of φ at the unknowns (x, y, z of each in
-        turn) to its difference from the average of the linear interpolant.
-    weights : (s,) float
-        Area of each patch.
-    components, source_ids : (s,) int
-        Connected component, and source, that each patch belongs to.
-    notes : tuple of Note
-        The parts of the sources that lie outside the mesh.
+    Where a source conforms to faces of the mesh, its patches are the vertices of these faces.
     """
 
-    vectors: Floats
-    strengths: Floats
-    centers: Floats
-    time: float
-    interpolation: sparse.csr_matrix
+    vectors: Floats  # (f, 3) X₀ at the faces
+    strengths: Floats  # (f,) the scalar source: areas without their normals, as for an unsigned distance
+    centers: Floats  # (p, 3) centroids of the clipped polygons
+    time: float  # t of Eq. 12
+    interpolation: sparse.csr_matrix  # (s, n) row i averages φ over patch i
+    # (s, 3n) from the gradients of φ at the unknowns (x, y, z of each in turn) to the difference between the average of
+    # a quadratic φ and that of its linear interpolant
     quadratic_correction: sparse.csr_matrix
-    weights: Floats
+    weights: Floats  # (s,) area of each patch
+    # (s,) connected component, and source, that each patch belongs to
     components: Ints
     source_ids: Ints
-    notes: tuple[Note, ...]
+    notes: tuple[Note, ...]  # the parts of the sources that lie outside the mesh
 
 
 def tet_source(
     mesh: TetMesh, planes: Planes, unknowns: Ints, sources: Sequence[Any], diffusion: float, spacing: float
 ) -> TetSource:
-    """Lower sources to a tet mesh.
+    """Clip sources against a tet mesh; parts outside the mesh are dropped, and noted.
 
-    Parameters
-    ----------
-    mesh : TetMesh
-        The domain.
-    planes : Planes
-        Of its faces.
-    unknowns : (m, 4) int
-        Unknown of φ at each corner of each tet.
-    sources : sequence of TriangleMesh, PolygonMesh or PointCloud
-        What distance is measured to, in any position. Parts outside the mesh are dropped, and noted.
-    diffusion, spacing : float
-        τ and h in ``t = τ max(h, h_source)²``.
+    `unknowns`, (m, 4), holds the unknown of φ at each corner of each tet; `diffusion` and `spacing` are τ and h in
+    ``t = τ max(h, h_source)²``.
     """
     cuts, components, outside, n_components, n_unknowns = [], [], np.zeros(len(sources)), 0, int(unknowns.max()) + 1
     for number, source in enumerate(sources):
@@ -123,12 +95,13 @@ def tet_source(
         quadratic_correction=sparse.vstack(corrections, format="csr"),
         weights=np.concatenate(weights),
         components=np.unique(np.concatenate(members), return_inverse=True)[1],
-        source_ids=np.repeat(np.arange(len(weights)), [len(found) for found in weights]),
+        source_ids=np.repeat(np.arange(len(weights)), [len(areas) for areas in weights]),
         notes=(OutsideMesh(leaving.tolist(), outside[leaving].tolist()),) if len(leaving) else (),
     )
 
 
 def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygons:
+    """Clip triangles against the tets, or find the tets that contain points."""
     if elements.corners.shape[1] == 3:
         polygons = clip_triangles(mesh.geometry, planes, elements.corners)
         sizes = np.linalg.norm(elements.vectors, axis=1)
@@ -141,14 +114,13 @@ def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygo
 
 
 def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> Floats:
-    """(f, 4) X₀ at the faces (Sec. 8.1), and in the last column the scalar source, from areas without their normals.
+    """Return (f, 4) X₀ at the faces (Sec. 8.1), and in the last column the scalar source.
 
     A polygon is distributed to the four faces of its tet in proportion to ψ = 1 − 3λ of the Crouzeix–Raviart basis,
     where that is positive: negative shares would emit waves of the wrong sign. For a polygon in a face of the mesh ψ is
     one there and zero on the other faces, as in the paper. Otherwise the shares are reweighted: a plane wave along the
     normal decays by e^(−r/√t), so a face δ √t in front of the polygon emits e^δ times the correct amplitude forward and
-    e^−δ times backward. Weights that are a mean of e^−δ and e^δ make both amplitudes correct, wherever such a mean
-    exists.
+    e^−δ times backward. Weights that are a mean of e^−δ and e^δ correct both amplitudes, wherever such a mean exists.
     """
     shares = np.maximum(1 - 3 * polygons.barycentric, 0)
     corners = mesh.vertices[mesh.tets[polygons.tets]]
@@ -167,7 +139,7 @@ def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> Floats:
 def _patches(
     mesh: TetMesh, unknowns: Ints, n_unknowns: int, polygons: ClippedPolygons, components: Ints
 ) -> tuple[sparse.csr_matrix, sparse.csr_matrix, Floats, Ints]:
-    """Interpolation rows, quadratic corrections, areas and components of the patches.
+    """Return interpolation rows, quadratic corrections, areas and components of the patches.
 
     One row per clipped polygon would be more constraints than a function that is linear on tets can meet without being
     constant around the source. A quadratic φ, at the point x with barycentric coordinates λ between corners v, is
@@ -184,7 +156,7 @@ def _patches(
     keys = np.concatenate([np.repeat(components[k], 3), components[inside]]) * n_unknowns
     keys += np.concatenate([at_vertices, nearest])
     areas = np.concatenate([np.repeat(polygons.areas[k] / 3, 3), polygons.areas[inside]])
-    found, patch = np.unique(keys, return_inverse=True)
+    patch_keys, patch = np.unique(keys, return_inverse=True)
     weights: Floats = np.bincount(patch, weights=areas).astype(np.float64)
     real = weights > 1e-9 * np.bincount(patch, weights=np.abs(areas))  # drop fan triangles that cancel
     n_on = len(at_vertices)
@@ -192,14 +164,14 @@ def _patches(
     entries = np.concatenate([areas[:n_on], (areas[n_on:, None] * polygons.barycentric[inside]).ravel()])
     index = np.concatenate([patch[:n_on], np.repeat(patch[n_on:], 4)])
     rows = sparse.csr_matrix(
-        (entries / np.where(real, weights, 1)[index], (index, columns)), shape=(len(found), n_unknowns)
+        (entries / np.where(real, weights, 1)[index], (index, columns)), shape=(len(patch_keys), n_unknowns)
     )
     rows.eliminate_zeros()
     away = (_centers(mesh, polygons)[:, None] - mesh.vertices[mesh.tets[polygons.tets]])[inside].reshape(-1, 3)
     steps = (entries / np.where(real, weights, 1)[index])[n_on:, None] * away / 2
     places = np.repeat(index[n_on:], 3), (3 * columns[n_on:, None] + np.arange(3)).ravel()
-    corrections = sparse.csr_matrix((steps.ravel(), places), shape=(len(found), 3 * n_unknowns))
-    return rows[real], corrections[real], weights[real], found[real] // n_unknowns
+    corrections = sparse.csr_matrix((steps.ravel(), places), shape=(len(patch_keys), 3 * n_unknowns))
+    return rows[real], corrections[real], weights[real], patch_keys[real] // n_unknowns
 
 
 def _centers(mesh: TetMesh, polygons: ClippedPolygons) -> Floats:
@@ -207,7 +179,7 @@ def _centers(mesh: TetMesh, polygons: ClippedPolygons) -> Floats:
 
 
 def _on_whole_faces(mesh: TetMesh, polygons: ClippedPolygons, components: Ints) -> Bools:
-    """(p,) polygons that lie in a face of the mesh that their component covers entirely."""
+    """Return (p,) whether each polygon lies in a face of the mesh that its component covers entirely."""
     on = polygons.in_face >= 0
     covered = np.zeros(len(on), dtype=bool)
     if on.any():
