@@ -5,7 +5,7 @@ import pytest
 
 import signedheat as sh
 from shapes import domain_cases as cases
-from signedheat.mesh.ear_clipping import cut_into_ears
+from signedheat.mesh.triangles import cut_into_ears
 from signedheat.surfaces.polygon_mesh import virtual_refinement, virtual_vertices
 
 

@@ -10,8 +10,7 @@ from scipy import sparse
 
 from ..linear import factorize
 from ..mesh.components import connected_components
-from ..mesh.face_pairs import FacePairs, split_corners
-from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, split_corners
 from ..mesh.segment_chains import assemble_polylines
 from ..surfaces.cotan import cotan_matrix, divergence
 from .piecewise_field import PiecewiseField

@@ -22,8 +22,7 @@ from ..foreign import ForeignShape, as_list, converted
 from ..linear import chosen_backend
 from ..memory import refuse_beyond_memory
 from ..mesh.curve_segments import CurveSegments
-from ..mesh.face_pairs import FacePairs, face_pairs
-from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs
 from ..mesh.surface_points import VERTEX, barycentric_in
 from ..method import diffuse, normalize
 from ..progress import Progress, Stopwatch

@@ -16,8 +16,7 @@ from ..errors import GeometryError
 from ..exchange import Displayed
 from ..field_arithmetic import Arithmetic
 from ..frozen import Frozen
-from ..mesh.face_pairs import FacePairs, face_pairs, split_corners
-from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs, split_corners
 from ..mesh.segment_chains import assemble_polylines
 from ..mesh.surface_points import barycentric_in, locate_points
 from ..mesh.triangles import gradients_along

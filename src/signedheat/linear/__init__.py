@@ -1,4 +1,4 @@
-"""Sparse linear solvers: one module per factorisation back end, a function that chooses one, and Krylov methods."""
+"""Sparse linear solvers: one module for each factorisation back end, the choice between them, and Krylov methods."""
 
 from __future__ import annotations
 
@@ -31,25 +31,26 @@ __all__ = [
 
 
 LARGE = 40_000
-"""Unknowns from which PARDISO is worth its size: SuperLU takes 1.3 times its time there, 2.5 times at 160,000."""
+"""Number of unknowns above which MKL is recommended: there SuperLU takes 1.3 times its time, and 2.5 times at
+160,000."""
 HAS_MKL = platform.machine() in ("x86_64", "AMD64") and sys.platform != "darwin"
-"""Whether there is an MKL for this machine."""
+"""Whether MKL exists for this machine."""
 advise: Announcement = Announcement("pip install mkl makes large surfaces and tets up to 2.5 times as fast")
 
 
 class Factor(Protocol):
-    """What solves systems with a Hermitian positive definite matrix."""
+    """A factor that solves systems with a Hermitian positive definite matrix."""
 
     @property
     def n(self) -> int:
         """Number of unknowns."""
 
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
-        """Solution for one right-hand side (n,) or several (n, k)."""
+        """Solve for one right-hand side (n,) or several (n, k)."""
 
 
 def available_backends() -> list[str]:
-    """Names of the back ends available on this machine, fastest first."""
+    """Return the names of the back ends available on this machine, fastest first."""
     return [
         *(["pardiso"] if pardiso.is_available() else []),
         *(["cholmod"] if cholmod.is_available() else []),
@@ -58,7 +59,7 @@ def available_backends() -> list[str]:
 
 
 def chosen_backend(backend: str | None = None) -> str:
-    """The name of the back end that `factorize` takes."""
+    """Return the name of the back end that `factorize` takes."""
     available = available_backends()
     name = backend or os.environ.get("SIGNEDHEAT_BACKEND") or available[0]
     if name not in available:
@@ -75,26 +76,14 @@ def factorize(
     reused: bool = False,
     like: Factor | None = None,
 ) -> Factor:
-    """Factorise a sparse Hermitian positive definite matrix.
+    """Factorise a sparse Hermitian positive definite matrix, float64 or complex128; only its upper triangle is read.
 
-    Parameters
-    ----------
-    matrix : (n, n) sparse, float64 or complex128
-        Only the upper triangle, diagonal included, is read.
-    backend : str, optional
-        One of `available_backends`; by default the environment variable ``SIGNEDHEAT_BACKEND``, or else the best.
-    order : (n,) int, optional
-        Fill-reducing elimination order, if one is known: ``order[k]`` is the unknown eliminated k-th.
-    reused : bool
-        Whether many systems will be solved. PARDISO then finds an order of its own, with which it solves on all cores.
-    like : Factor, optional
-        Of a matrix with entries at the same places: PARDISO then takes half the time or less. The factor that solved
-        last is in memory, the other is made anew when it is to solve.
+    The back end is one of `available_backends`, by default the environment variable ``SIGNEDHEAT_BACKEND``, or else the
+    fastest. A fill-reducing `order` can be given: ``order[k]`` is the unknown eliminated k-th. If many systems will be
+    solved (`reused`), PARDISO finds an order of its own, with which it solves on all cores.
 
-    Returns
-    -------
-    Factor
-        Solves ``matrix @ x = rhs``.
+    For a matrix with entries at the same places as that of the factor `like`, PARDISO takes half the time or less. Then
+    only the factor that solved last is in memory; the other is computed anew when it is to solve.
 
     Examples
     --------

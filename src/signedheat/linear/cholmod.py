@@ -39,7 +39,7 @@ class CholmodFactor:
             raise FactorizationError(f"CHOLMOD failed on {self.n} unknowns: {error}", element="matrix") from error
 
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
-        """Solution for one right-hand side (n,) or several (n, k)."""
+        """Solve for one right-hand side (n,) or several (n, k)."""
         rhs = np.asarray(rhs, dtype=self.dtype)
         if self._order is None:
             return self._factor(rhs)
@@ -54,7 +54,7 @@ class CholmodFactor:
 
 
 def is_available() -> bool:
-    """Whether scikit-sparse is installed, with the interface that its wheels and distributions have had until 0.4."""
+    """Return whether scikit-sparse is installed, with the interface that it has had until version 0.4."""
     if find_spec("sksparse") is None:
         return False
     return hasattr(cholmod, "cholesky")

@@ -24,9 +24,9 @@ def conjugate_gradients(
 
     Preconditioned conjugate gradients (Hestenes & Stiefel 1952; Saad, *Iterative Methods for Sparse Linear Systems*,
     2nd ed., Alg. 9.1). `operator` is A, `precondition` P, about A⁻¹ and positive definite, by default the identity;
-    each column of `rhs`, (n,) or (n, k), is a system of its own. One stops once ``rᵀ P r ≤ tolerance² · max(r₀ᵀ P r₀,
-    bᵀ P b)``, r the residual that the recurrence keeps; once A has no curvature left along the search direction; all of
-    them after `limit` steps, or once `converged` says so, of x and r.
+    each column of `rhs`, (n,) or (n, k), is a system of its own. A column is done once ``rᵀ P r ≤ tolerance² · max(r₀ᵀ
+    P r₀, bᵀ P b)``, r the residual of the recurrence, or once A has no curvature left along the search direction; all
+    columns after `limit` steps, or once ``converged(x, r)``.
 
     Examples
     --------
@@ -61,5 +61,5 @@ def conjugate_gradients(
 
 
 def _products(a: Floats, b: Floats) -> Floats:
-    """(k,) inner products of columns; that of two vectors has no axis."""
+    """Return (k,) inner products of columns, or one number for two vectors."""
     return np.asarray(np.vdot(a, b) if a.ndim == 1 else np.einsum("ij,ij->j", a, b))

@@ -1,6 +1,7 @@
-"""Incomplete Cholesky factors without fill, IC(0), which precondition conjugate gradients.
+"""Incomplete Cholesky factors without fill, IC(0), as preconditioners of conjugate gradients.
 
-For systems too large to factorise. The factor takes as much memory as half the matrix; time per iteration is linear.
+They are for systems too large to factorise: a factor takes as much memory as half the matrix, and the time per
+iteration is linear.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from .conjugate_gradients import conjugate_gradients
 from .ordering import whole
 
 SMALLEST = 1e-290
-"""Unknowns below this have lost bits to underflow, and are left out of the stopping criterion."""
+"""Residual below which a row counts as solved, since underflow has taken its digits."""
 MOST_ITERATIONS = 5000
 
 
@@ -26,10 +27,10 @@ MOST_ITERATIONS = 5000
 class IncompleteCholesky:
     """A symmetric positive definite matrix with its IC(0) factor, in a chosen order of unknowns."""
 
-    order: Ints  # (k,) unknowns to solve for, in this order; the others stay zero
+    order: Ints  # (k,) unknowns to solve for, in this order; all others stay zero
     matrix: sparse.csr_matrix  # (k, k) rows and columns in that order
     factor: sparse.csr_matrix  # (k, k) strictly lower triangle of the factor
-    pivots: Floats  # (k,) its inverse diagonal
+    pivots: Floats  # (k,) inverse diagonal of the factor
     n: int  # number of unknowns, solved for or not
 
     @classmethod
@@ -47,12 +48,12 @@ class IncompleteCholesky:
             shift = max(1e-3, 2 * shift)
 
     def solve(self, rhs: ArrayLike, relative: float = 1e-10, componentwise: float = 0.0) -> Floats:
-        """Solve by conjugate gradients for one right-hand side (n,) or several (n, k), as one block-diagonal system.
+        """Solve for one right-hand side (n,) or several (n, k), by conjugate gradients on all columns at once.
 
-        Conjugate gradients on all columns at once. They stop once ``‖r‖ ≤ relative · ‖b‖``, or once
-        ``|r_i| ≤ componentwise · A_ii |x_i|`` in every row (an entrywise backward error, Oettli & Prager 1964): the
-        second keeps solutions right that fall by hundreds of orders of magnitude. In `order` by distance from where b
-        is not zero, errors travel outward with the solution and shrink with it.
+        They stop once ``‖r‖ ≤ relative · ‖b‖``, or once ``|r_i| ≤ componentwise · A_ii |x_i|`` in every row (an
+        entrywise backward error, Oettli & Prager 1964): the second keeps solutions accurate that fall by hundreds of
+        orders of magnitude. In `order` by distance from where b is not zero, errors travel outward with the solution
+        and shrink with it.
         """
         b = np.asarray(rhs, dtype=np.float64)
         x = np.zeros((self.n, b[0].size))
@@ -85,7 +86,7 @@ class IncompleteCholesky:
 
 
 def outward_order(matrix: sparse.csr_matrix, seeds: Ints) -> Ints:
-    """The unknowns that are connected to the seeds in the graph of the matrix, in order of distance from them."""
+    """Return the unknowns connected to the seeds in the graph of a matrix, in order of distance from them."""
     n = matrix.shape[0]
     links = sparse.csr_matrix((np.ones(len(seeds)), (np.full(len(seeds), n), seeds)), shape=(n + 1, n + 1))
     graph = sparse.csr_matrix((matrix.data != 0, matrix.indices, matrix.indptr), shape=matrix.shape)
@@ -95,7 +96,7 @@ def outward_order(matrix: sparse.csr_matrix, seeds: Ints) -> Ints:
 
 
 def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
-    """What solves a system given by its upper triangle: unknowns in the order of its own graph, from the first on."""
+    """Factorise a system given by its upper triangle, with unknowns by distance from the first of each component."""
     full = whole(upper)
     _, first = np.unique(sparse.csgraph.connected_components(full, directed=False)[1], return_index=True)
     return IncompleteCholesky.of(full, outward_order(full, first))
@@ -103,7 +104,7 @@ def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
 
 @compiled
 def _factorize(indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Floats, pivots: Floats) -> bool:
-    """IC(0) in place; `pivots` becomes the inverse diagonal. Returns False if a pivot is not clearly positive."""
+    """Compute IC(0) in place; `pivots` becomes its inverse diagonal. Return whether all pivots are positive."""
     for i in range(len(pivots)):
         own = pivots[i]
         rest = own
@@ -133,7 +134,7 @@ def _factorize(indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Fl
 def _precondition(
     indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Floats, pivots: Floats, r: Floats
 ) -> Floats:
-    """z = (L Lᵀ)⁻¹ r, row by row down and up."""
+    """Return z = (L Lᵀ)⁻¹ r, row by row down and up."""
     n, width = r.shape
     z = np.empty((n, width))
     for i in range(n):
@@ -155,7 +156,7 @@ def _precondition(
 
 @compiled
 def _settled(diagonal: Floats, x: Floats, r: Floats, componentwise: float) -> bool:
-    """Whether every row's residual is small compared with its own unknowns."""
+    """Return whether every row's residual is small compared with its own unknowns."""
     n, width = x.shape
     for i in range(n):
         largest, residual = 0.0, 0.0

@@ -11,15 +11,16 @@ from scipy import sparse
 from ..arrays import Ints
 from ..compiled import compiled
 
-_LEAF = 3  # regions of so many unknowns are not dissected further
+LEAF = 3
+"""Largest number of unknowns of a region that is not dissected further."""
 
 
 def elimination_order(upper: Any) -> Ints:
-    """Nested dissection of a sparse symmetric matrix, from its upper triangle: ``order[k]`` is eliminated k-th.
+    """Order the unknowns of a sparse symmetric matrix, given its upper triangle, by nested dissection.
 
-    On surfaces the fill is that of METIS on even meshes, up to twice as much on very uneven ones, in a fifth of the
-    time; the time is n log n times the number of levels of a breadth-first search. For unknowns in a volume METIS,
-    which PARDISO runs by itself, is better.
+    ``order[k]`` is eliminated k-th. On surfaces the fill is that of METIS on even meshes, up to twice as much on very
+    uneven ones, in a fifth of the time; the time is n log n times the number of levels of a breadth-first search. For
+    unknowns in a volume METIS, which PARDISO runs by itself, is better.
 
     Examples
     --------
@@ -29,12 +30,12 @@ def elimination_order(upper: Any) -> Ints:
     True
     """
     graph = whole(upper)
-    return dissect(graph.indptr, graph.indices, _LEAF)
+    return _dissect(graph.indptr, graph.indices)
 
 
 @compiled
-def dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32], leaf: int) -> Ints:
-    """Elimination order: both sides of a small separator, each ordered in the same way, then the separator.
+def _dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32]) -> Ints:
+    """Order both sides of a small separator, each in the same way, then the separator.
 
     A separator is the smallest level near the middle of a breadth-first search from the end of a long path, without the
     unknowns that have no neighbour in the level after it (George 1973). `order` is partitioned in place; a region is a
@@ -49,15 +50,15 @@ def dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32], leaf: int) 
     regions = 1
     while len(stack) > 0:
         begin, end = stack.pop()
-        if end - begin <= leaf:
+        if end - begin <= LEAF:
             continue
-        here = region[order[begin]]
+        current = region[order[begin]]
         seed = order[begin]
         depth, reached = -1, 0
         while True:
             for p in range(begin, end):
                 level[order[p]] = -1
-            reached = _levels(starts, neighbors, region, here, seed, level, queue, 0)
+            reached = _levels(starts, neighbors, region, current, seed, level, queue, 0)
             last = level[queue[reached - 1]]
             if last <= depth or reached < end - begin:
                 break
@@ -72,7 +73,7 @@ def dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32], leaf: int) 
                     stack.append((begin + first, begin + reached))
                     first = reached
                 if p < end and level[order[p]] < 0:
-                    reached = _levels(starts, neighbors, region, here, order[p], level, queue, first)
+                    reached = _levels(starts, neighbors, region, current, order[p], level, queue, first)
             for p in range(begin, end):
                 order[p] = queue[p - begin]
             continue
@@ -86,7 +87,7 @@ def dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32], leaf: int) 
                 touches = False
                 for q in range(starts[i], starts[i + 1]):
                     j = neighbors[q]
-                    if region[j] == here and level[j] == cut + 1:
+                    if region[j] == current and level[j] == cut + 1:
                         touches = True
                         break
                 if not touches:
@@ -122,13 +123,13 @@ def _levels(
     starts: NDArray[np.int32],
     neighbors: NDArray[np.int32],
     region: Ints,
-    here: int,
+    current: int,
     seed: int,
     level: Ints,
     queue: Ints,
     begin: int,
 ) -> int:
-    """Breadth-first search within a region, into the queue from `begin` on; returns the end of the queue."""
+    """Search a region breadth first, into the queue from `begin` on; return the end of the queue."""
     level[seed] = 0
     queue[begin] = seed
     head, tail = begin, begin + 1
@@ -137,7 +138,7 @@ def _levels(
         head += 1
         for q in range(starts[i], starts[i + 1]):
             j = neighbors[q]
-            if region[j] == here and level[j] < 0:
+            if region[j] == current and level[j] < 0:
                 level[j] = level[i] + 1
                 queue[tail] = j
                 tail += 1
@@ -146,7 +147,7 @@ def _levels(
 
 @compiled
 def _thinnest(level: Ints, queue: Ints, reached: int, last: int) -> int:
-    """The smallest level that leaves at least 40 % of the unknowns on either side, or the median level."""
+    """Return the smallest level that leaves at least 40 % of the unknowns on either side, or the median level."""
     best, size, median = -1, reached, level[queue[reached // 2]]
     p = 0
     while p < reached:
@@ -162,7 +163,7 @@ def _thinnest(level: Ints, queue: Ints, reached: int, last: int) -> int:
 
 
 def upper_triangle(matrix: Any) -> sparse.csr_matrix:
-    """Upper triangle, diagonal included, as sorted CSR, from a whole Hermitian matrix or its upper triangle."""
+    """Return the upper triangle, diagonal included, as sorted CSR, of a Hermitian matrix or its upper triangle."""
     if sparse.issparse(matrix) and matrix.format == "csr" and _is_upper(matrix):
         return matrix
     upper = sparse.triu(matrix, format="csr")
@@ -176,12 +177,12 @@ def upper_triangle(matrix: Any) -> sparse.csr_matrix:
 
 
 def whole(upper: sparse.csr_matrix) -> sparse.csr_matrix:
-    """The whole Hermitian matrix from its upper triangle."""
+    """Return the whole Hermitian matrix, given its upper triangle."""
     return sparse.csr_matrix(upper + sparse.triu(upper, 1).conj().T)
 
 
 def _is_upper(matrix: sparse.csr_matrix) -> bool:
-    """Whether every row starts with its diagonal entry and has strictly increasing columns."""
+    """Return whether every row starts with its diagonal entry and has strictly increasing columns."""
     starts = matrix.indptr[:-1]
     if (np.diff(matrix.indptr) == 0).any() or (matrix.indices[starts] != np.arange(matrix.shape[0])).any():
         return False

@@ -30,9 +30,9 @@ _CAUSES = {
 
 
 class PardisoFactor:
-    """Cholesky factor of a Hermitian positive definite matrix, from its `upper_triangle`; memory goes with the object.
+    """Cholesky factor of a Hermitian positive definite matrix, from its `upper_triangle`; its memory is freed with it.
 
-    ``order[k]`` is the unknown eliminated k-th; without it, METIS finds an order.
+    ``order[k]`` is the unknown eliminated k-th; without an order, METIS finds one.
     """
 
     backend = "pardiso"
@@ -41,6 +41,7 @@ class PardisoFactor:
         self._take(_Analysis(upper, order), upper)
 
     def _take(self, analysis: _Analysis, upper: sparse.csr_matrix) -> None:
+        """Factorise in the memory of an analysis."""
         self.n: int = upper.shape[0]
         self.dtype: np.dtype[Any] = upper.dtype
         self._analysis, self._values = analysis, upper.data
@@ -48,21 +49,19 @@ class PardisoFactor:
             analysis.factorize(self._values)
 
     def like_this(self, upper: sparse.csr_matrix) -> PardisoFactor | None:
-        """Factor of another matrix with entries at the same places, for half the time; None if they are not.
+        """Factorise another matrix with entries at the same places, for half the time; None if they are elsewhere.
 
-        It takes the memory of this one, which is factorised again when it is to solve.
+        The new factor takes the memory of this one, which is factorised again when it is to solve.
         """
-        if not self._analysis.fits(upper) or not _makes_factors_anew():
-            return None
-        return self._again(upper)
+        return self._again(upper) if self._analysis.fits(upper) and _makes_factors_anew() else None
 
     def _again(self, upper: sparse.csr_matrix) -> PardisoFactor:
-        other = object.__new__(PardisoFactor)
-        other._take(self._analysis, upper)
-        return other
+        factor = object.__new__(PardisoFactor)
+        factor._take(self._analysis, upper)
+        return factor
 
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
-        """Solution for one right-hand side (n,) or several (n, k)."""
+        """Solve for one right-hand side (n,) or several (n, k)."""
         columns = np.asfortranarray(rhs, dtype=self.dtype)
         solution = np.empty_like(columns, order="F")
         with self._analysis.lock:
@@ -83,7 +82,7 @@ class PardisoFactor:
 
 
 class _Analysis:
-    """What factors of matrices with entries at the same places share: the order, and memory for one of them."""
+    """The order and the memory of one factor, which matrices with entries at the same places share."""
 
     def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None) -> None:
         self.call = _Call(upper, order)
@@ -93,7 +92,7 @@ class _Analysis:
         self.call(_ANALYZE)
 
     def factorize(self, values: NDArray[Any]) -> None:
-        """Make the factor of the matrix with these values, unless it is there."""
+        """Factorise the matrix with these values, unless that was done last."""
         if self._made is values:
             return
         self._made, self.call.values = None, values
@@ -101,7 +100,7 @@ class _Analysis:
         self._made = values
 
     def fits(self, upper: sparse.csr_matrix) -> bool:
-        """Whether a matrix has its entries at the places of the others."""
+        """Return whether a matrix has entries at the same places."""
         call = self.call
         same = upper.dtype == call.values.dtype and len(upper.data) == len(call.values)
         return bool(same and np.array_equal(upper.indptr, call.indptr) and np.array_equal(upper.indices, call.indices))
@@ -169,32 +168,32 @@ def _address(array: NDArray[Any]) -> ctypes.c_void_p:
 
 @cache
 def _library() -> ctypes.CDLL:
-    """The library ``mkl_rt``, from the wheel, the prefix of the environment, or the system."""
+    """Load ``mkl_rt`` from the wheel, the prefix of the environment, or the system."""
     names = {"win32": "mkl_rt*.dll", "darwin": "libmkl_rt*.dylib"}.get(sys.platform, "libmkl_rt.so*")
     try:
         installed = [Path(f.locate()) for f in importlib.metadata.files("mkl") or [] if f.match(names)]
     except importlib.metadata.PackageNotFoundError:
         installed = []
     prefix = Path(sys.prefix) / ("Library/bin" if sys.platform == "win32" else "lib")
-    found = ctypes.util.find_library("mkl_rt")
-    for path in [*installed, *sorted(prefix.glob(names)), *([found] if found else [])]:
+    system = ctypes.util.find_library("mkl_rt")
+    for path in [*installed, *sorted(prefix.glob(names)), *([system] if system else [])]:
         try:
             return ctypes.CDLL(str(path))
         except OSError:
             continue
-    raise ImportError("the library mkl_rt was not found: install the package mkl")
+    raise ImportError("the library mkl_rt was not system: install the package mkl")
 
 
 @cache
 def _makes_factors_anew() -> bool:
-    """Whether the library can: before 2026.2 a factor in two levels stays that of the first matrix, in silence."""
+    """Return whether the library can: before 2026.2 two-level factors silently stay those of the first matrix."""
     one, two = (sparse.csr_matrix(np.array([[diagonal]])) for diagonal in (1.0, 2.0))
     half = PardisoFactor(one)._again(two).solve(np.ones(1))[0]
     return bool(abs(half - 0.5) < 0.25)  # some processors round it
 
 
 def is_available() -> bool:
-    """Whether the MKL library can be loaded."""
+    """Return whether the MKL library can be loaded."""
     try:
         _library()
     except ImportError:

@@ -1,4 +1,4 @@
-"""Solutions that fall out of the range of floating-point numbers: underflow-safe restarts."""
+"""Solutions that leave the range of floating-point numbers: restarts that are safe from underflow."""
 
 from __future__ import annotations
 
@@ -12,26 +12,28 @@ from scipy import sparse
 from ..arrays import Bools, Floats
 
 FAINT = 2.0**-900
-"""Rows below this fraction of the largest are computed anew: what underflows on the way to them may be missing."""
+"""Size of rows, relative to the largest, below which they are computed anew: terms may have underflowed on the way
+there."""
 Solve = Callable[[NDArray[Any]], NDArray[Any]]
-"""From right-hand sides (n, k) or (n,), the solutions."""
+"""From right-hand sides (n, k) or (n,) to the solutions."""
 Forces = Callable[[NDArray[Any], Bools], tuple[Bools, NDArray[Any]]]
-"""From x, zero but on the faint rows, and these: (n,) rows that couple faint ones to others, and A x there."""
+"""From x, zero except on the faint rows, and these rows, to (n,) the rows that couple faint rows to others, and A x
+there."""
 
 
 class Stage(NamedTuple):
-    """Part of a solution: ``values · exp(logarithm)``."""
+    """A part of a solution: ``values · exp(logarithm)``."""
 
-    values: NDArray[Any]  # (n, k) or (n,), NaN on rows that an earlier stage knows well
-    logarithm: float  # natural logarithm of the factor that belongs to them
+    values: NDArray[Any]  # (n, k) or (n,), NaN on rows that an earlier stage has
+    logarithm: float  # natural logarithm of the factor
 
 
 def solve_with_restarts(solve: Solve, border_forces: Forces, loads: NDArray[Any], size: float = 1.0) -> list[Stage]:
-    """Solve ``A x = loads`` for columns that decay exponentially away from where the loads are.
+    """Solve ``A x = loads`` for columns that decay exponentially away from the loads; return the stages of x.
 
-    `border_forces` is what couples the faint rows to the others: `matrix_forces` makes it from A. Loads are scaled to
-    `size`, about that of A's diagonal, so that the largest x is about one. Each stage covers what the ones before it
-    are too small on.
+    `border_forces` couples faint rows to the others: `matrix_forces` makes it from A. Loads are scaled to `size`, about
+    that of A's diagonal, so that the largest x is about one. Each stage covers the rows on which those before are too
+    small.
 
     Examples
     --------
@@ -46,7 +48,7 @@ def solve_with_restarts(solve: Solve, border_forces: Forces, loads: NDArray[Any]
 
 
 def restart(solve: Solve, border_forces: Forces, loads: NDArray[Any], first: Stage, size: float = 1.0) -> list[Stage]:
-    """All stages of a solution, from the first one on; `loads` are scaled as they were for the first.
+    """Return all stages of a solution, given the first one; `loads` are scaled as they were for the first.
 
     On the faint rows x satisfies the same equation with a right-hand side along their border, where x is still
     accurate. Scaled up, that is the next right-hand side for the same solver, so the result is exact.
@@ -69,7 +71,7 @@ def restart(solve: Solve, border_forces: Forces, loads: NDArray[Any], first: Sta
 
 
 def scaled(loads: NDArray[Any], size: float) -> tuple[NDArray[Any], float]:
-    """Loads times a power of two, so that the largest is about `size`; and the logarithm of what undoes it."""
+    """Return loads times a power of two that makes the largest about `size`, and the logarithm of its inverse."""
     largest = float(largest_components(loads).max(initial=0.0))
     if largest == 0.0:
         return loads, 0.0
@@ -79,7 +81,7 @@ def scaled(loads: NDArray[Any], size: float) -> tuple[NDArray[Any], float]:
 
 
 def matrix_forces(matrix: sparse.csr_matrix) -> Forces:
-    """The forces at the border of faint rows, from the whole matrix A."""
+    """Return the function that computes forces at the border of faint rows, from the whole matrix A."""
     pattern = sparse.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
 
     def border_forces(values: NDArray[Any], faint: Bools) -> tuple[Bools, NDArray[Any]]:
@@ -90,7 +92,7 @@ def matrix_forces(matrix: sparse.csr_matrix) -> Forces:
 
 
 def largest_components(values: NDArray[Any]) -> Floats:
-    """(n,) largest real or imaginary part in each row: squares would underflow."""
+    """Return (n,) the largest real or imaginary part in each row: squares would underflow."""
     parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
     sizes = np.zeros(len(values))
     for part in parts:
@@ -100,5 +102,5 @@ def largest_components(values: NDArray[Any]) -> Floats:
 
 
 def _rows(chosen: Bools, values: NDArray[Any]) -> Bools:
-    """The same choice for every column."""
+    """Reshape a choice of rows so that it applies to every column."""
     return chosen.reshape(-1, *[1] * (values.ndim - 1))

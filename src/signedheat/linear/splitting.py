@@ -9,20 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 RELAXATION = 1.6
-"""Over-relaxation of K x; from 1.5 to 1.8 rounds are fewest."""
+"""Over-relaxation of K x; from 1.5 to 1.8 the rounds are fewest."""
 Map = Callable[[NDArray[Any]], NDArray[Any]]
 
 
 class Round(NamedTuple):
     """The state after one round."""
 
-    # x, and K x
-    solution: NDArray[Any]
-    image: NDArray[Any]
-    # z, and z in the round before
-    split: NDArray[Any]
-    before: NDArray[Any]
-    scaled_dual: NDArray[Any]  # multipliers over the penalty. The next round sees what is changed in place.
+    solution: NDArray[Any]  # x
+    image: NDArray[Any]  # K x
+    split: NDArray[Any]  # z
+    before: NDArray[Any]  # z in the round before
+    scaled_dual: NDArray[Any]  # multipliers over the penalty; the next round uses it as changed in place
 
 
 def split_rounds(
@@ -30,7 +28,7 @@ def split_rounds(
 ) -> Iterator[Round]:
     """Iterate from K x and z, without end.
 
-    `proximal` makes the next z of K x plus the scaled dual, `solve` the x nearest to z minus the scaled dual.
+    `proximal` makes the next z from K x plus the scaled dual, `solve` the x nearest to z minus the scaled dual.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """SciPy's SuperLU, available on every platform.
 
-With nested dissection and one BLAS thread it takes as much CPU time as PARDISO at 100 000 unknowns, 2.5 times as much
-at 500 000; PARDISO also uses all cores.
+With nested dissection and one BLAS thread it takes as much CPU time as PARDISO at 100 000 unknowns, and 2.5 times as
+much at 500 000; PARDISO also uses all cores.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class SuperLUFactor:
             )
 
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
-        """Solution for one right-hand side (n,) or several (n, k)."""
+        """Solve for one right-hand side (n,) or several (n, k)."""
         rhs = np.asarray(rhs, dtype=self.dtype)
         solution = np.empty_like(rhs)
         solution[self._order] = self._factor.solve(rhs[self._order])

@@ -1,8 +1,8 @@
-"""Triangles divided where others pass through them or lie in their planes, so that all meet in whole edges.
+"""Division of triangles where others pass through them or lie in their planes, so that all meet in whole edges.
 
-Where faces meet there are points that belong to both: an edge and a face have one, two edges that touch, and three
-faces. All that is nearer than rounding is one point, and pieces are made from these points alone, so that they have
-whole edges in common, whatever rounding does, and what was closed still is. Time grows with the number of these points.
+Faces that meet have points in common: an edge and a face have one, two edges that touch, and three faces. Points nearer
+than rounding are one point, and pieces are made from these points alone, so that they share whole edges, whatever
+rounding does, and what was closed stays closed. The time grows with the number of these points.
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ from .triangles import face_areas
 from .welding import distinct_rows, welded
 
 TOUCHING = 1e-8
-"""Distance, over the size of a shape, up to which what is near is one: what its coordinates are rounded to."""
+"""Distance, relative to the size of a shape, below which points are one, since coordinates are rounded."""
 STRAIGHT = 4.0
-"""Distance, over that up to which points are one, up to which points that two faces have in common are on a line."""
+"""Distance from a line within which common points of two faces lie on it, relative to that below which points are
+one."""
 PARALLEL = 1e-9
 """Sine of the angle between edges below which they are parallel."""
 ALIKE = 1e-4
-"""Difference in area and middle, over their size, up to which cells with one outline cover each other."""
+"""Relative difference in area and centroid up to which cells with one outline cover each other."""
 ON_EDGE, IN_FACE, EDGES, EDGE_AND_FACE = range(4)
-"""What is met: a vertex is on an edge or in a face, two edges touch, or an edge passes through a face."""
+"""Kinds of meetings: a vertex lies on an edge or in a face, two edges touch, or an edge passes through a face."""
 
 
 class Arrangement(NamedTuple):
@@ -43,14 +44,14 @@ class Arrangement(NamedTuple):
 
 
 class Incidence(NamedTuple):
-    """Points that lie on lines or faces: numbers of both, each pair once, in order."""
+    """Points that lie on lines or faces, as pairs of owner and point: each once, in order."""
 
     owners: Ints
     points: Ints
 
     @classmethod
     def of(cls, *pairs: tuple[Ints, Ints]) -> Incidence:
-        """The pairs of several lists."""
+        """Merge several lists of pairs."""
         owners, points = (np.concatenate(column).astype(np.int64) for column in zip(*pairs, strict=True))
         order = np.lexsort((points, owners))
         owners, points = owners[order], points[order]
@@ -58,20 +59,21 @@ class Incidence(NamedTuple):
         return cls(owners[new], points[new])
 
     def starts(self, n: int) -> Ints:
-        """(n + 1,) where the points of each of n owners begin."""
+        """Return (n + 1,) where the points of each of n owners begin."""
         return np.searchsorted(self.owners, np.arange(n + 1))
 
     def without(self, *others: tuple[Ints, Ints]) -> Incidence:
-        """The pairs that are in none of several lists."""
+        """Return the pairs that are in none of several lists."""
         owners, points = (np.concatenate(column) for column in zip(*others, strict=True))
-        return self.select(~_are_among((self.owners, self.points), (owners, points)))
+        shift = 1 + max(int(self.points.max(initial=0)), int(points.max(initial=0)))
+        return self.select(~np.isin(self.owners * shift + self.points, owners * shift + points))
 
     def select(self, chosen: Bools) -> Incidence:
-        """Some of the pairs."""
+        """Return the chosen pairs."""
         return Incidence(self.owners[chosen], self.points[chosen])
 
     def along(self, points: Floats, ends: Ints) -> Incidence:
-        """The points of lines in order from the first end of each to the other."""
+        """Return the points of each line in order from its first end to the other."""
         tails, heads = points[ends[self.owners, 0]], points[ends[self.owners, 1]]
         ahead = ((points[self.points] - tails) * (heads - tails)).sum(axis=1)
         order = np.lexsort((ahead, self.owners))
@@ -79,7 +81,7 @@ class Incidence(NamedTuple):
 
 
 def meeting_faces(points: Floats, faces: Ints) -> Ints:
-    """(k, 2) pairs of faces that cross, cover each other in one plane, or touch without a vertex in common."""
+    """Return (k, 2) pairs of faces that cross, cover each other in one plane, or touch without a common vertex."""
     slack = TOUCHING * float(np.ptp(points, axis=0).max())
     return overlapping_faces(points, faces, slack, -slack)
 
@@ -87,8 +89,8 @@ def meeting_faces(points: Floats, faces: Ints) -> Ints:
 def arranged(points: Floats, faces: Ints, pairs: Ints | None = None) -> Arrangement:
     """Divide faces where pairs of them, (k, 2), meet, and where edges that do not cancel end on others.
 
-    Points nearer than rounding are one, those that are this near to edges and faces lie on them, and triangles that are
-    thinner are left out. What has no part in any of this stays as it is. By default all faces that meet are divided.
+    By default all faces that meet are divided. Points nearer than rounding become one, points this near to an edge or
+    face lie on it, thinner triangles are left out, and all other faces stay as they are.
 
     Examples
     --------
@@ -110,8 +112,9 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None) -> Arrangem
     table = edge_table(faces)
     on_open = _on_open_edges(points, table, slack)
 
-    kinds, owners, others, places = _meet(points, faces, table.vertices, table.face_edges, pairs, slack)
-    points, ids = _with_new(points, np.stack([kinds, owners, others], axis=1), places, kinds >= EDGES, others)
+    meetings, places = _meet(points, faces, table.vertices, table.face_edges, pairs, slack)
+    kinds, owners, others = meetings.T
+    points, ids = _with_new(points, meetings, places, kinds >= EDGES, others)
     on_edge, edges, pierced, in_face = kinds == ON_EDGE, kinds == EDGES, kinds == EDGE_AND_FACE, kinds == IN_FACE
     along = on_edge | edges | pierced
     lines = Lines(
@@ -126,15 +129,15 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None) -> Arrangem
 
 
 class Lines(NamedTuple):
-    """Edges, and after them segments along which two faces meet."""
+    """Edges of faces, followed by the segments along which two faces meet."""
 
     ends: Ints  # (l, 2) points at which each line begins and ends
-    on: Incidence  # points on lines, but for their ends
-    within: Incidence  # points in faces, beside those on their edges
+    on: Incidence  # points on lines, without their ends
+    within: Incidence  # points in faces, without those on their edges
     sides: Ints = np.zeros((0, 2), dtype=np.int64)  # (s, 2) the two faces of each segment
 
     def renamed(self, rename: Ints) -> Lines:
-        """With points that have become one."""
+        """Replace points by those that they have become one with."""
         ends = rename[self.ends]
         on = Incidence.of((self.on.owners, rename[self.on.points]))
         on = on.select((on.points[:, None] != ends[on.owners]).all(axis=1))
@@ -142,13 +145,13 @@ class Lines(NamedTuple):
 
 
 def _heights(corners: Floats) -> Floats:
-    """(m,) of triangles above their longest sides."""
+    """Return (m,) heights of triangles above their longest sides."""
     sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
     return 2.0 * face_areas(corners) / np.maximum(sides, 1e-300)
 
 
 def _welded(points: Floats, chosen: Ints, slack: float) -> Ints:
-    """(n,) the first of the chosen points that each of them is one with; all others stay."""
+    """Return (n,) the first of the chosen points at the place of each of them; all other points stay."""
     rename = np.arange(len(points))
     chosen = np.unique(chosen)
     rename[chosen] = chosen[welded(points[chosen], slack)]
@@ -156,28 +159,15 @@ def _welded(points: Floats, chosen: Ints, slack: float) -> Ints:
 
 
 def _with_new(points: Floats, names: Ints, places: Floats, new: Bools, ids: Ints) -> tuple[Floats, Ints]:
-    """Points, with one for each different name that is new, and the number of the point of each name."""
+    """Append one point for each different name among the new ones; return all, and the point of each name."""
     numbers, first = distinct_rows(names[new])
     ids = ids.copy()
     ids[new] = len(points) + numbers
     return np.concatenate([points, places[new][first]]), ids
 
 
-def _are_among(pairs: tuple[Ints, Ints], others: tuple[Ints, Ints]) -> Bools:
-    """(n,) whether pairs of numbers are among others."""
-    shift = 1 + max(int(pairs[1].max(initial=0)), int(others[1].max(initial=0)))
-    return np.isin(pairs[0] * shift + pairs[1], others[0] * shift + others[1])
-
-
-def _listed(starts: Ints, rows: Ints) -> tuple[Ints, Ints]:
-    """For lists that begin somewhere: which of the rows each member is of, and its place."""
-    counts = starts[rows + 1] - starts[rows]
-    owners = np.repeat(np.arange(len(rows)), counts)
-    return owners, np.arange(len(owners)) + np.repeat(starts[rows] - np.cumsum(counts) + counts, counts)
-
-
 def _on_open_edges(points: Floats, table: EdgeTable, slack: float) -> tuple[Ints, Ints]:
-    """Edges that do not cancel, and ends of others that lie on them."""
+    """Return edges that do not cancel, and ends of others that lie on them."""
     edges = np.flatnonzero(table.balance != 0)
     if not len(edges):
         return edges, edges
@@ -195,16 +185,13 @@ def _on_open_edges(points: Floats, table: EdgeTable, slack: float) -> tuple[Ints
 
 
 def _members(faces: Ints, table: EdgeTable, lines: Lines, chosen: Ints) -> Incidence:
-    """All points of chosen faces: corners, those on edges and those within."""
-    starts = lines.on.starts(len(lines.ends))
-    owners, places = _listed(starts, table.face_edges[chosen].ravel())
-    return Incidence.of(
-        (np.repeat(chosen, 3), faces[chosen].ravel()), (chosen[owners // 3], lines.on.points[places]), lines.within
-    )
+    """Return all points of chosen faces: corners, those on edges and those within."""
+    sides, points = members_of(lines.on.starts(len(lines.ends)), lines.on.points, table.face_edges[chosen].ravel())
+    return Incidence.of((np.repeat(chosen, 3), faces[chosen].ravel()), (chosen[sides // 3], points), lines.within)
 
 
 class Records(NamedTuple):
-    """Parts of lines that lie in faces: the face, the line, and the points between which it does, (r,) each."""
+    """Parts of lines that lie in faces, (r,) each: the face, the line, and the two points between which it does."""
 
     faces: Ints
     lines: Ints
@@ -217,7 +204,7 @@ def _with_segments(
 ) -> tuple[Lines, Records]:
     """Add the segments along which pairs of faces meet, from the points that they have in common."""
     members = _members(faces, table, lines, np.unique(pairs))
-    found, sides = _segments(
+    rows, sides = _segments(
         points,
         members.starts(len(faces)),
         members.points,
@@ -228,10 +215,10 @@ def _with_segments(
         pairs,
         STRAIGHT * slack,
     )
-    own = found[:, 1] >= len(lines.ends)
+    own = rows[:, 1] >= len(lines.ends)
     ends = np.zeros((len(sides), 2), dtype=np.int64)
-    ends[found[own, 1] - len(lines.ends)] = found[own, 2:]
-    return lines._replace(ends=np.concatenate([lines.ends, ends]), sides=sides), Records(*found.T)
+    ends[rows[own, 1] - len(lines.ends)] = rows[own, 2:]
+    return lines._replace(ends=np.concatenate([lines.ends, ends]), sides=sides), Records(*rows.T)
 
 
 def _with_crossings(
@@ -295,7 +282,7 @@ def _divided(
         return Arrangement(points, faces, origins, np.arange(len(faces)))
     # points on rims, in order
     edges, forward = table.face_edges[chosen].ravel(), table.forward[chosen].ravel()
-    side, place = _listed(starts, edges)
+    side, place = members_of(starts, np.arange(starts[-1]), edges)
     backwards = ~forward[side]
     place = np.where(backwards, starts[edges[side]] + starts[edges[side] + 1] - 1 - place, place)
     last = np.append(side[1:] != side[:-1], True)
@@ -360,8 +347,8 @@ def _with_copies_alike(pieces: Arrangement) -> Arrangement:
     sums, counts = np.zeros(n, dtype=np.uint64), np.bincount(owners, minlength=n)
     np.add.at(sums, owners, codes[edges])
     forward = np.zeros(n, dtype=bool)
-    some = np.flatnonzero(counts)
-    forward[some] = table.forward.ravel()[outline[np.searchsorted(owners, some)]]
+    with_outline = np.flatnonzero(counts)
+    forward[with_outline] = table.forward.ravel()[outline[np.searchsorted(owners, with_outline)]]
     alone = np.where(counts > 0, -1, np.arange(n))
     kinds, first = distinct_rows(np.stack([sums.view(np.int64), counts, alone], axis=1))
     models = first[kinds]
@@ -373,20 +360,20 @@ def _with_copies_alike(pieces: Arrangement) -> Arrangement:
     covers = (models != np.arange(n)) & (np.abs(totals - totals[models]) <= ALIKE * totals)
     covers &= np.linalg.norm(middles - middles[models], axis=1) <= ALIKE * np.sqrt(totals)
     copies = np.flatnonzero(covers)
-    own = np.empty(n, dtype=np.int64)
-    own[cells] = origins
+    origin_of = np.empty(n, dtype=np.int64)
+    origin_of[cells] = origins
     which, members = members_of(*grouped(cells, n), models[copies])
     reverse = (forward[copies] != forward[models[copies]])[which]
     kept = ~covers[cells]
     faces = np.concatenate([faces[kept], np.where(reverse[:, None], faces[members, ::-1], faces[members])])
     cells = np.concatenate([cells[kept], copies[which]])
-    order = np.argsort(own[cells], kind="stable")
-    return Arrangement(points, faces[order], own[cells[order]], cells[order])
+    order = np.argsort(origin_of[cells], kind="stable")
+    return Arrangement(points, faces[order], origin_of[cells[order]], cells[order])
 
 
 @compiled
 def _is_on(points: Floats, v: int, a: int, b: int, slack: float) -> bool:
-    """Whether a point lies on an edge, between its ends."""
+    """Return whether a point lies on an edge, between its ends."""
     square, ahead = 0.0, 0.0
     for d in range(3):
         way = points[b, d] - points[a, d]
@@ -402,7 +389,7 @@ def _is_on(points: Floats, v: int, a: int, b: int, slack: float) -> bool:
 
 @compiled
 def _closest(points: Floats, a: int, b: int, c: int, d: int, place: Floats) -> float:
-    """Distance between two edges where they pass each other, and the place there; infinity if they do not."""
+    """Return the distance of two edges where they pass each other, and write the place; infinity if they do not."""
     u, v, w = points[b] - points[a], points[d] - points[c], points[c] - points[a]
     n, square, s, t = np.empty(3), 0.0, 0.0, 0.0
     for k in range(3):
@@ -435,7 +422,7 @@ def _normal(points: Floats, face: Ints) -> Floats:
 
 @compiled
 def _is_over(points: Floats, x: Floats, face: Ints, n: Floats) -> bool:
-    """Whether a place lies over a face, within its edges."""
+    """Return whether a place lies over a face, within its edges."""
     for k in range(3):
         a, b = face[k], face[(k + 1) % 3]
         turn = 0.0
@@ -451,46 +438,35 @@ def _is_over(points: Floats, x: Floats, face: Ints, n: Floats) -> bool:
 
 
 @compiled
-def _meet(
-    points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Ints, slack: float
-) -> tuple[Ints, Ints, Ints, Floats]:
-    """What pairs of faces have in common: of which kind, the two that meet, and where if that is a new point."""
-    size = 4 * len(pairs) + 64
-    events, places, count = np.empty((size, 3), np.int64), np.zeros((size, 3)), 0
+def _meet(points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Ints, slack: float) -> tuple[Ints, Floats]:
+    """Return (e, 3) meetings of pairs of faces: the kind and the two that meet; and the places of new points."""
+    meetings, places = [(0, 0, 0)], [(0.0, 0.0, 0.0)]
     touch = np.empty((2, 3, 3), np.bool_)  # whether a corner of one lies on an edge of the other
     on, hit, heights = np.empty((2, 3), np.bool_), np.empty((2, 3), np.bool_), np.empty((2, 3))
     normals, place = np.empty((2, 3)), np.empty(3)
     for r in range(len(pairs)):
-        if count + 64 > size:
-            size = 2 * size + 64
-            more, where = np.empty((size, 3), np.int64), np.zeros((size, 3))
-            more[:count], where[:count] = events[:count], places[:count]
-            events, places = more, where
         touch[:], on[:], hit[:], heights[:] = False, False, False, 0.0
         for s in range(2):
             normals[s] = _normal(points, faces[pairs[r, s]])
         for s in range(2):
-            one, other = faces[pairs[r, s]], faces[pairs[r, 1 - s]]
+            corners, g = faces[pairs[r, s]], pairs[r, 1 - s]
             for i in range(3):
-                v = one[i]
-                if v == other[0] or v == other[1] or v == other[2]:
+                v = corners[i]
+                if v == faces[g, 0] or v == faces[g, 1] or v == faces[g, 2]:
                     on[s, i] = True
                     continue
                 for k in range(3):
-                    if _is_on(points, v, other[k], other[(k + 1) % 3], slack):
-                        events[count, 0], events[count, 1], events[count, 2] = (
-                            ON_EDGE,
-                            face_edges[pairs[r, 1 - s], k],
-                            v,
-                        )
-                        count += 1
+                    if _is_on(points, v, faces[g, k], faces[g, (k + 1) % 3], slack):
+                        meetings.append((ON_EDGE, face_edges[g, k], v))
+                        places.append((0.0, 0.0, 0.0))
                         touch[s, i, k], on[s, i], hit[1 - s, k] = True, True, True
                 for d in range(3):
-                    heights[s, i] += normals[1 - s, d] * (points[v, d] - points[other[0], d])
-                if not on[s, i] and abs(heights[s, i]) <= slack and _is_over(points, points[v], other, normals[1 - s]):
-                    events[count, 0], events[count, 1], events[count, 2] = IN_FACE, pairs[r, 1 - s], v
-                    count += 1
-                    on[s, i] = True
+                    heights[s, i] += normals[1 - s, d] * (points[v, d] - points[faces[g, 0], d])
+                if not on[s, i] and abs(heights[s, i]) <= slack:
+                    if _is_over(points, points[v], faces[g], normals[1 - s]):
+                        meetings.append((IN_FACE, g, v))
+                        places.append((0.0, 0.0, 0.0))
+                        on[s, i] = True
         f, g = pairs[r, 0], pairs[r, 1]
         for i in range(3):
             e = face_edges[f, i]
@@ -507,58 +483,48 @@ def _meet(
                 else:
                     off = _closest(points, c, d, a, b, place)
                 if off <= slack:
-                    events[count, 0], events[count, 1], events[count, 2] = EDGES, min(e, h), max(e, h)
-                    places[count] = place
-                    count += 1
+                    meetings.append((EDGES, min(e, h), max(e, h)))
+                    places.append((place[0], place[1], place[2]))
                     hit[0, i], hit[1, k] = True, True
         for s in range(2):
+            g = pairs[r, 1 - s]
             for i in range(3):
                 k = (i + 1) % 3
                 low, high = heights[s, i], heights[s, k]
                 if on[s, i] or on[s, k] or hit[s, i] or not low * high < 0.0:
                     continue
-                e = face_edges[pairs[r, s], i]
                 v, w = faces[pairs[r, s], i], faces[pairs[r, s], k]
                 for d in range(3):
                     place[d] = points[v, d] + low / (low - high) * (points[w, d] - points[v, d])
-                if _is_over(points, place, faces[pairs[r, 1 - s]], normals[1 - s]):
-                    events[count, 0], events[count, 1], events[count, 2] = EDGE_AND_FACE, e, pairs[r, 1 - s]
-                    places[count] = place
-                    count += 1
-    return events[:count, 0].copy(), events[:count, 1].copy(), events[:count, 2].copy(), places[:count].copy()
+                if _is_over(points, place, faces[g], normals[1 - s]):
+                    meetings.append((EDGE_AND_FACE, face_edges[pairs[r, s], i], g))
+                    places.append((place[0], place[1], place[2]))
+    return np.array(meetings)[1:], np.array(places)[1:]
 
 
 @compiled
 def _shared_edge(face_edges: Ints, ends: Ints, starts: Ints, on: Ints, f: int, a: int, b: int) -> int:
-    """The edge of a face that two points lie on, or −1."""
+    """Return the edge of a face that two points lie on, or −1."""
     for k in range(3):
         e = face_edges[f, k]
-        first = (
-            a == ends[e, 0]
-            or a == ends[e, 1]
-            or (starts[e] < starts[e + 1] and _within(on, starts[e], starts[e + 1], a))
-        )
-        second = (
-            b == ends[e, 0]
-            or b == ends[e, 1]
-            or (starts[e] < starts[e + 1] and _within(on, starts[e], starts[e + 1], b))
-        )
-        if first and second:
+        if _is_along(ends, starts, on, e, a) and _is_along(ends, starts, on, e, b):
             return e
     return -1
 
 
 @compiled
-def _within(sorted_points: Ints, begin: int, end: int, p: int) -> bool:
-    """Whether a number is in a part of a list that is in order."""
-    stop = end
+def _is_along(ends: Ints, starts: Ints, on: Ints, line: int, p: int) -> bool:
+    """Return whether a point is an end of a line or one of the points on it, which are in order."""
+    if p == ends[line, 0] or p == ends[line, 1]:
+        return True
+    begin, end = starts[line], starts[line + 1]
     while begin < end:
         middle = (begin + end) // 2
-        if sorted_points[middle] < p:
+        if on[middle] < p:
             begin = middle + 1
         else:
             end = middle
-    return begin < stop and sorted_points[begin] == p
+    return begin < starts[line + 1] and on[begin] == p
 
 
 @compiled
@@ -573,7 +539,7 @@ def _segments(
     pairs: Ints,
     straight: float,
 ) -> tuple[Ints, Ints]:
-    """Parts of lines in faces, as rows of face, line and ends; and the faces of new lines."""
+    """Return parts of lines in faces, as rows of face, line and two ends; and the two faces of each new line."""
     records, sides = [(0, 0, 0, 0)], [(0, 0)]
     n_lines = len(ends)
     for r in range(len(pairs)):
@@ -630,7 +596,7 @@ def _segments(
                 e = face_edges[inner, k]
                 first, last = np.int64(-1), np.int64(-1)
                 for c in common:
-                    if c == ends[e, 0] or c == ends[e, 1] or _within(on, line_starts[e], line_starts[e + 1], c):
+                    if _is_along(ends, line_starts, on, e, c):
                         if first < 0:
                             first = last = c
                             continue
@@ -650,7 +616,7 @@ def _segments(
 def _cross(
     points: Floats, faces: Ints, lines: Ints, ends: Ints, starts: Ints, near: Ints, slack: float
 ) -> tuple[Ints, Ints, Floats]:
-    """Lines and points that lie on them; and pairs of parts of lines that cross within a face, and where."""
+    """Return lines and points on them; and pairs of parts of lines that cross within a face, and where."""
     touching, crossing, places = [(0, 0)], [(0, 0)], [(0.0, 0.0, 0.0)]
     place = np.empty(3)
     for r in range(len(faces)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,11 @@ from ..arrays import Floats, Ints
 from ..compiled import compiled
 
 LEAF = 4
-"""Boxes per leaf."""
+"""Boxes in each leaf."""
 USUAL = 64
-"""Boxes near a triangle for which there is room at first: faces of a mesh have some forty in the leaves around them."""
+"""Boxes near each triangle for which there is room at first; faces of a mesh have about forty around them."""
 FEW = 64
-"""Points that are not worth ordering: it takes as long as the searches of some of them."""
+"""Points that are not worth sorting, which would take as long as searches for them."""
 SPREAD = (
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),
@@ -28,30 +28,17 @@ FLAT_LEVELS = 8
 """Levels of a tree over triangles, from the leaves up, that are bounded by slabs as well."""
 
 
-@dataclass(frozen=True, eq=False)
-class BoxTree:
-    """A complete binary tree over boxes in Morton order: node i has the children 2i and 2i + 1, the root is 1.
+class BoxTree(NamedTuple):
+    """A complete binary tree over boxes in Morton order: node i has the children 2i and 2i + 1, the root is 1."""
 
-    Attributes
-    ----------
-    bounds : (2 · leaves, 6) float
-        Lower and upper corner of the box around everything below each node; an empty node has lower > upper.
-    items : (leaves · LEAF,) int
-        Boxes in each leaf, −1 where there are none.
-    groups : (2 · leaves,) int
-        Group that all boxes below each node are of; −1 if they are of several.
-    slabs : (2 · leaves, 10) float
-        Two directions, the mean normal and the one across long faces, and the least and the largest extent along each
-        of everything below each node.
-    triangles : (n, 9) or (0, 9) float
-        What the boxes are of, if that is triangles.
-    """
-
+    # (2 · leaves, 6) lower and upper corner of the box around all below each node; lower > upper for an empty node
     bounds: Floats
-    items: Ints
-    groups: Ints
+    items: Ints  # (leaves · LEAF,) the boxes in each leaf, −1 where there are none
+    groups: Ints  # (2 · leaves,) the group of all boxes below each node; −1 if they are of several
+    # (2 · leaves, 10) two directions, the mean normal and the one across long faces, each followed by the least and the
+    # largest extent along it of all below each node
     slabs: Floats
-    triangles: Floats
+    triangles: Floats  # (n, 9) the triangles that the boxes are of, or (0, 9)
 
     @classmethod
     def of(cls, lower: Floats, upper: Floats) -> BoxTree:
@@ -67,9 +54,9 @@ class BoxTree:
 
     @classmethod
     def in_order(cls, lower: Floats, upper: Floats, order: Ints, groups: Ints | None = None) -> BoxTree:
-        """The same, with boxes in a given order, in which those near each other in space should be near each other.
+        """Build the tree over boxes in a given order, in which boxes near each other in space should be neighbours.
 
-        Those of a group, named by (n,) numbers from 0, should follow each other; −1 is in none.
+        Boxes of a group, named by (n,) numbers from 0, should follow each other; −1 is no group.
         """
         n = len(lower)
         leaves = 1 << max(int(np.ceil(np.log2(max(n, 1) / LEAF))), 0)
@@ -100,13 +87,13 @@ class BoxTree:
         """Build the tree over (n, 3, 3) triangles, bounded by slabs as well."""
         tree = cls.in_order(triangles.min(axis=1), triangles.max(axis=1), order, groups)
         corners = np.ascontiguousarray(triangles).reshape(-1, 9)
-        return replace(tree, slabs=_slabs(triangles, tree.items), triangles=corners)
+        return tree._replace(slabs=_slabs(triangles, tree.items), triangles=corners)
 
     def meeting(self, triangles: Floats, slack: float | Floats = 0.0, groups: Ints | None = None) -> tuple[Ints, Ints]:
-        """Where what is near each of (n, 3, 3) triangles begins, and what it is: all in leaves that they may meet.
+        """Return where the boxes near each of (n, 3, 3) triangles begin, and these: all in leaves that they may meet.
 
-        A triangle may meet a node if its box, its plane and the prism over it do, to a slack along each axis, and not
-        all of the node is of the triangle's own group.
+        A triangle may meet a node if its box, its plane and the prism over it do, with some slack along each axis,
+        unless all of the node belongs to the triangle's own group.
 
         Examples
         --------
@@ -119,29 +106,17 @@ class BoxTree:
         own = np.full(len(corners), -1) if groups is None else np.ascontiguousarray(groups, dtype=np.int64)
         starts, room = np.zeros(len(corners) + 1, dtype=np.int64), USUAL * len(corners)
         while True:
-            found = np.empty(room, dtype=np.int64)
-            _meeting(
-                self.bounds, self.items, self.groups, self.slabs, self.triangles, corners, slacks, own, starts, found
-            )
+            near = np.empty(room, dtype=np.int64)
+            _meeting(self, corners, slacks, own, starts, near)
             if starts[-1] <= room:
-                return starts, found[: starts[-1]]
+                return starts, near[: starts[-1]]
             room = int(starts[-1])
 
 
 @compiled
-def _meeting(
-    bounds: Floats,
-    items: Ints,
-    groups: Ints,
-    slabs: Floats,
-    triangles: Floats,
-    corners: Floats,
-    slacks: Floats,
-    own: Ints,
-    starts: Ints,
-    out: Ints,
-) -> None:
-    """Write what is near each triangle, as far as there is room, and where it begins."""
+def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, starts: Ints, out: Ints) -> None:
+    """Write the boxes near each triangle, as far as there is room, and where they begin."""
+    bounds, items, groups, slabs, triangles = tree
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
     lower, upper, ways, ends = np.empty(3), np.empty(3), np.empty((4, 3)), np.empty((4, 2))
     for t in range(len(corners)):
@@ -214,7 +189,7 @@ def _meeting(
 
 @compiled
 def _is_beyond(triangle: Floats, lower: Floats, upper: Floats, ways: Floats, ends: Floats) -> bool:
-    """Whether a triangle lies off a box, or beyond what is between two ends along any of some ways."""
+    """Return whether a triangle lies outside a box, or outside the interval between two `ends` along any direction."""
     for d in range(3):
         a, b, c = triangle[d], triangle[3 + d], triangle[6 + d]
         if min(a, b, c) > upper[d] or max(a, b, c) < lower[d]:
@@ -231,7 +206,7 @@ def _is_beyond(triangle: Floats, lower: Floats, upper: Floats, ways: Floats, end
 
 @np.errstate(all="ignore")
 def _slabs(triangles: Floats, items: Ints) -> Floats:
-    """(2 · leaves, 10) what bounds (n, 3, 3) triangles in the lowest nodes of a tree; see `BoxTree.slabs`."""
+    """Return (2 · leaves, 10) the slabs around (n, 3, 3) triangles in the lowest nodes of a tree: see `BoxTree`."""
     first, n = len(items) // LEAF, len(triangles)
     slabs = _unbounded(first)
     if not n:
@@ -255,12 +230,12 @@ def _slabs(triangles: Floats, items: Ints) -> Floats:
 
 
 def _unbounded(leaves: int) -> Floats:
-    """(2 · leaves, 10) slabs that bound nothing."""
+    """Return (2 · leaves, 10) slabs that bound nothing."""
     return np.tile([0.0, 0.0, 0.0, -np.inf, np.inf], (2 * leaves, 2))
 
 
 def order_in_space(points: Floats) -> Ints:
-    """(n,) numbers of (n, 3) points along a space-filling curve; few points stay as they are."""
+    """Return the order of (n, 3) points along a space-filling curve; few points stay as they are."""
     if len(points) < FEW:
         return np.arange(len(points))
     return np.argsort(morton_codes(points), kind="stable")
@@ -268,7 +243,7 @@ def order_in_space(points: Floats) -> Ints:
 
 @np.errstate(all="ignore")
 def morton_codes(points: Floats) -> NDArray[np.uint64]:
-    """(n,) Morton codes of (n, 3) points: their positions along a space-filling curve, with 21 bits per axis."""
+    """Return Morton codes of (n, 3) points: positions along a space-filling curve, with 21 bits per axis."""
     lower = points.min(axis=0)
     extent = max(float((points.max(axis=0) - lower).max()), 1e-290)
     codes = np.zeros(len(points), dtype=np.uint64)

@@ -1,4 +1,4 @@
-"""Connected components of graphs and of elements; members of groups, group after group in one array."""
+"""Connected components of graphs and of elements; members of groups, one group after another in one array."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ..frozen import read_only
 
 
 def connected_components(n: int, one: NDArray[np.integer], other: NDArray[np.integer]) -> Ints:
-    """(n,) component of each node of a graph with edges from `one` to `other`, numbered by first appearance."""
+    """Return (n,) the component of each node of a graph, numbered by first appearance; edges join `one` and `other`."""
     return _labels(n, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (one, other)))
 
 
 def element_components(elements: Ints) -> Ints:
-    """(m,) connected component of each element, numbered by first appearance: those that share a vertex are connected.
+    """Return (m,) the component of each element, numbered by first appearance; elements that share a vertex are joined.
 
     The (m, k) elements may name their edges or faces instead of vertices.
     """
@@ -26,7 +26,7 @@ def element_components(elements: Ints) -> Ints:
 
 
 def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
-    """New numbers for ids below n, in order of first appearance; and the old id of each number."""
+    """Renumber ids below n in order of first appearance; return the new numbers, and the old id of each."""
     first = np.full(n, -1)
     first[ids[::-1]] = np.arange(len(ids))[::-1]
     used = np.flatnonzero(first >= 0)
@@ -38,7 +38,7 @@ def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
 
 @compiled
 def _labels(n: int, one: Ints, other: Ints) -> Ints:
-    """The root of a tree is its least node; paths are halved on the way to it."""
+    """Join trees whose root is their least node; paths are halved on the way to it."""
     parents = np.arange(n)
     for k in range(len(one)):
         a, b = one[k], other[k]
@@ -60,20 +60,20 @@ def _labels(n: int, one: Ints, other: Ints) -> Ints:
 
 
 def grouped(groups: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
-    """(n + 1,) where the members of each of n groups begin, and the members in order: each is in one of `groups`."""
+    """Return (n + 1,) where the members of each of n groups begin, and the members in order."""
     starts, members = _grouped(read_only(np.ascontiguousarray(groups, dtype=np.int64)), n)
     return starts, members
 
 
 def members_of(starts: Ints, members: Ints, chosen: NDArray[np.integer]) -> tuple[Ints, Ints]:
-    """All members of some groups, as pairs: index into `chosen`, and member."""
+    """Return all members of the chosen groups, as pairs: index into `chosen`, and member."""
     begin, count = starts[chosen], starts[chosen + 1] - starts[chosen]
     which = np.repeat(np.arange(len(chosen)), count)
     return which, members[np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(which))]
 
 
 def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -> Floats:
-    """(n, ...) sums of the rows of (k, ...) values in each of n groups."""
+    """Return (n, ...) sums of the rows of (k, ...) values in each of n groups."""
     columns = values.reshape(len(values), int(np.prod(values.shape[1:]))).T
     sums = np.stack([np.bincount(groups, column, n) for column in columns], axis=1)
     return np.asarray(sums.reshape(n, *values.shape[1:]), np.float64)

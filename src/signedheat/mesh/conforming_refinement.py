@@ -26,11 +26,12 @@ from .surface_points import EDGE, FACE, VERTEX, LocatedPoints, barycentric_on_ed
 def refine_to_conform(
     triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
 ) -> tuple[IntrinsicMesh, list[list[CurveSegments]]]:
-    """Cut faces wherever an unoriented curve crosses them, and put vertices at isolated points; sources on the result.
+    """Cut faces wherever an unoriented curve crosses them, and put vertices at isolated points.
 
-    All other segments in a face that is cut, or on an edge that is split, become edges too; other faces and segments
-    stay as they are. Edges of the cut faces that no segment uses are then flipped to Delaunay, which removes slivers.
-    The old vertices come first; nothing to cut gives the very same triangles.
+    Returns the mesh, and the sources on it. All other segments in a face that is cut, or on an edge that is split,
+    become edges too; other faces and segments stay as they are. Edges of the cut faces that no segment uses are then
+    flipped to Delaunay, which removes slivers. The old vertices come first; if there is nothing to cut, the same mesh
+    is returned.
     """
     parts = [part for group in groups for part in group]
     if all(part.is_conforming for part in parts):
@@ -47,10 +48,10 @@ def cut_along(
     unfit: Sequence[bool] | None = None,
     begin: Ints | None = None,
 ) -> tuple[IntrinsicMesh, MergedSources, Bools, Ints]:
-    """Cut faces so that sources run along edges: triangles, sources on them, which faces are new, and their parents.
+    """Cut faces so that sources run along edges; return triangles, sources, which faces are new, and parents of all.
 
-    Only sources that are `unfit` must run along edges, by default all. Others are cut only in faces, and at edges, that
-    these cut. The triangles into which a face is cut depend on the corner at which it begins, `begin` (m,).
+    Only `unfit` sources, by default all, must run along edges. Others are cut only in faces, and at edges, that these
+    cut. The triangles into which a face is cut depend on the corner at which it begins, `begin` (m,).
     """
     merged = MergedSources.of(parts)
     faces, edges = affected_elements(triangles, merged, [True] * len(parts) if unfit is None else unfit)
@@ -61,7 +62,7 @@ def cut_along(
 
 
 def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Sequence[bool]) -> tuple[Ints, Ints]:
-    """Faces to cut and edges to split: those of nonconforming sources, and those that these entail in turn.
+    """Return the faces to cut and the edges to split: those of nonconforming sources, and those that these entail.
 
     Where a face is cut, the edges on which a segment in it ends are split; where an edge is split, its faces are cut.
     """
@@ -71,15 +72,15 @@ def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Se
     on_edge = nodes.kinds[end] == EDGE
     with_points = np.zeros(triangles.n_edges, dtype=bool)
     with_points[nodes.elements[nodes.kinds == EDGE]] = True
-    at, side = np.nonzero(with_points[triangles.edges.face_edges])
+    faces_at, side = np.nonzero(with_points[triangles.edges.face_edges])
     wanted = nodes[np.unique(np.concatenate([s for s, bad in zip(merged.samples, unfit, strict=True) if bad]))]
     begin = [
         merged.faces[inside & np.asarray(unfit)[merged.owners]],
         wanted.elements[wanted.kinds == FACE],
         m + wanted.elements[wanted.kinds == EDGE],
     ]
-    heads = np.concatenate([m + nodes.elements[end[on_edge]], at, *begin])
-    given = np.concatenate([face[on_edge], m + triangles.edges.face_edges[at, side]])
+    heads = np.concatenate([m + nodes.elements[end[on_edge]], faces_at, *begin])
+    given = np.concatenate([face[on_edge], m + triangles.edges.face_edges[faces_at, side]])
     tails = np.concatenate([given, np.full(len(heads) - len(given), last)])
     graph = csr_matrix((np.ones(len(heads)), (tails, heads)), shape=(last + 1, last + 1))
     reached = np.sort(breadth_first_order(graph, last, return_predecessors=False))[:-1]
@@ -87,7 +88,7 @@ def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Se
 
 
 class FaceCutter:
-    """An intrinsic mesh while some of its faces are being cut."""
+    """An intrinsic mesh while some of its faces are cut."""
 
     def __init__(self, triangles: IntrinsicMesh, merged: MergedSources, faces: Ints, edges: Ints, begin: Ints) -> None:
         self.triangles, self.merged, self.begin = triangles, merged, begin
@@ -132,7 +133,7 @@ class FaceCutter:
         return self.n_edges - 1
 
     def node(self, vertex: int) -> int:
-        """The node at a vertex, a new one if it had none."""
+        """Return the node at a vertex, a new one if it had none."""
         if vertex not in self.node_at:
             self.node_at[vertex] = len(self.vertex_of)
             self.vertex_of.append(vertex)
@@ -150,7 +151,7 @@ class FaceCutter:
             self.pieces.append(NewSegment(*ends, -1, sub, vector, merged.owners[p]))
 
     def along_edge(self, edge: int) -> tuple[list[int], list[float], dict[int, int]]:
-        """Vertices along a split edge, where each is from tail to head, and which place in the list each has."""
+        """Return the vertices along a split edge, the fraction of it at each, and the index of each in this list."""
         if edge not in self.chains:
             chain = self.on_edge[edge]
             tail, head = self.triangles.edges.vertices[edge].tolist()
@@ -226,7 +227,7 @@ class FaceCutter:
                 )
 
     def assemble(self) -> tuple[IntrinsicMesh, MergedSources, Bools, Ints]:
-        """What `cut_along` returns."""
+        """Return what `cut_along` returns."""
         triangles, merged = self.triangles, self.merged
         kept = np.setdiff1d(np.arange(triangles.n_faces), self.cut_faces)
         parents = np.concatenate([kept, [f.parent for f in self.faces]]).astype(np.int64)
@@ -273,7 +274,7 @@ class FaceCutter:
 
 
 class NewFace(NamedTuple):
-    """Part of a face that was cut."""
+    """A part of a face that was cut."""
 
     parent: int
     corners: list[int]
@@ -296,7 +297,7 @@ class NewSegment(NamedTuple):
 def points_on_elements(
     triangles: IntrinsicMesh, kinds: Ints, elements: Ints, along: Floats, barycentric: Floats
 ) -> LocatedPoints:
-    """Points given by their elements: by the fraction `along` an edge, or by `barycentric` coordinates in a face."""
+    """Locate points given by their elements: by the fraction `along` an edge, or by `barycentric` coordinates."""
     faces, weights = elements.copy(), barycentric.copy()
     at_vertex, on_edge = kinds == VERTEX, np.flatnonzero(kinds == EDGE)
     vertices = points_at_vertices(triangles, elements[at_vertex])

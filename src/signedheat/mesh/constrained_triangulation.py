@@ -1,4 +1,4 @@
-"""A constrained triangulation of one triangle: points inside it, and straight segments that must become edges."""
+"""Constrained triangulation of one triangle, with points inside it and straight segments that must become edges."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ Point = tuple[float, float]
 Edge = tuple[int, int]
 
 CLOSE = 1e-9
-"""Distance, in barycentric coordinates, below which a point counts as lying on a segment."""
+"""Distance, in barycentric coordinates, below which a point lies on a segment."""
 FLAT = 1e-14
-"""Twice the area below which a triangle is as good as flat, and is not made by a flip."""
+"""Twice the area below which a triangle is flat, and no flip makes it."""
 
 
 def turn(a: Point, b: Point, c: Point) -> float:
-    """Twice the signed area of a triangle."""
+    """Return twice the signed area of a triangle."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def edges_of(triangle: Sequence[int]) -> tuple[Edge, Edge, Edge]:
-    """The directed edges of a triangle."""
+    """Return the directed edges of a triangle."""
     u, v, w = triangle
     return (u, v), (v, w), (w, u)
 
@@ -35,12 +35,12 @@ class _Line:
     done: float = 0.0
 
     def share(self, x: Point) -> float:
-        """The fraction of the line at which its nearest point to a given point is."""
+        """Return the fraction of the line at which its point nearest to a given point is."""
         (px, py), (qx, qy) = self.start, self.end
         return ((x[0] - px) * (qx - px) + (x[1] - py) * (qy - py)) / ((qx - px) ** 2 + (qy - py) ** 2)
 
     def meets(self, x: Point) -> bool:
-        """Whether a point lies on the part of the segment that is ahead."""
+        """Return whether a point lies on the part of the segment that is not yet done."""
         length = ((self.end[0] - self.start[0]) ** 2 + (self.end[1] - self.start[1]) ** 2) ** 0.5
         return abs(turn(self.start, self.end, x)) <= CLOSE * length and self.done < self.share(x) <= 1
 
@@ -58,15 +58,15 @@ class Triangulation:
 
     @classmethod
     def of(cls, points: Sequence[Point], sides: Sequence[Sequence[int]]) -> Triangulation:
-        """One triangle, and points on its sides, listed for each side from its tail to its head without the corners."""
-        made = cls(list(points))
-        made.add(0, 1, 2)
+        """Make one triangle with points on its sides, listed for each side from tail to head, without corners."""
+        triangulation = cls(list(points))
+        triangulation.add(0, 1, 2)
         for k, side in enumerate(sides):
             tail = k
             for i in side:
-                made.split(tail, (k + 1) % 3, i)
+                triangulation.split(tail, (k + 1) % 3, i)
                 tail = i
-        return made
+        return triangulation
 
     @property
     def triangles(self) -> list[tuple[int, int, int]]:
@@ -87,36 +87,36 @@ class Triangulation:
                 self.add(i, b, w)
 
     def insert(self, x: Point) -> int:
-        """Put a point into the triangle that has it, or on its edge; the number of the point."""
-        here = self.locate(x)
+        """Put a point into the triangle that contains it, or on its edge; return the number of the point."""
+        triangle = self.locate(x)
         i = len(self.points)
         self.points.append(x)
-        for a, b in edges_of(here):
+        for a, b in edges_of(triangle):
             p, q = self.points[a], self.points[b]
             length = ((q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2) ** 0.5
             if (b, a) in self.apex and turn(p, q, x) <= CLOSE * length:
                 self.split(a, b, i)
                 return i
-        for a, b in edges_of(here):
+        for a, b in edges_of(triangle):
             self.add(a, b, i)
         return i
 
     def locate(self, x: Point) -> Sequence[int]:
-        """The triangle that a point lies in: a walk over the edges that hide it, or, where it goes round, a search."""
+        """Find the triangle that contains a point by a walk over the edges that hide it, or by a search."""
         points, apex = self.points, self.apex
         last = next(reversed(apex))
-        here: Sequence[int] = (*last, apex[last])
+        triangle: Sequence[int] = (*last, apex[last])
         for _ in range(len(apex)):
-            depth, a, b = min((turn(points[a], points[b], x), a, b) for a, b in edges_of(here))
+            depth, a, b = min((turn(points[a], points[b], x), a, b) for a, b in edges_of(triangle))
             if depth >= 0 or (b, a) not in apex:
                 break
-            here = (b, a, apex[b, a])
+            triangle = (b, a, apex[b, a])
         if depth >= 0:
-            return here
-        return max(self.triangles, key=lambda one: min(turn(points[a], points[b], x) for a, b in edges_of(one)))
+            return triangle
+        return max(self.triangles, key=lambda corners: min(turn(points[a], points[b], x) for a, b in edges_of(corners)))
 
     def around(self, a: int) -> Iterator[Edge]:
-        """Directed edges opposite a point, in the triangles around it: counter-clockwise from one, then the rest."""
+        """Yield the directed edges opposite a point in the triangles around it, counter-clockwise from one of them."""
         apex, first = self.apex, self.leaving[a]
         u = first
         while (a, u) in apex:
@@ -130,34 +130,34 @@ class Triangulation:
             u = apex[u, a]
 
     def connect(self, a: int, b: int) -> list[int]:
-        """Make a segment run along edges; the points along it, with those where it crosses others.
+        """Make a segment edges; return the points along it, including those where it crosses other segments.
 
-        Where points nearer to it than rounding are in its way, it goes through them.
+        Points nearer to the segment than rounding are passed through.
         """
         way, line, patience = [a], _Line(self.points[a], self.points[b]), 100 + len(self.apex)
         while way[-1] != b and patience:
             patience -= 1
-            here = way[-1]
-            there, crossed = self.aim(here, b, line)
+            tail = way[-1]
+            head, crossed = self.aim(tail, b, line)
             if crossed is not None:
-                there = self.clear(here, b, crossed, line)
-            if there >= 0:
-                self.parts.setdefault((here, there), [there])
-                self.parts.setdefault((there, here), [here])
-                way.append(there)
-                line = replace(line, done=max(line.done, line.share(self.points[there])))
+                head = self.clear(tail, b, crossed, line)
+            if head >= 0:
+                self.parts.setdefault((tail, head), [head])
+                self.parts.setdefault((head, tail), [tail])
+                way.append(head)
+                line = replace(line, done=max(line.done, line.share(self.points[head])))
         return way
 
     def along(self, way: Sequence[int]) -> list[int]:
-        """The points along a way, with those that have come to lie on it later."""
-        return [way[0], *(i for edge in pairwise(way) for i in self._parts_of(edge))]
-
-    def _parts_of(self, edge: Edge) -> list[int]:
-        middle = self.parts[edge]
-        return middle if len(middle) == 1 else self.along([edge[0], *middle])[1:]
+        """Return the points along a way, with those that were put on it later."""
+        points = [way[0]]
+        for edge in pairwise(way):
+            parts = self.parts[edge]
+            points += parts if len(parts) == 1 else self.along([edge[0], *parts])[1:]
+        return points
 
     def aim(self, a: int, b: int, line: _Line) -> tuple[int, Edge | None]:
-        """The neighbour of a that a segment to b meets first, or −1 and the edge that it crosses."""
+        """Return the neighbour of a that a segment to b meets first; or −1, and the edge that the segment crosses."""
         p, q = self.points[a], line.end
         met, nearest, crossed, most = -1, 2.0, None, -float("inf")
         for u, w in self.around(a):
@@ -174,8 +174,8 @@ class Triangulation:
     def clear(self, a: int, b: int, edge: Edge, line: _Line) -> int:
         """Flip the edges that the segment from a to b crosses, up to the point that it meets first (Sloan 1993).
 
-        Returns that point, or where rounding is in the way one near the segment; or −1 if there is a new point where
-        the segment crosses another one.
+        Returns that point; where rounding is in the way, a point near the segment; or −1 where the segment crosses
+        another one, at a new point.
         """
         points, apex = self.points, self.apex
         p, q = points[a], line.end
@@ -191,7 +191,7 @@ class Triangulation:
         moved = goal >= 0
         while moved and (a, goal) not in apex and (goal, a) not in apex:
             moved, left = False, []
-            for u, v in reversed(waiting):  # there and back: flips at one end make room for the next
+            for u, v in reversed(waiting):  # met and back: flips at one end make room for the next
                 w, x = apex[u, v], apex[v, u]
                 if min(turn(points[x], points[v], points[w]), turn(points[w], points[u], points[x])) <= FLAT:
                     left.append((u, v))
@@ -205,8 +205,8 @@ class Triangulation:
             waiting = left
         if moved:
             return goal
-        there, crossed = self.aim(a, b, line)
-        return there if crossed is None else min(crossed, key=lambda i: abs(turn(p, q, points[i])))
+        met, crossed = self.aim(a, b, line)
+        return met if crossed is None else min(crossed, key=lambda i: abs(turn(p, q, points[i])))
 
     def _cross(self, p: Point, q: Point, u: int, w: int) -> None:
         """Put a point where a segment crosses an edge along another one."""
@@ -220,7 +220,7 @@ class Triangulation:
         self.parts.update({(u, i): [i], (i, w): [w], (w, i): [i], (i, u): [u]})
 
     def _crosses(self, a: int, b: int, u: int, v: int) -> bool:
-        """Whether two segments cross, away from their ends."""
+        """Return whether two segments cross, away from their ends."""
         if a in (u, v) or b in (u, v):
             return False
         p, q, r, s = (self.points[i] for i in (a, b, u, v))

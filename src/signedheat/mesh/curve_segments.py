@@ -13,8 +13,7 @@ from scipy.sparse import csr_matrix
 from ..arrays import Bools, Complexes, Floats, Ints
 from ..errors import SourceError
 from .components import connected_components
-from .face_pairs import face_pairs
-from .intrinsic_mesh import IntrinsicMesh
+from .intrinsic_mesh import IntrinsicMesh, face_pairs
 from .segment_chains import assemble_polylines
 from .signed_graph import Links, signs_of
 from .surface_points import (
@@ -30,8 +29,8 @@ from .surface_points import (
 from .unit_vectors import unit
 
 STRAIGHT = 1e-6
-"""Change of the unit normal from one segment to the next, up to which a line may go straight on: ends of short ones are
-rounded. How far all of them are off the line between the outer ones decides then (`SNAP`)."""
+"""Change of the unit normal between segments up to which a line may be straight: short segments have rounded ends.
+`SNAP` then decides, by how far all points are from the line between the outer ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +47,7 @@ class CurveSegments:
 
     @classmethod
     def of_points(cls, nodes: LocatedPoints) -> CurveSegments:
-        """Isolated points as a source without segments."""
+        """Make isolated points a source without segments."""
         none = np.empty(0, dtype=np.int64)
         return cls(nodes, np.empty((0, 2), dtype=np.int64), none, none, np.empty(0, dtype=np.complex128), False)
 
@@ -59,7 +58,7 @@ class CurveSegments:
 
     @property
     def is_conforming(self) -> bool:
-        """Whether the triangles can represent it as they are: all but unoriented curves that cross faces."""
+        """Whether the triangles can represent it without being cut: all but unoriented curves that cross faces."""
         return self.oriented or bool((self.nodes.kinds[self.ends] == VERTEX).all() and (self.edges >= 0).all())
 
 
@@ -77,7 +76,7 @@ class MergedSources:
 
     @classmethod
     def of(cls, parts: Sequence[CurveSegments]) -> MergedSources:
-        """Merge sources; `samples` has the nodes of each."""
+        """Merge sources; `samples` holds the nodes of each."""
         located = concatenated([p.nodes for p in parts])
         first, who = unique_points(located)
         offsets = np.cumsum([0] + [len(p.nodes) for p in parts])
@@ -92,24 +91,24 @@ class MergedSources:
         )
 
     def parts(self, oriented: Sequence[bool]) -> list[CurveSegments]:
-        """The sources, each by itself again."""
+        """Return the sources one by one again."""
         order = np.argsort(self.owners, kind="stable")
         bounds = np.searchsorted(self.owners[order], np.arange(len(oriented) + 1))
-        each = zip(pairwise(bounds), self.samples, oriented, strict=True)
-        return [self._part(order[begin:end], old, has_sides) for (begin, end), old, has_sides in each]
-
-    def _part(self, mine: Ints, old: Ints, oriented: bool) -> CurveSegments:
-        """The source that has some of the pieces; its old nodes come first."""
-        nodes = np.concatenate([old, np.setdiff1d(self.ends[mine], old)]).astype(np.int64)
-        distinct, first = np.unique(nodes, return_index=True)
-        ends = first[np.searchsorted(distinct, self.ends[mine])]
-        return CurveSegments(self.nodes[nodes], ends, self.faces[mine], self.edges[mine], self.vectors[mine], oriented)
+        parts = []
+        for (begin, end), samples, has_sides in zip(pairwise(bounds), self.samples, oriented, strict=True):
+            own = order[begin:end]
+            nodes = np.concatenate([samples, np.setdiff1d(self.ends[own], samples)]).astype(np.int64)
+            distinct, first = np.unique(nodes, return_index=True)
+            ends = first[np.searchsorted(distinct, self.ends[own])]
+            columns = self.faces[own], self.edges[own], self.vectors[own]
+            parts.append(CurveSegments(self.nodes[nodes], ends, *columns, has_sides))
+        return parts
 
 
 def without_copies(parts: Sequence[CurveSegments], by_points: Bools) -> tuple[Ints, Ints]:
-    """The first of all curves with the same segments, and which of these each curve is; not of those with normals.
+    """Find the first (u,) of all curves with the same segments, and which of these each curve is (k,).
 
-    Shapes: `by_points` (k,); returned: first (u,), which (k,).
+    Only curves marked in `by_points` (k,) are compared; normals tell the others apart.
     """
     merged = MergedSources.of(parts)
     bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
@@ -118,16 +117,15 @@ def without_copies(parts: Sequence[CurveSegments], by_points: Bools) -> tuple[In
         for (begin, end), may in zip(pairwise(bounds), by_points.tolist(), strict=True)
     ]
     first = {key: k for k, key in reversed(list(enumerate(keys)))}
-    found = np.unique(list(first.values()))
-    return found, np.searchsorted(found, [first[key] for key in keys])
+    kept = np.unique(list(first.values()))
+    return kept, np.searchsorted(kept, [first[key] for key in keys])
 
 
 def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple[list[CurveSegments], Ints]:
-    """Lines in which one curve goes on in the next where they touch, and no third one ends there.
+    """Join curves into lines where one goes on in the next and no third one ends; return lines, and the line of each.
 
-    A curve that runs back along the one before it is a copy of that, and does not continue it.
-
-    Shapes: `may_go_on` (k,); returned: lines, which (k,).
+    A curve that runs back along the one before it is a copy of that, and does not continue it. Curves that are not
+    marked in `may_go_on` (k,) are not joined.
     """
     merged = MergedSources.of(parts)
     bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
@@ -162,9 +160,9 @@ def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple
 
 
 def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> list[CurveSegments]:
-    """The same lines with as few points as they need: those where a line goes straight on within a face are left out.
+    """Leave out the points at which lines go straight on within a face.
 
-    Points at which another line ends or bends stay, and those where the normals of a line change.
+    Points stay at which another line ends or bends, or at which the normals of a line change.
     """
     merged = MergedSources.of(parts)
     faces, vectors = merged.faces, merged.vectors
@@ -191,9 +189,9 @@ def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegmen
 
 
 def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
-    """Where one segment goes on in another, in a face or along an edge in the same direction: the node, and these two.
+    """Return the nodes at which a segment goes straight on in another, in a face or along an edge, and these two.
 
-    A node is there once for each source that goes on there.
+    A node is listed once for each source that goes on there.
     """
     k = len(merged.ends)
     of_source = merged.owners[:, None] * len(merged.nodes) + merged.ends
@@ -201,22 +199,22 @@ def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
     tails, heads = index.reshape(-1, 2).T
     into, out = np.full(len(places), -1), np.full(len(places), -1)
     into[heads], out[tails] = np.arange(k), np.arange(k)
-    at = np.flatnonzero((np.bincount(index.ravel()) == 2) & (into >= 0) & (out >= 0))
-    before, after = into[at], out[at]
+    places_between = np.flatnonzero((np.bincount(index.ravel()) == 2) & (into >= 0) & (out >= 0))
+    before, after = into[places_between], out[places_between]
     normals = merged.vectors / np.abs(merged.vectors)
     alike = np.abs(normals[before] - normals[after]) <= STRAIGHT
-    for each in (merged.edges, np.where(merged.edges < 0, merged.faces, -1)):
-        alike &= each[before] == each[after]
-    at, before, after = at[alike], before[alike], after[alike]
+    for elements in (merged.edges, np.where(merged.edges < 0, merged.faces, -1)):
+        alike &= elements[before] == elements[after]
+    places_between, before, after = places_between[alike], before[alike], after[alike]
     run = connected_components(k, before, after)  # loops that go straight on, as such without area do, begin somewhere
     of_runs, link = np.unique(run[before], return_index=True)
     begins = link[np.bincount(run[before], minlength=k)[of_runs] == np.bincount(run)[of_runs]]
-    at, before, after = (np.delete(each, begins) for each in (at, before, after))
-    return places[at] % max(len(merged.nodes), 1), before, after
+    places_between, before, after = (np.delete(column, begins) for column in (places_between, before, after))
+    return places[places_between] % max(len(merged.nodes), 1), before, after
 
 
 def _runs(k: int, before: Ints, after: Ints) -> tuple[Ints, Ints, Ints]:
-    """The run of each of k segments, in order of their first ones; the first and the last segment of each run."""
+    """Return the run of each of k segments, in order of their first ones, and the two ends of each run."""
     is_first, is_last = np.ones(k, dtype=bool), np.ones(k, dtype=bool)
     is_first[after] = False
     is_last[before] = False
@@ -232,10 +230,10 @@ def _runs(k: int, before: Ints, after: Ints) -> tuple[Ints, Ints, Ints]:
 def given_directions(
     triangles: IntrinsicMesh, positions: Floats, faces: Ints, edges: Ints, normals: Floats, name: str
 ) -> Complexes:
-    """(k,) unit vectors along given normals: in the layout of the face, or in the frame of the edge.
+    """Return unit vectors along given normals: in the layout of the face, or in the frame of the edge.
 
-    On an edge the normal is projected into the plane of each of the edge's faces; the mean of these projections,
-    expressed in the frame of the edge, is used.
+    On an edge this is the mean of the normal's projections into the planes of the edge's faces, in the frame of the
+    edge.
     """
     largest = np.abs(normals).max(axis=1, initial=0.0)
     extreme = (largest > 1e100) | ((largest > 0) & (largest < 1e-100))  # whose squares cannot be computed
@@ -266,11 +264,11 @@ def given_directions(
 
 
 def carried_left(triangles: IntrinsicMesh, faces: Ints, edges: Ints, lengths: Floats) -> Floats:
-    """(k,) −1 where the face that decides a segment's left is turned against those of most of the curve, else 1.
+    """Return −1 where the face that decides a segment's left is turned against those of most of the curve, else 1.
 
-    Faces are compared across the edges around the curve, so left stays on one side of it however faces are turned. On a
-    curve along which orientation is lost, left changes sides somewhere. On a segment along an edge (`edges`; else −1)
-    the first face at the edge decides.
+    Faces are compared across the edges around the curve, so that left stays on one side of it however faces are turned;
+    where orientation is lost along the curve, left changes sides somewhere. On a segment along an edge (`edges`, else
+    −1) the first face at the edge decides.
     """
     telling, links, number = _agreement_around(triangles, faces, edges)
     signs = signs_of(links, int(number.max(initial=-1)) + 1)[number[telling]]
@@ -279,7 +277,7 @@ def carried_left(triangles: IntrinsicMesh, faces: Ints, edges: Ints, lengths: Fl
 
 
 def loses_orientation(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> bool:
-    """Whether the faces around a curve cannot all be turned to agree, as those around the middle of a Möbius strip."""
+    """Return whether the faces around a curve cannot all be made to agree, as along the middle of a Möbius strip."""
     _, links, number = _agreement_around(triangles, faces, edges)
     of_two = np.abs(links.weights) == 1  # of three faces around an edge two cannot agree
     links = Links(links.tails[of_two], links.heads[of_two], links.weights[of_two])
@@ -288,7 +286,7 @@ def loses_orientation(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> boo
 
 
 def _agreement_around(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> tuple[Ints, Links, Ints]:
-    """The face that decides the left of each segment; which faces around a curve agree; and their numbers there."""
+    """Return the face that decides the left of each segment, links between faces around a curve, and their numbers."""
     first = triangles.first_halfedges
     first_faces = np.zeros(triangles.n_edges, dtype=np.int64)
     first_faces[triangles.edges.face_edges.ravel()[first]] = first // 3
@@ -300,16 +298,16 @@ def _agreement_around(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> tup
     around = np.asarray(touched[corners].any(axis=1))
     number = np.cumsum(around) - 1
     pairs = face_pairs(triangles)
-    (one, other), sides = pairs.faces.T, pairs.sides
+    (first_of, second_of), sides = pairs.faces.T, pairs.sides
     forward = triangles.edges.forward
-    agree = np.where(forward[one, sides[:, 0]] != forward[other, sides[:, 1]], 1.0, -1.0)
-    near = around[one] & around[other]
-    links = Links(number[one[near]], number[other[near]], agree[near] * pairs.shares[near])
+    agree = np.where(forward[first_of, sides[:, 0]] != forward[second_of, sides[:, 1]], 1.0, -1.0)
+    near = around[first_of] & around[second_of]
+    links = Links(number[first_of[near]], number[second_of[near]], agree[near] * pairs.shares[near])
     return telling, links, number
 
 
 def in_layout(triangles: IntrinsicMesh, positions: Floats, faces: Ints, vectors: Floats) -> Complexes:
-    """(k,) vectors in space projected into the planes of their faces, in layout coordinates."""
+    """Project vectors in space into the planes of their faces; return (k,) layout coordinates."""
     of_faces = positions[faces] if positions.ndim == 3 else positions[triangles.corner_vertices[faces]]
     a, b, c = of_faces.transpose(1, 0, 2)
     first = unit(b - a)
@@ -321,7 +319,7 @@ def in_layout(triangles: IntrinsicMesh, positions: Floats, faces: Ints, vectors:
 
 
 def interpolation_at(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:
-    """(n, n_vertices) sparse: from values at vertices to values at points. The rows of A in Eq. 14."""
+    """Return the sparse (n, n_vertices) map from values at vertices to values at points: the rows of A in Eq. 14."""
     weights = located.barycentric
     index = np.repeat(np.arange(len(located)), 3).reshape(-1, 3)
     used = weights > 0

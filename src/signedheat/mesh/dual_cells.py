@@ -39,9 +39,8 @@ AFTER = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
 class Crossings:
     """Edges of a grid that a level set crosses."""
 
-    # (e, 3) and (e,): first node of each, and what it runs along
-    nodes: Ints
-    axes: Ints
+    nodes: Ints  # (e, 3) the first node of each
+    axes: Ints  # (e,) the axis that it runs along
     rising: Bools  # (e,) whether the first node is inside
     shares: Floats  # (e,) how far from the first node the crossing is, in cells
 
@@ -59,28 +58,28 @@ class DualCells:
 
 
 def cells_around(crossings: Crossings, shape: tuple[int, ...]) -> tuple[Ints, Ints, Ints, Ints]:
-    """The cells around crossed edges, none of which is on a wall of a grid with so many nodes along each axis.
+    """Find the cells around crossed edges, none of which may be on a wall of the grid of this shape.
 
-    Returns the first nodes (c, 3) of the cells, the crossed edges (c, 12) of each, −1 where an edge is not crossed; and
+    Returns the first nodes (c, 3) of the cells; the crossed edges (c, 12) of each, −1 where an edge is not crossed; and
     the cells around each edge (e, 4), as in `AROUND`, with which of their edges it is.
     """
-    axes, each = crossings.axes, np.arange(len(crossings.axes))[:, None]
+    axes, crossed_edges = crossings.axes, np.arange(len(crossings.axes))[:, None]
     around = np.repeat(crossings.nodes[:, None], 4, axis=1)
-    around[each, np.arange(4), AFTER[axes, 1][:, None]] -= AROUND[:, 0]
-    around[each, np.arange(4), AFTER[axes, 2][:, None]] -= AROUND[:, 1]
+    around[crossed_edges, np.arange(4), AFTER[axes, 1][:, None]] -= AROUND[:, 0]
+    around[crossed_edges, np.arange(4), AFTER[axes, 2][:, None]] -= AROUND[:, 1]
     flat = np.ravel_multi_index(tuple(around.reshape(-1, 3).T), shape)
     cells, rows = np.unique(flat, return_inverse=True)
     rows = rows.reshape(-1, 4)
     sides = 4 * axes[:, None] + 2 * AROUND[:, 0] + AROUND[:, 1]
     edges = np.full((len(cells), 12), -1, dtype=np.int64)
-    edges[rows, sides] = each
+    edges[rows, sides] = crossed_edges
     return np.stack(np.unravel_index(cells, shape), axis=1).astype(np.int64), edges, rows, sides
 
 
 def dual_cells(crossings: Crossings, shape: tuple[int, ...], inside: Callable[[Floats], Bools]) -> DualCells:
-    """The pieces of a level set in the cells of a grid with so many nodes along each axis.
+    """Find the pieces of a level set in the cells of a grid of this shape.
 
-    `inside` says of (n, 3) places, in cells, whether they are inside: it is asked about the middles of faces.
+    `inside` tells whether (n, 3) places, in cells, are inside; it is asked about the middles of faces.
 
     Examples
     --------
@@ -104,9 +103,8 @@ def dual_cells(crossings: Crossings, shape: tuple[int, ...], inside: Callable[[F
         keys = np.ravel_multi_index(tuple(first.T), shape) * 3 + across
         order = np.argsort(keys, kind="stable").reshape(-1, 2)  # the two cells at each face
         middles = first[order[:, 0]] + 0.5 * (np.arange(3) != across[order[:, 0], None])
-        corner = crossings.rising[
-            edges[cells, 4 * AFTER[across, 1] + side]
-        ]  # whether the first corner of the face is inside
+        # whether the first corner of the face is inside
+        corner = crossings.rising[edges[cells, 4 * AFTER[across, 1] + side]]
         way = inside(middles) == corner[order[:, 0]]
         while True:
             ways[cells[order], faces[order]] = way[:, None]
@@ -120,61 +118,61 @@ def dual_cells(crossings: Crossings, shape: tuple[int, ...], inside: Callable[[F
             np.minimum.at(first_of, cells[order[double]], double[:, None])
             way[double[(first_of[cells[order[double]]] == double[:, None]).all(axis=1)]] ^= True
     owners = np.empty(int(pieces.max(initial=-1)) + 1, dtype=np.int64)
-    at, side = np.nonzero(edges >= 0)
-    owners[pieces[at, side]] = at
+    crossed_cells, side = np.nonzero(edges >= 0)
+    owners[pieces[crossed_cells, side]] = crossed_cells
     return DualCells(places, edges, pieces, owners, pieces[rows, sides])
 
 
 def open_cells(edges: Ints) -> Ints:
-    """Cells with a face of which an odd number of edges is crossed: a node around them has no value."""
+    """Return the cells with a face of which an odd number of edges is crossed: a node around them has no value."""
     return np.flatnonzero((_crossed_faces(edges) % 2 == 1).any(axis=1))
 
 
 def _face_edges(faces: Ints) -> Ints:
-    """(n, 4) edges of faces of a cell, in order around them."""
+    """Return (n, 4) edges of faces of a cell, in order around them."""
     axis, side = faces // 2, faces % 2
     b, c = 4 * AFTER[axis, 1], 4 * AFTER[axis, 2] + 2 * side
     return np.stack([b + side, c + 1, b + 2 + side, c], axis=1)
 
 
 def _crossed_faces(edges: Ints) -> Ints:
-    """(c, 6) number of crossed edges of each face."""
+    """Return (c, 6) the number of crossed edges of each face."""
     return (edges[:, _face_edges(np.arange(6))] >= 0).sum(axis=2)
 
 
 def _pieces(edges: Ints, ways: Bools) -> Ints:
-    """(c, 12) number of the piece to which each crossed edge of each cell belongs, cell after cell; −1 for others.
+    """Return (c, 12) the piece that each crossed edge of each cell belongs to, counted over all cells; −1 elsewhere.
 
-    Of a face with four crossed edges, numbered around it from the first corner, way 0 links the first with the last and
-    the second with the third; way 1 the first two and the last two.
+    Of a face with four crossed edges, in order around it from the first corner, way 0 links the first with the last and
+    the second with the third; way 1 links the first two and the last two.
     """
     crossed, around = edges >= 0, _face_edges(np.arange(6))
     of_faces = crossed[:, around]
-    cells, faces, one = np.nonzero(of_faces)
-    way = np.where(ways[cells, faces], one ^ 1, 3 - one)
-    other = np.where(of_faces[cells, faces].all(axis=1), way, of_faces[cells, faces].argmax(axis=1))
+    cells, faces, edge = np.nonzero(of_faces)
+    way = np.where(ways[cells, faces], edge ^ 1, 3 - edge)
+    linked = np.where(of_faces[cells, faces].all(axis=1), way, of_faces[cells, faces].argmax(axis=1))
     numbers = np.cumsum(crossed).reshape(edges.shape) - 1
-    links = (numbers[cells, around[faces, each]] for each in (one, other))
+    links = (numbers[cells, around[faces, end]] for end in (edge, linked))
     result = np.full(edges.shape, -1, dtype=np.int64)
     result[crossed] = connected_components(int(crossed.sum()), *links)
     return result
 
 
 SLACK = 1e-6
-"""Cells by which a diagonal stays away from the sides of the tetrahedra."""
+"""Distance, in cells, that a diagonal keeps from the sides of the tetrahedra."""
 ROUNDS = 8
-"""Times that vertices are moved where triangles pass through each other; twice is enough for nearly all shapes."""
+"""Rounds of moving vertices whose triangles pass through each other; two are enough for nearly all shapes."""
 
 
 def dual_triangles(
     cells: DualCells, crossings: Crossings, vertices: Floats, fanned: Bools
 ) -> tuple[Floats, Ints, Ints]:
-    """Triangles (m, 3) between the vertices of pieces, counter-clockwise as seen from outside.
+    """Join the vertices of pieces, (v, 3) in cells, to triangles (m, 3), counter-clockwise as seen from outside.
 
-    The four vertices around an edge make two triangles. Of the two diagonals between them, if both are possible, the
-    one is taken that passes nearer to the crossing of the edge; if they are equally near, the shorter one. `vertices`,
-    (v, 3), are in cells, each within its own. The crossings of `fanned` edges, (e,), become vertices anyway: they
-    follow the others, and their edges (k,) are returned as well.
+    Of the two diagonals between the four vertices around an edge, if both are possible, the one is taken that passes
+    nearer to the crossing of the edge, and of two that are equally near the shorter. The crossings of `fanned` edges,
+    (e,), and of those with no possible diagonal become vertices, after all others; their edges (k,) are returned as
+    well.
     """
     quads, axes, shares = cells.quads, crossings.axes, crossings.shares
     around = vertices[quads] - crossings.nodes[:, None]
@@ -203,7 +201,7 @@ def dual_triangles(
 
 
 def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) -> tuple[Floats, Ints]:
-    """Vertices and triangles as of `dual_triangles`; wherever possible none of them pass through each other.
+    """Return vertices and triangles as `dual_triangles` does, none of which pass through each other wherever possible.
 
     Edges are flipped to run along creases. Vertices of triangles that pass through each other go from one of three
     `choices`, (3, v, 3), to the next, and edges around them are flipped no more. The first choice is the best; the last
@@ -213,46 +211,46 @@ def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) 
     chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(cells.quads), dtype=bool)
     for _ in range(ROUNDS):
         vertices = choices[np.minimum(chosen, 2), np.arange(count)]
-        found, faces, centres = dual_triangles(cells, crossings, vertices, fanned)
+        points, faces, centres = dual_triangles(cells, crossings, vertices, fanned)
         held = np.concatenate([chosen > 0, np.zeros(len(centres), dtype=bool)])
-        faces = flipped_along_creases(found, faces, held)
-        meeting = np.unique(faces[self_intersections(found, faces)])
+        faces = flipped_along_creases(points, faces, held)
+        meeting = np.unique(faces[self_intersections(points, faces)])
         if not len(meeting):
             break
         meeting = np.union1d(meeting[meeting < count], cells.quads[centres[meeting[meeting >= count] - count]])
         chosen[meeting] += 1
         fanned |= np.isin(cells.quads, meeting).sum(axis=1) > 1
-    return found, faces
+    return points, faces
 
 
 def _safe(flat: Floats, height: Floats) -> tuple[Bools, Floats]:
-    """(n,) whether the diagonal from the first to the third of (n, 4, 2) corners stays within the tetrahedra.
+    """Return (n,) whether the diagonal from the first to the third of four corners (n, 4, 2) stays in the tetrahedra.
 
     Seen along the edge, which is from 0 to 1 above the origin, the diagonal passes on one side of it. The triangle on
-    the other side crosses the edge, at the height that is returned; and the diagonal passes between the edge and the
-    corner that is left.
+    the other side must cross the edge, at the height that is returned; and the diagonal must pass between the edge and
+    the corner that is left.
     """
     p, r = flat[:, 0], flat[:, 2]
     side = _cross(p, r) > 0  # the origin is to the left of the diagonal, with the fourth corner
     rows = np.arange(len(flat))
-    with_origin, other = np.where(side, 3, 1), np.where(side, 1, 3)
-    s, q = flat[rows, with_origin], flat[rows, other]
+    with_origin, left_corner = np.where(side, 3, 1), np.where(side, 1, 3)
+    s, q = flat[rows, with_origin], flat[rows, left_corner]
     # barycentric coordinates of the origin in the triangle p, r, s
     weights = np.stack([_cross(r, s), _cross(s, p), _cross(p, r)], axis=1)
     total = weights.sum(axis=1)
     total = np.where(np.abs(total) > 1e-300, total, 1e-300)
     heights = np.stack([height[:, 0], height[:, 2], height[rows, with_origin]], axis=1)
-    at = (weights * heights).sum(axis=1) / total
+    crossed_at = (weights * heights).sum(axis=1) / total
     # where the diagonal, from p to r, passes the line from the origin to q
     along = _cross(p - r, q)
     share = _cross(p, q) / np.where(np.abs(along) > 1e-300, along, 1e-300)
     passing = p + share[:, None] * (r - p)
     reach = (passing * q).sum(axis=1) / np.maximum((q * q).sum(axis=1), 1e-300)
     level = height[:, 0] + share * (height[:, 2] - height[:, 0])
-    last = height[rows, other]
-    safe = (at > SLACK) & (at < 1 - SLACK) & (reach < 1 - SLACK)
+    last = height[rows, left_corner]
+    safe = (crossed_at > SLACK) & (crossed_at < 1 - SLACK) & (reach < 1 - SLACK)
     safe &= (level > reach * last + SLACK) & (level < (1 - reach) + reach * last - SLACK)
-    return safe, at
+    return safe, crossed_at
 
 
 def _cross(u: Floats, v: Floats) -> Floats:

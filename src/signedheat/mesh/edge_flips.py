@@ -1,6 +1,6 @@
-"""Edges of a triangulated level set flipped so that they run along its creases.
+"""Flips of edges of a triangulated level set, after which they run along its creases.
 
-Marching from cell to cell cuts across the creases of a level set, and leaves teeth there although every vertex lies on
+Marching from cell to cell cuts across the creases of a level set and leaves teeth there, although every vertex lies on
 the level. Of the two triangulations of a quadrilateral the one that bends less, ``Σ length · angle`` over its five
 edges, has its diagonal along the crease.
 """
@@ -15,19 +15,19 @@ from .triangles import area_vectors
 from .unit_vectors import unit
 
 SHARP = np.deg2rad(25.0)
-"""Angle between two faces from which on the edge between them is looked at."""
+"""Angle between two faces above which the edge between them is a candidate."""
 GAIN = 1e-9
-"""What a flip must save, over the length of the edges around times a radian: less is rounding."""
+"""Least gain of a flip, relative to the length of the new edge times a radian: less is rounding."""
 ROUNDS = 12
-"""Times that edges are flipped at most; what one flip makes better for another is nearly done after four."""
+"""Largest number of rounds of flips; nearly all are made in the first four."""
 MOST = 4_000_000
-"""Faces beyond which creases stay as they are, lest looking for them takes more memory than the surface itself."""
+"""Number of faces above which creases stay as they are: the search for them would take more memory than the surface."""
 
 
 def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = None) -> Ints:
-    """(m, 3) faces on the same vertices, with edges flipped wherever that makes the surface bend less.
+    """Return (m, 3) faces on the same vertices, with edges flipped wherever that makes the surface bend less.
 
-    No edge has more than two faces, which agree; it stays so. Around vertices that are held, (n,), nothing is flipped.
+    No edge may have more than two faces, and these agree. Nothing is flipped around vertices that are `held`, (n,).
 
     Examples
     --------
@@ -46,28 +46,28 @@ def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = No
         return faces
     near = np.zeros(len(vertices), dtype=bool)
     near[faces[sharp // 3]] = True
-    some = np.flatnonzero(near[faces].any(axis=1))
+    chosen = np.flatnonzero(near[faces].any(axis=1))
     result: Ints = faces.copy()
     for _ in range(ROUNDS):
-        first, second, one, other = _flips(vertices, result[some], near, held)
+        first, second, new_first, new_second = _flips(vertices, result[chosen], near, held)
         if not len(first):
             break
-        result[some[first]], result[some[second]] = one, other
+        result[chosen[first]], result[chosen[second]] = new_first, new_second
     return result
 
 
 def _creases(vertices: Floats, faces: Ints) -> tuple[EdgeTable, Floats, Ints]:
-    """Edges and unit normals of faces, and both halfedges of the edges at which two make an angle of over `SHARP`."""
+    """Return edges and unit normals of faces, and both halfedges of the edges with an angle above `SHARP`."""
     table, normals = edge_table(faces), unit(area_vectors(vertices[faces]))
-    one, other = normals[table.pairs // 3].swapaxes(0, 1)
-    return table, normals, table.pairs[np.einsum("ij,ij->i", one, other) < np.cos(SHARP)]
+    first, second = normals[table.pairs // 3].swapaxes(0, 1)
+    return table, normals, table.pairs[np.einsum("ij,ij->i", first, second) < np.cos(SHARP)]
 
 
 def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> tuple[Ints, Ints, Ints, Ints]:
-    """Pairs of faces to replace, (k,) each, no two of them neighbors, and what replaces them, (k, 3) each.
+    """Return pairs of faces to replace, (k,) each, no two pairs neighbours, and their replacements, (k, 3) each.
 
-    The edge from a to b has c and d across; the edge from c to d takes its place, unless there is one already: of the
-    vertices that are `whole`, one of which it needs, all faces are here.
+    The edge from a to b has c and d across; it is replaced by the edge from c to d, unless there is one already. One of
+    these must be `whole`: a vertex all of whose faces are given.
     """
     table, normals, creases = _creases(vertices, faces)
     (first, second), (i, j) = (creases // 3).T, (creases % 3).T
@@ -80,17 +80,17 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
         (d, b, (j + 2) % 3, second, 1),
     )
     new = np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)
-    made = [unit(area_vectors(vertices[each])) for each in new]
-    gain = _bend(vertices, a, b, normals[first], normals[second]) - _bend(vertices, c, d, *made)
+    new_normals = [unit(area_vectors(vertices[corners])) for corners in new]
+    gain = _bend(vertices, a, b, normals[first], normals[second]) - _bend(vertices, c, d, *new_normals)
     reach = np.linalg.norm(vertices[c] - vertices[d], axis=1)
     faces_around = [first, second]
     for tail, head, side, owner, which in rim:
         beyond = table.mates[3 * owner + side]
-        there = beyond >= 0
-        other = np.where(there, beyond // 3, owner)
-        faces_around.append(other)
-        before = _bend(vertices, tail, head, normals[owner], normals[other])
-        gain += np.where(there, before - _bend(vertices, tail, head, made[which], normals[other]), 0.0)
+        neighbor = np.where(beyond >= 0, beyond // 3, owner)
+        faces_around.append(neighbor)
+        before = _bend(vertices, tail, head, normals[owner], normals[neighbor])
+        after = _bend(vertices, tail, head, new_normals[which], normals[neighbor])
+        gain += np.where(beyond >= 0, before - after, 0.0)
     keys = edge_keys(c, d)
     present = np.isin(keys, edge_keys(*table.vertices.T))
     gain[present | ~(whole[c] | whole[d]) | (c == d)] = 0.0
@@ -108,7 +108,7 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
     return first[won], second[won], new[0][won], new[1][won]
 
 
-def _bend(vertices: Floats, tails: Ints, heads: Ints, one: Floats, other: Floats) -> Floats:
-    """(k,) length times the angle between the unit normals on both sides of edges."""
+def _bend(vertices: Floats, tails: Ints, heads: Ints, first_normals: Floats, second_normals: Floats) -> Floats:
+    """Return (k,) length times the angle between the unit normals on both sides of edges."""
     lengths = np.linalg.norm(vertices[heads] - vertices[tails], axis=1)
-    return lengths * np.arccos(np.clip(np.einsum("ij,ij->i", one, other), -1.0, 1.0))
+    return lengths * np.arccos(np.clip(np.einsum("ij,ij->i", first_normals, second_normals), -1.0, 1.0))

@@ -1,4 +1,4 @@
-"""Edges of triangles and polygons: which halfedges run along each, and how the faces they belong to hang together."""
+"""Edges of triangles and polygons: the halfedges along each, and how the faces that they belong to are connected."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ class HalfedgePairs:
 
     edges: Ints  # (h,) edge of each halfedge; −1 where it joins a vertex to itself or its face is left out
     counts: Ints  # (e,) halfedges of each edge
-    # (e,) least halfedge of each edge and the next; −1 where there is none
+    # (e,) the least halfedge of each edge and the next one; −1 where there is none
     first: Ints
     second: Ints
 
     @property
     def around(self) -> Ints:
-        """(h,) halfedges along the edge of each; 0 for those that have none."""
+        """(h,) number of halfedges along the edge of each; 0 for halfedges without an edge."""
         return np.append(self.counts, 0)[self.edges]
 
 
 @dataclass(frozen=True, eq=False)
 class FaceOrientation:
-    """Parts of faces that hang together across edges of two faces, and how the faces of each agree."""
+    """Parts of faces that are connected across edges of two faces, and how the faces of each agree."""
 
     parts: Ints  # (n_faces,) part of each face; parts are numbered by first appearance
     turned: Bools  # (n_faces,) which faces must turn; of parts that cannot be oriented, none
@@ -43,14 +43,14 @@ class FaceOrientation:
 
 
 def following_corners(offsets: Ints) -> NDArray[np.int32]:
-    """(c,) place of the corner that follows each around its face."""
+    """Return (c,) the corner that follows each around its face."""
     following = np.arange(1, offsets[-1] + 1, dtype=np.int32)
     following[offsets[1:] - 1] = offsets[:-1]
     return following
 
 
 def pair_halfedges(tails: Ints, heads: Ints, n_vertices: int, used: Bools | None = None) -> HalfedgePairs:
-    """Find the edges of polygons and the first two used halfedges of each. Takes O(n) time, hubs included.
+    """Find the edges of polygons and the first two used halfedges of each. The time is O(n), even at hubs.
 
     Examples
     --------
@@ -64,9 +64,9 @@ def pair_halfedges(tails: Ints, heads: Ints, n_vertices: int, used: Bools | None
 
 
 def orient_faces(pairs: HalfedgePairs, tails: Ints, owners: NDArray[np.integer], weights: Floats) -> FaceOrientation:
-    """Make faces agree with their neighbours across edges of two faces, in each part with the majority by area.
+    """Make faces agree with their neighbours across edges of two faces; in each part the majority by weight stays.
 
-    The weights, (n_faces,), say how much each face is to stay as it is: its area; negative where it is rather to turn.
+    The weights, (n_faces,), are the areas of the faces; negative where a face is rather to be turned.
 
     Examples
     --------
@@ -76,10 +76,10 @@ def orient_faces(pairs: HalfedgePairs, tails: Ints, owners: NDArray[np.integer],
     (array([ True, False]), array([ True]), 1)
     """
     two = pairs.counts == 2
-    one, other = pairs.first[two], pairs.second[two]
-    (f, g), n, disagree = (owners[one], owners[other]), len(weights), tails[one] == tails[other]
+    first, second = pairs.first[two], pairs.second[two]
+    (f, g), n, disagree = (owners[first], owners[second]), len(weights), tails[first] == tails[second]
     parts = connected_components(n, f, g)
-    # every face as it is and, n numbers farther on, turned over: what agrees hangs together
+    # each face is there twice, as it is and, n numbers farther on, turned over: faces that agree are connected
     ways = np.concatenate([f, f + n]), np.concatenate([np.where(disagree, g + n, g), np.where(disagree, g, g + n)])
     cover = connected_components(2 * n, *ways)
     orientable, closed = np.ones((2, int(parts.max(initial=-1)) + 1), dtype=bool)
@@ -95,18 +95,18 @@ def orient_faces(pairs: HalfedgePairs, tails: Ints, owners: NDArray[np.integer],
 
 
 def may_coincide(pairs: HalfedgePairs, tails: Ints, following: NDArray[np.integer]) -> bool:
-    """Whether any two faces may be on the same corners: they would share an edge, and a corner next to it.
+    """Return whether any two faces may be on the same corners: they would share an edge, and a corner next to it.
 
     `following` is the halfedge that follows each around its face.
     """
     two = pairs.counts == 2
-    one, other = pairs.first[two], pairs.second[two]
+    first, second = pairs.first[two], pairs.second[two]
     preceding = np.empty_like(following)
     preceding[following] = np.arange(len(following), dtype=following.dtype)
-    beyond = tails[following[following[one]]]
-    alike = tails[one] == tails[other]  # else the corner beyond the edge is the one before it
-    there = tails[np.where(alike, following[following[other]], preceding[other])]
-    return bool((pairs.counts > 2).any() or (beyond == there).any())
+    first_next = tails[following[following[first]]]
+    alike = tails[first] == tails[second]  # else the corner beyond the edge is the one before it
+    second_next = tails[np.where(alike, following[following[second]], preceding[second])]
+    return bool((pairs.counts > 2).any() or (first_next == second_next).any())
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,11 +149,11 @@ class EdgeTable(Frozen):
         return read_only(np.stack([one, self.mates[one]], axis=1))
 
     def elimination_order(self, vertex_order: NDArray[np.integer]) -> Ints:
-        """Fill-reducing order of unknowns at edges, from one of the vertices: ``order[k]`` is eliminated k-th.
+        """Order unknowns at edges to reduce fill, given an order of the vertices: ``order[k]`` is eliminated k-th.
 
-        An edge is eliminated with its first eliminated end. Where a set of vertices separates two parts of the mesh, no
-        edge of one part shares a face with an edge of the other, so the edges within that set separate them too: the
-        order is a nested dissection of the edges, for a fraction of the cost of finding one anew.
+        An edge is eliminated with its first eliminated end. Vertices that separate two parts of the mesh separate the
+        edges of the two as well, since these share no face: the order is a nested dissection of the edges, for a
+        fraction of the cost of finding one anew.
         """
         rank = np.empty(len(vertex_order), dtype=np.int64)
         rank[vertex_order] = np.arange(len(vertex_order))
@@ -163,8 +163,6 @@ class EdgeTable(Frozen):
 
 def edge_table(faces: Ints) -> EdgeTable:
     """Find the edges of triangles, numbered by first appearance (corner 0–1, 1–2, 2–0, face after face).
-
-    Time is linear in the number of faces, even if all of them share a vertex.
 
     Examples
     --------
@@ -183,17 +181,17 @@ def edge_table(faces: Ints) -> EdgeTable:
 
 
 def edge_keys(one: NDArray[np.integer], other: NDArray[np.integer]) -> Ints:
-    """(k,) a number for each pair of vertices, whichever comes first."""
+    """Return (k,) a number for each pair of vertices, whichever of the two comes first."""
     return (np.minimum(one, other).astype(np.int64) << 32) | np.maximum(one, other)
 
 
 @compiled
 def find_edges(tails: Ints, heads: Ints, used: Bools, n_vertices: int) -> tuple[Ints, Bools, Ints, Ints, Ints]:
-    """Edges of halfedges (h,), in order of first appearance; those that are not used have none.
+    """Find the edges of halfedges (h,), in order of first appearance; halfedges that are not used have none.
 
-    There is one list per vertex: an edge is in that of its end with fewer halfedges, so that lists stay short. Returns
-    the edge of each halfedge, or −1, and whether it runs as the first along its edge does; how many halfedges each edge
-    (e,) has, the first, and the second, or −1.
+    Returns the edge of each halfedge, or −1, and whether it runs as the first along its edge does; and of each edge
+    (e,) the number of halfedges, the first, and the second, or −1. Each edge is in the list of its end with fewer
+    halfedges, so that lists stay short.
     """
     degrees, last = np.zeros(n_vertices, dtype=np.int64), np.full(n_vertices, -1)
     for h in range(len(tails)):

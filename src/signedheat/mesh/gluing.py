@@ -1,4 +1,4 @@
-"""Intrinsic triangulations: triangles given by their gluing and their edge lengths alone, and flips to Delaunay.
+"""Intrinsic triangulations, given by their gluing and their edge lengths alone, and flips to Delaunay.
 
 Halfedge ``3 f + k`` runs from corner k to corner k + 1 of face f. Two halfedges of one edge may lie in one face, and
 two edges may join the same two vertices, so nothing here is looked up by vertex ids.
@@ -23,7 +23,7 @@ kernel = compiled(error_model="numpy")  # without exceptions, compilation takes 
 FLIP, TURN, SPLIT_FACE, SPLIT_EDGE = 0, 1, 2, 3
 """Kinds of steps in a history."""
 MOST_FLIPS = 1000
-"""An edge that has been flipped as often flips back and forth because of rounding, and is left as it is."""
+"""Number of flips after which an edge is left as it is: rounding makes it flip back and forth."""
 
 
 class Gluing(NamedTuple):
@@ -33,8 +33,8 @@ class Gluing(NamedTuple):
     tail: Ints
     edge: Ints
     forward: Bools  # (3 m,) whether the halfedge runs in the direction of its edge
-    # (3 m,) which of the two sides of its edge the halfedge is on: it stays through all steps, so that the two sides of
-    # a source do, until the edge is flipped
+    # (3 m,) which of the two sides of its edge the halfedge is on; it stays until the edge is flipped, so that the two
+    # sides of a source stay apart
     front: Bools
     sibling: Ints  # (3 m,) next halfedge of the same edge, cyclically; the halfedge itself at a boundary
     start: Ints  # (e,) one halfedge of every edge
@@ -42,29 +42,27 @@ class Gluing(NamedTuple):
     fixed: Bools  # (e,) edges that must not be flipped
     flips: Ints  # (e,) how often each edge has been flipped
     counts: Ints  # (5,) numbers of faces, edges, vertices, steps of the history, and edges on the stack
-    # (s, 4) and (s, 4): the history: kind of the step, two halfedges or faces, the new vertex; and the affine
-    # dependency of its points
-    steps: Ints
-    weights: Floats
+    steps: Ints  # (s, 4) the history: kind of each step, two halfedges or faces, and the new vertex
+    weights: Floats  # (s, 4) the affine dependency of the points of each step
     scratch: Ints  # work array
     unit: float  # unit of length
 
 
 @kernel
 def following(h: int) -> int:
-    """The next halfedge around the face."""
+    """Return the next halfedge around the face."""
     return h + 1 if h % 3 < 2 else h - 2
 
 
 @kernel
 def preceding(h: int) -> int:
-    """The previous halfedge around the face."""
+    """Return the previous halfedge around the face."""
     return h - 1 if h % 3 else h + 2
 
 
 @kernel
 def half_tangent(a: float, b: float, c: float) -> tuple[float, float]:
-    """Numerator and denominator of tan²(α/2), α the angle opposite to side a, without cancellation (Kahan).
+    """Return numerator and denominator of tan²(α/2), α the angle opposite side a, without cancellation (Kahan).
 
     Their product is 16 times the squared area; lengths that violate the triangle inequality count as a flat triangle.
     """
@@ -78,14 +76,14 @@ def half_tangent(a: float, b: float, c: float) -> tuple[float, float]:
 
 @kernel
 def tangent_at(g: Gluing, h: int) -> tuple[float, float]:
-    """`half_tangent` of the corner at the tail of a halfedge."""
+    """Return the `half_tangent` of the corner at the tail of a halfedge."""
     n = following(h)
     return half_tangent(g.length[g.edge[n]], g.length[g.edge[h]], g.length[g.edge[preceding(h)]])
 
 
 @kernel
 def is_interior(g: Gluing, h: int) -> bool:
-    """Whether exactly two different faces meet at the halfedge's edge."""
+    """Return whether exactly two different faces meet at the halfedge's edge."""
     other: int = g.sibling[h]
     back: int = g.sibling[other]
     return other != h and back == h and other // 3 != h // 3
@@ -93,7 +91,7 @@ def is_interior(g: Gluing, h: int) -> bool:
 
 @kernel
 def violates_delaunay(g: Gluing, h: int) -> bool:
-    """Whether the two angles opposite to an interior edge sum to more than π (by more than rounding)."""
+    """Return whether the two angles opposite an interior edge sum to more than π, beyond rounding."""
     n, d = tangent_at(g, preceding(h))
     m, e = tangent_at(g, preceding(g.sibling[h]))
     return n * m > d * e * (1.0 + 1e-10)
@@ -136,7 +134,7 @@ def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float,
 
 @kernel
 def faces_around(steps: Ints, n: int, around: Ints, start: Ints) -> None:
-    """The faces that step n of a history has or makes, and the corner of each that its first point is at."""
+    """Write the faces that step n of a history has or makes, and the corner of each that its first point is at."""
     kind = steps[n, 0]
     around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
     start[0] = start[1] = start[2] = 0
@@ -161,7 +159,7 @@ def turn_over(g: Gluing, face: int) -> None:
 
 @kernel
 def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
-    """The two faces at an edge unfolded into one plane: ``h: i → j`` with apex a, its twin with apex b.
+    """Unfold the two faces at an edge into one plane: ``h: i → j`` with apex a, its twin with apex b.
 
     Returns the signed areas of jab and iab, the areas of the twin's face and of h's face, and the length of ab. The
     areas are the affine dependency of the four corners: area_jab·i + area_iab·j = area_twin·a + area_h·b.
@@ -189,7 +187,7 @@ def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
 
 @kernel
 def flip(g: Gluing, h: int) -> bool:
-    """Flip an interior edge, if the two faces form a strictly convex quadrilateral; returns whether it did.
+    """Flip an interior edge, if its two faces form a strictly convex quadrilateral; return whether it was flipped.
 
     ``h: i → j`` with apex a and its twin ``t: j → i`` with apex b become ``h: b → a`` with apex i, ``t: a → b`` with
     apex j. Faces and halfedges keep their ids, so that a history can be run backwards.
@@ -215,9 +213,9 @@ def flip(g: Gluing, h: int) -> bool:
 
 @kernel
 def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
-    """Flip until every edge that is not fixed is Delaunay; returns False if the history is full before that.
+    """Flip until every edge that is not fixed is Delaunay; return False if the history is full before that.
 
-    `stack` holds the edges still to be checked, `counts[4]` of them; `stacked` marks them.
+    `stack` holds the ``counts[4]`` edges that are still to be checked; `stacked` marks them.
     """
     while g.counts[4] > 0:
         if g.counts[3] + 2 > len(g.steps):
@@ -248,7 +246,7 @@ def look_at(g: Gluing, stack: Ints, stacked: Bools, e: int) -> None:
 
 @kernel
 def new_edge(g: Gluing, length: float, fixed: bool) -> int:
-    """Add an edge."""
+    """Add an edge; return its id."""
     e: int = g.counts[1]
     g.counts[1] = e + 1
     g.length[e], g.fixed[e], g.flips[e] = length, fixed, 0
@@ -257,7 +255,7 @@ def new_edge(g: Gluing, length: float, fixed: bool) -> int:
 
 @kernel
 def apex_position(g: Gluing, h: int) -> tuple[float, float]:
-    """(x, y) of the face's third corner, with the halfedge along the positive x axis from the origin; y ≥ 0."""
+    """Return (x, y ≥ 0) of the face's third corner, with the halfedge along the positive x axis from the origin."""
     base, right, left = g.length[g.edge[h]], g.length[g.edge[following(h)]], g.length[g.edge[preceding(h)]]
     n, d = half_tangent(right, base, left)
     return 0.5 * (base + (left - right) * (left + right) / base), 0.5 * np.sqrt(n * d) / base
@@ -265,7 +263,7 @@ def apex_position(g: Gluing, h: int) -> tuple[float, float]:
 
 @kernel
 def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
-    """Insert a vertex into a face at barycentric coordinates (u, v, w); returns the vertex.
+    """Insert a vertex into a face at barycentric coordinates (u, v, w); return the vertex.
 
     Face (a, b, c) becomes (a, b, x) and two new faces (b, c, x) and (c, a, x).
     """
@@ -291,10 +289,10 @@ def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
 
 @kernel
 def split_edge(g: Gluing, h: int, fraction: float) -> int:
-    """Insert a vertex on an edge, `fraction` of the way along halfedge h, splitting all its faces; returns the vertex.
+    """Insert a vertex on an edge, `fraction` of the way along halfedge h, splitting all its faces; return the vertex.
 
-    Face (tail, head, apex) becomes (tail, x, apex) and a new face (x, head, apex). No face may have the edge twice.
-    The half at the edge's own tail keeps its id.
+    Face (tail, head, apex) becomes (tail, x, apex) and a new face (x, head, apex). No face may have the edge twice. The
+    half at the edge's own tail keeps its id.
     """
     count = sibling_count(g, h)
     around, seconds = np.empty(count, np.int64), np.empty(count, np.int64)
@@ -335,7 +333,7 @@ def split_edge(g: Gluing, h: int, fraction: float) -> int:
 
 @kernel
 def sibling_count(g: Gluing, h: int) -> int:
-    """Number of halfedges of an edge."""
+    """Return the number of halfedges of an edge."""
     count, y = 1, g.sibling[h]
     while y != h:
         count += 1
@@ -352,7 +350,7 @@ def pair(g: Gluing, h: int, tail: int, t: int, head: int, e: int) -> None:
 
 
 def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
-    """Start an intrinsic triangulation, with an empty history."""
+    """Start an intrinsic triangulation with an empty history."""
     edges, first = triangles.edges, triangles.first_halfedges
     edge, n_edges = edges.face_edges.ravel(), triangles.n_edges
     starts, order = edges.halfedges
@@ -385,12 +383,11 @@ def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
 
 
 def flip_all(gluing: Gluing) -> Gluing:
-    """Flip edges, in place, until the two angles opposite to every edge sum to at most π.
+    """Flip edges, in place, until the two angles opposite every edge sum to at most π.
 
-    The surface stays the same, with its vertices, angle sums and area. Boundary, nonmanifold and fixed edges are not
-    flipped and keep their ids; faces are turned over where neighbours have opposite orientations. Two edges may then
-    join the same two vertices, or an edge a vertex with itself. Returns the gluing with arrays long enough for its
-    history.
+    The surface stays the same, with its vertices, angle sums and area. Boundary, nonmanifold and fixed edges keep their
+    ids; faces are turned over where neighbours have opposite orientations. Afterwards two edges may join the same two
+    vertices, or an edge a vertex with itself. Returns the gluing, with arrays long enough for its history.
 
     Examples
     --------
@@ -410,7 +407,7 @@ def flip_all(gluing: Gluing) -> Gluing:
 
 
 def lay_out(gluing: Gluing) -> IntrinsicMesh:
-    """The current triangulation as an intrinsic mesh. Edges keep their ids and their frames."""
+    """Return the current triangulation as an intrinsic mesh, whose edges keep their ids and their frames."""
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     corners, edge = gluing.tail[: 3 * n_faces].reshape(-1, 3).copy(), gluing.edge[: 3 * n_faces].copy()
     front, heads = np.flatnonzero(gluing.front[: 3 * n_faces]), np.roll(corners, -1, axis=1).ravel()

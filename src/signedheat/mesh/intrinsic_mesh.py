@@ -1,8 +1,8 @@
 """Intrinsic mesh: all that the surface method needs to know of a surface.
 
-Per face three vertex ids, three edge ids, and the three corners laid out in the plane as complex numbers. Triangle
-meshes, polygon meshes after virtual refinement, digital surfaces with corrected normals, intrinsic triangulations and
-the local triangulations of point clouds are all represented in this way.
+It holds three vertex ids and three edge ids of each face, and its corners laid out in the plane as complex numbers.
+Triangle meshes, polygon meshes after virtual refinement, digital surfaces with corrected normals, intrinsic
+triangulations and the local triangulations of point clouds are all represented in this way.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from scipy import sparse
 from ..arrays import Bools, Complexes, Floats, Ints
 from ..errors import GeometryError
 from ..frozen import Frozen
-from .components import element_components
+from .components import connected_components, element_components
 from .edges import EdgeTable, edge_table
 from .triangles import Triangles
 
 Index = Ints | slice
 FLATTEST = 1e-18
-"""Area relative to the square of the longest edge, below which a face is taken to be as thick as that."""
+"""Area, relative to the square of the longest edge, that a flatter face counts as where it divides."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,16 +160,16 @@ class IntrinsicMesh(Frozen):
         return element_components(self.edges.face_edges)
 
     def in_edge_frames(self, vectors: Complexes, faces: Index = slice(None), sides: Index = slice(None)) -> Complexes:
-        """Vectors in the layouts of some faces, as the frames of some of their edges see them.
+        """Express vectors in the layouts of faces in the frames of their edges.
 
-        Without `sides` there is a vector for each side of the faces, (k, 3), or one for all three, (k, 1); with them
-        one for that side of each.
+        Without `sides` there is a vector for each side of the faces, (k, 3), or one for all three, (k, 1); with `sides`
+        there is one for that side of each face.
         """
         turned = np.conj(self.edge_directions[faces, sides]) * vectors
         return np.where(self.reflected[faces, sides], np.conj(turned), turned)
 
     def in_face_frames(self, vectors: Complexes, faces: Index = slice(None)) -> Complexes:
-        """(k, 3) the vectors of an (e,) edge array as seen in the layouts of some faces."""
+        """Return (k, 3) the vectors of an (e,) edge array in the layouts of faces."""
         of_face = vectors[self.edges.face_edges[faces]]
         return self.edge_directions[faces] * np.where(self.reflected[faces], np.conj(of_face), of_face)
 
@@ -195,7 +195,7 @@ class IntrinsicMesh(Frozen):
 
 
 MARGIN = 1e-14
-"""Margin of the triangle inequalities, relative to the mean length, to which flat triangles are mollified at least."""
+"""Least margin of the triangle inequalities, relative to the mean length, to which flat triangles are mollified."""
 
 
 def mollify(lengths: Floats, margin: float) -> tuple[Floats, float]:
@@ -216,7 +216,7 @@ def mollify(lengths: Floats, margin: float) -> tuple[Floats, float]:
 
 
 def laid_out(mesh: Triangles, margin: float) -> tuple[IntrinsicMesh, float]:
-    """The intrinsic mesh of a mesh, mollified, and the length that mollification has added to all edges."""
+    """Lay out a mesh, mollified; return the intrinsic mesh, and the length that was added to all edges."""
     corners = mesh.vertices[mesh.faces]
     sides = np.roll(corners, -1, axis=1) - corners
     lengths = np.linalg.norm(sides, axis=2)
@@ -229,3 +229,60 @@ def laid_out(mesh: Triangles, margin: float) -> tuple[IntrinsicMesh, float]:
         )
     lengths, added = mollify(lengths, margin)
     return IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges), added
+
+
+@dataclass(frozen=True, eq=False)
+class FacePairs:
+    """Pairs of faces that meet at an edge.
+
+    Around an edge with three or more faces each is paired with the next, cyclically, and each pair has weight ½:
+    separating one face from all others then costs as much as separating two faces at a manifold edge.
+    """
+
+    faces: Ints  # (p, 2) the two faces
+    sides: Ints  # (p, 2) the side of each face that is the edge: side k runs from corner k to corner k + 1
+    edges: Ints  # (p,) the edge
+    # (p, 2) the corner of each face at the edge's tail, and that at its head: indices into raveled (m, 3) corners
+    tails: Ints
+    heads: Ints
+    shares: Floats  # (p,) weight of each pair: 1, or ½ where three or more faces meet
+
+    def ends(self, corner_values: Floats) -> Floats:
+        """Return (p, 2) differences, first face less second, of (m, 3) corner values at the edge's tail and head.
+
+        Of the values that a face field Y integrates to, the two differ by the edge's length times its curl (Eq. 15).
+        """
+        flat = corner_values.ravel()
+        at_tail, at_head = flat[self.tails], flat[self.heads]
+        return np.stack([at_tail[:, 0] - at_tail[:, 1], at_head[:, 0] - at_head[:, 1]], axis=1)
+
+
+def face_pairs(triangles: IntrinsicMesh) -> FacePairs:
+    """Pair the faces at every edge; boundary edges have no pair."""
+    edge = triangles.edges.face_edges.ravel()
+    starts, order = triangles.edges.halfedges
+    count = np.diff(starts)
+    following = np.arange(1, len(order) + 1)
+    following[starts[1:][count > 0] - 1] = starts[:-1][count > 0]
+    halfedges = np.stack([order, order[following]], axis=1)
+    around = count[edge[order]]
+    halfedges = halfedges[(around > 2) | ((around == 2) & (halfedges[:, 0] < halfedges[:, 1]))]
+
+    faces, sides = halfedges // 3, halfedges % 3
+    begin, end = halfedges, 3 * faces + (sides + 1) % 3
+    forward = triangles.edges.forward.ravel()[halfedges]
+    edges = edge[halfedges[:, 0]]
+    return FacePairs(
+        faces,
+        sides,
+        edges,
+        tails=np.where(forward, begin, end),
+        heads=np.where(forward, end, begin),
+        shares=np.where(count[edges] > 2, 0.5, 1.0),
+    )
+
+
+def split_corners(triangles: IntrinsicMesh, pairs: FacePairs, cut: Bools) -> Ints:
+    """Return (3m,) the vertex of each corner, from zero, once the surface is cut open between some pairs (p,)."""
+    ends = np.concatenate([pairs.tails[~cut], pairs.heads[~cut]])
+    return connected_components(triangles.corner_vertices.size, *ends.T)

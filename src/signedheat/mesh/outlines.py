@@ -15,22 +15,22 @@ from .box_tree import BoxTree
 manifold3d: Any = lazy_module("manifold3d", "drawings of closed outlines")
 
 FillRule: TypeAlias = Literal["nonzero", "evenodd"]
-"""Which places closed outlines fill: those around which they run a number of times that is not zero, or that is odd."""
+"""Rule for the places that outlines fill: those around which they wind a number of times that is not zero, or odd."""
 SIZE = 2.0**30
 """Size to which outlines are scaled for manifold3d, which rounds coordinates to 1e-8."""
 SEAM = 1e-12
-"""Distance, relative to all outlines, up to which a corner is on a line: where outlines share lines, what they fill is
-bounded by lines that run there and back, without an area between them."""
+"""Distance, relative to the size of all outlines, within which a corner lies on a line. Where outlines share lines, the
+region they fill is bounded by lines that run there and back, without an area between them."""
 LEAST_SHARE = 1e-9
-"""Of an area or a length, below which it is rounding."""
+"""Relative difference of areas below which it is rounding."""
 
 
 def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
-    """Outlines, (n, 2) each, of what closed outlines fill: clockwise around it, counter-clockwise around its holes.
+    """Return the outlines, (n, 2) each, of the region that outlines fill: clockwise, those of holes counter-clockwise.
 
-    They do not cross, but may touch at vertices. What is filled without having an area is left out. By the rule
-    "nonzero" an outline within another one is a hole where it runs the other way; otherwise it does not matter which
-    way outlines run, so that those that cross are united.
+    The result does not cross itself, but may touch itself at vertices; parts without area are left out. By the rule
+    "nonzero" an outline within another one is a hole where it runs the other way; otherwise directions do not matter,
+    so that outlines that cross are united.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
 
 
 def without_seams(segments: Floats) -> Floats:
-    """(k, 2, 2) segments of outlines, cut where corners lie on them, without those along which others run back.
+    """Cut (k, 2, 2) segments of outlines where corners lie on them, and leave out those along which others run back.
 
     Examples
     --------
@@ -73,14 +73,14 @@ def without_seams(segments: Floats) -> Floats:
     corners, (tails, heads) = segments.reshape(-1, 2)[first], ends[ends[:, 0] != ends[:, 1]].T
     start, step = corners[tails], corners[heads] - corners[tails]
     lengths, in_space = np.linalg.norm(step, axis=1), np.pad(corners, ((0, 0), (0, 1)))
-    begins, found = BoxTree.of(in_space, in_space).meeting(in_space[np.stack([tails, heads, heads], axis=1)], near)
+    begins, touched = BoxTree.of(in_space, in_space).meeting(in_space[np.stack([tails, heads, heads], axis=1)], near)
     which = np.repeat(np.arange(len(tails)), np.diff(begins))
-    away, along = corners[found] - start[which], step[which] / lengths[which, None]
+    away, along = corners[touched] - start[which], step[which] / lengths[which, None]
     share, off = (away * along).sum(axis=1), np.abs(along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0])
     on = (off <= near) & (share >= -near) & (share <= lengths[which] + near)
     order = np.flatnonzero(on)[np.lexsort((share[on], which[on]))]
     goes_on = np.diff(which[order]) == 0
-    parts = np.stack([found[order][:-1], found[order][1:]], axis=1)[goes_on]
+    parts = np.stack([touched[order][:-1], touched[order][1:]], axis=1)[goes_on]
     pairs, pair = np.unique(np.sort(parts, axis=1), axis=0, return_inverse=True)
     net = np.bincount(pair.ravel(), np.where(parts[:, 0] < parts[:, 1], 1, -1), len(pairs))
     kept = np.where(net[:, None] < 0, pairs[:, ::-1], pairs)[net != 0]
@@ -88,7 +88,7 @@ def without_seams(segments: Floats) -> Floats:
 
 
 def _united(outlines: list[Floats]) -> Any:
-    """What outlines fill by the rule "nonzero", after those in no other one are turned alike, with all within them."""
+    """Return what outlines fill by the rule "nonzero", after the outermost are turned alike, with all within."""
     nonzero = manifold3d.FillRule.NonZero
     parts = [manifold3d.CrossSection([outline], nonzero) for outline in outlines]
     boxes = np.array([[outline.min(axis=0), outline.max(axis=0)] for outline in outlines])

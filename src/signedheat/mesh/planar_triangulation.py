@@ -1,4 +1,4 @@
-"""Kernel: constrained Delaunay triangulations of triangles with points on their sides and within, and segments."""
+"""Constrained Delaunay triangulation of triangles with points on their sides and within, and segments."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 
 FLAT = 1e-13
-"""Height of a triangle, over the size of the face, below which it is flat."""
+"""Height of a triangle, relative to the size of the face, below which it is flat."""
 DELAUNAY = 1e-10
-"""Sine by which two opposite angles may add up to more than a straight one."""
+"""Sine of the excess over π up to which two opposite angles satisfy Delaunay's condition."""
 
 ROUNDS = 64
-"""Times that all edges are looked at; most faces need three."""
+"""Largest number of passes over all edges; most faces need three."""
 
 
 class Planar(NamedTuple):
@@ -33,13 +33,13 @@ class Planar(NamedTuple):
 def triangulate_faces(
     points: Floats, starts: Ints, members: Ints, corners: Ints, segment_starts: Ints, segments: Ints
 ) -> tuple[Ints, Ints, Ints]:
-    """Triangulate faces, each with points on its rim and within, so that segments between these are edges.
+    """Triangulate faces, each with points on its rim and within, so that segments between these become edges.
 
     The `members` of each face, from ``starts[f]`` on, are those of the `points` (n, 3) on its rim, in order from the
-    first corner on, then those within. `corners`, (m, 3), are the places of the second and third corner among them, and
-    how many are on the rim; `segments`, (t, 2), from ``segment_starts[f]`` on, join two such places each. Returns
-    triangles (k, 3), the face of each, ascending, and its cell: numbers from zero of what hangs together without a
-    segment between.
+    first corner on, then those within. `corners`, (m, 3), are the indices of the second and third corner among them,
+    and the number of points on the rim; `segments`, (t, 2), from ``segment_starts[f]`` on, join two such indices each.
+    Returns triangles (k, 3), the face of each, ascending, and its cell: triangles connected without a segment between
+    have the same.
     """
     m = len(corners)
     total = np.int64(0)
@@ -72,7 +72,7 @@ def triangulate_faces(
 
 @compiled
 def _number_cells(adj: Ints, fixed: Bools, cells: Ints, n_cells: int) -> int:
-    """Number triangles, none of which has a number, by what hangs together; returns the next number."""
+    """Give triangles that are connected across free edges the same number; return the next number."""
     stack = np.empty(len(cells), np.int64)
     for seed in range(len(cells)):
         if cells[seed] >= 0:
@@ -94,7 +94,7 @@ def _number_cells(adj: Ints, fixed: Bools, cells: Ints, n_cells: int) -> int:
 
 @compiled
 def _flattened(points: Floats, members: Ints, corners: Ints) -> Floats:
-    """(n, 2) the two coordinates along which a face is largest, counter-clockwise, from its first corner."""
+    """Return (n, 2) the two coordinates along which a face is largest, counter-clockwise, from its first corner."""
     a, b, c = members[0], members[corners[0]], members[corners[1]]
     normal = np.empty(3)
     for d in range(3):
@@ -114,7 +114,7 @@ def _flattened(points: Floats, members: Ints, corners: Ints) -> Floats:
 
 @compiled
 def _turn(x: Floats, a: int, b: int, c: int) -> float:
-    """Twice the signed area of a triangle."""
+    """Return twice the signed area of a triangle."""
     return (x[b, 0] - x[a, 0]) * (x[c, 1] - x[a, 1]) - (x[b, 1] - x[a, 1]) * (x[c, 0] - x[a, 0])
 
 
@@ -125,7 +125,7 @@ def _length(x: Floats, a: int, b: int) -> float:
 
 @compiled
 def _rim(mesh: Planar, corners: Ints) -> int:
-    """Divide the face at the points on its rim; returns how many triangles there are."""
+    """Divide the face at the points on its rim; return the number of triangles."""
     tri, at = mesh.tri, mesh.at
     tri[0, 0], tri[0, 1], tri[0, 2] = 0, corners[0], corners[1]
     at[0] = at[corners[0]] = at[corners[1]] = 0
@@ -142,7 +142,7 @@ def _rim(mesh: Planar, corners: Ints) -> int:
 
 @compiled
 def _point_to(tri: Ints, adj: Ints, t: int, tail: int, neighbour: int) -> None:
-    """Make a triangle know its neighbour across the edge that begins at a vertex."""
+    """Set the neighbour of a triangle across the edge that begins at a vertex."""
     if t >= 0:
         for k in range(3):
             if tri[t, k] == tail:
@@ -151,7 +151,7 @@ def _point_to(tri: Ints, adj: Ints, t: int, tail: int, neighbour: int) -> None:
 
 @compiled
 def _split(mesh: Planar, t: int, k: int, i: int, new: int) -> None:
-    """Put a vertex on edge k of a triangle: the half from the vertex to the edge's head is new."""
+    """Put a vertex on edge k of a triangle; the half from the vertex to the edge's head is new."""
     tri, adj, at = mesh.tri, mesh.adj, mesh.at
     a, b = (k + 1) % 3, (k + 2) % 3
     u, v, w = tri[t, k], tri[t, a], tri[t, b]
@@ -166,7 +166,7 @@ def _split(mesh: Planar, t: int, k: int, i: int, new: int) -> None:
 
 @compiled
 def _flip(mesh: Planar, t: int, k: int) -> int:
-    """Replace edge k of a triangle by the one between the apexes: (c, a, d) and (d, b, c). Returns the second."""
+    """Replace edge k of a triangle by the one between the apexes: (c, a, d) and (d, b, c); return the second."""
     tri, adj, fixed, at = mesh.tri, mesh.adj, mesh.fixed, mesh.at
     s = adj[t, k]
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
@@ -188,7 +188,7 @@ def _flip(mesh: Planar, t: int, k: int) -> int:
 
 @compiled
 def _insert(mesh: Planar, count: int, i: int) -> int:
-    """Put a point into the triangle that has it, and flip edges until they are Delaunay; the number of triangles."""
+    """Put a point into the triangle that contains it and restore Delaunay by flips; return the number of triangles."""
     x, tri, adj, at, flat = mesh.x, mesh.tri, mesh.adj, mesh.at, mesh.flat
     t, k, depth = _locate(mesh, count, i)
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
@@ -255,7 +255,7 @@ def _improve(mesh: Planar) -> None:
 
 @compiled
 def _bad(mesh: Planar, t: int, k: int) -> bool:
-    """Whether an edge is not Delaunay, and can be flipped."""
+    """Return whether an edge is not Delaunay and can be flipped."""
     x, tri, adj, flat = mesh.x, mesh.tri, mesh.adj, mesh.flat
     s = adj[t, k]
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
@@ -273,14 +273,14 @@ def _bad(mesh: Planar, t: int, k: int) -> bool:
 
 @compiled
 def _convex(x: Floats, a: int, b: int, c: int, d: int, flat: float) -> bool:
-    """Whether the edge from a to b between the apexes c, on its left, and d can be flipped."""
+    """Return whether the edge from a to b between the apexes c, on its left, and d can be flipped."""
     least = flat * _length(x, c, d)
     return _turn(x, c, a, d) > least and _turn(x, d, b, c) > least
 
 
 @compiled
 def _locate(mesh: Planar, count: int, i: int) -> tuple[int, int, float]:
-    """The triangle that has a point, the edge that it is nearest to, and twice the area between."""
+    """Return the triangle that contains a point, the edge that it is nearest to, and twice the area between."""
     x, tri, adj = mesh.x, mesh.tri, mesh.adj
     t = count - 1
     for _ in range(count):
@@ -301,7 +301,7 @@ def _locate(mesh: Planar, count: int, i: int) -> tuple[int, int, float]:
 
 @compiled
 def _side(x: Floats, tri: Ints, t: int, i: int) -> tuple[int, float]:
-    """The edge of a triangle that a point is farthest beyond, and twice the area between."""
+    """Return the edge of a triangle that a point is farthest beyond, and twice the area between."""
     side, depth = 0, np.inf
     for k in range(3):
         turn = _turn(x, tri[t, k], tri[t, (k + 1) % 3], i)
@@ -312,7 +312,7 @@ def _side(x: Floats, tri: Ints, t: int, i: int) -> tuple[int, float]:
 
 @compiled
 def _edge(mesh: Planar, u: int, v: int) -> int:
-    """The edge from one vertex to another as three times its triangle plus its place there; −1 if there is none."""
+    """Return the edge between two vertices as three times its triangle plus its index there; −1 if there is none."""
     tri, adj, at = mesh.tri, mesh.adj, mesh.at
     first = at[u]
     t, back = first, False
@@ -350,11 +350,11 @@ def _connect(mesh: Planar, a: int, b: int) -> bool:
 
 @compiled
 def _aim(mesh: Planar, a: int, b: int) -> tuple[int, int, int]:
-    """The triangle around a, and its edge, that a segment to b leaves through; or the neighbour of a that it meets."""
+    """Return the triangle at a, and its edge, through which the segment to b leaves; or the neighbour it meets."""
     x, tri, adj, at, flat = mesh.x, mesh.tri, mesh.adj, mesh.at, mesh.flat
     first = at[a]
     t, back, length = first, False, _length(x, a, b)
-    found, edge = -1, -1
+    crossed, edge = -1, -1
     while t >= 0:
         k = _place(tri, t, a)
         u, w = tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
@@ -365,13 +365,13 @@ def _aim(mesh: Planar, a: int, b: int) -> tuple[int, int, int]:
             if ahead > 0.0 and ahead < length * length and abs(_turn(x, a, b, i)) <= flat * length:
                 return t, k, i
         if _turn(x, a, b, u) < 0.0 and _turn(x, a, b, w) > 0.0:
-            found, edge = t, (k + 1) % 3
+            crossed, edge = t, (k + 1) % 3
         t = adj[t, k if back else (k + 2) % 3]
         if t < 0 and not back:
             back, t = True, adj[first, _place(tri, first, a)]
         if t == first:
             break
-    return found, edge, -1
+    return crossed, edge, -1
 
 
 @compiled
@@ -384,7 +384,7 @@ def _place(tri: Ints, t: int, a: int) -> int:
 
 @compiled
 def _clear(mesh: Planar, t: int, k: int, a: int, b: int) -> int:
-    """Flip the edges that a segment crosses, beginning with edge k of a triangle, up to the point it meets; or −1."""
+    """Flip the edges that a segment crosses, from edge k of a triangle on; return the point that it meets, or −1."""
     x, tri, adj, fixed, flat = mesh.x, mesh.tri, mesh.adj, mesh.fixed, mesh.flat
     tails, heads = [tri[t, k]], [tri[t, (k + 1) % 3]]
     length = _length(x, a, b)

@@ -8,9 +8,9 @@ from ..arrays import Bools, Floats, Ints
 
 
 def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[tuple[Ints, Bools, bool]]:
-    """Join segments end to end into polylines, which end where not exactly two segments meet.
+    """Join segments end to end into polylines, which end at nodes where not exactly two segments meet.
 
-    Segments join nodes. Unless they are directed they are reversed where needed. Of each polyline: segments in order,
+    Segments join nodes; undirected ones are reversed where needed. Returns the segments of each polyline in order,
     which of them run from head to tail, and whether it is closed.
 
     Examples
@@ -23,11 +23,11 @@ def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[
     (tails, heads), n = ends.reshape(2, -1), len(nodes)
     leaving, arriving = np.bincount(tails, minlength=n), np.bincount(heads, minlength=n)
     through = (leaving == 1) & (arriving == 1) if directed else leaving + arriving == 2
-    at: list[list[int]] = [[] for _ in range(n)]
+    segments_at: list[list[int]] = [[] for _ in range(n)]
     for segment, (tail, head) in enumerate(zip(tails.tolist(), heads.tolist(), strict=True)):
-        at[tail].append(segment)
+        segments_at[tail].append(segment)
         if not directed:
-            at[head].append(segment)
+            segments_at[head].append(segment)
     used = np.zeros(len(tails), dtype=bool)
 
     def walk(segment: int, start: int) -> tuple[list[int], list[bool], int]:
@@ -37,12 +37,12 @@ def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[
             order.append(segment)
             backwards.append(bool(tails[segment] != node))
             node = int(tails[segment] if backwards[-1] else heads[segment])
-            onward = [s for s in at[node] if not used[s]] if through[node] else []
+            onward = [s for s in segments_at[node] if not used[s]] if through[node] else []
             if not onward:
                 return order, backwards, node
             segment = onward[0]
 
-    found = []
+    polylines = []
     for pass_through in (False, True):  # first from ends and junctions; the segments left form loops
         for segment in range(len(tails)):
             start = int(tails[segment])
@@ -51,14 +51,14 @@ def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[
             if used[segment] or (not pass_through and through[start]):
                 continue
             order, backwards, end = walk(segment, start)
-            found.append((np.array(order), np.array(backwards), end == start))
-    return found
+            polylines.append((np.array(order), np.array(backwards), end == start))
+    return polylines
 
 
 def leaving(points: Floats, closed: bool, room: Floats) -> Ints:
-    """Which of (n, d) points of a polyline are left for another place, which is farther than the `room` (n,) of each.
+    """Return which of (n, d) points of a polyline are left for a place farther away than the `room` (n,) of each.
 
-    The end of an open polyline, which is left for nothing, is kept as well.
+    The end of an open polyline is kept as well.
 
     Examples
     --------

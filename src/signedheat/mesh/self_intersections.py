@@ -15,21 +15,21 @@ from .unit_vectors import unit
 from .welding import same_positions
 
 TOUCHING = 1e-10
-"""Depth, over the size of the mesh, up to which triangles only touch."""
+"""Depth, relative to the size of the mesh, up to which triangles only touch."""
 FOLDED = 1e-10
-"""One less the cosine between two neighbours as seen along their edge, up to which one covers the other."""
+"""One minus the cosine between two neighbours, as seen along their edge, up to which one covers the other."""
 CROWD = 64
-"""Faces around a vertex above which those that meet there are looked for around it, and not in space."""
+"""Number of faces around a vertex above which their intersections are found around it, and not in space."""
 NEAR_ARC = 1e-6
-"""Slack, as an angle, by which the arcs of faces around a vertex may miss each other."""
+"""Angle by which the arcs of two faces around a vertex may miss each other."""
 UPRIGHT = 1e-13
-"""One less the cosine between two directions up to which they are one."""
+"""One minus the cosine between two directions up to which they are one."""
 
 
 def self_intersections(vertices: Floats, faces: Ints) -> Ints:
-    """(k, 2) pairs of faces that pass through each other, or cover each other in one plane.
+    """Return (k, 2) pairs of faces that pass through each other, or cover each other in one plane.
 
-    Those that have no vertex in common must not touch, either; vertices at one place are one.
+    Faces without a common vertex must not touch, either; vertices at one place are one.
 
     Examples
     --------
@@ -42,9 +42,9 @@ def self_intersections(vertices: Floats, faces: Ints) -> Ints:
 
 
 def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float) -> Ints:
-    """(k, 2) pairs of faces that overlap to a depth, or by `slack` if they have a vertex in common.
+    """Return (k, 2) pairs of faces that overlap by more than `depth`, or `slack` if they have a common vertex.
 
-    Along their normals they may be apart by `slack`. Those that have an edge in common overlap if they are folded.
+    Along their normals they may be apart by `slack`. Faces with a common edge overlap if they are folded.
     """
     if not len(faces):
         return np.zeros((0, 2), dtype=np.int64)
@@ -58,12 +58,12 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float)
     arcs = _arcs(centred, ids[fans], hubs[fans]) if len(fans) else corners[:0]
     around = BoxTree.of(arcs.min(axis=1), arcs.max(axis=1)) if len(fans) else tree
 
-    def overlapping(one: Ints, other: Ints) -> Ints:
-        shared = sum((i == j).astype(np.int8) for i, j in product(ids[one].T.copy(), ids[other].T.copy()))
-        meet, few, many = np.empty(len(one), dtype=bool), np.flatnonzero(shared < 2), np.flatnonzero(shared > 1)
-        meet[many] = _folded(corners, ids, one[many], other[many])
-        meet[few] = _overlapping(flat, one[few], other[few], slack, np.where(shared[few] > 0, slack, depth))
-        return np.stack([one, other], axis=1)[meet]
+    def overlapping(first: Ints, second: Ints) -> Ints:
+        shared = sum((i == j).astype(np.int8) for i, j in product(ids[first].T.copy(), ids[second].T.copy()))
+        meet, few, many = np.empty(len(first), dtype=bool), np.flatnonzero(shared < 2), np.flatnonzero(shared > 1)
+        meet[many] = _folded(corners, ids, first[many], second[many])
+        meet[few] = _overlapping(flat, first[few], second[few], slack, np.where(shared[few] > 0, slack, depth))
+        return np.stack([first, second], axis=1)[meet]
 
     def of_tree(start: int) -> Ints:
         own = hubs[start : start + CHUNK]
@@ -85,9 +85,9 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float)
 
 
 def _hubs(faces: Ints, n_vertices: int) -> Ints:
-    """(m,) the corner of each face that most faces meet at, if these are more than `CROWD`; else −1.
+    """Return (m,) the corner of each face at which most faces meet, if these are more than `CROWD`; else −1.
 
-    Faces around one vertex meet elsewhere only where the arcs do that they are seen as from there.
+    Faces around one vertex meet elsewhere only where their arcs meet, as seen from that vertex.
     """
     valences = np.bincount(faces.ravel(), minlength=n_vertices)[faces]
     hubs = np.take_along_axis(faces, valences.argmax(axis=1)[:, None], axis=1)[:, 0]
@@ -95,7 +95,7 @@ def _hubs(faces: Ints, n_vertices: int) -> Ints:
 
 
 def _order(corners: Floats, vertices: Floats, hubs: Ints) -> Ints:
-    """(m,) triangles along a space-filling curve, those around one hub after each other."""
+    """Return (m,) the order of triangles along a space-filling curve, with those around one hub together."""
     middles = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
     if not (hubs >= 0).any():
         return np.argsort(morton_codes(middles), kind="stable")
@@ -104,9 +104,9 @@ def _order(corners: Floats, vertices: Floats, hubs: Ints) -> Ints:
 
 
 def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:
-    """(k, 3, 3) triangles around the arcs that faces are seen as from their hubs, each hub in a place of its own."""
-    at = np.argmax(faces == hubs[:, None], axis=1)
-    ends = [faces[np.arange(len(faces)), (at + k) % 3] for k in (1, 2)]
+    """Return (k, 3, 3) triangles around the arcs of faces as seen from their hubs, each hub in a place of its own."""
+    corner = np.argmax(faces == hubs[:, None], axis=1)
+    ends = [faces[np.arange(len(faces)), (corner + k) % 3] for k in (1, 2)]
     first, second = (unit(vertices[end] - vertices[hubs]) for end in ends)
     tip = (first + second) / np.maximum(1.0 + (first * second).sum(axis=1), 1e-3)[:, None]
     names = np.unique(hubs, return_inverse=True)[1]
@@ -115,34 +115,34 @@ def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:
     return arcs
 
 
-def _folded(corners: Floats, ids: Ints, one: Ints, other: Ints) -> Bools:
-    """(k,) whether faces with an edge in common lie on the same side of it, or have all corners in common."""
-    same = ids[one][:, :, None] == ids[other][:, None, :]
+def _folded(corners: Floats, ids: Ints, face: Ints, neighbor: Ints) -> Bools:
+    """Return (k,) whether faces with a common edge lie on the same side of it, or have all corners in common."""
+    same = ids[face][:, :, None] == ids[neighbor][:, None, :]
     apex = np.argmin(same.any(axis=2), axis=1)
     beyond = np.argmin(same.any(axis=1), axis=1)
-    start, end = corners[one, (apex + 1) % 3], corners[one, (apex + 2) % 3]
+    start, end = corners[face, (apex + 1) % 3], corners[face, (apex + 2) % 3]
     along = unit(end - start)
-    away = [place - start for place in (corners[one, apex], corners[other, beyond])]
-    first, second = (unit(each - (each * along).sum(axis=1)[:, None] * along) for each in away)
+    away = [place - start for place in (corners[face, apex], corners[neighbor, beyond])]
+    first, second = (unit(way - (way * along).sum(axis=1)[:, None] * along) for way in away)
     folded: Bools = ((first * second).sum(axis=1) > 1.0 - FOLDED) | same.any(axis=2).all(axis=1)
     return folded
 
 
 @compiled
-def _overlapping(corners: Floats, one: Ints, other: Ints, slack: float, depths: Floats) -> Bools:
-    """(k,) whether triangles overlap, each pair deeper than its depth."""
-    result, ways = np.empty(len(one), dtype=np.bool_), np.empty((10, 3))
-    for k in range(len(one)):
-        result[k] = overlap(corners[one[k]], corners[other[k]], slack, depths[k], ways)
+def _overlapping(corners: Floats, first: Ints, second: Ints, slack: float, depths: Floats) -> Bools:
+    """Return (k,) whether triangles overlap, each pair by more than its depth."""
+    result, ways = np.empty(len(first), dtype=np.bool_), np.empty((10, 3))
+    for k in range(len(first)):
+        result[k] = overlap(corners[first[k]], corners[second[k]], slack, depths[k], ways)
     return result
 
 
 @compiled
 def overlap(p: Floats, q: Floats, slack: float, depth: float, ways: Floats) -> bool:
-    """Whether two triangles, (9,) each, overlap deeper than a depth along every axis that may separate them.
+    """Return whether two triangles, (9,) each, overlap by more than a depth along every axis that may separate them.
 
-    Along their normals they may be apart by a slack. There is room for ten `ways`: their sides, their normals, and
-    these of length 1.
+    Along their normals they may be apart by a slack. `ways` is room for ten vectors: their sides, normals and unit
+    normals.
     """
     for d in range(3):
         if min(p[d], p[3 + d], p[6 + d]) > max(q[d], q[3 + d], q[6 + d]) + slack:

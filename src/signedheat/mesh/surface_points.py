@@ -16,7 +16,7 @@ from .intrinsic_mesh import IntrinsicMesh
 VERTEX, EDGE, FACE = 0, 1, 2
 
 SNAP = 1e-9
-"""Barycentric coordinates below this count as zero: the point lies on the edge or at the vertex."""
+"""Barycentric coordinate below which it counts as zero: the point then lies on the edge or at the vertex."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,8 +24,7 @@ class LocatedPoints:
     """Points of a surface, each with the lowest-dimensional element that contains it."""
 
     faces: Ints  # (n,) a face that contains the point
-    # (n, 3) barycentric coordinates in that face; exact zeros on edges and at vertices
-    barycentric: Floats
+    barycentric: Floats  # (n, 3) coordinates in that face; exact zeros on edges and at vertices
     kinds: Ints  # (n,) `VERTEX`, `EDGE` or `FACE`
     elements: Ints  # (n,) id of the vertex, edge or face
     along: Floats  # (n,) on edges, the fraction of the way from tail to head; otherwise 0
@@ -40,7 +39,7 @@ class LocatedPoints:
 
 
 def locate_points(triangles: IntrinsicMesh, faces: Ints, barycentric: Floats, name: str = "point") -> LocatedPoints:
-    """Find the vertex, edge or face that contains each of n points, given by faces and barycentric coordinates."""
+    """Find the vertex, edge or face that contains each point, given by its face and barycentric coordinates."""
     outside = np.flatnonzero((faces < 0) | (faces >= triangles.n_faces))
     if len(outside):
         raise SourceError(
@@ -68,14 +67,14 @@ def locate_points(triangles: IntrinsicMesh, faces: Ints, barycentric: Floats, na
 
 
 def points_at_vertices(triangles: IntrinsicMesh, vertices: Ints) -> LocatedPoints:
-    """Vertices as located points, each through its first face."""
+    """Locate vertices, each through its first face."""
     corners = corners_at(triangles.corner_vertices, vertices, triangles.n_vertices)
     kinds = np.full(len(vertices), VERTEX)
     return LocatedPoints(corners // 3, np.eye(3)[corners % 3], kinds, vertices, np.zeros(len(vertices)))
 
 
 def corners_at(faces: Ints, vertices: Ints, n_vertices: int, name: str = "point") -> Ints:
-    """(k,) the first corner ``3 face + k`` at each vertex."""
+    """Return (k,) the first corner ``3 face + k`` at each vertex."""
     if not np.issubdtype(vertices.dtype, np.integer):
         if len(vertices) == 0:
             return np.empty(0, dtype=np.int64)
@@ -103,7 +102,7 @@ def corners_at(faces: Ints, vertices: Ints, n_vertices: int, name: str = "point"
 
 
 def contain(triangles: IntrinsicMesh, faces: Ints, located: LocatedPoints) -> Bools:
-    """(n,) whether face k contains point k."""
+    """Return (n,) whether face k contains point k."""
     return np.choose(
         located.kinds,
         [
@@ -115,37 +114,39 @@ def contain(triangles: IntrinsicMesh, faces: Ints, located: LocatedPoints) -> Bo
 
 
 def barycentric_in(triangles: IntrinsicMesh, faces: Ints, located: LocatedPoints) -> Floats:
-    """(n, 3) barycentric coordinates of point k in face k, which must contain it."""
+    """Return (n, 3) barycentric coordinates of point k in face k, which must contain it."""
     weights: Floats = located.barycentric.copy()
     moved = np.flatnonzero(faces != located.faces)
-    kinds, elements, along, other = (a[moved] for a in (located.kinds, located.elements, located.along, faces))
+    kinds, elements, along, moved_to = (
+        column[moved] for column in (located.kinds, located.elements, located.along, faces)
+    )
     weights[moved] = 0.0
 
     at_vertex = kinds == VERTEX
-    corner = (triangles.corner_vertices[other[at_vertex]] == elements[at_vertex, None]).argmax(axis=1)
+    corner = (triangles.corner_vertices[moved_to[at_vertex]] == elements[at_vertex, None]).argmax(axis=1)
     weights[moved[at_vertex], corner] = 1.0
 
     on_edge = kinds == EDGE
-    rows, face = moved[on_edge], other[on_edge]
+    rows, face = moved[on_edge], moved_to[on_edge]
     side = (triangles.edges.face_edges[face] == elements[on_edge, None]).argmax(axis=1)
     weights[rows] = barycentric_on_edges(triangles.edges, face, side, along[on_edge])
     return weights
 
 
 def barycentric_on_edges(edges: EdgeTable, faces: Ints, sides: Ints, along: Floats) -> Floats:
-    """(n, 3) barycentric coordinates, in faces, of points on a side of each at fractions along the edge there."""
+    """Return (n, 3) barycentric coordinates, in faces, of points at fractions along the edge on a side of each."""
     return barycentric_on_sides(sides, np.where(edges.forward[faces, sides], along, 1 - along))
 
 
 def edges_between(triangles: IntrinsicMesh, faces: Ints, starts: Floats, ends: Floats) -> tuple[Ints, Ints]:
-    """(n,) the edge along which a segment in a face, by barycentric coordinates, runs, or −1; and its side there."""
+    """Return the edge along which each segment in a face runs, or −1, and its side; ends are barycentric."""
     empty = (starts == 0) & (ends == 0)
     sides = (empty.argmax(axis=1) + 1) % 3
     return np.where(empty.any(axis=1), triangles.edges.face_edges[faces, sides], -1), sides
 
 
 def barycentric_on_sides(sides: Ints, shares: Floats) -> Floats:
-    """(n, 3) barycentric coordinates of points at a share of the way along sides of faces."""
+    """Return (n, 3) barycentric coordinates of points at a fraction of the way along sides of faces."""
     weights, row = np.zeros((len(sides), 3)), np.arange(len(sides))
     weights[row, sides] = 1 - shares
     weights[row, (sides + 1) % 3] = shares
@@ -153,31 +154,31 @@ def barycentric_on_sides(sides: Ints, shares: Floats) -> Floats:
 
 
 def crossed_sides(above: Bools, chosen: Bools) -> tuple[Ints, Ints]:
-    """Faces that a level set crosses, and the (k, 2) sides at which it enters and leaves: what is above is to its left.
+    """Return faces that a level set crosses, and the (k, 2) sides where it enters and leaves, with above on its left.
 
-    Each corner of each face is above the level, (m, 3), or not; only chosen faces, (m,), are looked at.
+    `above`, (m, 3), tells whether each corner is above the level; only chosen faces, (m,), are considered.
     """
     faces = np.flatnonzero(chosen & above.any(axis=1) & ~above.all(axis=1))
-    here, there = above[faces], np.roll(above[faces], -1, axis=1)
-    return faces, np.stack([(here & ~there).argmax(axis=1), (there & ~here).argmax(axis=1)], axis=1)
+    starts, ends = above[faces], np.roll(above[faces], -1, axis=1)
+    return faces, np.stack([(starts & ~ends).argmax(axis=1), (ends & ~starts).argmax(axis=1)], axis=1)
 
 
 def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints) -> Ints:
-    """(k,) a face that contains both ends, or −1; preferably a face through which one of them is given."""
+    """Return (k,) a face that contains both ends, or −1; preferably a face through which one of them is given."""
     shared = np.where(contain(triangles, end.faces, start), end.faces, -1)
     shared = np.where(contain(triangles, start.faces, end), start.faces, shared)
     left = np.flatnonzero((shared < 0) & (start.kinds != FACE))
     if len(left):
         which, faces = incident_faces(triangles, start[left])
         fits = contain(triangles, faces, end[left[which]])
-        found = np.full(len(left), triangles.n_faces)
-        np.minimum.at(found, which[fits], faces[fits])
-        shared[left] = np.where(found < triangles.n_faces, found, -1)
+        least = np.full(len(left), triangles.n_faces)
+        np.minimum.at(least, which[fits], faces[fits])
+        shared[left] = np.where(least < triangles.n_faces, least, -1)
     return shared
 
 
 def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[Ints, Ints]:
-    """All faces that contain each point, as pairs: index of the point, and face."""
+    """Return all faces that contain each point, as pairs: index of the point, and face."""
     inside = np.flatnonzero(located.kinds == FACE)
     which, faces = [inside], [located.elements[inside]]
     for kind, table, count in (
@@ -187,16 +188,16 @@ def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[In
         members = np.flatnonzero(located.kinds == kind)
         if not len(members):
             continue
-        starts, at = grouped(located.elements[members], count)
+        starts, members_at = grouped(located.elements[members], count)
         face, corner = np.nonzero((np.diff(starts) > 0)[table])
-        row, point = members_of(starts, at, table[face, corner])
+        row, point = members_of(starts, members_at, table[face, corner])
         which.append(members[point])
         faces.append(face[row])
     return np.concatenate(which), np.concatenate(faces)
 
 
 def unique_points(located: LocatedPoints) -> tuple[Ints, Ints]:
-    """Distinct points in order of first appearance: index of the first of each, and the inverse index of all points."""
+    """Return the first index of each distinct point, in order of appearance, and the inverse index of all points."""
     inner = np.where((located.kinds == FACE)[:, None], located.barycentric, 0.0)
     columns = [located.kinds, located.elements, located.along, inner[:, 0], inner[:, 1]]
     order = np.lexsort(columns[::-1])
@@ -214,5 +215,5 @@ def unique_points(located: LocatedPoints) -> tuple[Ints, Ints]:
 
 
 def concatenated(parts: Sequence[LocatedPoints]) -> LocatedPoints:
-    """Several sets of located points in one."""
+    """Concatenate several sets of located points."""
     return LocatedPoints(*(np.concatenate([getattr(p, f) for p in parts]) for f in LocatedPoints.__dataclass_fields__))

@@ -1,8 +1,8 @@
 """Tets in space: their faces, areas, volumes, and operators on them (Sec. 8.1, App. B).
 
-Diffusion has Crouzeix–Raviart functions on faces, integration linear ones on vertices. Everything follows from the area
-vectors N_k of the face opposite corner k, pointing out of the tet T: the barycentric coordinate λ_k has gradient
-``−N_k / (3|T|)``, the Crouzeix–Raviart function ``ψ_k = 1 − 3λ_k`` has ``N_k / |T|``.
+Diffusion has Crouzeix–Raviart functions on faces, integration linear functions on vertices. Everything follows from the
+outward area vectors N_k of the face opposite corner k of a tet T: the barycentric coordinate λ_k has gradient ``−N_k /
+(3|T|)``, the Crouzeix–Raviart function ``ψ_k = 1 − 3λ_k`` has ``N_k / |T|``.
 """
 
 from __future__ import annotations
@@ -97,15 +97,15 @@ class TetShapes:
 
 
 def signed_volumes(vertices: Floats, tets: Ints) -> Floats:
-    """(m,) volumes, negative for inverted tets."""
+    """Return (m,) volumes, negative for inverted tets."""
     a, b, c, d = (vertices[tets[:, k]] for k in range(4))
     return np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6
 
 
 THIN = 1e-2
-"""Volume over the cube of the longest edge below which a tet has a reduced weight; it is 0.118 for a regular tet."""
+"""Volume, relative to the cube of the longest edge, below which a tet has a reduced weight; regular tets have 0.118."""
 FLAT = 1e-6
-"""Volume over the cube of the longest edge below which a tet counts as flat."""
+"""Volume, relative to the cube of the longest edge, below which a tet counts as flat."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,33 +134,33 @@ class Tetrahedra(TetShapes):
         return lengths * (1 - np.minimum(self.thickness / FLAT, 1))
 
     def face_mass(self) -> Floats:
-        """(f,) M of Eq. 12, lumped: a quarter of the volume at each face.
+        """Return (f,) M of Eq. 12, lumped: a quarter of the volume of each tet at each of its faces.
 
-        The consistent mass of Eq. 23 has 2/5 of the volume on its diagonal and −1/20 between two faces of a tet. These
-        quarters are its row sums; they are as accurate, and simpler.
+        These are the row sums of the consistent mass of Eq. 23, with 2/5 of the volume on its diagonal and −1/20
+        between two faces of a tet, and they are as accurate.
         """
         quarter = np.repeat(self.weights * self.volumes / 4, 4)
         return np.asarray(np.bincount(self.faces.tet_faces.ravel(), quarter, len(self.faces.vertices)), np.float64)
 
     def face_laplacian(self) -> sparse.csr_matrix:
-        """(f, f) Laplacian of faces (Eq. 20, Eq. 21): L_ab = Σ_T N_a·N_b / |T|, −(3/2) |e| cot θ between two faces.
+        """Return (f, f) the Laplacian of faces (Eq. 20, Eq. 21): L_ab = Σ_T N_a·N_b / |T| = −(3/2) Σ |e| cot θ.
 
-        e is the edge that the two faces share, θ the dihedral angle of the tet there.
-        The faces of flat tets are coupled by the `ties` besides, so that directions pass through these unchanged.
+        Here e is the edge that the two faces share, and θ the dihedral angle of the tet there. `ties` couple the faces
+        of flat tets besides, so that directions pass through these unchanged.
         """
         faces = self.faces
         return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.tet_faces, len(faces.vertices))
 
     def vertex_laplacian(self, corners: Ints, n: int) -> sparse.csr_matrix:
-        """(n, n) cotan Laplacian, Eq. 10 in tets: C_ij = Σ_T N_i·N_j / (9|T|), −(1/6) |e| cot θ between two vertices.
+        """Return (n, n) the cotan Laplacian, Eq. 10 in tets: C_ij = Σ_T N_i·N_j / (9|T|) = −(1/6) Σ |e| cot θ.
 
-        e is the edge of the tet opposite edge ij, θ the dihedral angle there.
-        The vertices of flat tets are coupled by weak `ties` besides, since some belong to no other tet.
+        Here e is the edge of the tet opposite edge ij, and θ the dihedral angle there. Weak `ties` couple the vertices
+        of flat tets besides, since some belong to no other tet.
         """
         return _assemble(self.area_vectors, self.stiffness_factors / 9, 1e-4 * self.ties, corners, n)
 
     def divergence(self, directions: Floats, corners: Ints, n: int) -> Floats:
-        """(n,) b of Eq. 13 for one vector Y per tet: the divergence of Eq. 22, ``∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T``.
+        """Return (n,) b of Eq. 13 for one vector Y per tet: the divergence of Eq. 22, ``∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T``.
 
         Eq. 22 is printed without the ⅓, and with the opposite sign, as the paper's Laplacian is negative semidefinite.
         """
@@ -168,13 +168,13 @@ class Tetrahedra(TetShapes):
         return np.asarray(np.bincount(corners.ravel(), parts.ravel(), n), np.float64)
 
     def gradients(self, corner_values: Floats) -> Floats:
-        """(m, 3) gradient of the linear interpolant of (m, 4) corner values; zero on flat tets."""
+        """Return (m, 3) gradients of the linear interpolant of (m, 4) corner values; zero on flat tets."""
         flat = self.thickness < 1e-10
         sums = np.einsum("mki,mk->mi", self.area_vectors, corner_values)
         return np.where(flat[:, None], 0.0, sums / (-3 * np.where(flat, 1.0, self.volumes))[:, None])
 
     def mean_gradients(self, values: Floats, corners: Ints, n: int) -> Floats:
-        """(n, 3) gradients at vertices: volume-weighted means over the tets around each that have values, else NaN."""
+        """Return (n, 3) gradients at vertices: volume-weighted means over the tets with values around each, or NaN."""
         sums = np.einsum("mki,mk->mi", self.area_vectors, values[corners]) * (self.weights / -3)[:, None]
         finite = np.isfinite(sums).all(axis=1)
         ids, volumes = corners[finite].ravel(), (self.weights * self.volumes)[finite]
@@ -184,7 +184,7 @@ class Tetrahedra(TetShapes):
 
 
 def _assemble(vectors: Floats, factors: Floats, ties: Floats, ids: Ints, n: int) -> sparse.csr_matrix:
-    """Sparse (n, n) matrix with ``Σ_T factor · N_a·N_b`` at the entry (id of a, id of b), plus the ties."""
+    """Assemble the sparse (n, n) matrix of ``Σ_T factor · N_a·N_b`` at entry (id of a, id of b), plus the ties."""
     entries = np.einsum("mai,mbi->mab", vectors, vectors) * factors[:, None, None]
     entries += ties[:, None, None] * (4.0 * np.eye(4) - 1.0)
     corners = ids.astype(np.int32)

@@ -1,7 +1,8 @@
-"""Triangle meshes in space: the arrays that algorithms need of them, and gradients on their faces."""
+"""Triangles and polygons in space: areas, volumes, gradients, division, and triangulation by cutting off ears."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -41,17 +42,17 @@ class Triangles(Protocol):
 
 
 def area_vectors(triangles: Floats) -> Floats:
-    """(m, 3) of (m, 3, 3) triangles: their normals, as long as their areas."""
+    """Return (m, 3) normals of (m, 3, 3) triangles, as long as their areas."""
     return 0.5 * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
 
 def face_areas(triangles: Floats) -> Floats:
-    """(m,) areas of (m, 3, 3) triangles."""
+    """Return (m,) areas of (m, 3, 3) triangles."""
     return np.linalg.norm(area_vectors(triangles), axis=1)
 
 
 def part_volumes(vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:
-    """(m,) connected part of each triangle, and the volume inside each part; negative for cavities.
+    """Return (m,) the connected part of each triangle, and the volume inside each part; negative for cavities.
 
     Volumes are taken about a vertex of each part, so that nothing cancels far from the origin.
     """
@@ -62,14 +63,14 @@ def part_volumes(vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:
 
 
 def divided_at(faces: Ints, rows: Ints, corners: Ints, points: Ints) -> Ints:
-    """Faces, some of which are divided by a point on the side that begins at a corner; their halves are at the end."""
+    """Divide some faces by a point on the side that begins at a corner; their halves come last."""
     a, b, c = (faces[rows, (corners + k) % 3] for k in range(3))
     halves = np.concatenate([np.stack([a, points, c], axis=1), np.stack([points, b, c], axis=1)])
     return np.concatenate([np.delete(faces, rows, axis=0), halves])
 
 
 def gradients_along(sides: Floats, rises: Floats) -> Floats:
-    """(p, 3) gradients in the planes of sides (p, 2, 3), along which a function rises by (p, 2); 0 if these are one."""
+    """Return (p, 3) gradients in the planes of sides (p, 2, 3) along which a function rises by (p, 2); else 0."""
     normals = np.cross(sides[:, 0], sides[:, 1])
     square = np.einsum("pd,pd->p", normals, normals)
     across = rises[:, :1] * sides[:, 1] - rises[:, 1:] * sides[:, 0]
@@ -82,9 +83,9 @@ EPSILON = 2.0**-52
 
 @compiled
 def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[Floats, Bools]:
-    """(p,) areas of polygons; and which are degenerate: without area, to roundoff, or with a vertex twice.
+    """Return (p,) areas of polygons, and which are degenerate: without area, to roundoff, or with a repeated vertex.
 
-    An area is none if it is below what moving the corners by a few units in the last place of the coordinates makes.
+    An area counts as none if moving the corners by a few units in the last place of the coordinates could make it.
     Polygon f has the corners from ``offsets[f]`` to ``offsets[f + 1]``.
     """
     n = len(offsets) - 1
@@ -102,12 +103,54 @@ def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[F
                 middle[d] += vertices[v, d] / (offsets[f + 1] - offsets[f])
                 largest = max(largest, abs(vertices[v, d]))
         for c in range(offsets[f], offsets[f + 1]):
-            here, there = corners[c], corners[c + 1 if c + 1 < offsets[f + 1] else offsets[f]]
+            tail, head = corners[c], corners[c + 1 if c + 1 < offsets[f + 1] else offsets[f]]
             for d in range(3):
-                away[d], after[d] = vertices[here, d] - middle[d], vertices[there, d] - middle[d]
+                away[d], after[d] = vertices[tail, d] - middle[d], vertices[head, d] - middle[d]
                 radius = max(radius, abs(away[d]))
             for d in range(3):
                 normal[d] += away[d - 2] * after[d - 1] - away[d - 1] * after[d - 2]  # a cross product, cyclically
         areas[f] = 0.5 * np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
         degenerate[f] |= areas[f] <= 4.0 * EPSILON * radius * largest
     return areas, degenerate
+
+
+def cut_into_ears(polygon: Floats, normal: Floats, allowed: Callable[[int, int], bool] | None = None) -> Ints:
+    """Cut a simple polygon along diagonals, best-shaped ears first: (k − 2, 3) corners; empty if it runs out of ears.
+
+    The polygon is counter-clockwise as seen from the normal. `allowed` tells whether a diagonal may join two corners;
+    by default all may. The time is cubic in the number of corners.
+
+    Examples
+    --------
+    >>> arrow = np.array([[0.0, 0, 0], [2, -1, 0], [1, 0, 0], [2, 1, 0]])
+    >>> cut_into_ears(arrow, np.array([0.0, 0, 1])).tolist()
+    [[0, 1, 2], [0, 2, 3]]
+    """
+    upright = np.eye(3)[np.abs(normal).argmin()]
+    first = np.cross(upright, normal)
+    second = np.cross(normal, first)
+    sizes = np.linalg.norm(first), np.linalg.norm(second)
+    if not min(sizes) > 0:
+        return np.empty((0, 3), dtype=np.int64)
+    plane = polygon @ first / sizes[0] + 1j * (polygon @ second / sizes[1])
+    left = np.arange(len(polygon))
+    triangles = []
+    while len(left) > 3:
+        before, after = np.roll(left, 1), np.roll(left, -1)
+        a, b, c = plane[before], plane[left], plane[after]
+        area = (np.conj(b - a) * (c - a)).imag
+        size = np.abs(b - a) ** 2 + np.abs(c - b) ** 2 + np.abs(a - c) ** 2
+        z = plane[left][:, None]
+        inside = np.ones((len(left), len(left)), dtype=bool)  # [point, ear]
+        for u, v in ((a, b), (b, c), (c, a)):
+            inside &= (np.conj(v - u) * (z - u)).imag >= 0
+        inside &= (left[:, None] != before) & (left[:, None] != left) & (left[:, None] != after)
+        quality = np.where(inside.any(axis=0), -1.0, area / np.where(size > 0, size, 1.0))
+        ears = np.argsort(-quality, kind="stable")
+        fitting = (k for k in ears[quality[ears] > 0] if allowed is None or allowed(int(before[k]), int(after[k])))
+        ear = next(fitting, None)
+        if ear is None:
+            return np.empty((0, 3), dtype=np.int64)
+        triangles.append([before[ear], left[ear], after[ear]])
+        left = np.delete(left, ear)
+    return np.array([*triangles, left])

@@ -13,11 +13,10 @@ from ..parallel import n_threads
 
 
 def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
-    """Vectors scaled to length one; complex numbers are plane vectors, rows of a real array vectors in space.
+    """Scale vectors to length one: complex numbers as vectors in the plane, rows of a real array as vectors in space.
 
+    Divides by the largest component first, because X falls like exp(−r/√t), and its square underflows long before it.
     With `overwrite` the memory of a real array is used for the result.
-
-    Divides by the largest component first, because X falls like exp(−r/√t) and its square underflows long before it.
 
     Examples
     --------
@@ -49,13 +48,13 @@ def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
 
 
 def axes_across(vectors: Floats) -> tuple[Floats, Floats]:
-    """(n, 3) unit vectors at right angles to (n, 3) vectors, and to both: right-handed in this order after them."""
+    """Return two (n, 3) unit vectors perpendicular to each vector and to each other, right-handed in this order."""
     first = unit(np.cross(vectors, np.eye(3)[np.abs(vectors).argmin(axis=1)]))
     return first, unit(np.cross(vectors, first))
 
 
 def _blocks(shape: tuple[int, ...], size: int = 2**16) -> list[Any]:
-    """Slices of the first axes that make blocks of about `size` vectors, small enough for the processor's cache."""
+    """Return slices of the first axes that make blocks of about `size` vectors, which fit the processor's cache."""
     if len(shape) == 1 or np.prod(shape[:-1]) <= size:
         return [...]
     inner = int(np.prod(shape[1:-1], dtype=np.int64))

@@ -1,4 +1,4 @@
-"""What is the same: points at one place, to the last bit or to roundoff, rows of numbers, faces on the same corners."""
+"""Coincidence: points at one place, exactly or to roundoff, equal rows of numbers, and faces on the same corners."""
 
 from __future__ import annotations
 
@@ -11,22 +11,21 @@ from ..frozen import read_only
 from .edges import find_edges
 
 SINGLE, DOUBLE = 2.0**-22, 2.0**-46
-"""How far apart, over the largest coordinate, the same place may come out in single and in double precision."""
+"""Largest difference of coordinates of one place, relative to the largest coordinate, in single and in double
+precision."""
 SHORT_EDGES = 0.1
 """Share of the open edges that may be so short that welding collapses them."""
 _HALF = 0xFFFFFFFF
 _CELL = 16.0
-"""Side of the cells in which points are looked up, over the tolerance: few points are near a wall."""
+"""Side of the cells in which points are looked up, relative to the tolerance: few points are near a wall."""
 
 
 def welded_vertices(points: Floats, tails: Ints, heads: Ints) -> Ints:
-    """Find the vertices of faces that are at one place, exactly or but for rounding.
+    """Return (n,) the first vertex at the place of each, where places may differ by rounding on rims.
 
-    Only rims may be torn by rounding. So vertices at different places become one where both are on open edges, of an
-    odd number of faces, and if rounding explains how they differ: by a few units in the last place of the largest
+    Tails and heads (h,) are those of halfedges. Vertices at different places become one if both are on open edges, with
+    an odd number of faces, and if rounding explains the difference: a few units in the last place of the largest
     coordinate, along axes whose coordinates make use of that last place.
-
-    Shapes: `points` (n, 3), `tails`, `heads` (h,); returned: an array (n,).
 
     Examples
     --------
@@ -58,7 +57,7 @@ def welded_vertices(points: Floats, tails: Ints, heads: Ints) -> Ints:
 
 
 def joined_rims(points: Floats, tails: Ints, heads: Ints) -> Ints:
-    """(n,) first vertex at the place of each that is on a rim, as of a seam; other vertices are on their own."""
+    """Return (n,) the first vertex at the place of each that is on a rim, as of a seam; all others stay."""
     edges, _, counts, _, _ = find_edges(read_only(tails), read_only(heads), tails != heads, len(points))
     is_open = (edges >= 0) & (np.append(counts, 0)[edges] == 1)
     rims, ends = np.unique(np.stack([tails[is_open], heads[is_open]]), return_inverse=True)
@@ -68,57 +67,54 @@ def joined_rims(points: Floats, tails: Ints, heads: Ints) -> Ints:
 
 
 def _is_single(points: Floats) -> bool:
-    """Whether single precision holds all coordinates without loss."""
+    """Return whether single precision holds all coordinates without loss."""
     with np.errstate(over="ignore", under="ignore"):
         return bool((points.astype(np.float32) == points).all())
 
 
 def _is_rounded(points: Floats, single: bool) -> Bools:
-    """(3,) whether coordinates along an axis make use of the last place of the largest of them."""
+    """Return (3,) whether coordinates along an axis make use of the last place of the largest of them."""
     last_places = np.ldexp(1.0, np.frexp(np.abs(points).max(axis=0))[1] - (24 if single else 53))
     return (np.fmod(points, 2.0 * last_places) != 0).any(axis=0)
 
 
 def welded(points: Floats, tolerance: float | Floats) -> Ints:
-    """(n,) first point within `tolerance` along each axis of each of (n, 3) points; its own index if there is none.
+    """Return (n,) the first point within `tolerance` along each axis of each of (n, 3) points, or its own index.
 
-    Chains are not followed: a point is compared with such only as stand for themselves. Takes O(n) time as long as few
-    points stand for themselves within one cell of 16 tolerances.
+    Chains are not followed: a point is compared only with points that stand for themselves. The time is O(n) as long as
+    few of these lie within one cell of 16 tolerances.
     """
     smallest = float(np.nextafter(np.abs(points).max(initial=0.0), np.inf)) * 2.0**-60
     return _weld(np.ascontiguousarray(points), np.maximum(np.broadcast_to(tolerance, 3), max(smallest, 1e-300)))
 
 
 def same_positions(points: Floats) -> Ints:
-    """(n,) first point at exactly the same position as each of (n, d) points."""
+    """Return (n,) the first point at exactly the same position as each of (n, d) points."""
     return same_rows((np.ascontiguousarray(points) + 0.0).view(np.uint64))  # −0 becomes 0
 
 
 def indexed(triangles: Floats) -> tuple[Floats, Ints]:
-    """(n, 3) points of (m, 3, 3) triangles in order of first use, and (m, 3) triangles between them."""
+    """Return the points of (m, 3, 3) triangles in order of first use, and (m, 3) triangles between them."""
     corners = triangles.reshape(-1, 3)
     used, faces = np.unique(same_positions(corners), return_inverse=True)
     return corners[used], faces.reshape(-1, 3)
 
 
 def same_rows(rows: NDArray[np.integer]) -> Ints:
-    """(n,) first row that equals each of (n, k) rows, in O(n) time."""
+    """Return (n,) the first row that equals each of (n, k) rows, in O(n) time."""
     numbers = np.ascontiguousarray(rows)
     return _same_rows(numbers.view(np.int64) if numbers.itemsize == 8 else numbers.astype(np.int64))
 
 
 def distinct_rows(rows: NDArray[np.integer]) -> tuple[Ints, Ints]:
-    """Number of each of (n, k) rows among the different ones, in order of first appearance; and the first of each."""
+    """Return the number of each of (n, k) rows by first appearance, equal ones alike, and the first row of each."""
     first = same_rows(rows)
     is_first = first == np.arange(len(first))
     return (np.cumsum(is_first) - 1)[first], np.flatnonzero(is_first)
 
 
 def coincident_faces(corners: Ints, offsets: Ints) -> tuple[Ints, Bools]:
-    """First face on the same corners as each, and whether it runs the other way round.
-
-    Returned: first (p,), reversed (p,).
-    """
+    """Return (p,) the first face on the same corners as each, and whether it runs the other way."""
     sizes = np.diff(offsets)
     first, reverse = np.arange(len(sizes)), np.zeros(len(sizes), dtype=bool)
     for size in np.unique(sizes).tolist():
@@ -138,7 +134,7 @@ def coincident_faces(corners: Ints, offsets: Ints) -> tuple[Ints, Bools]:
 
 @compiled
 def mixed(a: int, b: int, c: int) -> int:
-    """Hash of three integers, not negative: halves times odd numbers, so that no product leaves 64 bits."""
+    """Return a nonnegative hash of three integers: halves times odd numbers, so that no product exceeds 64 bits."""
     x = ((a & _HALF) * 0x1E3779B1) ^ ((b & _HALF) * 0x2545F491) ^ ((c & _HALF) * 0x165667B1)
     x ^= (((a >> 32) & _HALF) * 0x27D4EB2F) ^ (((b >> 32) & _HALF) * 0x1B873593) ^ (((c >> 32) & _HALF) * 0x0CC9E2D5)
     x = ((x ^ (x >> 29)) & _HALF) * 0x3C6EF373

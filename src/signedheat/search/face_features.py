@@ -1,4 +1,4 @@
-"""What lies around each feature of triangles: normals of edges and vertices, and faces on their other side."""
+"""Features of triangles: normals of their edges and vertices, and the faces across their edges."""
 
 from __future__ import annotations
 
@@ -16,42 +16,40 @@ from ..mesh.welding import coincident_faces, same_positions, same_rows
 from .nearest_triangles import triangle_rows
 
 FOLD = 0.02
-"""Where unit normals of two faces add up to less than this, the edge between them is a fold and decides no side."""
+"""Length of the sum of two unit normals below which the edge between them is a fold, and decides no side."""
 
 
 class FaceFeatures(NamedTuple):
     """Triangles with the normals of their features (Bærentzen & Aanæs 2005).
 
     An edge is regular if exactly two faces share it, run along it in opposite directions and do not lie on each other;
-    a vertex is, if all edges around it are and its faces make one fan. There the sign of ``(x − y) · normal`` is the
-    side of a point x whose nearest place is y.
+    a vertex is regular if all edges around it are and its faces make one fan. There the sign of ``(x − y) · normal`` is
+    the side of a point x whose nearest place is y.
     """
 
     corners: Floats  # (m, 9) corners of the faces, each face once, in the order of a space-filling curve
     rows: Floats  # (m, 16) the same as `foot_on_triangle` wants it
     vertices: Floats  # (n, 3) their positions
-    # (m, 3) vertices, which are different where positions are; and edges, corner k to corner k + 1
-    faces: NDArray[np.int32]
-    edges: NDArray[np.int32]
-    # (·, 3) unit normals of the faces, their sums at edges, and angle-weighted at vertices
-    face_normals: Floats
-    edge_normals: Floats
-    vertex_normals: Floats
-    # (·,) whether the surface is closed and consistent there
+    faces: NDArray[np.int32]  # (m, 3) vertices; equal positions have equal ids
+    edges: NDArray[np.int32]  # (m, 3) edges, from corner k to corner k + 1
+    face_normals: Floats  # (m, 3) unit normals
+    edge_normals: Floats  # (e, 3) sums of the unit normals of the faces at each edge
+    vertex_normals: Floats  # (n, 3) sums of these weighted by the angles of the faces
+    # (e,) and (n,) whether the surface is closed and consistent there
     edge_regular: Bools
     vertex_regular: Bools
-    # (m, 3) the face on the other side of each edge, and its vertex that is not on it; −1 where the edge is not regular
+    # (m, 3) the face across each edge, and its vertex opposite the edge; −1 where the edge is not regular
     across: NDArray[np.int32]
     apexes: NDArray[np.int32]
-    # (n + 1,) and (3 m,): corners around each vertex, in compressed rows: three times the face, plus 0, 1 or 2
+    # (n + 1,) and (3 m,): where the corners at each vertex begin in the second, and these as 3 × face + corner
     vertex_starts: Ints
     vertex_corners: NDArray[np.int32]
-    trusted: NDArray[np.float32]  # (m,) confidence in each face: 1 where it was there, less where it was put back
-    ids: Ints  # (m,) which of the triangles given each is
+    trusted: NDArray[np.float32]  # (m,) confidence in each face: 1 for given faces, less for completed ones
+    ids: Ints  # (m,) which of the given triangles each is
 
     @classmethod
     def of(cls, vertices: Floats, faces: Ints, trusted: NDArray[np.float32] | None = None) -> FaceFeatures:
-        """Features of (m, 3) faces. Vertices at one position are one; faces without extent and copies are left out."""
+        """Compute the features of (m, 3) faces; coincident vertices are one, and faces without extent and copies go."""
         faces = same_positions(vertices)[faces]
         trusted = np.ones(len(faces), dtype=np.float32) if trusted is None else trusted
         ids = np.arange(len(faces))
@@ -105,12 +103,12 @@ class FaceFeatures(NamedTuple):
 
 
 def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: int) -> tuple[Bools, Bools, Ints]:
-    """Which edges and vertices are regular; and (3 m,) the other halfedge of each at a regular edge, else −1."""
+    """Return which edges and vertices are regular; and (3 m,) the other halfedge of each at a regular edge, or −1."""
     edges = (table.face_counts == 2) & (table.balance == 0) & ((edge_normals**2).sum(axis=1) > FOLD**2)
     mates = np.where(edges[table.face_edges].ravel(), table.mates, -1)
-    one = np.flatnonzero(mates >= 0)
+    mated = np.flatnonzero(mates >= 0)
     following = np.roll(np.arange(len(mates)).reshape(-1, 3), -1, axis=1).ravel()
-    fans = connected_components(len(mates), one, following[mates[one]])  # both leave the same vertex
+    fans = connected_components(len(mates), mated, following[mates[mated]])  # both leave the same vertex
     corners, fan = faces.ravel(), np.empty(n_vertices, dtype=np.int64)
     fan[corners] = fans
     vertices = np.ones(n_vertices, dtype=bool)
@@ -120,7 +118,7 @@ def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: in
 
 
 def _copies(faces: Ints, table: EdgeTable) -> Bools:
-    """Which faces are there before, with the same corners in the same order of rotation."""
+    """Return which faces repeat earlier ones, with the same corners in the same order of rotation."""
     copies = np.zeros(len(faces), dtype=bool)
     crowded = np.flatnonzero((table.face_counts > 2)[table.face_edges].all(axis=1))
     if len(crowded):

@@ -1,10 +1,10 @@
 """The nearest face of points, through a tree of boxes and discs.
 
-A disc is flat: its plane is that of the faces below a node, its thickness what they deviate from it. Far from a surface
-the boxes of many faces are as near as the nearest one's, since boxes stand askew to it; few discs are.
+A disc is flat: its plane is that of the faces below a node, its thickness their deviation from it. Far from a surface
+the boxes of many faces are as near as that of the nearest face, since boxes are askew to the surface; few discs are.
 
-A candidate is a face that is near, not always the nearest. Over a surface without gaps it leads there: as long as the
-foot lies on the rim of a face, faces on the other side of that rim may be nearer.
+A search may start from a candidate, a face that is near but not always the nearest. Over a surface without gaps it
+leads to the nearest: as long as the foot lies on the rim of a face, faces across that rim may be nearer.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats
 from ..compiled import compiled
 from ..mesh.box_tree import LEAF, BoxTree
 from ..parallel import in_chunks
@@ -23,14 +23,14 @@ from .face_features import FaceFeatures
 from .nearest_triangles import foot_on_triangle, nearest_faces
 
 RUN = 512
-"""Points after which a search starts anew: a part of what a thread takes at a time."""
+"""Number of points after which a search starts anew: a part of the points that a thread takes at a time."""
 DISC_LEVELS = 8
 """Levels of the tree, from the leaves up, that have discs."""
 FLAT = 0.5
-"""Thickness over radius up to which a disc says more than a box."""
+"""Thickness over radius up to which a disc is used besides the box."""
 FAR = 1e7
-"""Sizes of a surface beyond which a point is searched for where it would be at that distance: neither rounding, which
-grows with distance, nor the other angle then moves the nearest place by more than 1e-7 of the size."""
+"""Distance, in sizes of a surface, at which farther points are searched for: rounding, which grows with distance, and
+the other angle then move the nearest place by at most 1e-7 of the size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,38 +42,38 @@ class FaceTree:
 
     @classmethod
     def of(cls, features: FaceFeatures) -> FaceTree:
-        """The tree of some faces, of which there is at least one; their order is one along a curve through space."""
+        """Build the tree of some faces, of which there is at least one."""
         triangles = features.corners.reshape(-1, 3, 3)
         lower, upper = triangles.min(axis=1), triangles.max(axis=1)
         return cls(features, BoxTree.in_order(lower, upper, np.arange(len(triangles))))
 
     @classmethod
     def of_triangles(cls, triangles: Floats, trusted: NDArray[np.float32] | None = None) -> FaceTree:
-        """The tree of (m, 3, 3) triangles, of which one has area; corners at one position are one vertex."""
+        """Build the tree of (m, 3, 3) triangles, of which one has area; corners at one position are one vertex."""
         return cls.of(FaceFeatures.of(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), trusted))
 
     @cached_property
     def discs(self) -> Floats:
-        """(2 · leaves, 8) centre, normal, radius and half the thickness of what is below each node.
+        """(2 · leaves, 8) centre, normal, radius and half the thickness of all faces below each node.
 
-        Thickness is negative where there is no disc, or none that is flat.
+        The thickness is negative where there is no disc, or none that is flat.
         """
-        return _discs(self.features.corners, self.tree.bounds, self.tree.items)
+        return _discs(self.features.corners, self.tree)
 
     def distances(self, points: Floats) -> Floats:
-        """(n,) distance of each of (n, 3) points to the nearest face."""
+        """Return (n,) distances of (n, 3) points to the nearest face."""
         (distances,) = in_chunks(lambda chunk: (self._distances(chunk),), points)
         return distances
 
     def search(self, points: Floats) -> NearestFaces:
-        """The nearest face of each of (n, 3) points: fast where those that follow each other are near each other.
+        """Find the nearest face of each of (n, 3) points, fastest where consecutive points are near each other.
 
-        Each `RUN` of points is searched on its own: what comes before does not matter.
+        Each `RUN` of points is searched on its own, so that the points before do not matter.
         """
         nearer = self._brought_near(points)
         faces, _ = self.nearest(nearer)
-        found = search_from(self.features, nearer, faces[:, None])
-        return found if nearer is points else replace(found, distances=np.linalg.norm(points - found.places, axis=1))
+        result = search_from(self.features, nearer, faces[:, None])
+        return result if nearer is points else replace(result, distances=np.linalg.norm(points - result.places, axis=1))
 
     def _distances(self, points: Floats) -> Floats:
         nearer = self._brought_near(points)
@@ -82,7 +82,7 @@ class FaceTree:
         return np.sqrt(self.nearest(points)[1])
 
     def _brought_near(self, points: Floats) -> Floats:
-        """The points; those farther than `FAR` sizes of the surface are moved towards its middle, to that distance."""
+        """Move points farther than `FAR` sizes of the surface towards its middle, to that distance."""
         lower, upper = self.tree.bounds[1, :3], self.tree.bounds[1, 3:]
         middle, limit = 0.5 * (lower + upper), FAR * float(np.linalg.norm(upper - lower))
         away = points - middle
@@ -95,13 +95,14 @@ class FaceTree:
         return result
 
     def nearest(self, points: Floats) -> tuple[NDArray[np.int32], Floats]:
-        """Nearest faces of points, and the squares of their distances."""
+        """Return the nearest faces of points, and the squares of their distances."""
         return nearest_faces(self.features.rows, self.tree, self.discs, points, RUN)
 
 
 @compiled
-def _discs(corners: Floats, bounds: Floats, items: Ints) -> Floats:
-    """See `FaceTree.discs`. Discs are convex, so that it is enough to put the corners of the faces into them."""
+def _discs(corners: Floats, tree: BoxTree) -> Floats:
+    """Compute `FaceTree.discs`. Discs are convex, so that it is enough that they contain the corners of the faces."""
+    bounds, items = tree.bounds, tree.items
     leaves = len(bounds) // 2
     discs = np.full((2 * leaves, 8), -1.0)
     first = max(1, leaves >> (DISC_LEVELS - 1))
@@ -141,55 +142,47 @@ def _discs(corners: Floats, bounds: Floats, items: Ints) -> Floats:
 
 
 STEPS = 24
-"""Faces that a search goes on to at most."""
+"""Largest number of faces that a search goes on to."""
 
 
 @dataclass(frozen=True, eq=False)
 class NearestFaces:
     """The nearest face of each of some points."""
 
-    faces: NDArray[np.int32]  # (n,) which one
-    distances: Floats  # (n,) to it
+    faces: NDArray[np.int32]  # (n,) its id
+    distances: Floats  # (n,) its distance
     places: Floats  # (n, 3) the nearest place
-    features: NDArray[np.int8]  # (n,) what it lies on, in the code of `foot_on_triangle`
-    # (n,) of the angle between the way from the foot to the point and the normal there: positive in front of the face
+    features: NDArray[np.int8]  # (n,) the feature that this place lies on, in the code of `foot_on_triangle`
+    # (n,) cosine of the angle between the normal and the way from the place to the point: positive in front of the face
     cosines: NDArray[np.float32]
     # (n,) whether that decides the side: the nearest place is inside a face, or on a regular edge or vertex
     regular: Bools
 
 
 def search_from(features: FaceFeatures, points: Floats, candidates: NDArray[np.int32]) -> NearestFaces:
-    """The nearest of (n, c) candidate faces of each of (n, 3) points, or one that it leads on to; −1 is none.
+    """Find the nearest of (n, c) candidate faces of each of (n, 3) points, or one that it leads on to; −1 is none.
 
-    Where a point has no candidate, there is no face, and distance is infinite.
+    Where a point has no candidate, there is no face, and the distance is infinite.
     """
-    n = len(points)
-    faces, squares, places = np.empty(n, dtype=np.int32), np.empty(n), np.empty((n, 3))
-    codes, cosines, regular = np.empty(n, dtype=np.int8), np.empty(n, dtype=np.float32), np.empty(n, dtype=np.bool_)
-    nearest_of_candidates(features, points, candidates, faces, squares, codes, places, cosines, regular)
-    return NearestFaces(faces, np.sqrt(squares), places, codes, cosines, regular)
+    return NearestFaces(*_nearest_of_candidates(features, points, candidates))
 
 
 @compiled
-def nearest_of_candidates(
-    features: FaceFeatures,
-    points: Floats,
-    candidates: NDArray[np.int32],
-    out_faces: NDArray[np.int32],
-    out_squares: Floats,
-    out_features: NDArray[np.int8],
-    out_places: Floats,
-    out_cosines: NDArray[np.float32],
-    out_regular: Bools,
-) -> None:
-    """From the nearest of some faces, and the nearest place on it, to faces that are nearer, across their rims.
+def _nearest_of_candidates(
+    features: FaceFeatures, points: Floats, candidates: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], Floats, Floats, NDArray[np.int8], NDArray[np.float32], Bools]:
+    """Go from the nearest of some faces, and the nearest place on it, to nearer faces, across their rims.
 
-    Over an edge lies what is nearer, if anything does, on the side of the point: the place is the nearest of the
-    edge, so the point must be in front of the plane that the edge divides from the other face's apex. Around a vertex
-    the side along which distance shrinks fastest leads on; where it grows along all of them no place is nearer.
+    Nearer places beyond an edge, if any, lie on the side of the point: the place is the nearest of the edge, so the
+    point must be in front of the plane that the edge divides from the other face's apex. Around a vertex the side along
+    which distance shrinks fastest leads on; where it grows along all of them no place is nearer.
 
-    All points in one call, since a call costs more than the way of one point.
+    All points are done in one call, since a call costs more than the way of one point.
     """
+    n = len(points)
+    out_faces, out_distances, out_places = np.empty(n, dtype=np.int32), np.empty(n), np.empty((n, 3))
+    out_features, out_cosines = np.empty(n, dtype=np.int8), np.empty(n, dtype=np.float32)
+    out_regular = np.empty(n, dtype=np.bool_)
     rows, places, faces, vertex_regular = features.rows, features.vertices, features.faces, features.vertex_regular
     across, apexes = features.across, features.apexes
     starts, around = features.vertex_starts, features.vertex_corners
@@ -236,14 +229,15 @@ def nearest_of_candidates(
             if not s < square:
                 break
             face, square, feature, fx, fy, fz = other, s, which, u, v, w
-        out_faces[p], out_squares[p], out_features[p] = face, square, feature
+        out_faces[p], out_distances[p], out_features[p] = face, np.sqrt(square), feature
         out_places[p, 0], out_places[p, 1], out_places[p, 2] = fx, fy, fz
         out_cosines[p], out_regular[p] = facing(features, face, feature, x - fx, y - fy, z - fz)
+    return out_faces, out_distances, out_places, out_features, out_cosines, out_regular
 
 
 @compiled
 def facing(features: FaceFeatures, face: int, feature: int, dx: float, dy: float, dz: float) -> tuple[float, bool]:
-    """Cosine between the normal at a feature of a face and the way from there; and whether that decides the side."""
+    """Return the cosine between a feature's normal and the way from a face, and whether it decides the side."""
     if face < 0:
         return 0.0, False
     normals, at, regular = features.face_normals, np.int64(face), True

@@ -1,4 +1,4 @@
-"""Nearest places on triangles: of one, of all through a tree of boxes."""
+"""Nearest places on triangles: on one, or on all, through a tree of boxes."""
 
 from __future__ import annotations
 
@@ -16,17 +16,19 @@ from ..parallel import in_chunks
 # Feature codes of a foot: 0 inside the face; 1, 2, 3 on its edges (corner 0–1, 1–2, 2–0); 4, 5, 6 its corners 0, 1, 2.
 
 HEIGHT = 1e-14
-"""Height of a triangle over its length up to which it has none: rounding would say where it lies, and its normal."""
+"""Height of a triangle, relative to its length, up to which it counts as none: rounding would decide its direction."""
 TOGETHER = 8
-"""Points that go down a tree together. With 16 a million take a tenth less on 20,000 faces, and a tenth more on 1.3
-million, whose boxes are smaller than what 16 points at random are apart; with 4 half as much again."""
+"""Number of points that descend a tree together. With 16 a million points take a tenth less time on 20,000 faces, and a
+tenth more on 1.3 million, whose boxes are smaller than the distances between 16 random points; with 4 half as much
+again."""
 
 
 def triangle_rows(corners: Floats) -> Floats:
-    """(m, 16) what `foot_on_triangle` needs of (m, 9) corners: each triangle in a plane of its own.
+    """Return (m, 16) the numbers that `foot_on_triangle` needs of (m, 9) corners: each triangle in a plane of its own.
 
-    A corner; directions of two axes, along the first side and at a right angle to it; the length of this side; the
-    directions in the plane, and the lengths, of the sides from the first corner to the third and from the second.
+    They are a corner; the directions of two axes, along the first side and perpendicular to it; the length of this
+    side; and the directions in the plane, and the lengths, of the sides from the first corner to the third and from the
+    second to the third.
     """
     (rows,) = in_chunks(lambda chunk: (_rows(chunk),), corners)
     return rows
@@ -64,9 +66,9 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 @compiled
 def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tuple[float, int, float, float, float]:
-    """Squared distance to triangle f, feature code, and the three coordinates of the foot.
+    """Return the squared distance to triangle f, a feature code, and the three coordinates of the foot.
 
-    Inside, where the foot of the perpendicular is; else the nearest on three sides.
+    The foot is that of the perpendicular if it is inside, else the nearest on three sides.
     """
     px, py, pz = x - rows[f, 0], y - rows[f, 1], z - rows[f, 2]
     p = px * rows[f, 3] + py * rows[f, 4] + pz * rows[f, 5]
@@ -106,10 +108,10 @@ def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tupl
 
 @compiled
 def away_from_triangle(rows: Floats, f: int, places: Floats, at: int, out: Floats) -> None:
-    """Squared distance of (3, n) places to triangle f, and the way to each from its foot, into ``out[at]``, (4, n).
+    """Write squared distances of (3, n) places to triangle f, and the ways from their feet, to ``out[at]``, (4, n).
 
-    The same as `foot_on_triangle`, without a branch, so that processors do several places at once. The compiler must
-    not know how many there are: it does few one by one.
+    This is `foot_on_triangle` without branches, so that processors do several places at once; the compiler must not
+    know their number, or it does them one by one.
     """
     ax, ay, az = rows[f, 0], rows[f, 1], rows[f, 2]
     ux, uy, uz = rows[f, 3], rows[f, 4], rows[f, 5]
@@ -155,7 +157,7 @@ def away_from_triangle(rows: Floats, f: int, places: Floats, at: int, out: Float
 
 @compiled
 def barycentric_on_triangles(rows: Floats, faces: NDArray[np.int32], points: Floats) -> Floats:
-    """(n, 3) barycentric coordinates of the place of a triangle that is nearest to each point."""
+    """Return (n, 3) barycentric coordinates of the place of a triangle that is nearest to each point."""
     weights = np.zeros((len(points), 3))
     for k in range(len(points)):
         f = faces[k]
@@ -182,21 +184,21 @@ def barycentric_on_triangles(rows: Floats, faces: NDArray[np.int32], points: Flo
 
 
 def weights_in(triangles: Floats, places: Floats) -> Floats:
-    """(n, 3) barycentric coordinates of (n, 3) places, each in one of (n, 3, 3) triangles."""
+    """Return (n, 3) barycentric coordinates of (n, 3) places, each in one of (n, 3, 3) triangles."""
     rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
     return barycentric_on_triangles(rows, np.arange(len(rows), dtype=np.int32), places)
 
 
 @dataclass(frozen=True, eq=False)
 class TriangleTree:
-    """Triangles in a tree of boxes, in which the nearest to points are found."""
+    """Triangles in a tree of boxes, for finding the triangle nearest to a point."""
 
     rows: Floats  # (m, 16) the triangles, as `triangle_rows` gives them
     tree: BoxTree  # of their bounding boxes
 
     @classmethod
     def of(cls, triangles: Floats) -> TriangleTree:
-        """The tree of (m, 3, 3) corners."""
+        """Build the tree of (m, 3, 3) corners."""
         rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
         return cls(rows, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)))
 
@@ -205,43 +207,33 @@ class TriangleTree:
         return np.full((len(self.tree.bounds), 8), -1.0)
 
     def nearest(self, points: Floats) -> tuple[Ints, Floats]:
-        """Closest triangle to each of (k, 3) points, and barycentric coordinates of the closest point in it."""
+        """Return the triangle nearest to each of (k, 3) points, and barycentric coordinates of its nearest place."""
         points = np.ascontiguousarray(points)
-        found, _ = nearest_faces(self.rows, self.tree, self._no_discs, points, TOGETHER * max(len(points), 1))
-        return found.astype(np.int64), barycentric_on_triangles(self.rows, found, points)
+        faces, _ = nearest_faces(self.rows, self.tree, self._no_discs, points, TOGETHER * max(len(points), 1))
+        return faces.astype(np.int64), barycentric_on_triangles(self.rows, faces, points)
 
 
 def nearest_faces(
     rows: Floats, tree: BoxTree, discs: Floats, points: Floats, run: int
 ) -> tuple[NDArray[np.int32], Floats]:
-    """(n,) nearest face of each of (n, 3) points, and the square of its distance: see `descend`."""
-    faces, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
-    best = np.empty(min(max(len(points), 1), TOGETHER))
-    descend(rows, tree.bounds, discs, tree.items, points, run, best, faces, squares)
-    return faces, squares
+    """Return (n,) the nearest face of each of (n, 3) points, and the squares of their distances: see `_descend`."""
+    return _descend(rows, tree, discs, points, run, np.empty(min(max(len(points), 1), TOGETHER)))
 
 
 @compiled
-def descend(
-    rows: Floats,
-    bounds: Floats,
-    discs: Floats,
-    items: Ints,
-    points: Floats,
-    run: int,
-    best: Floats,
-    out_faces: NDArray[np.int32],
-    out_squares: Floats,
-) -> None:
-    """Nearest face of each point (n, 3), and the square of its distance, down a tree of boxes; into `out_…`, (n,).
+def _descend(
+    rows: Floats, tree: BoxTree, discs: Floats, points: Floats, run: int, best: Floats
+) -> tuple[NDArray[np.int32], Floats]:
+    """Find the nearest face of each point (n, 3), and the square of its distance, down a tree of boxes.
 
-    Points that follow each other go down together, where any of them may find something nearer, so that processors do
-    several at once. Every `run` points, a multiple of how many go together, the search starts anew, in between from the
-    face before. Where a node has a disc (`FaceTree.discs`) that is farther than its box, it counts. All in one
-    function, since calls cost as much as boxes. There is at least one face; `rows` are as `triangle_rows` gives them.
-    `best` is as long as there are points that go together: the compiler must not know how many, or it does few one by
-    one.
+    Consecutive points descend together, wherever any of them may find a nearer face, so that processors do several at
+    once. Every `run` points, a multiple of their number, the search starts anew, in between from the face before. Where
+    a node has a disc (`FaceTree.discs`) that is farther than its box, the disc counts. There must be a face; `rows` are
+    those of `triangle_rows`. `best` has an entry for each point that descends with others: if the compiler knew how
+    many, it would do them one by one. All is in one function, since calls cost as much as boxes.
     """
+    bounds, items = tree.bounds, tree.items
+    out_faces, out_squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
     leaves, together, middle = len(bounds) // 2, len(best), len(best) // 2
     places, which = np.empty((3, together)), np.zeros(together, dtype=np.int64)
     stack, gaps = np.empty(66, dtype=np.int64), np.zeros((66, together))
@@ -347,3 +339,4 @@ def descend(
             begun = True
         for k in range(min(together, len(points) - begin)):
             out_faces[begin + k], out_squares[begin + k] = which[k], best[k]
+    return out_faces, out_squares

@@ -1,15 +1,14 @@
 """Straight lines through a shape, evenly spread over places and directions, and where they cross its triangles.
 
-Lines of one direction pass through the pixels of a picture of the shape, and the triangles are drawn into it one by
-one: no tree is built, and the time grows with triangles plus crossings. Lines spread like this meet each piece of
-surface in proportion to its area (Cauchy and Crofton's formula), however it is cut into triangles.
+Lines of one direction pass through the pixels of a picture of the shape, into which the triangles are drawn one by one:
+no tree is built, and the time grows with the number of triangles and crossings. Lines spread like this meet each piece
+of surface in proportion to its area (Cauchy and Crofton's formula), however it is cut into triangles.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,20 +27,15 @@ class LineCrossings:
     crossed: NDArray[np.integer]  # (k,) triangle of each crossing, or the face that it is part of
     entering: Bools  # (k,) whether the line comes from the side to which the triangle's normal points
     depths: Floats  # (k,) place along the line, in units of length
-    cosines: Floats  # (k,) of the angle between line and normal, not negative
-
-    def chosen(self, kept: Bools) -> LineCrossings:
-        """Some of the crossings, of as many lines."""
-        starts = np.concatenate([[0], np.cumsum(kept)])[self.starts]
-        return LineCrossings(starts, self.crossed[kept], self.entering[kept], self.depths[kept], self.cosines[kept])
+    cosines: Floats  # (k,) cosine of the angle between line and normal, not negative
 
 
 def stabbing_lines(
     vertices: Floats, triangles: Ints, bounds: Floats, n_lines: int, n_directions: int = 16
 ) -> LineCrossings:
-    """Cross a shape by about so many lines, through its shadows along some directions. The same lines every time.
+    """Cross a shape by about `n_lines` lines, through its shadows along some directions; the same lines every time.
 
-    Lines that pass between triangles which share an edge by vertex ids cross exactly one of them. Many may miss the
+    A line between triangles that share an edge by vertex ids crosses exactly one of them. Many lines may miss the
     shape. `bounds`, (2, 3), is a box around it.
     """
     frames = line_frames(n_directions)
@@ -51,19 +45,15 @@ def stabbing_lines(
     pixel = max(pixel, 1e-4 * float(extents.max()), np.finfo(float).tiny)  # where the box is hardly more than a line
     shapes = np.floor(extents[:, :2] / pixel).astype(np.int64) + 1
     first_lines = np.concatenate([[0], np.cumsum(shapes.prod(axis=1))])
-    found, fixed = [], read_only(triangles)
+    parts, fixed = [], read_only(triangles)
     for k in range(n_directions):
         shift = 0.5 * (shapes[k] - 1) + 0.5 * np.modf((k + 1) * np.array([2**0.5, 3**0.5]))[0] - 0.25
-        found.append(
+        parts.append(
             crossings_at_pixels(vertices, fixed, frames[k], center, pixel, shift, shapes[k], int(first_lines[k]))
         )
-    return _in_order(found, int(first_lines[-1]))
-
-
-def _in_order(found: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]], n_lines: int) -> LineCrossings:
-    ids, entering, places = (np.concatenate(columns) for columns in zip(*found, strict=True))
+    ids, entering, places = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     by_depth = np.argsort(places[:, 0])
-    starts, members = grouped(ids[by_depth, 0], n_lines)  # which keeps the order within each line
+    starts, members = grouped(ids[by_depth, 0], int(first_lines[-1]))  # which keeps the order within each line
     order = by_depth[members]
     places = places[order]
     return LineCrossings(starts, ids[order, 1], entering[order], places[:, 0], places[:, 1])
@@ -71,7 +61,7 @@ def _in_order(found: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]], n_li
 
 @lru_cache(maxsize=4)
 def line_frames(n: int) -> Floats:
-    """(n, 3, 3) right-handed frames whose last rows are spread evenly over half a sphere, none along an axis."""
+    """Return (n, 3, 3) right-handed frames whose last rows are spread evenly over half a sphere, none along an axis."""
     height = (np.arange(n) + 0.5) / n
     turn = np.pi * (3 - 5**0.5) * np.arange(n)
     radius = np.sqrt(1 - height**2)
@@ -96,11 +86,11 @@ def crossings_at_pixels(
     shape: Ints,
     first_line: int,
 ) -> tuple[NDArray[np.int32], Bools, Floats]:
-    """Crossings of the lines through a picture's pixels: lines and triangles, whether they enter, depths and cosines.
+    """Return crossings of the lines through a picture's pixels: (line, triangle), whether it enters, (depth, cosine).
 
-    A row's pixels from one side of a triangle on to before the next. Line `first_line` is that of the first pixel, the
-    next one is to its right; pixels are `pixel` apart in the plane of the first two rows of the frame, and the first
-    one lies `shift` pixels before the center.
+    Pixels are `pixel` apart in the plane of the first two rows of the frame, and the first one lies `shift` pixels
+    before the center. Its line is `first_line`; the next line is to its right. On a row, the pixels from one side of a
+    triangle on to before the next are inside.
     """
     n = len(vertices)
     at, cells = np.empty((n, 3)), np.empty((n, 2), dtype=np.int32)
@@ -155,7 +145,7 @@ def crossings_at_pixels(
 
 @compiled
 def _crossed(ax: float, ay: float, bx: float, by: float, y: float) -> float:
-    """Where a row crosses a side: the same number whichever way round the side is given."""
+    """Return where a row crosses a side: the same number whichever way round the side is given."""
     if ay > by:
         ax, ay, bx, by = bx, by, ax, ay
     return ax + (bx - ax) * ((y - ay) / (by - ay))
@@ -163,7 +153,7 @@ def _crossed(ax: float, ay: float, bx: float, by: float, y: float) -> float:
 
 @compiled
 def _doubled(ids: NDArray[np.int32], entering: Bools, places: Floats) -> tuple[NDArray[np.int32], Bools, Floats]:
-    """The same rows with room for as many more."""
+    """Return the same rows with room for as many more."""
     n = len(ids)
     more = np.empty((2 * n, 2), np.int32), np.empty(2 * n, np.bool_), np.empty((2 * n, 2))
     for k in range(n):

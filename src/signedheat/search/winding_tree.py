@@ -1,10 +1,9 @@
-"""Kernels: generalized winding numbers of points, through a tree of boxes (Barill et al. 2018).
+"""Generalized winding numbers of points, through a tree of boxes (Barill et al. 2018).
 
-Faces near a point count by the solid angles that they are seen under, what is far by its moments.
-
-Around a centre p, with offsets e and area vectors a, 4π times the winding number at ``p − d`` is, by Taylor's theorem,
-``a·d / r³ + (tr M − 3 M(d) / r²) / r³ + (15 S(d) / r² − 3 tr S(d)) / 2 r⁵``, where ``M(d) = Σ (a·d) (e·d)`` and
-``S(d) = Σ (a·d) (e·d)²`` are polynomials, of which the symmetric part is all that counts (Barill et al. 2018).
+Faces near a point count by their solid angles, faces far away by the moments of the nodes that contain them. Around a
+centre p, with offsets e and area vectors a, 4π times the winding number at ``p − d`` is, by Taylor's theorem, ``a·d /
+r³ + (tr M − 3 M(d) / r²) / r³ + (15 S(d) / r² − 3 tr S(d)) / 2 r⁵``, where ``M(d) = Σ (a·d) (e·d)`` and ``S(d) = Σ
+(a·d) (e·d)²`` are polynomials, whose symmetric parts are all that counts.
 """
 
 from __future__ import annotations
@@ -21,11 +20,12 @@ from ..mesh.box_tree import LEAF, BoxTree
 from ..parallel import in_chunks
 
 DEPTH = 1e-5
-"""Size of a face by which what is behind it lies behind it."""
+"""Offset behind a face, relative to its size."""
 IN_PLANE = 1e-9
-"""Volume of the cone to a triangle, over the product of its sides there, up to which a point lies in its plane."""
+"""Volume of the cone to a triangle, relative to the product of its edges at the apex, up to which the apex is in its
+plane."""
 OPENING = 1.25
-"""Distance over radius from which on moments replace what is below a node."""
+"""Distance, relative to a node's radius, above which its moments replace its faces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +37,13 @@ class WindingTree:
 
     @classmethod
     def of(cls, triangles: Floats) -> WindingTree:
-        """A tree of its own over (m, 3, 3) triangles."""
+        """Build a tree over (m, 3, 3) triangles."""
         return cls(triangles, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)))
 
     def numbers(self, points: Floats) -> Floats:
-        """(n,) winding numbers around (n, 3) points, to some hundredths, in time O(n log m).
+        """Return (n,) winding numbers around (n, 3) points, to some hundredths, in time O(n log m).
 
-        On a face it is that of one of its sides: take `behind`.
+        On a face the number is that of one of its sides: use `behind`.
         """
         corners = np.ascontiguousarray(self.triangles).reshape(-1, 9)
         points = np.ascontiguousarray(points)  # one kind of array, for which the kernel is compiled
@@ -51,9 +51,9 @@ class WindingTree:
         return numbers
 
     def behind(self, faces: NDArray[np.integer], places: Floats) -> Floats:
-        """(n,) winding numbers just behind places (n, 3) in faces (n,): 1 more than in front, where no other face lies.
+        """Return (n,) winding numbers just behind places (n, 3) in faces (n,): 1 more than in front of single faces.
 
-        They must not be on the rims of these, where other faces meet them.
+        The places must not be on the rims of faces, where other faces meet them.
         """
         corners = self.triangles[faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -68,10 +68,10 @@ class WindingTree:
 
 @compiled
 def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> Floats:
-    """(n,) winding numbers around points, down the tree (Barill et al. 2018).
+    """Return (n,) winding numbers around points, down the tree.
 
-    Far from a node, the first three terms of the expansion about its centre replace its triangles: area vector, first
-    and second moments (see `moments_of` for the columns of `moments`). In leaves, solid angles are summed.
+    Far from a node the first three terms of the expansion about its centre replace its triangles (see `moments_of` for
+    the columns of `moments`); in leaves solid angles are summed.
     """
     leaves = len(moments) // 2
     stack = np.empty(64, dtype=np.int64)
@@ -117,9 +117,9 @@ def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> F
 
 @compiled
 def solid_angle(corners: Floats, face: int, x: float, y: float, z: float) -> tuple[float, float]:
-    """Parts of a complex number whose argument is half the signed solid angle of a triangle from a point.
+    """Return parts of a complex number whose argument is half the signed solid angle of a triangle from a point.
 
-    Positive from behind it (van Oosterom & Strackee 1983).
+    It is positive from behind the triangle (van Oosterom & Strackee 1983).
     """
     ax, ay, az = corners[face, 0] - x, corners[face, 1] - y, corners[face, 2] - z
     bx, by, bz = corners[face, 3] - x, corners[face, 4] - y, corners[face, 5] - z
@@ -135,7 +135,7 @@ def solid_angle(corners: Floats, face: int, x: float, y: float, z: float) -> tup
 
 @compiled
 def mean_angle(corners: Floats, face: int, x: float, y: float, z: float) -> float:
-    """Signed solid angle of a triangle from a point; from a point in its plane the mean of both sides, 0."""
+    """Return the signed solid angle of a triangle from a point, or 0, the mean of both sides, in its plane."""
     rest, volume = solid_angle(corners, face, x, y, z)
     scale = 1.0
     for c in range(0, 9, 3):
@@ -149,14 +149,15 @@ SQUARES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 CUBES = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 0, 1), (0, 0, 2), (0, 1, 1), (1, 1, 2), (0, 2, 2), (1, 2, 2), (0, 1, 2))
 """Terms of S: xxx, yyy, zzz, xxy, xxz, xyy, yyz, xzz, yzz, xyz."""
 BLOCK = 2**13
-"""Leaves whose moments are computed at a time."""
+"""Number of leaves whose moments are computed at a time."""
 WIDTH = 7 + len(SQUARES) + len(CUBES)
 
 
 def moments_of(triangles: Floats, tree: BoxTree, opening: float) -> Floats:
-    """(2 · leaves, 23) of what is below each node of a tree.
+    """Return (2 · leaves, 23) moments of the triangles below each node of a tree.
 
-    Area vector, centre, the square of `opening` times the radius around it, then the coefficients of M and S.
+    The columns are area vector, centre, the square of `opening` times the radius around it, and the coefficients of M
+    and S.
     """
     leaves = len(tree.bounds) // 2
     grouped = tree.items.reshape(leaves, LEAF)
@@ -183,12 +184,12 @@ def moments_of(triangles: Floats, tree: BoxTree, opening: float) -> Floats:
         second = second + 2 * _product(first, moved) + _product(_product(vectors, moved), moved)
         first = first + _product(vectors, moved)
         radii = (radii + np.linalg.norm(moved, axis=0)).reshape(-1, 2).max(axis=1)
-        vectors, first, second = (_of_pairs(each) for each in (vectors, first, second))
+        vectors, first, second = (_of_pairs(moment) for moment in (vectors, first, second))
         centres, weights = middle, total
 
 
 def _of_leaves(triangles: Floats, grouped: Ints) -> tuple[Floats, ...]:
-    """Of some leaves: sums of area vectors, areas, and areas times centres; their centre, M and S, and radii."""
+    """Return sums of leaves: area vectors, areas, areas times centres; and their centres, M, S, and radii."""
     there = grouped >= 0
     corners = np.where(there[..., None, None], triangles[grouped], 0.0)
     corners = np.ascontiguousarray(corners.transpose(2, 3, 0, 1))  # corner, axis, leaf, place in it
@@ -210,7 +211,7 @@ def _of_leaves(triangles: Floats, grouped: Ints) -> tuple[Floats, ...]:
 
 
 def _product(form: Floats, line: Floats) -> Floats:
-    """Coefficients of a linear or quadratic form, (3, …) or (6, …), times a linear one."""
+    """Return the coefficients of a linear or quadratic form, (3, …) or (6, …), times a linear one."""
     given, wanted = (((0,), (1,), (2,)), SQUARES) if len(form) == 3 else (SQUARES, CUBES)
     result = np.zeros((len(wanted), *form.shape[1:]))
     for term, axes in enumerate(given):
@@ -224,5 +225,5 @@ def _over(firsts: Floats, weights: Floats) -> Floats:
 
 
 def _of_pairs(values: Floats) -> Floats:
-    """(…, n / 2) sums of the two nodes below each."""
+    """Return (…, n / 2) sums of the two nodes below each."""
     return values[..., ::2] + values[..., 1::2]

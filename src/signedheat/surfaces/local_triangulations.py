@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.components import connected_components, grouped, members_of
-from ..mesh.ear_clipping import cut_into_ears
 from ..mesh.edges import edge_table
 from ..mesh.signed_graph import Links, signs_of
+from ..mesh.triangles import cut_into_ears
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import distinct_rows
 from ..parallel import in_chunks

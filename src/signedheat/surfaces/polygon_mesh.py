@@ -21,8 +21,7 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError
 from ..exchange import Elements, Exchangeable
 from ..mesh.components import sums_of
-from ..mesh.ear_clipping import cut_into_ears
-from ..mesh.triangles import area_vectors
+from ..mesh.triangles import area_vectors, cut_into_ears
 from ..validation import array_of, coordinates, frozen, used_bounds, whole_numbers
 from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh
