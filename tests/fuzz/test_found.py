@@ -63,6 +63,8 @@ FOUND = [
     ("surface curves", 7009, 1312),
     # an image in space whose origin is one of the plane
     ("files labels", 7008, 2630),
+    # parts of cut faces without area
+    ("surface triangulation", 4503, 7974),
     # segments whose ends are one to rounding
     ("surface triangulation", 7007, 1631),
     # a part of the surface that no curve reaches, and whose sides touch one
