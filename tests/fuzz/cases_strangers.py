@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import warnings
 import zipfile
 from dataclasses import dataclass
 from functools import cache
@@ -20,12 +21,19 @@ from fuzz.cases_files import Damaged, check, written
 from fuzz.frame import Wrong, family
 from fuzz.mutations import damaged
 from signedheat import samples
+from signedheat.cache import fingerprint
+from signedheat.io.numpy_files import write_npz
+from signedheat.io.solid_arrays import NEEDED, SOURCE
 
 NUMBERS: list[Any] = [0, -1, 1, 2, 3, 4, 7, 255, 65535, 2**31, -(2**31), 2**32, 2**53, 10**30]
 NUMBERS += [0.5, -0.0, 1e-320, 1e300, 1e400, None, "1", [], {}, True]
 """What numbers in JSON become."""
 VALUES = [0.0, -1.0, 1.0, 1e-320, 1e-30, 1e30, 1e300, np.nan, np.inf, -np.inf]
 """What numbers in arrays become."""
+INTEGERS = [-7, -1, 0, 1, 127, 2**31, -(2**31), 2**62, -(2**63)]
+"""What indices and counts become."""
+TYPES = ["f2", "f4", ">f8", "i1", "i8", "u8", "c16", "b", "S8"]
+"""What the types of arrays become."""
 
 
 def graph(random: np.random.Generator, folder: Path) -> Damaged:
@@ -125,29 +133,43 @@ def solid() -> dict[str, np.ndarray]:
 
 
 def numbers(random: np.random.Generator, folder: Path) -> Loaded:
-    """A solid of which an array has other numbers, or another shape or type."""
+    """A solid of which arrays have other numbers, shapes or types, or are gone; most have a right key."""
     arrays = dict(solid())
+    changed = [one_changed(random, arrays) for _ in range(int(random.choice([1, 1, 2])))]
+    if "key" in arrays and random.random() < 0.7:
+        held = [np.asarray(arrays[name]) for name in (*NEEDED, *SOURCE) if name in arrays and name != "key"]
+        arrays["key"] = np.frombuffer(fingerprint(*held), dtype=np.uint8)
+    write_npz(folder / "solid.npz", **arrays)
+    return Loaded(folder / "solid.npz", "; ".join(changed))
+
+
+def one_changed(random: np.random.Generator, arrays: dict[str, np.ndarray]) -> str:
+    """Change one of the arrays; what was changed."""
     name = list(arrays)[int(random.integers(0, len(arrays)))]
     array = np.array(arrays[name])
-    kind = int(random.integers(0, 6))
-    value = VALUES[int(random.integers(0, len(VALUES)))]
-    with np.errstate(all="ignore"):
+    is_real, kind = array.dtype.kind == "f", int(random.integers(0, 8))
+    value = VALUES[int(random.integers(0, len(VALUES)))] if is_real else int(random.choice(INTEGERS))
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
         if kind == 0:
-            array = np.full_like(array, value) if array.dtype.kind == "f" else np.zeros_like(array)
+            array = np.full(array.shape, value).astype(array.dtype)
         elif kind == 1 and array.size:
-            array = array.copy()
-            other = value if array.dtype.kind == "f" else int(random.choice([-7, 0, 1]))
-            array.reshape(-1)[random.integers(0, array.size, 3)] = other
+            array.reshape(-1)[random.integers(0, array.size, 3)] = np.array(value).astype(array.dtype)
         elif kind == 2:
-            array = array[: len(array) // 2] if array.ndim else array
+            array = array[: len(array) // int(random.choice([1, 2, 10**6]))] if array.ndim else array
         elif kind == 3:
             array = array.astype(array.dtype.newbyteorder(">"))
         elif kind == 4:
-            array = array.astype(np.float16 if array.dtype.kind == "f" else np.int8)
+            array = array.astype(np.dtype(str(random.choice(TYPES))))
+        elif kind == 5:
+            array = [array[None], array.reshape(-1), array.T, array.reshape(-1)[:0]][int(random.integers(0, 4))]
+        elif kind == 6 and array.ndim:
+            array = array[random.integers(0, len(array), int(random.integers(0, 2 * len(array) + 1)))]
         else:
-            array = array[None]
-    np.savez(folder / "solid.npz", **arrays | {name: array})
-    return Loaded(folder / "solid.npz", f"{name}: {kind}, {value}")
+            del arrays[name]
+            return f"{name}: gone"
+    arrays[name] = array
+    return f"{name}: {kind}, {value}, {array.dtype} {array.shape}"
 
 
 def use(subject: Loaded) -> str:
@@ -156,7 +178,8 @@ def use(subject: Loaded) -> str:
     points = np.random.default_rng(0).normal(size=(50, 3))
     distances = loaded.distance(points)
     closest = loaded.closest(points)
-    if not np.isfinite(distances).all() or not np.isfinite(closest.points).all():
+    values = loaded.field(resolution=5).values, loaded.surface(keep_faces=True).vertices, loaded.volume
+    if not all(np.isfinite(numbers).all() for numbers in (distances, closest.points, *values)):
         raise Wrong("not finite", subject.changed)
     return "loaded"
 

@@ -1,8 +1,11 @@
-"""Damage to files: bytes, lines, numbers, headers, truncation, insertion."""
+"""Damage to files: bytes, lines, numbers, headers, truncation, insertion; in packed files, to what is packed."""
 
 from __future__ import annotations
 
+import gzip
+import io
 import re
+import zipfile
 from collections.abc import Callable
 
 import numpy as np
@@ -113,9 +116,37 @@ def stretch(random: np.random.Generator, length: int, most: int) -> tuple[int, i
 MUTATIONS: list[Mutation] = [flip, overwrite, truncate, remove, repeat, insert, word, number, lines, key]
 
 
+OF_CONTENT = 0.9
+"""How often what is packed is damaged, and not the pack, whose checksums tell that."""
+
+
 def damaged(random: np.random.Generator, data: bytes) -> bytes:
     """Data with one to three damages."""
+    if data.startswith((b"PK", b"\x1f\x8b")) and random.random() < OF_CONTENT:
+        return member_damaged(random, data) if data.startswith(b"PK") else packed_damaged(random, data)
     for _ in range(int(random.integers(1, 4))):
         if data:
             data = MUTATIONS[int(random.integers(0, len(MUTATIONS)))](random, data)
     return data
+
+
+def packed_damaged(random: np.random.Generator, data: bytes) -> bytes:
+    """A gzip file of which the content is damaged; its checksum is right."""
+    return gzip.compress(damaged(random, gzip.decompress(data)), mtime=0)
+
+
+def member_damaged(random: np.random.Generator, data: bytes) -> bytes:
+    """An archive of which a member is damaged, is missing, or has the content of another; its checksums are right."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    name, other = (list(members)[int(k)] for k in random.integers(0, len(members), 2))
+    kind = random.random()
+    if kind < 0.05:
+        del members[name]
+    else:
+        members[name] = members[other] if kind < 0.15 else damaged(random, members[name])
+    new = io.BytesIO()
+    with zipfile.ZipFile(new, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return new.getvalue()
