@@ -24,12 +24,6 @@ class LastUsed(Generic[K, V]):
     ----------
     size : int
         How many values are kept; the old one is let go before the next is made.
-
-    Examples
-    --------
-    >>> squares = LastUsed[int, int]()
-    >>> squares(3, lambda: 3 * 3), squares(3, lambda: 0), squares(2, lambda: 4), squares(3, lambda: 0)
-    (9, 9, 4, 0)
     """
 
     def __init__(self, size: int = 1) -> None:
@@ -54,13 +48,7 @@ class LastUsed(Generic[K, V]):
 
 
 def fingerprint(*arrays: NDArray[Any]) -> bytes:
-    """A key for arrays: equal for equal bits and shapes, and, for all that matters, for these alone.
-
-    Examples
-    --------
-    >>> fingerprint(np.zeros(3)) == fingerprint(np.zeros(3)) != fingerprint(np.ones(3))
-    True
-    """
+    """A key for arrays: equal for equal bits and shapes, and, for all that matters, for these alone."""
     digest = hashlib.blake2b(digest_size=32)
     for array in arrays:
         digest.update(f"{array.dtype.str}{array.shape}".encode())

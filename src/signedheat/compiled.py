@@ -48,16 +48,7 @@ announce: Announcement = Announcement("compiling what this needs, once (signedhe
 
 
 class Kernel(Generic[Parameters, Returned]):
-    """A function that Numba compiles at its first call, with a cache on disk. Kernels may call kernels.
-
-    Examples
-    --------
-    >>> @compiled
-    ... def twice(x):
-    ...     return 2 * x
-    >>> twice(1.5)
-    3.0
-    """
+    """A function that Numba compiles at its first call, with a cache on disk. Kernels may call kernels."""
 
     is_kept: bool = True
     """Whether what is compiled is kept on disk: no longer once the cache was found damaged, or the disk full."""

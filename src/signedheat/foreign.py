@@ -84,13 +84,7 @@ ForeignShape: TypeAlias = (
 
 
 def what_to_pass(thing: object) -> str:
-    """The remedy where something is no shape: files are read first, and bare points are a cloud.
-
-    Examples
-    --------
-    >>> what_to_pass("part.stl")
-    'pass sh.read("part.stl")'
-    """
+    """The remedy where something is no shape: files are read first, and bare points are a cloud."""
     if isinstance(thing, str | PathLike):
         return f'pass sh.read("{fspath(thing)!s}")'
     if isinstance(thing, np.ndarray) and thing.ndim == 2:
@@ -99,25 +93,13 @@ def what_to_pass(thing: object) -> str:
 
 
 def package_of(thing: object) -> str | None:
-    """The package that made an object, among those whose objects are taken; classes derived from theirs count.
-
-    Examples
-    --------
-    >>> package_of([1, 2]) is None
-    True
-    """
+    """The package that made an object, among those whose objects are taken; classes derived from theirs count."""
     roots = (kind.__module__.partition(".")[0] for kind in type(thing).__mro__)
     return next((root for root in roots if root in PACKAGES), None)
 
 
 def is_pair(thing: object) -> bool:
-    """Whether something is a pair of arrays (vertices, faces), and not two sources or two numbers.
-
-    Examples
-    --------
-    >>> is_pair(([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])), is_pair(([0.0, 1], [0.0, 1]))
-    (True, False)
-    """
+    """Whether something is a pair of arrays (vertices, faces), and not two sources or two numbers."""
     if not (isinstance(thing, tuple | list) and len(thing) == 2 and all(_like_array(part) for part in thing)):
         return False
     points, faces = thing

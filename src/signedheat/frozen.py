@@ -15,18 +15,6 @@ class Frozen:
     """A frozen dataclass whose copies and pickles hold only its fields; read-only arrays stay read-only.
 
     Cached properties are computed anew, since they are often larger than the fields, or in memory of other libraries.
-
-    Examples
-    --------
-    >>> import copy
-    >>> from dataclasses import dataclass
-    >>> @dataclass(frozen=True)
-    ... class Row(Frozen):
-    ...     values: NDArray[np.float64]
-    >>> row = Row(np.zeros(3))
-    >>> row.values.flags.writeable = False
-    >>> copy.deepcopy(row).values.flags.writeable
-    False
     """
 
     def __getstate__(self) -> tuple[dict[str, object], frozenset[str]]:

@@ -139,14 +139,7 @@ class TetReport:
 
 
 def inspect(shape: Shape) -> SurfaceReport | CloudReport | TetReport:
-    """Count the elements and defects of a shape, in O(n) time.
-
-    Examples
-    --------
-    >>> report = inspect(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 2, 3]]))
-    >>> report.open_edges, report.inconsistent_edges, report.borders
-    (4, 1, 1)
-    """
+    """Count the elements and defects of a shape, in O(n) time."""
     if isinstance(shape, PointCloud):
         return CloudReport(
             n_points=shape.n_points,

@@ -25,11 +25,6 @@ def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -
     """Run a job on its own thread, call `report` every `INTERVAL` seconds until it ends, and return its result.
 
     An exception from `report` is raised at once; the job then runs on in the background and its result is dropped.
-
-    Examples
-    --------
-    >>> run_cancellable(lambda: 6 * 7, lambda: None)
-    42
     """
     if report is None:
         return job()
@@ -52,13 +47,7 @@ def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -
 
 
 def run_limited(job: Callable[[], Any], seconds: float) -> Any:
-    """Run a job on its own thread and return its result; raise `TimeoutError` after some seconds.
-
-    Examples
-    --------
-    >>> run_limited(lambda: 6 * 7, 10.0)
-    42
-    """
+    """Run a job on its own thread and return its result; raise `TimeoutError` after some seconds."""
     end = time.monotonic() + seconds
 
     def refuse_to_wait() -> None:
@@ -80,12 +69,6 @@ def command_for(entry: str, *arguments: str) -> list[str]:
         The function, as ``"module:name"``.
     arguments : str
         Arguments of the function.
-
-    Examples
-    --------
-    >>> import subprocess
-    >>> subprocess.run(command_for("builtins:print", "a b"), capture_output=True).stdout.decode().strip()
-    'a b'
     """
     path = [os.path.abspath(folder) for folder in sys.path if folder]
     return [sys.executable, "-I", "-c", RUN, json.dumps(path), entry, *arguments]

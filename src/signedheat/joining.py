@@ -58,27 +58,13 @@ def joined_triangles(parts: Sequence[TriangleMesh | PolygonMesh], origin: Floats
 
 
 def concatenated(bodies: Sequence[Body]) -> Body:
-    """Concatenate the vertices and faces of several bodies without merging any.
-
-    Examples
-    --------
-    >>> corners, triangle = np.eye(3), np.array([[0, 1, 2]])
-    >>> concatenated([(corners, triangle), (corners, triangle)])[1].tolist()
-    [[0, 1, 2], [3, 4, 5]]
-    """
+    """Concatenate the vertices and faces of several bodies without merging any."""
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
     faces = [own + start for (_, own), start in zip(bodies, starts, strict=False)]
     return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
 
 
 def placed(body: Body, matrix: Floats) -> Body:
-    """Move a body by a (4, 3) matrix that multiplies rows from the right; a mirrored body keeps its outside.
-
-    Examples
-    --------
-    >>> mirror = np.vstack([np.diag([-1.0, 1, 1]), [5, 0, 0]])
-    >>> placed((np.eye(3), np.array([[0, 1, 2]])), mirror)[0][0].tolist()
-    [4.0, 0.0, 0.0]
-    """
+    """Move a body by a (4, 3) matrix that multiplies rows from the right; a mirrored body keeps its outside."""
     vertices, faces = body
     return vertices @ matrix[:3] + matrix[3], faces if np.linalg.det(matrix[:3]) >= 0 else faces[:, ::-1]

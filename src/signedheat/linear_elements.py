@@ -32,15 +32,7 @@ class LinearElements:
 
     @classmethod
     def of(cls, corners: Ints, sizes: Floats, hats: Floats, n: int) -> LinearElements:
-        """From the gradients (m, d + 1, d) of the hat functions of each cell, one at a corner and zero at the others.
-
-        Examples
-        --------
-        >>> hats = np.array([[[-1.0], [1.0]], [[-0.5], [0.5]]])
-        >>> line = LinearElements.of(np.array([[0, 1], [1, 2]]), np.array([1.0, 2.0]), hats, 3)
-        >>> line.slopes(np.array([0.0, 1.0, 4.0])).ravel().tolist(), line.masses.tolist()
-        ([1.0, 1.5], [0.5, 1.5, 1.0])
-        """
+        """Make elements of the gradients (m, d + 1, d) of the hat functions of each cell."""
         m, k = corners.shape
         d = hats.shape[2]
         columns = np.repeat(corners[:, None], d, axis=1)

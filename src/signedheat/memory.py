@@ -53,11 +53,6 @@ def untouched_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     """Allocate zeros whose pages take memory only once they are written.
 
     `numpy.zeros` uses pages of 2 MB, most of which a surface through a grid would touch.
-
-    Examples
-    --------
-    >>> untouched_zeros((2, 2), np.float32).tolist()
-    [[0.0, 0.0], [0.0, 0.0]]
     """
     count = math.prod(shape)
     if count == 0:
@@ -67,13 +62,7 @@ def untouched_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
 
 
 def fitting_count(count: int, estimate: Callable[[int], float], available: float) -> int:
-    """The largest number of elements, up to `count`, whose estimated memory is available.
-
-    Examples
-    --------
-    >>> fitting_count(10**9, lambda n: 100 * n, 1e6)
-    10000
-    """
+    """The largest number of elements, up to `count`, whose estimated memory is available."""
     low, high = 0, count
     while low < high:
         middle = (low + high + 1) // 2

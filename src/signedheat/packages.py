@@ -52,16 +52,7 @@ def lazy_module(name: str, purpose: str) -> Any:
 
 
 def require(name: str, purpose: str) -> ModuleType:
-    """Import a module now, for instance before a long computation that needs it at the end.
-
-    Examples
-    --------
-    >>> require("json", "examples").__name__
-    'json'
-    >>> require("no_such_package", "examples")
-    Traceback (most recent call last):
-    signedheat.errors.MissingPackageError: examples need the package no_such_package, which is not installed: ...
-    """
+    """Import a module now, for instance before a long computation that needs it at the end."""
     try:
         return import_module(name)
     except ImportError as error:
@@ -72,23 +63,12 @@ def require(name: str, purpose: str) -> ModuleType:
 
 
 def ensure_installed(package: str, purpose: str) -> None:
-    """Raise `MissingPackageError` if a package is not installed, without importing it.
-
-    Examples
-    --------
-    >>> ensure_installed("json", "examples")
-    """
+    """Raise `MissingPackageError` if a package is not installed, without importing it."""
     if find_spec(package) is None:
         raise missing_package(package, purpose)
 
 
 def missing_package(package: str, purpose: str, cause: str = "is not installed") -> MissingPackageError:
-    """The error for a missing package.
-
-    Examples
-    --------
-    >>> print(missing_package("PIL", "pictures"))
-    pictures need the package PIL, which is not installed: pip install pillow
-    """
+    """The error for a missing package."""
     remedy = REMEDIES.get(package, f"pip install {package}")
     return MissingPackageError(f"{purpose} need the package {package}, which {cause}", remedy=remedy, element=package)

@@ -38,12 +38,6 @@ def in_chunks(
     """Apply a function to chunks of rows on all threads, and concatenate its results.
 
     The result does not depend on the number of threads. Each thread needs additional memory for one chunk.
-
-    Examples
-    --------
-    >>> in_chunks(lambda x: (x.sum(axis=1), x > 1), np.array([[1.0, 2.0], [3.0, 0.0]]))
-    (array([3., 3.]), array([[False,  True],
-           [ True, False]]))
     """
     if len(rows) <= CHUNK:
         return function(rows)
@@ -71,14 +65,7 @@ def connected(address: str) -> Any:
         If no scheduler answers at the address within a minute.
     MissingPackageError
         If Dask is not installed.
-
-    Examples
-    --------
-    >>> connected("nobody")
-    Traceback (most recent call last):
-        ...
-    signedheat.errors.SignedHeatError: no Dask scheduler answers at 'nobody' (missing port number in address 'nobody'): start one with `dask scheduler`, and name its address
-    """  # noqa: E501
+    """
     comm = distributed.comm  # raises if Dask is missing, before errors are converted
     try:
         if comm.parse_address(address)[0] == "tcp":

@@ -69,15 +69,7 @@ class Stopwatch:
 
 
 def within(progress: Progress | None, start: float, stop: float) -> Progress | None:
-    """Progress of a part of a computation, from `start` to `stop` of the whole.
-
-    Examples
-    --------
-    >>> seen = []
-    >>> within(lambda fraction, step: seen.append(fraction), 0.5, 1.0)(0.5, "halfway")
-    >>> seen
-    [0.75]
-    """
+    """Progress of a part of a computation, from `start` to `stop` of the whole."""
     if progress is None:
         return None
     whole = progress

@@ -11,18 +11,7 @@ MOST = 6
 
 
 class ShortRepr:
-    """A dataclass, made with ``repr=False``, whose representation is short.
-
-    Examples
-    --------
-    >>> from dataclasses import dataclass
-    >>> @dataclass(repr=False)
-    ... class Heap(ShortRepr):
-    ...     height: float
-    ...     grains: NDArray[np.float64]
-    >>> Heap(1 / 3, np.zeros((500, 3)))
-    Heap(height=0.3333, grains=500 × 3 numbers)
-    """
+    """A dataclass, made with ``repr=False``, whose representation is short."""
 
     def __repr__(self) -> str:
         assert is_dataclass(self)
@@ -31,13 +20,7 @@ class ShortRepr:
 
 
 def short(value: object) -> str:
-    """A value as text: four digits of numbers, the size of arrays.
-
-    Examples
-    --------
-    >>> short(0.1 + 0.2), short(np.array([1.0, 2.5])), short(np.arange(1000)), short((1, 2)), short({"a": 1 / 3})
-    ('0.3', '[1, 2.5]', '1000 numbers', '(1, 2)', '{a: 0.3333}')
-    """
+    """A value as text: four digits of numbers, the size of arrays."""
     if isinstance(value, np.ndarray):
         if value.ndim == 1 and value.size <= MOST and value.dtype.kind in "biuf":
             return f"[{', '.join(short(entry) for entry in value.tolist())}]"

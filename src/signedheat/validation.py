@@ -34,13 +34,7 @@ def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
 
 
 def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Floats:
-    """`values` as a new float64 array of any shape; whatever holds anything but real numbers is refused.
-
-    Examples
-    --------
-    >>> numbers([[1, 2]], "points")
-    array([[1., 2.]])
-    """
+    """`values` as a new float64 array of any shape; whatever holds anything but real numbers is refused."""
     array = array_of(values, name, error)
     try:
         if array.dtype.kind not in "biufO":
@@ -105,14 +99,7 @@ def finite_rows(
 def coordinates(
     values: object, name: str, columns: int | None = None, error: type[SignedHeatError] = GeometryError
 ) -> Floats:
-    """The same, within what can be computed with: powers of lengths must not leave the range of numbers.
-
-    Examples
-    --------
-    >>> coordinates([[0, 0], [1, 1e-200]], "points")
-    array([[0.e+000, 0.e+000],
-           [1.e+000, 1.e-200]])
-    """
+    """The same, within what can be computed with: powers of lengths must not leave the range of numbers."""
     array = finite_rows(values, name, columns, error)
     if len(array):
         refuse_extreme(array.min(axis=0), array.max(axis=0), name, error)
@@ -154,13 +141,7 @@ def query_points(values: object, columns: int) -> tuple[Floats, tuple[int, ...]]
 
 
 def shaped(values: NDArray[Scalar], shape: tuple[int, ...]) -> NDArray[Scalar]:
-    """(n, ...) values at points in the shape that these were given in; () is that of a single one.
-
-    Examples
-    --------
-    >>> shaped(np.zeros((6, 4)), (2, 3)).shape, shaped(np.ones((1, 4)), ()), float(shaped(np.ones(1), ()))
-    ((2, 3, 4), array([1., 1., 1., 1.]), 1.0)
-    """
+    """(n, ...) values at points in the shape that these were given in; () is that of a single one."""
     return values.reshape((*shape, *values.shape[1:]))[()]
 
 
@@ -177,13 +158,7 @@ def refuse_lost_spacing(steps: Floats, first: Floats, last: Floats) -> None:
 def finite_number(
     value: object, name: str, least: float = -np.inf, error: type[SignedHeatError] = SignedHeatError
 ) -> float:
-    """`value` as a finite float, at least `least`.
-
-    Examples
-    --------
-    >>> finite_number(2, "the distance", least=0)
-    2.0
-    """
+    """`value` as a finite float, at least `least`."""
     if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:  # type: ignore[arg-type]
         described = _described(value) if isinstance(value, np.ndarray) else " ".join(f"{value!r:.60}".split())
         raise error(f"{name} must be a number, not {described}", element=name)
@@ -263,13 +238,7 @@ def element_ids(values: object, name: str, corners: int, n_vertices: int) -> Int
 
 
 def used_bounds(points: Floats, ids: Ints) -> Floats:
-    """(2, d) lower and upper corner of the box around the points that are named, column by column: that is fast.
-
-    Examples
-    --------
-    >>> used_bounds(np.array([[0.0, 1.0], [2.0, 0.0], [9.0, 9.0]]), np.array([0, 1, 0])).tolist()
-    [[0.0, 0.0], [2.0, 1.0]]
-    """
+    """(2, d) lower and upper corner of the box around the points that are named, column by column: that is fast."""
     used = np.zeros(len(points), dtype=bool)
     used[ids.ravel()] = True
     columns = (points if used.all() else points[used]).T

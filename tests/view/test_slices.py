@@ -6,7 +6,9 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples, view
-from signedheat.view.slice_pictures import cross_section, level_pieces
+from signedheat.view.figures import isolines_between, legible
+from signedheat.view.rasterizer import looking
+from signedheat.view.slice_pictures import cross_section, level_pieces, rounded
 
 
 def test_cross_section_of_a_sphere_is_a_circle():
@@ -54,3 +56,17 @@ def test_completed_parts_of_levels_are_dashed():
 def test_a_picture_of_unknown_kind_is_refused(tmp_path):
     with refused(sh.errors.FileFormatError):
         view.save_scene(samples.sphere(0), tmp_path / "a.bmp")
+
+
+def test_isolines_and_labels_are_round_numbers():
+    levels, step = isolines_between(-0.25, 0.5, 8)
+    assert step == 0.1
+    np.testing.assert_allclose(levels, [-0.2, -0.1, 0.1, 0.2, 0.3, 0.4, 0.5])
+    assert legible(np.array([-0.5, 0.5, 1.0, 1.5, 2.0]), -0.7, 2.2) == [-0.5, 0, 0.5, 1, 1.5, 2]
+    assert legible(np.arange(11.0), 0.0, 10.5) == [0, 1, 2, 3, 4, 5, 7, 9]
+    positions = (-5e-7, 0.03), (12.34567, 0.03), (12345.6, 30.0)
+    assert [rounded(position, spacing) for position, spacing in positions] == ["0", "12.346", "12346"]
+
+
+def test_the_view_along_y_has_x_to_the_right_and_z_up():
+    assert looking(np.array([0.0, -1.0, 0.0])).tolist() == [[1, 0, 0], [0, 0, 1], [0, -1, 0]]

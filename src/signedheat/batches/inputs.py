@@ -117,12 +117,6 @@ def _names(below: dict[str, str]) -> list[str]:
 
 
 def _without_extension(name: str) -> str:
-    """A name without its extension, unless only dots would be left, as of ``..stl``.
-
-    Examples
-    --------
-    >>> _without_extension("parts/a.stl"), _without_extension("..stl")
-    ('parts/a', '..stl')
-    """
+    """A name without its extension, unless only dots would be left, as of ``..stl``."""
     short = name.removesuffix(Path(name).suffix)
     return name if os.path.basename(short) in ("", ".", "..") else short

@@ -275,13 +275,7 @@ def _on_cluster(
 
 
 def duration(seconds: float) -> str:
-    """Seconds in words.
-
-    Examples
-    --------
-    >>> duration(42.3), duration(400), duration(8000)
-    ('42 s', '7 min', '2.2 h')
-    """
+    """Seconds in words."""
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

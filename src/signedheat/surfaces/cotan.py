@@ -13,27 +13,15 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 
 
 def cotan_matrix(triangles: IntrinsicMesh) -> sparse.csr_matrix:
-    """Upper triangle of C (Eq. 10), one unknown per vertex, its whole diagonal stored.
-
-    Positive semidefinite, ``φᵀ C φ = ∫ |∇φ|²``: the negative of the paper's matrix.
-
-    Examples
-    --------
-    >>> flat = IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.array([[1.0, 2**0.5, 1.0]]), 3)
-    >>> cotan_matrix(flat).toarray().round(12)
-    array([[ 1. , -0.5, -0.5],
-           [ 0. ,  0.5,  0. ],
-           [ 0. ,  0. ,  0.5]])
-    """
+    """Upper triangle of C (Eq. 10) on the vertices, the negative of the paper's matrix: ``φᵀ C φ = ∫ |∇φ|²``."""
     half = 0.5 * np.roll(triangles.corner_cotangents, 1, axis=1)  # the corner facing edge k is k + 2
     diagonal = half + np.roll(half, 1, axis=1)
     return assemble(triangles.corner_vertices, diagonal, -half, triangles.n_vertices)
 
 
 def divergence(triangles: IntrinsicMesh, directions: Complexes) -> Floats:
-    """b of Eq. 13: with ``C φ = b`` the gradient of φ is closest to a face field Y. ``b_i = ∫ ⟨∇λ_i, Y⟩`` (Sec. 5.5).
+    """b of Eq. 13, ``b_i = ∫ ⟨∇λ_i, Y⟩`` (Sec. 5.5): the negative of the paper's divergence, as C is of its Laplacian.
 
-    The negative of the divergence in the paper, as C is the negative of its Laplacian.
     The area-weighted gradient of corner k's hat function is half the opposite edge, turned inward by 90°.
     """
     facing = np.roll(triangles.corner_vertices, 1, axis=1)  # edge k faces corner k + 2
@@ -43,16 +31,9 @@ def divergence(triangles: IntrinsicMesh, directions: Complexes) -> Floats:
 
 
 def assemble(unknowns: Ints, diagonal: Floats, coupling: NDArray[Any], n: int) -> sparse.csr_matrix:
-    """Upper triangle of the Hermitian matrix that element matrices add up to, with its whole diagonal stored.
+    """Upper triangle of the Hermitian sum of element matrices, with its whole diagonal stored.
 
     `coupling`, (m, 3), is the entry of each element matrix in row k and column k + 1 (cyclically).
-
-    Examples
-    --------
-    >>> assemble(np.array([[0, 2, 1]]), np.ones((1, 3)), np.array([[1j, 2.0, 3.0]]), 3).toarray()
-    array([[1.+0.j, 3.+0.j, 0.+1.j],
-           [0.+0.j, 1.+0.j, 2.+0.j],
-           [0.+0.j, 0.+0.j, 1.+0.j]])
     """
     following = np.roll(unknowns, -1, axis=1)
     above = np.where(unknowns <= following, coupling, np.conj(coupling))

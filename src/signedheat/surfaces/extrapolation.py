@@ -1,4 +1,4 @@
-"""Diffusion times: one, or Richardson's extrapolation from it, in which what short and long times spoil cancels."""
+"""Diffusion times: one, or Richardson's extrapolation from it, which cancels the errors of short and long times."""
 
 from __future__ import annotations
 
@@ -15,10 +15,9 @@ from .surface_discretization import SurfaceDiscretization
 from .surface_source import SurfaceSource
 
 FINE = 263.0
-"""Extent of a surface, in h, from which longer times pay: that of 20,000 vertices in equilateral triangles."""
-
+"""Extent of a surface, in h, above which τ grows: that of 20,000 vertices in equilateral triangles."""
 AT_ENDS = 1 / 3
-"""Time, relative to that which is extrapolated from, where curves end: 1 h², the paper's, by default."""
+"""τ where curves end, relative to that of the extrapolation: the paper's 1 by default."""
 
 
 @dataclass(frozen=True)
@@ -71,10 +70,10 @@ Diffusion = float | Extrapolated
 def default_diffusion(discretization: Discretization) -> Diffusion:
     """`Extrapolated` on surfaces, where directions limit the accuracy; 1 in space.
 
-    What extrapolation leaves of h²/t, about 1/τ², does not fall with h. What it cannot take away is the smoothing of Y
-    where it turns back, at equal distance from two parts of the source, over a width of √t = h √τ. On fine surfaces τ
-    therefore grows such that both stay alike, like h to the power −2/5: the sum falls like h to the power 4/5. On
-    scans, whose distance has many such places, the second outweighs the first up to 100,000 vertices and more.
+    Two errors remain. Of h²/t, extrapolation leaves about 1/τ², which does not fall with h. And Y is smoothed over a
+    width of √t = h √τ where it turns back, at equal distance from two parts of the source. On fine surfaces τ grows
+    like h^(−2/5), so that both stay alike and their sum falls like h^(4/5). On scans, whose distance has many such
+    places, the second error is the larger one up to 100,000 vertices and more.
     """
     if not isinstance(discretization, SurfaceDiscretization):
         return 1.0
@@ -83,7 +82,7 @@ def default_diffusion(discretization: Discretization) -> Diffusion:
 
 
 def lowered_for_times(discretization: Discretization, sources: Sequence[Any], diffusion: Diffusion) -> list[SourceTerm]:
-    """The sources lowered for the τ that is to be used; once more for the parts of a surface in which curves end."""
+    """Lower the sources for their τ, and once more for the parts of a surface in which curves end."""
     if not isinstance(diffusion, Extrapolated):
         return [discretization.lower(sources, diffusion)]
     source = discretization.lower(sources, diffusion.tau)
@@ -99,9 +98,9 @@ def lowered_for_times(discretization: Discretization, sources: Sequence[Any], di
 
 
 def blended(sources: Sequence[SourceTerm], directions: Iterable[NDArray[Any]]) -> NDArray[Any]:
-    """Y, from that of each source of `lowered_for_times`."""
+    """Y everywhere, from the directions of each source of `lowered_for_times`."""
     everywhere, *at_ends = directions
-    for each in at_ends:
+    for ending in at_ends:
         assert isinstance(sources[0], SurfaceSource)
-        everywhere[sources[0].ending] = each[sources[0].ending]
+        everywhere[sources[0].ending] = ending[sources[0].ending]
     return everywhere

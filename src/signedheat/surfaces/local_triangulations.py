@@ -436,13 +436,6 @@ def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
     A boundary loop is a hole if the faces lie outside it: an outer boundary, however short, is left open. An ear that
     would make an edge that exists already is not cut off. Faces run counter-clockwise as seen from their normals,
     except across a few edges, and an edge has two of them at most.
-
-    Examples
-    --------
-    >>> points = np.array([[0.0, 0, 0], [3, 0, 0], [0, 3, 0], [1, 1, 0], [1.5, 1, 0], [1, 1.5, 0]])
-    >>> ring = np.array([[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]])
-    >>> hole_fillings(points, np.tile([0.0, 0, 1], (6, 1)), ring).tolist()
-    [[5, 3, 4]]
     """
     edges = edge_table(faces)
     face, side = np.nonzero(edges.face_counts[edges.face_edges] == 1)

@@ -182,14 +182,6 @@ def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = Fals
     between neighbours alone, and none with the outside.
 
     Shapes: `places` (n, 3), `axes` (n, 3), `reaches` (n,).
-
-    Examples
-    --------
-    >>> from signedheat import samples
-    >>> ball = samples.sphere(1).vertices
-    >>> links, _ = sign_links(ball, ball, np.ones(len(ball)))
-    >>> bool((links.weights >= 0).all())
-    True
     """
     near = _neighbor_links(places, axes, 1.0 if noisy else DIRECT_WEIGHT)
     moves = np.random.default_rng(0).uniform(-1, 1, places.shape) * (JOGGLE * reaches[:, None])
@@ -257,13 +249,7 @@ def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
 
 
 def spread_out(points: Floats, radii: Floats) -> Ints:
-    """Ids of points, none within the radius of an earlier one, and every point within that of one of them.
-
-    Examples
-    --------
-    >>> spread_out(np.array([[0.0, 0, 0], [0.4, 0, 0], [0.8, 0, 0]]), np.full(3, 0.5)).tolist()
-    [0, 2]
-    """
+    """Ids of points, none within the radius of an earlier one, and every point within that of one of them."""
     tree = scipy.spatial.cKDTree(points)
     free = np.ones(len(points), dtype=bool)
     for begin in range(0, len(points), _CHUNK):

@@ -187,28 +187,6 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         ids, found = self._distinct
         return TriangleMesh(self.points, ids[found.faces])
 
-    def on_triangulation(self, values: Floats) -> Floats:
-        """Values at the vertices of `triangulation`, from values at the vertices of the cloud.
-
-        Parameters
-        ----------
-        values : (n,) float
-            One for each vertex.
-
-        Returns
-        -------
-        (m,) float
-            One for each vertex of the triangulation: the same.
-
-        Examples
-        --------
-        >>> from signedheat import samples
-        >>> cloud = PointCloud(samples.sphere(1).vertices)
-        >>> cloud.on_triangulation(cloud.points[:, 2]).shape == cloud.points.shape[:1]
-        True
-        """
-        return values
-
     @cached_property
     def surface_normals(self) -> Floats:
         """(n, 3) unit normals, estimated from neighbours, on the side from which `triangulation` is oriented."""

@@ -1,8 +1,8 @@
 """Polygon meshes: faces with any number of corners, which may be nonconvex and mildly nonplanar.
 
-They are refined virtually: into fans of triangles around a virtual vertex (Bunge, Herholz, Kazhdan & Botsch 2020),
-which minimises the sum of the squared areas of the triangles that it spans with the sides of its polygon. It is an
-affine combination of the corners, so that functions on the corners can be prolonged to the fan.
+They are refined virtually, into fans of triangles around a virtual vertex (Bunge, Herholz, Kazhdan & Botsch 2020). The
+vertex minimises the sum of the squared areas of these triangles. It is an affine combination of the corners, so that
+functions on the corners can be prolonged to the fan.
 """
 
 from __future__ import annotations
@@ -155,24 +155,6 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         return TriangleMesh(np.concatenate([self.vertices, refinement.virtual_vertices]), refinement.faces)
 
     def on_triangulation(self, values: Floats) -> Floats:
-        """Values at the vertices of `triangulation`, from values at the vertices of the mesh.
-
-        Parameters
-        ----------
-        values : (n,) float
-            One for each vertex.
-
-        Returns
-        -------
-        (m,) float
-            One for each vertex of the triangulation.
-
-        Examples
-        --------
-        >>> square = PolygonMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
-        >>> square.on_triangulation(np.array([0.0, 1.0, 1.0, 0.0])).max().item()
-        1.0
-        """
         return self.refinement.prolongation @ values
 
     def _triangle_mask(self, face_mask: Bools) -> Bools:
@@ -190,32 +172,17 @@ _SLIVER = 1e-6  # a fan triangle whose area is less than this fraction of its po
 class VirtualRefinement:
     """Triangles that subdivide polygons."""
 
-    # (m, 3) vertex ids; virtual vertices follow the given ones. Polygon after polygon, side after side.
-    faces: Ints
+    faces: Ints  # (m, 3) vertex ids, polygon after polygon and side after side; virtual vertices follow the given ones
     face_polygons: Ints  # (m,) polygon that each triangle is part of
     virtual_vertices: Floats  # (q, 3) positions
-    # (n + q, n) P: identity on the given vertices; each virtual vertex is an affine combination of the corners of its
-    # polygon
-    prolongation: sparse.csr_matrix
+    prolongation: sparse.csr_matrix  # (n + q, n) P: values at the given vertices, then affine combinations of them
 
 
 def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> VirtualRefinement:
     """Subdivide polygons into triangles; polygon k has the vertices ``corners[offsets[k]:offsets[k + 1]]``.
 
-    Triangles are not subdivided, so that results on triangle meshes are those of the triangles. A polygon so far from
-    convex that a triangle of its fan would turn over is cut along diagonals instead. A corner that equals the one
-    before it is skipped.
-
-    Examples
-    --------
-    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    >>> fan = virtual_refinement(square, np.array([0, 1, 2, 3]), np.array([0, 4]))
-    >>> fan.faces.tolist()
-    [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
-    >>> fan.virtual_vertices
-    array([[0.5, 0.5, 0. ]])
-    >>> fan.prolongation[[4]].toarray()
-    array([[0.25, 0.25, 0.25, 0.25]])
+    Triangles are not subdivided. A polygon so far from convex that a triangle of its fan would turn over is cut along
+    diagonals instead. A corner that equals the one before it is skipped.
     """
     corners, polygons = _without_repeats(corners, offsets)
     counts = np.bincount(polygons, minlength=len(offsets) - 1)
@@ -264,7 +231,7 @@ def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> Virtua
 def virtual_vertices(
     vertices: Floats, tails: Ints, heads: Ints, polygons: Ints, n_polygons: int
 ) -> tuple[Floats, Floats]:
-    """The points that minimise Σ |fan triangle|², and their affine weights of least norm.
+    """Find the points that minimise Σ |fan triangle|², and their affine weights of least norm.
 
     Twice the area vector of the triangle of side ``a → b`` and apex x is ``a × b + (b − a) × x``, linear in x: three
     equations for each polygon. Side k runs from vertex ``tails[k]`` to ``heads[k]`` of polygon ``polygons[k]``.
@@ -285,7 +252,7 @@ def virtual_vertices(
 
 
 def _cut(polygon: Floats) -> Ints:
-    """(k − 2, 3) corners of the triangles of a polygon cut along diagonals."""
+    """(k − 2, 3) triangles into which diagonals cut a polygon."""
     center = np.broadcast_to(polygon.mean(axis=0), polygon.shape)
     normal = area_vectors(np.stack([polygon, np.roll(polygon, -1, axis=0), center], axis=1)).sum(axis=0)
     return np.sort(cut_into_ears(polygon, normal), axis=1)

@@ -37,11 +37,29 @@ class Surface(Frozen):
         return self.triangulation.n_vertices
 
     def on_triangulation(self, values: Floats) -> Floats:
-        """Values at the vertices of `triangulation`, from values at the vertices of the domain."""
-        raise NotImplementedError
+        """Extend values at the vertices of the domain to the vertices of `triangulation`.
+
+        Parameters
+        ----------
+        values : (n,) float
+            One for each vertex of the domain.
+
+        Returns
+        -------
+        (m,) float
+            One for each vertex of the triangulation, which may have further ones inside polygons.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> square = sh.PolygonMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+        >>> square.on_triangulation(np.array([0.0, 1.0, 1.0, 0.0])).tolist()
+        [0.0, 1.0, 1.0, 0.0, 0.5]
+        """
+        return values
 
     def path(self, vertices: ArrayLike, closed: bool = False, oriented: bool = True) -> Curve:
-        """Curve through vertices, in order, with φ > 0 to its left.
+        """Join vertices, in order, by a curve with φ > 0 to its left.
 
         Parameters
         ----------
@@ -72,7 +90,7 @@ class Surface(Frozen):
         return Curve(faces, weights, closed=closed, oriented=oriented)
 
     def points_at(self, vertices: ArrayLike) -> SurfacePoints:
-        """Vertices as isolated point sources, from which φ grows in all directions.
+        """Take vertices as isolated point sources, from which φ grows in all directions.
 
         Parameters
         ----------
@@ -135,7 +153,7 @@ class Surface(Frozen):
     def polyline(
         self, points: ArrayLike, closed: bool = False, oriented: bool = True, max_distance: float | None = None
     ) -> Curve:
-        """Polyline in space, projected on the surface: the closest points, joined by geodesic paths.
+        """Project a polyline in space on the surface: its closest points, joined by geodesic paths.
 
         Parameters
         ----------
@@ -169,7 +187,7 @@ class Surface(Frozen):
         return projected_curve(self.triangulation, points, closed, oriented, max_distance)
 
     def level_set(self, values: ArrayLike, level: float = 0.0) -> list[Curve]:
-        """Level set of a function that is linear between vertices, oriented so that φ grows with the function.
+        """Find a level set of a function that is linear between vertices, oriented so that φ grows with the function.
 
         Parameters
         ----------
@@ -203,7 +221,7 @@ class Surface(Frozen):
         return level_set(self.triangulation, self.on_triangulation(at_vertices), height)
 
     def region_boundary(self, face_mask: ArrayLike) -> list[Curve]:
-        """Boundary of a region of faces, with the region to the left, so that φ > 0 in it.
+        """Find the boundary of a region of faces, with the region to the left, so that φ > 0 in it.
 
         Parameters
         ----------
@@ -230,7 +248,7 @@ class Surface(Frozen):
         return region_boundary(self.triangulation, self._triangle_mask(array_of(face_mask, "face_mask", SourceError)))
 
     def boundary_curves(self) -> list[Curve]:
-        """The boundary of the surface, with the surface to its left.
+        """Find the boundary of the surface, with the surface to its left.
 
         Returns
         -------
@@ -271,33 +289,27 @@ def check_mask(face_mask: Bools, n_faces: int) -> None:
 
 
 class Joined(Protocol):
-    """Triangles along which points are joined."""
+    """Triangles along which points are joined; see `TriangleMesh` for what the properties mean."""
 
     @property
-    def intrinsic(self) -> IntrinsicMesh:
-        """The triangles in the plane."""
+    def intrinsic(self) -> IntrinsicMesh: ...
 
 
 class PlaceableTriangles(Triangles, Protocol):
-    """Triangles on which points in space are placed and joined; what that takes is made once."""
+    """Triangles on which points in space are placed and joined; see `TriangleMesh` for what the properties mean."""
 
     @property
-    def joined(self) -> Joined:
-        """The same triangles, with one vertex for those of rims at one place."""
-
+    def joined(self) -> Joined: ...
     @property
-    def edge_lengths(self) -> Floats:
-        """(e,) lengths of the edges."""
-
+    def edge_lengths(self) -> Floats: ...
     @property
-    def search_tree(self) -> TriangleTree:
-        """Tree of the faces."""
+    def search_tree(self) -> TriangleTree: ...
 
 
 def projected_curve(
     mesh: PlaceableTriangles, points: ArrayLike, closed: bool, oriented: bool, max_distance: float | None
 ) -> Curve:
-    """The curve through the closest points on a mesh, joined by geodesic paths."""
+    """Join the closest points on a mesh by geodesic paths."""
     points = coordinates(points, "points of the polyline", 3, SourceError)
     if len(points) < 2:
         raise SourceError(
@@ -326,5 +338,5 @@ def projected_curve(
 def closest_points(mesh: PlaceableTriangles, points: Floats) -> tuple[Ints, Floats, Floats]:
     """Face, barycentric coordinates and distance of the closest point on a mesh, for each of (n, 3) points."""
     faces, weights = mesh.search_tree.nearest(points)
-    found = np.einsum("ik,ikj->ij", weights, mesh.vertices[mesh.faces[faces]])
-    return faces, weights, np.linalg.norm(points - found, axis=1)
+    closest = np.einsum("ik,ikj->ij", weights, mesh.vertices[mesh.faces[faces]])
+    return faces, weights, np.linalg.norm(points - closest, axis=1)

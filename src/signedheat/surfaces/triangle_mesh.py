@@ -99,45 +99,25 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @cached_property
     def intrinsic(self) -> IntrinsicMesh:
-        """The triangles in the plane, edges lengthened by no more than rounding so that every one has an area."""
+        """The triangles laid out in the plane, with edges lengthened by rounding error so that each has an area."""
         return laid_out(self, MARGIN)[0]
 
     @cached_property
     def joined(self) -> TriangleMesh:
-        """The same faces, with one vertex for those of rims at one place, as along seams."""
+        """The same faces, with one vertex for boundary vertices at the same place, as along seams."""
         places = joined_rims(self.vertices, self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel())
         whole = (places == np.arange(len(places))).all()
         return self if whole else TriangleMesh(self.vertices, places[self.faces])
 
     @cached_property
     def search_tree(self) -> TriangleTree:
-        """Tree of the faces, in which those nearest to points are found."""
+        """Tree to find the faces nearest to points."""
         return TriangleTree.of(self.vertices[self.faces])
 
     @property
     def triangulation(self) -> TriangleMesh:
         """The triangles that curves refer to: the mesh itself."""
         return self
-
-    def on_triangulation(self, values: Floats) -> Floats:
-        """Values at the vertices of `triangulation`, from values at the vertices of the mesh.
-
-        Parameters
-        ----------
-        values : (n,) float
-            One for each vertex.
-
-        Returns
-        -------
-        (m,) float
-            One for each vertex of the triangulation: the same.
-
-        Examples
-        --------
-        >>> TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).on_triangulation(np.arange(3.0)).tolist()
-        [0.0, 1.0, 2.0]
-        """
-        return values
 
     def __repr__(self) -> str:
         return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"

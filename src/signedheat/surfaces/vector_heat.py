@@ -101,15 +101,6 @@ def extrapolated(columns: Complexes) -> Complexes:
     With ``D = t d/dt``, Richardson's extrapolation in the limit of equal times is ``Π (1 − D/e) Y`` over the exponents
     e: it keeps what does not depend on t, and takes ``t^e`` to zero. For ``R = (M + tL)⁻¹ M``, since ``tL = (M + tL) −
     M``, ``D X = R X − X`` and ``D² X = X − 3 R X + 2 R² X``; those of Y follow from the angle θ of X = exp(ρ + iθ).
-
-    Examples
-    --------
-    >>> t, change = 4.0, 0.01 * (1 / 4.0)  # X = exp(i a/t): its angle is an error of exponent −1
-    >>> X = np.exp(1j * change)
-    >>> DX, DDX = -1j * change * X, (1j * change - change**2) * X
-    >>> RX = DX + X
-    >>> bool(abs(np.angle(extrapolated(np.array([[X, RX, (DDX - X + 3 * RX) / 2]]))[0])) < 1e-5)
-    True
     """
     x, once, twice = columns.T
     with np.errstate(all="ignore"):
@@ -187,15 +178,6 @@ def nonmanifold_frames(
     face from the others, so the first must be the face that heat comes from: vectors that pass between two of the
     others would be reflected. Edges whose ends are nearer than every opposite corner, which heat passes or runs along,
     keep their first face. Where none changes, the same triangles are returned.
-
-    Examples
-    --------
-    >>> from signedheat.surfaces.surface_curves import Curve
-    >>> from signedheat.surfaces.source_segments import segments_of_each
-    >>> three = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [1, 0, 3], [1, 0, 4]]), np.ones((3, 3)), 5)
-    >>> on_the_last = segments_of_each([Curve([2, 2], [[0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])], three)
-    >>> nonmanifold_frames(three, on_the_last)[0].first_halfedges.tolist()
-    [6, 1, 2, 4, 5, 7, 8]
     """
     table = triangles.edges
     if table.face_counts.max(initial=0) <= 2:

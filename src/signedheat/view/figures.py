@@ -89,14 +89,7 @@ def signed_square(values: Any) -> Any:
 
 
 def isolines_between(low: float, high: float, most: int = 16) -> tuple[Floats, float]:
-    """Levels between two values, without zero, about `most` of them; and the step between them, a round number.
-
-    Examples
-    --------
-    >>> levels, step = isolines_between(-0.25, 0.5, 8)
-    >>> levels.tolist(), step
-    ([-0.2, -0.1, 0.1, 0.2, 0.30000000000000004, 0.4, 0.5], 0.1)
-    """
+    """Levels between two values, without zero, about `most` of them; and the step between them, a round number."""
     step = round_step((high - low) / max(most, 1))
     levels = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
     return levels[np.abs(levels) > 0.5 * step], step
@@ -111,15 +104,7 @@ def round_step(width: float) -> float:
 
 
 def legible(ticks: Floats, low: float, high: float) -> list[float]:
-    """Zero, and ticks that are far enough from the previous one in the root of distance.
-
-    Examples
-    --------
-    >>> legible(np.array([-0.5, 0.5, 1.0, 1.5, 2.0]), -0.7, 2.2)
-    [-0.5, 0.0, 0.5, 1.0, 1.5, 2.0]
-    >>> legible(np.arange(11.0), 0.0, 10.5)
-    [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 9.0]
-    """
+    """Zero, and ticks that are far enough from the previous one in the root of distance."""
     apart = CLOSEST * float(signed_root(high) - signed_root(low))
     kept = [0.0]
     for outwards in (ticks[ticks > 0], ticks[ticks < 0][::-1]):

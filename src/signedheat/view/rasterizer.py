@@ -67,13 +67,7 @@ class Camera:
 
 
 def looking(direction: Floats, up: int = 2) -> Floats:
-    """(3, 3) axes right, up and towards the eye, for a direction towards the eye.
-
-    Examples
-    --------
-    >>> looking(np.array([0.0, -1.0, 0.0])).tolist()
-    [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
-    """
+    """(3, 3) axes right, up and towards the eye, for a direction towards the eye."""
     towards = np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)
     upwards = np.eye(3)[up] if abs(towards[up]) < 0.95 else np.eye(3)[up - 1]
     right = np.cross(upwards, towards)

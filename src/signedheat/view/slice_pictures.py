@@ -117,13 +117,7 @@ def clearest_layer(field: GridField, axis: int) -> int:
 
 
 def rounded(position: float, spacing: float) -> str:
-    """A position as text, rounded to the resolution of the grid.
-
-    Examples
-    --------
-    >>> rounded(-5e-7, 0.03), rounded(12.34567, 0.03), rounded(12345.6, 30.0)
-    ('0', '12.346', '12346')
-    """
+    """A position as text, rounded to the resolution of the grid."""
     digits = max(0, 1 - int(np.floor(np.log10(spacing))))
     return f"{round(position, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{position:.0f}"
 
