@@ -1,8 +1,8 @@
-"""Oriented area elements: what a shape in space is to the method, whatever it was made of (Eq. 11 in space).
+"""Oriented area elements, the form in which the method takes every shape in space (Eq. 11 in space).
 
-Triangles, fans of polygons, segments of a polyline and oriented points are all simplices with a vector: area times
-normal. They are bisected until they are no larger than a cell, and merged again per cell and connected component, so
-that neither huge faces nor millions of tiny ones cost more than the cells that they pass through.
+Triangles, fans of polygons, segments of a polyline and oriented points are simplices with a vector: area times normal.
+They are bisected until they are no larger than a cell, and merged per cell and connected component, so that neither
+huge faces nor millions of tiny ones cost more than the cells that they pass through.
 """
 
 from __future__ import annotations
@@ -43,68 +43,35 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class AreaElements:
-    """Simplices with area vectors.
+    """Simplices with area vectors."""
 
-    Attributes
-    ----------
-    corners : (m, c, d) float
-        Corners: three for triangles, two for segments, one for points.
-    vectors : (m, d) float
-        Area times unit normal.
-    weights : (m,) float
-        Area; negative for the parts of a nonconvex polygon's fan that lie outside it.
-    components : (m,) int
-        Connected component of the shape, from 0.
-    spacing : float
-        Mean distance between points of a cloud; 0 for simplices, which can be sampled as densely as needed.
-    """
-
-    corners: Floats
-    vectors: Floats
-    weights: Floats
-    components: Ints
-    spacing: float = 0.0
+    corners: Floats  # (m, c, d): three for triangles, two for segments, one for points
+    vectors: Floats  # (m, d) area times unit normal
+    weights: Floats  # (m,) area; negative for the parts of a nonconvex polygon's fan that lie outside it
+    components: Ints  # (m,) connected component of the shape, from 0
+    spacing: float = 0.0  # mean distance between points of a cloud; simplices are sampled as densely as needed
 
 
 @dataclass(frozen=True, eq=False)
 class AreaSamples:
-    """Area elements merged per cell of a grid and per connected component.
+    """Area elements merged per cell of a grid and per connected component."""
 
-    Attributes
-    ----------
-    positions : (s, d) float
-        Mean position, in cells from the grid's origin.
-    vectors : (s, d) float
-        Sum of area times unit normal.
-    weights : (s,) float
-        Sum of areas.
-    components, source_ids : (s,) int
-        Connected component, and source, that each sample belongs to.
-    spacing : float
-        h_source: the largest of the sources' mean spacings.
-    outside : float
-        Fraction of the area that lies outside the grid.
-    cancelled : float
-        Fraction of the area inside the grid whose normals cancel with others of the same cell and component: sheets
-        thinner than a cell, and faces given twice with opposite orientations.
-    nodes : NodeSources
-        X₀: the vectors spread to the nodes by linear interpolation, up to a common factor.
-    """
-
-    positions: Floats
-    vectors: Floats
-    weights: Floats
-    components: Ints
-    source_ids: Ints
-    spacing: float
-    outside: float
+    positions: Floats  # (s, d) mean position, in cells from the grid's origin
+    vectors: Floats  # (s, d) sum of area times unit normal
+    weights: Floats  # (s,) sum of areas
+    components: Ints  # (s,) connected component of each sample
+    source_ids: Ints  # (s,) source of each sample
+    spacing: float  # h_source: the largest of the sources' mean spacings
+    outside: float  # fraction of the area that lies outside the grid
+    # fraction of the area in the grid whose normals cancel with others of the same cell and component: sheets thinner
+    # than a cell, and faces given twice with opposite orientations
     cancelled: float
-    nodes: NodeSources
+    nodes: NodeSources  # X₀: the vectors spread to the nodes by linear interpolation, up to a common factor
 
     def chosen(self, rows: Ints) -> AreaSamples:
-        """Some of the samples; what is said of all of them stays."""
-        each = ("positions", "vectors", "weights", "components", "source_ids")
-        return replace(self, **{name: getattr(self, name)[rows] for name in each})
+        """Choose samples; what holds for all of them together stays."""
+        by_sample = ("positions", "vectors", "weights", "components", "source_ids")
+        return replace(self, **{name: getattr(self, name)[rows] for name in by_sample})
 
 
 @singledispatch
@@ -127,7 +94,6 @@ def _(shape: TriangleMesh) -> AreaElements:
 
 @area_elements.register
 def _(shape: TetMesh) -> AreaElements:
-    """The boundary of the tets."""
     return area_elements(shape.boundary)
 
 
@@ -166,9 +132,9 @@ def bounds_around(shapes: Sequence[Any]) -> Floats:
 
 
 def point_areas(points: Floats) -> Floats:
-    """(n,) area that each point represents: that of the disk around it up to its k-th neighbour, divided by k.
+    """(n,) area of the disk around each point up to its k-th neighbour, divided by k; coinciding points share one.
 
-    Points that coincide share the area of one. In d dimensions the disk is a ball of dimension d − 1.
+    In d dimensions the disk is a ball of dimension d − 1.
     """
     places, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     dimension = points.shape[1] - 1

@@ -1,4 +1,4 @@
-"""What has been made for a key, kept while the key stays in use."""
+"""A small cache for values that depend on an object and a key."""
 
 from __future__ import annotations
 
@@ -15,15 +15,10 @@ V = TypeVar("V")
 
 
 class LastUsed(Generic[K, V]):
-    """A few values by key, the least recently used of which makes room for the next.
+    """A few values by key, the least recently used of which makes room before the next is made.
 
-    For what a frozen object derives from itself and an argument; what depends on the object alone is a
-    `functools.cached_property`. Copies and pickles of it are empty: values are made anew.
-
-    Parameters
-    ----------
-    size : int
-        How many values are kept; the old one is let go before the next is made.
+    It holds what a frozen object derives from itself and an argument; what depends on the object alone is a
+    `functools.cached_property`. Copies and pickles of it are empty.
     """
 
     def __init__(self, size: int = 1) -> None:
@@ -32,7 +27,7 @@ class LastUsed(Generic[K, V]):
         self._lock = RLock()
 
     def __call__(self, key: K, make: Callable[[], V]) -> V:
-        """The value for a key, made now unless it is kept."""
+        """Return the value for a key, and make it unless it is kept."""
         with self._lock:
             if key in self._values:
                 value = self._values.pop(key)
@@ -48,7 +43,7 @@ class LastUsed(Generic[K, V]):
 
 
 def fingerprint(*arrays: NDArray[Any]) -> bytes:
-    """A key for arrays: equal for equal bits and shapes, and, for all that matters, for these alone."""
+    """Make a key of arrays, which only arrays with equal types, shapes and bits share."""
     digest = hashlib.blake2b(digest_size=32)
     for array in arrays:
         digest.update(f"{array.dtype.str}{array.shape}".encode())

@@ -1,8 +1,8 @@
 """Kernels: functions that Numba compiles at their first call, so that importing them does not import Numba.
 
-What is compiled is kept on disk by Numba's own cache, which knows a kernel by the text of its file. A kernel takes in
-those that it calls and constants of other files too, so that here the cache's folder is named by a digest of them all:
-of code as it was imported, since files may have been edited before a kernel is first called.
+Numba's own cache keeps compiled code on disk, and recognises a kernel by the text of its file. But a kernel also
+contains the kernels that it calls, and constants of other files. Therefore the cache's folder is named by a digest of
+them all: of the code as it was imported, since files may have been edited before a kernel is first called.
 """
 
 from __future__ import annotations
@@ -33,17 +33,15 @@ extending: Any = lazy_module("numba.extending", "compiled kernels")
 logger: logging.Logger = logging.getLogger("signedheat")
 MOST_THREADS = 1024
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-"""Dividing by zero is no exception; C does not call kernels, so that what it would call is not compiled."""
+"""Division by zero raises nothing; and since C does not call kernels, no wrapper for it is compiled."""
 WORD = re.compile(r"\w+")
 DAMAGE = OSError, EOFError, UnpicklingError
-"""What reading or writing the cache raises where files are damaged or cannot be written. Kernels raise none of them."""
+"""Errors of a cache whose files are damaged or cannot be written. Kernels raise none of them."""
 _lock = RLock()
 Parameters = ParamSpec("Parameters")
 Returned = TypeVar("Returned")
 made: list[Kernel[..., Any]] = []
 """The kernels that this process has used."""
-
-
 announce: Announcement = Announcement("compiling what this needs, once (signedheat warmup compiles all)")
 
 
@@ -51,7 +49,7 @@ class Kernel(Generic[Parameters, Returned]):
     """A function that Numba compiles at its first call, with a cache on disk. Kernels may call kernels."""
 
     is_kept: bool = True
-    """Whether what is compiled is kept on disk: no longer once the cache was found damaged, or the disk full."""
+    """Whether compiled code is kept on disk: no longer once the cache is damaged, or the disk is full."""
 
     def __init__(self, function: Callable[Parameters, Returned], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
@@ -75,7 +73,7 @@ class Kernel(Generic[Parameters, Returned]):
 
     @cached_property
     def dispatcher(self) -> Callable[Parameters, Returned]:
-        """What Numba makes of the function, which is the function itself if ``NUMBA_DISABLE_JIT`` is set."""
+        """The compiled function, or the function itself if ``NUMBA_DISABLE_JIT`` is set."""
         with _lock:
             _prepare()
             made.append(self)
@@ -96,7 +94,7 @@ class Kernel(Generic[Parameters, Returned]):
 
 
 def _of_numbers(dispatcher: Any) -> Any:
-    """Let a kernel that others call with a number that is written there be compiled for numbers, not for that one."""
+    """Compile a kernel that others call with a literal number for all numbers of its type, not for that one alone."""
     compile_for = dispatcher.compile
 
     def compile_once(signature: Any) -> Any:
@@ -121,7 +119,7 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 
 def cache_folder() -> Path:
-    """Where compiled code is kept; if it cannot be written, Numba keeps it next to the source, or in its own folder."""
+    """Return the folder of compiled code; if it cannot be written, Numba uses that of the source, or its own."""
     wanted = os.environ.get("NUMBA_CACHE_DIR")
     if wanted:
         return Path(wanted) / "signedheat"
@@ -135,18 +133,18 @@ def cache_folder() -> Path:
 
 
 def _digest(kernel: Kernel[..., Any]) -> str:
-    """A digest of Numba's version and of the code, options, constants and classes of a kernel and of those it calls.
+    """Digest Numba's version and the code, options, constants and classes of a kernel and of those that it calls.
 
     Numba's cache knows named tuples by their modules, and does not find those that have moved.
     """
     digest, seen, waiting = hashlib.sha256(repr(numba.version_info).encode()), set(), [kernel]
     while waiting:
-        one = waiting.pop()
-        if one in seen:
+        current = waiting.pop()
+        if current in seen:
             continue
-        seen.add(one)
-        function = one.function
-        digest.update(repr((one.__module__, one.options, _spelled(function.__code__))).encode())
+        seen.add(current)
+        function = current.function
+        digest.update(repr((current.__module__, current.options, _spelled(function.__code__))).encode())
         mentioned = [*function.__annotations__.values(), *function.__code__.co_names]
         digest.update("".join(_named_tuples(mentioned, function.__globals__)).encode())
         cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
@@ -162,7 +160,7 @@ def _digest(kernel: Kernel[..., Any]) -> str:
 
 
 def _named_tuples(mentioned: Iterable[Any], names: dict[str, Any]) -> Iterator[str]:
-    """Where the named tuples that annotations mention are from, and what they hold, down to those within them."""
+    """Yield the module, name and fields of each named tuple that annotations mention, and of those within them."""
     for word in WORD.findall(" ".join(map(str, mentioned))):
         value = names.get(word)
         if isinstance(value, type) and hasattr(value, "_fields"):
@@ -171,7 +169,7 @@ def _named_tuples(mentioned: Iterable[Any], names: dict[str, Any]) -> Iterator[s
 
 
 def _spelled(value: Any) -> Any:
-    """Code and constants as values whose text is the same in every process: sets have no order of their own."""
+    """Return code and constants as values whose text is the same in every process: sets have no order of their own."""
     if isinstance(value, CodeType):
         return value.co_code, value.co_names, [_spelled(constant) for constant in value.co_consts]
     return sorted(map(repr, value)) if isinstance(value, frozenset) else value

@@ -1,4 +1,4 @@
-"""Diagnostics of the computation of a field, and one class for each kind of note in them."""
+"""Diagnostics of the computation of a field, with one class for each kind of note."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from .frozen import Frozen
 from .reprs import ShortRepr
 
 SMALL = 0.005
-"""Fraction of the surface that may be completed, or bound nothing, without being important."""
+"""Fraction of the surface below which its completion, or parts that bound nothing, are not important."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Note(Frozen, ShortRepr):
-    """A note on a computation; ``str(note)`` is its text, in which `text` names values of the note.
+    """A note on a computation, whose values are numbers and lists; ``str(note)`` is its text.
 
-    Its values are numbers and lists: ``json.dumps(dataclasses.asdict(note))``.
+    `text` is a format string in which ``{0.name}`` is a value of the note.
     """
 
     text: ClassVar[str] = ""
@@ -40,7 +40,7 @@ class Note(Frozen, ShortRepr):
                 object.__setattr__(self, entry.name, value.item())
 
     def as_dict(self) -> dict[str, object]:
-        """The values of the note by name, ready for JSON."""
+        """Return the values of the note by name, ready for JSON."""
         return asdict(self)
 
 
@@ -82,12 +82,12 @@ class Diagnostics(ShortRepr):
         return [note for note in self.notes if note.important]
 
     def note(self, kind: type[AnyNote]) -> AnyNote | None:
-        """The note of a given type, or None.
+        """Return the note of a given type, or None.
 
         Parameters
         ----------
         kind : type
-            A class of `signedheat.results`, such as ``TetsTurned``.
+            A class of `signedheat.diagnostics`, such as ``TetsTurned``.
 
         Returns
         -------
@@ -102,7 +102,7 @@ class Diagnostics(ShortRepr):
         return next((note for note in self.notes if isinstance(note, kind)), None)
 
     def noting(self, *notes: Note) -> Diagnostics:
-        """The same with further notes, each replacing an older one of the same type.
+        """Add notes, each replacing an older one of the same type.
 
         Parameters
         ----------

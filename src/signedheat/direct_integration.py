@@ -29,23 +29,13 @@ BATCH = 32
 
 @dataclass(frozen=True, eq=False)
 class DirectIntegration(Frozen):
-    """``C φ = b`` on vertices, under the constraints of Sec. 7.1 but for `fit`, which those who inherit it define.
+    """``C φ = b`` on vertices, under the constraints of Sec. 7.1 but for `fit`, which derived classes define."""
 
-    Parameters
-    ----------
-    stiffness : (n, n) sparse
-        Upper triangle of C, as `upper_triangle` makes it. Its kernel are the constants on each connected component.
-    factorize : callable
-        From the upper triangle of a matrix to an object with a method ``solve``; one that returns a
-        `PardisoFactor` is given the last one as `like`.
-    spring : float
-        ρ of the augmented Lagrangian behind exact constraints, relative to the largest diagonal entry of C. Larger
-        values need fewer rounds, and worsen the condition of the matrix.
-    """
-
-    stiffness: sparse.csr_matrix
-    factorize: Callable[..., Factor] = factorize
+    stiffness: sparse.csr_matrix  # (n, n) upper triangle of C, whose kernel are the constants on each component
+    factorize: Callable[..., Factor] = factorize  # of an upper triangle; takes the last `PardisoFactor` as `like`
     spring: float = 1e8
+    """ρ of the augmented Lagrangian behind exact constraints, relative to the largest diagonal entry of C: larger ones
+    need fewer rounds, and worsen the condition of the matrix."""
     _pulled: LastUsed[bytes, Factor] = field(default_factory=LastUsed, init=False, repr=False)
     _of_this_pattern: LastUsed[bytes, list[Factor]] = field(default_factory=LastUsed, init=False, repr=False)
 
@@ -65,7 +55,7 @@ class DirectIntegration(Frozen):
         return self.solve_many([divergence], [source])[0]
 
     def solve_many(self, divergences: Iterable[Floats], sources: Sequence[SourceTerm]) -> list[Floats]:
-        """The same for several sources at once."""
+        """Solve for several sources at once."""
         solved = self.factor.solve(np.stack(list(divergences)).T)
         return [self._centered(values, source) for values, source in zip(solved.T, sources, strict=True)]
 
@@ -176,7 +166,7 @@ class DirectIntegration(Frozen):
         return self.components[rows.indices[rows.indptr[:-1]]]
 
     def _reached(self, values: Floats, rows: sparse.csr_matrix) -> Floats:
-        """The values, with NaN on connected components without samples."""
+        """Put NaN on connected components without samples."""
         return np.where(np.isin(self.components, self._component_of(rows)), values, np.nan)
 
     def _centered(self, values: Floats, source: SourceTerm) -> Floats:
@@ -195,7 +185,7 @@ class DirectIntegration(Frozen):
 
 
 def _grounded(matrix: sparse.csr_matrix, vertices: Ints) -> sparse.csr_matrix:
-    """The matrix, made definite by larger entries at the vertices given.
+    """Make the matrix definite by larger entries at some vertices.
 
     Since b sums to zero on each connected component, the solution is zero at these vertices.
     """

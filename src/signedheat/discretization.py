@@ -61,7 +61,7 @@ class Integration(Protocol):
         """Minimise ∫|∇φ − Y|² (Eq. 2) with nothing imposed: ``C φ = b`` (Eq. 13)."""
 
     def solve_many(self, divergences: Iterable[Any], sources: Sequence[Any]) -> Iterable[Floats]:
-        """The same for several sources (see `SolvesEach`)."""
+        """Solve for several sources (see `SolvesEach`)."""
 
     def fit(self, divergence: Any, source: Any, levels: Levels) -> Floats:
         """Impose levels at the samples (Eq. 14), in the way that suits the domain best."""
@@ -77,7 +77,7 @@ class Adaptable(Protocol):
     """What becomes a discretisation when the sources are given."""
 
     def adapt(self, sources: Sequence[Any]) -> tuple[Discretization, Sequence[Any]]:
-        """A discretisation that can represent these sources, and the sources on it: usually ``(self, sources)``.
+        """Return a discretisation that can represent these sources, and the sources on it: usually ``(self, sources)``.
 
         Unoriented curves inside faces of a surface, for instance, need edges of their own.
         """
@@ -100,7 +100,7 @@ class Discretization(Adaptable, Protocol):
         """Solve ``(M + tL) X = X₀`` (Eq. 12); directions stay right however small X becomes."""
 
     def diffuse_many(self, sources: Sequence[SourceTerm]) -> Iterable[Any]:
-        """The same for several sources of one τ (see `DiffusesEach`)."""
+        """Diffuse several sources of one τ (see `DiffusesEach`)."""
 
     def to_cells(self, vectors: Any) -> NDArray[Any]:
         """X at the cells on which ∇φ lives: complex numbers on surfaces, rows of components in space."""
@@ -127,21 +127,13 @@ class SolvesEach:
 
 @dataclass(frozen=True)
 class Levels:
-    """The levels that a constraint imposes on φ at the source samples.
+    """The levels that a constraint imposes on φ at the source samples."""
 
-    Attributes
-    ----------
-    values : (s,) float
-        Level of each sample; absolute, or, with groups, up to an unknown constant per group.
-    groups : (s,) int, optional
-        Group of each sample.
-    """
-
-    values: Floats
-    groups: Ints | None = None
+    values: Floats  # (s,) absolute, or, with groups, up to an unknown constant per group
+    groups: Ints | None = None  # (s,) group of each sample
 
     def at(self, places: Any) -> Levels:
-        """The levels at means of samples: sparse (r, s), each of samples of one group."""
+        """Average levels by the rows of a sparse matrix (r, s), each of samples of one group."""
         return Levels(
             places @ self.values, None if self.groups is None else self.groups[places.indices[places.indptr[:-1]]]
         )

@@ -252,7 +252,7 @@ def plain_distance(
 def grid_around(
     shape: Any, reach: float, resolution: int, padding: float | None, spacing: ArrayLike | None = None
 ) -> Grid:
-    """A grid around one or several shapes, by default with room for offsets up to `reach`."""
+    """Make a grid around one or several shapes, by default with room for offsets up to `reach`."""
     bounds = bounds_around(as_list(shape))
     return Grid.around(bounds, resolution, room_around(bounds, reach) if padding is None else padding, spacing)
 

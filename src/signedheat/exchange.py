@@ -1,7 +1,7 @@
-"""Shapes as objects of trimesh, PyVista, meshio and Open3D, and back; and what they look like there.
+"""Conversion of shapes to objects of trimesh, PyVista, meshio and Open3D, and back; pictures of shapes and fields.
 
-All of them give and take the same (`Elements`): positions, faces, normals of points, or tets. Vertices and faces keep
-their number and order in both directions. Each package is imported only where it is used.
+All conversions pass through `Elements`: positions, faces, normals of points, or tets. Vertices and faces keep their
+number and order in both directions. Each package is imported only where it is used.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .packages import lazy_module
 from .validation import array_of, coordinates, element_ids
 
 TAKEN = "a shape of signedheat, trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces)"
-"""What is taken for a shape, for messages."""
+"""What functions accept as a shape, for messages."""
 
 if TYPE_CHECKING:
     import meshio
@@ -41,14 +41,14 @@ Kind = TypeVar("Kind", bound="Exchangeable[Any]")
 Trimesh = TypeVar("Trimesh")
 """The type of trimesh that corresponds to a kind of shape."""
 NAME = "signed_distance"
-"""Of the values of a field, in objects of PyVista and in files."""
+"""Name of the values of a field in objects of PyVista and in files."""
 _SIDES = {"triangle": 3, "quad": 4}
 _VTK_FACES = {5: "triangle", 7: "polygon", 9: "quad"}
 _VTK_TETRA = 10
 
 
 def with_values(thing: Any, values: NDArray[np.floating]) -> Any:
-    """An object of PyVista with the values of a field at its points."""
+    """Give an object of PyVista the values of a field at its points."""
     thing.point_data[NAME] = np.array(values)
     thing.set_active_scalars(NAME)
     return thing
@@ -58,7 +58,7 @@ class Displayed:
     """A shape or a field that can be looked at."""
 
     def plotter(self) -> pyvista.Plotter:
-        """A `pyvista.Plotter` in which this is drawn, to add more to it, or to make a file of it.
+        """Draw this into a `pyvista.Plotter`, to add more to it, or to make a file of it.
 
         Fields have the colours of all pictures here: blue for negative distance, orange for positive, light at zero;
         the surface or line of distance zero is drawn too. Of shapes, outer sides are light and inner sides red.
@@ -110,31 +110,15 @@ def _no_ids() -> Ints:
 
 @dataclass(frozen=True)
 class Elements:
-    """What a shape is made of, in this package and in the others.
+    """The elements of a shape, in this package and in the others."""
 
-    Attributes
-    ----------
-    points : (n, 3) float
-        Vertices, or the points of a cloud.
-    corners, counts : (k,), (m,) int
-        Vertex ids of all faces, one face after another, and how many each has. None: a cloud, or tets.
-    normals : (n, 3) float, optional
-        Of points.
-    tets : (t, 4) int, optional
-        Vertex ids, where there are tets and no faces.
-    areas : (n,) float, optional
-        Of points.
-    values : mapping
-        Further numbers at the points, by name.
-    """
-
-    points: NDArray[Any]
-    corners: Ints = field(default_factory=_no_ids)
-    counts: Ints = field(default_factory=_no_ids)
-    normals: NDArray[Any] | None = None
-    tets: Ints | None = None
-    areas: NDArray[Any] | None = None
-    values: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    points: NDArray[Any]  # (n, 3) vertices, or the points of a cloud
+    corners: Ints = field(default_factory=_no_ids)  # vertex ids of all faces, one face after another
+    counts: Ints = field(default_factory=_no_ids)  # (m,) number of corners of each face; a cloud and tets have no faces
+    normals: NDArray[Any] | None = None  # (n, 3) of points
+    tets: Ints | None = None  # (t, 4) vertex ids
+    areas: NDArray[Any] | None = None  # (n,) of points
+    values: Mapping[str, NDArray[Any]] = field(default_factory=dict)  # further numbers at the points, by name
 
     @classmethod
     def of_triangles(cls, points: NDArray[Any], faces: Any, normals: NDArray[Any] | None = None) -> Elements:
@@ -185,13 +169,21 @@ class Exchangeable(Displayed, Generic[Trimesh]):
     """A shape that can be saved, and converted from and to objects of trimesh, PyVista, meshio and Open3D.
 
     Vertices and faces keep their number and order. Each package is optional, and imported when it is needed.
+
+    Raises
+    ------
+    MissingPackageError
+        If the package of a conversion is not installed.
+    GeometryError, UnsupportedTypeError
+        If an object holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles; or if a shape
+        with polygons is converted to trimesh or Open3D, which have triangles only.
     """
 
     _has_faces = True
 
     @classmethod
     def _of(cls: type[Kind], elements: Elements) -> Kind:
-        """The shape with these elements."""
+        """Make the shape with these elements."""
         raise NotImplementedError
 
     @property
@@ -236,11 +228,6 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         TriangleMesh, PolygonMesh or PointCloud
             Of the class that this was called on.
 
-        Raises
-        ------
-        SignedHeatError
-            If it holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles.
-
         Examples
         --------
         >>> import trimesh
@@ -257,13 +244,6 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         -------
         trimesh.Trimesh or trimesh.PointCloud
             Not processed: vertices and faces keep their order.
-
-        Raises
-        ------
-        MissingPackageError
-            If trimesh is not installed.
-        GeometryError
-            If it has polygons of more than three corners.
 
         Examples
         --------
@@ -289,11 +269,6 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         TriangleMesh, PolygonMesh or PointCloud
             Of the class that this was called on.
 
-        Raises
-        ------
-        SignedHeatError
-            If it holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles.
-
         Examples
         --------
         >>> import pyvista
@@ -310,11 +285,6 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         -------
         pyvista.PolyData
             The normals of points are point data ``Normals``.
-
-        Raises
-        ------
-        MissingPackageError
-            If PyVista is not installed.
 
         Examples
         --------
@@ -338,11 +308,6 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         TriangleMesh, PolygonMesh or PointCloud
             Of the class that this was called on.
 
-        Raises
-        ------
-        SignedHeatError
-            If it holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles.
-
         Examples
         --------
         >>> import meshio
@@ -360,11 +325,6 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         -------
         meshio.Mesh
             The normals of points are point data ``nx``, ``ny``, ``nz``.
-
-        Raises
-        ------
-        MissingPackageError
-            If meshio is not installed.
 
         Examples
         --------
@@ -388,11 +348,6 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         TriangleMesh, PolygonMesh or PointCloud
             Of the class that this was called on.
 
-        Raises
-        ------
-        SignedHeatError
-            If it holds nothing of this kind, such as lines alone, or polygons for a mesh of triangles.
-
         Examples
         --------
         >>> import open3d  # doctest: +SKIP
@@ -407,13 +362,6 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         -------
         open3d.geometry.TriangleMesh or open3d.geometry.PointCloud
             In double precision.
-
-        Raises
-        ------
-        MissingPackageError
-            If Open3D is not installed.
-        GeometryError
-            If it has polygons of more than three corners.
 
         Examples
         --------
@@ -463,7 +411,7 @@ def from_pyvista(thing: Any) -> Elements:
 
 
 def _from_cells(thing: Any) -> Elements:
-    """The faces of an unstructured grid; if there is none, its tets; else its points."""
+    """Take the faces of an unstructured grid; if there is none, its tets; else its points."""
     types = np.asarray(thing.celltypes)
     offsets = np.asarray(thing.cell_offsets if hasattr(thing, "cell_offsets") else thing.offset, dtype=np.int64)
     corners = np.asarray(thing.cell_connectivity, dtype=np.int64)

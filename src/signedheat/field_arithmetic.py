@@ -28,10 +28,10 @@ class HasValues(Protocol):
         """φ at the unknowns."""
 
     def _mapped(self: AnyField, change: Change) -> AnyField:
-        """The field with changed values."""
+        """Change the values."""
 
     def _scaled(self: AnyField, factor: float) -> AnyField:
-        """The field times a number."""
+        """Multiply the field by a number."""
 
 
 class SolidField(HasValues, Protocol):
@@ -42,18 +42,18 @@ class SolidField(HasValues, Protocol):
         """Where the unknowns are."""
 
     def with_values(self: Solid, values: Floats) -> Solid:
-        """A field with other values on the same domain."""
+        """Put other values on the same domain."""
 
     def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
-        """The field whose values a rule makes of the values of two, wherever both have one."""
+        """Combine the values of two fields by a rule, wherever both have one."""
 
 
 @runtime_checkable
 class HasFields(Protocol):
-    """What distance can be computed to where a field has it, such as a `Solid`."""
+    """Something to which distance can be computed on a given grid, such as a `Solid`."""
 
     def field_on(self, field: Any) -> Any:
-        """Distance at the nodes that a field has."""
+        """Compute distance at the nodes of a field."""
 
 
 AnyField = TypeVar("AnyField", bound=HasValues)
@@ -153,18 +153,18 @@ class Combinable(Arithmetic):
         return self._scaled(-1.0)
 
     def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
-        """The field whose values a rule makes of those of two fields on one domain.
+        """Combine the values of two fields on one domain by a rule.
 
         Parameters
         ----------
-        other : Combinable
+        other : GridField, TetField or VertexField
             On the same domain.
         rule : callable
             Takes two arrays of values and returns one, such as `np.minimum`.
 
         Returns
         -------
-        Combinable
+        GridField, TetField or VertexField
             With the values of the rule.
 
         Examples
@@ -178,12 +178,12 @@ class Combinable(Arithmetic):
         return self.with_values(rule(self.values, other.values))
 
     def _mapped(self: Solid, change: Change) -> Solid:
-        """The field with changed values, without the diagnostics of this one."""
+        """Change the values, and drop the diagnostics."""
         return self.combined_with(self, lambda phi, _: change(phi))
 
 
 def smooth_union(a: Solid, b: Solid, width: float) -> Solid:
-    """The union of two solids, with a round transition where they meet.
+    """Unite two solids, with a round transition where they meet.
 
     Where the two differ by less than w, the width, φ is the polynomial smooth minimum
     ``min(a, b) − (w − |a − b|)² / 4w``; elsewhere it is the smaller of the two. The concave edge where they meet
@@ -220,7 +220,7 @@ def smooth_union(a: Solid, b: Solid, width: float) -> Solid:
 
 
 def smooth_intersection(a: Solid, b: Solid, width: float) -> Solid:
-    """The intersection of two solids, with a rounded edge where they meet; see `smooth_union`.
+    """Intersect two solids, with a rounded edge where they meet; see `smooth_union`.
 
     Examples
     --------
@@ -234,7 +234,7 @@ def smooth_intersection(a: Solid, b: Solid, width: float) -> Solid:
 
 
 def smooth_difference(a: Solid, b: Solid, width: float) -> Solid:
-    """The first solid without the second, with a rounded edge where they meet; see `smooth_union`.
+    """Subtract the second solid from the first, with a rounded edge where they meet; see `smooth_union`.
 
     Examples
     --------
@@ -249,16 +249,10 @@ def smooth_difference(a: Solid, b: Solid, width: float) -> Solid:
 
 
 def combined(a: Solid, b: Solid, takes_first: Callable[[Floats, Floats], Bools], bulge: float) -> Solid:
-    """Everywhere the values of one of two fields, moved where they are nearly equal.
+    """Take the values of `a` where `takes_first(a, b)`, else those of `b`, and blend them where they are nearly equal.
 
-    Parameters
-    ----------
-    a, b : GridField, TetField or VertexField
-        On the same domain, or a field on a grid in space and a solid; the result is NaN where one of them is.
-    takes_first : callable
-        From the values of both, where those of `a` are taken.
-    bulge : float
-        Width of the transition: negative adds to the inside, positive takes from it.
+    `bulge` is the width of the transition: negative adds to the inside, positive takes from it. The result is NaN where
+    one of both is.
     """
     b = _checked(a, b)
 
@@ -274,7 +268,7 @@ def combined(a: Solid, b: Solid, takes_first: Callable[[Floats, Floats], Bools],
 
 
 def _of_solids(a: Solid, b: Solid, operation: Callable[[Any, Any], Any]) -> Any:
-    """The field of what the solids of two fields make; None unless both have one, and something is left."""
+    """Combine the solids of two fields, and compute the field of the result; None unless both have one that remains."""
     solids = [field if isinstance(field, HasFields) else getattr(field, "solid", None) for field in (a, b)]
     if not all(isinstance(solid, HasFields) for solid in solids):
         return None
@@ -288,7 +282,7 @@ def _of_solids(a: Solid, b: Solid, operation: Callable[[Any, Any], Any]) -> Any:
 
 
 def _checked(a: Solid, b: Solid) -> Solid:
-    """The second field, if it can be combined with the first."""
+    """Return the second field if it can be combined with the first."""
     if not (hasattr(a, "with_values") and hasattr(a, "domain")):
         raise UnsupportedTypeError(
             f"fields of type {type(a).__name__} are not combined",

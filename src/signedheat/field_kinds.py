@@ -1,4 +1,4 @@
-"""From the unknowns of a discretisation to a field on its domain, one function for each kind of discretisation."""
+"""Fields made of the unknowns of a discretisation, one function for each kind of discretisation."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ AnyField = TypeVar("AnyField", GridField, VertexField, TetField, Field)
 SMALL_LOOP = 3.5
 """Length of a loop, in sides of the triangles that it crosses, below which a quarter or more of its heat cancels."""
 NEAREST = 8
-"""Nearest points that a point is joined to, if it is among theirs: on a surface about six lie round a point."""
+"""Number of nearest points to which a point is joined: on a surface about six lie around a point."""
 
 
 @singledispatch
 def to_field(discretization: Any, values: Floats, source: Any, diagnostics: Diagnostics) -> Field:
-    """The field with the values of a discretisation's unknowns, and with its notes added to the diagnostics."""
+    """Make the field with the values of a discretisation's unknowns, and add its notes to the diagnostics."""
     raise UnsupportedTypeError(f"there is no field for {type(discretization).__name__}", element="domain")
 
 
@@ -50,7 +50,7 @@ def _(discretization: GridDiscretization, values: Floats, source: GridSource, di
 def _(
     discretization: SurfaceDiscretization, values: Floats, source: SurfaceSource, diagnostics: Diagnostics
 ) -> VertexField:
-    """φ at the vertices of the domain; NaN where diffusion did not reach, such as behind a single shared vertex."""
+    # NaN where diffusion did not reach, such as behind a single shared vertex
     values = np.where(discretization.reached_by(source.vectors), values, np.nan)
     triangulation, everywhere = discretization.triangulation, values
     if discretization.restriction is not None:
@@ -78,14 +78,13 @@ def _(
 
 
 def _named(domain: object, vertex: int) -> str:
-    """A vertex by its place, which does not depend on how vertices are numbered, or else by its number."""
+    """Name a vertex by its place, which does not depend on how vertices are numbered, or else by its number."""
     places = getattr(domain, "vertices", getattr(domain, "points", None))
     return f"number {vertex}" if places is None else f"at ({', '.join(f'{x:.4g}' for x in places[vertex])})"
 
 
 @to_field.register
 def _(discretization: TetDiscretization, values: Floats, source: TetSource, diagnostics: Diagnostics) -> TetField:
-    """φ at the vertices of the mesh."""
     mesh, at_vertices = discretization.mesh, discretization.at_vertices(values)
     unreached = np.flatnonzero(np.isnan(at_vertices))
     if np.isnan(values).any():
@@ -104,7 +103,7 @@ def sampled(source: GridSource) -> SampledSource:
 
 
 def warned(field: AnyField) -> AnyField:
-    """The field; with a warning if it is that of the method, and curves are too small for its triangles."""
+    """Return the field, and warn if it was computed from curves that are too small for its triangles."""
     note = field.diagnostics.note(SmallLoops)
     if note:
         warn_user(
@@ -116,7 +115,7 @@ def warned(field: AnyField) -> AnyField:
 
 
 def small_loops(source: SurfaceSource) -> int:
-    """How many closed oriented curves are shorter than `SMALL_LOOP` sides of the triangles that they cross.
+    """Count the closed oriented curves shorter than `SMALL_LOOP` sides of the triangles that they cross.
 
     Distance to them is several times less accurate than triangles of this size allow.
     """

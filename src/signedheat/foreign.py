@@ -1,4 +1,4 @@
-"""What is taken for a shape: ours, objects of other packages (`signedheat.exchange`), pairs of arrays."""
+"""Conversion of arguments to shapes: objects of other packages (`signedheat.exchange`), solids, pairs of arrays."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PACKAGES = frozenset({"meshio", "open3d", "pyvista", "trimesh"})
 
 
 class Represented(ABC):
-    """What has a surface, and is taken wherever a shape is: solids, images of labels."""
+    """Something with a surface that is accepted wherever a shape is: solids, images of labels."""
 
     @property
     @abstractmethod
@@ -76,7 +76,7 @@ class HasTriangles(Protocol):
 SurfaceShape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud
 """The kinds of shapes that most file formats support."""
 Shape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh
-"""What a file of a shape may hold. In space points need normals, and volumes are refused: give their boundary."""
+"""All kinds of shapes that files hold."""
 ForeignShape: TypeAlias = (
     Represented | HasVertices | HasGeometry | HasPointData | HasTriangles | tuple[ArrayLike, ArrayLike]
 )
@@ -84,7 +84,7 @@ ForeignShape: TypeAlias = (
 
 
 def what_to_pass(thing: object) -> str:
-    """The remedy where something is no shape: files are read first, and bare points are a cloud."""
+    """Suggest what to pass in place of something that is no shape."""
     if isinstance(thing, str | PathLike):
         return f'pass sh.read("{fspath(thing)!s}")'
     if isinstance(thing, np.ndarray) and thing.ndim == 2:
@@ -93,7 +93,7 @@ def what_to_pass(thing: object) -> str:
 
 
 def package_of(thing: object) -> str | None:
-    """The package that made an object, among those whose objects are taken; classes derived from theirs count."""
+    """Return which of the `PACKAGES` made an object, whose class may be derived from theirs; None for others."""
     roots = (kind.__module__.partition(".")[0] for kind in type(thing).__mro__)
     return next((root for root in roots if root in PACKAGES), None)
 
@@ -111,12 +111,11 @@ def is_pair(thing: object) -> bool:
 
 
 def as_shape(thing: Shape | ForeignShape) -> Shape:
-    """The shape that an object of another package, a pair of arrays, a solid or an image describes; a shape as it is.
+    """Convert an object of another package, a pair of arrays, a solid or an image to a shape.
 
-    Every function that takes a shape does this by itself. Of a `Solid` it is the ``boundary``.
-
-    Faces keep their number, order and defects. A shape without faces becomes a `PointCloud`, one of triangles alone a
-    `TriangleMesh`, any other a `PolygonMesh`; tets become a `TetMesh`.
+    Every function that takes a shape does this by itself. A shape is returned as it is, and of a `Solid` its
+    ``boundary``. Faces keep their number, order and defects. An object without faces becomes a `PointCloud`, one of
+    triangles alone a `TriangleMesh`, any other a `PolygonMesh`; tets become a `TetMesh`.
 
     Parameters
     ----------
@@ -150,7 +149,7 @@ def as_shape(thing: Shape | ForeignShape) -> Shape:
 
 
 def converted(thing: Thing) -> Thing:
-    """A shape of another package, a solid or an image as a shape; everything else, such as curves, as it is."""
+    """Convert a shape of another package, a solid or an image; return everything else, such as curves, as it is."""
     if isinstance(thing, Represented):
         return cast("Thing", thing.boundary)
     package = "numpy" if is_pair(thing) else package_of(thing)
@@ -158,7 +157,7 @@ def converted(thing: Thing) -> Thing:
 
 
 def shape_of(elements: Elements) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh:
-    """The shape of the kind that fits."""
+    """Make a shape of the kind that fits."""
     if elements.tets is not None:
         return TetMesh(elements.points, elements.tets)
     kinds = {kind.__name__: kind for kind in (TriangleMesh, PolygonMesh, PointCloud)}
@@ -166,7 +165,7 @@ def shape_of(elements: Elements) -> TriangleMesh | PolygonMesh | PointCloud | Te
 
 
 def refuse_arrays(things: Sequence[object]) -> None:
-    """Raise if things are arrays that were meant for a shape, and say what is wrong with them."""
+    """Raise if arguments are arrays that were meant as a shape, and say what is wrong with them."""
     arrays = [np.asarray(thing) for thing in things if _like_array(thing)]
     if not arrays or len(arrays) < len(things) or any(array.dtype.kind not in "biuf" for array in arrays):
         return
@@ -188,7 +187,7 @@ def refuse_arrays(things: Sequence[object]) -> None:
 
 
 def as_shapes(things: Thing | Sequence[Thing]) -> list[Thing]:
-    """One thing or several, as a list, with every shape of another package among them converted (see `as_shape`)."""
+    """List one argument or several, with every shape of another package among them converted (see `as_shape`)."""
     several = isinstance(things, Sequence) and not isinstance(things, str)
     if is_pair(things) or package_of(things) is not None:
         several = False
@@ -215,12 +214,12 @@ def _whole(ids: NDArray[np.generic], axes: int) -> bool:
 
 
 def elements(shape: SurfaceShape, values: Mapping[str, NDArray[np.floating]] = MappingProxyType({})) -> Elements:
-    """The inverse of `shape_of`, with named values at the points."""
+    """Return the elements of a shape, with named values at the points."""
     return replace(shape._elements, values=values)
 
 
 def as_list(sources: One | Sequence[One]) -> list[One]:
-    """One source or several sources, as a list, with those of other packages as shapes."""
+    """List one source or several, with those of other packages as shapes; refuse an empty list."""
     listed: list[One] = as_shapes(sources)
     if not listed:
         raise SourceError("there is no source", remedy="pass at least one curve, point or shape")

@@ -31,7 +31,7 @@ class Frozen:
 
 
 def read_only(array: NDArray[Number]) -> NDArray[Number]:
-    """A read-only view, since kernels would be compiled again for writable arrays."""
+    """Return a read-only view, since kernels would be compiled again for writable arrays."""
     view: NDArray[Number] = array.view()
     view.flags.writeable = False
     return view

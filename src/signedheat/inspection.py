@@ -24,49 +24,24 @@ from .validation import used_bounds
 
 @dataclass(frozen=True)
 class SurfaceReport:
-    """Counts of the elements and defects of a surface. No defect is an error: every such surface has a signed distance.
-
-    Attributes
-    ----------
-    n_vertices, n_faces, n_edges : int
-        Numbers of elements; an edge joins two different vertices.
-    corners_per_face : (int, int)
-        Least and greatest number of corners.
-    components : int
-        Connected components through shared vertices, unreferenced vertices not counted.
-    open_edges, borders : int
-        Edges with a single face; boundary curves, that is connected sets of open edges.
-    nonmanifold_edges, nonmanifold_vertices : int
-        Edges with more than two faces; vertices at which the faces do not form a single fan or disk.
-    inconsistent_edges : int
-        Edges whose two faces run along them in the same direction, so that one of the faces is flipped.
-    degenerate_faces, duplicate_faces : int
-        Faces without area, or with a repeated vertex; faces with the same vertices as an earlier one, in the same or in
-        the opposite order.
-    duplicate_vertices, unreferenced_vertices : int
-        Vertices at exactly the position of an earlier one; vertices without a face.
-    area : float
-        Total area.
-    lower, upper : tuple of float
-        Corners of the bounding box of the faces.
-    """
+    """Elements and defects of a surface. No defect is an error: every such surface has a signed distance."""
 
     n_vertices: int
     n_faces: int
-    n_edges: int
-    corners_per_face: tuple[int, int]
-    components: int
-    open_edges: int
-    borders: int
-    nonmanifold_edges: int
-    nonmanifold_vertices: int
-    inconsistent_edges: int
-    degenerate_faces: int
-    duplicate_faces: int
-    duplicate_vertices: int
-    unreferenced_vertices: int
+    n_edges: int  # between two different vertices
+    corners_per_face: tuple[int, int]  # the least and greatest number
+    components: int  # connected through shared vertices; unreferenced vertices do not count
+    open_edges: int  # with a single face
+    borders: int  # connected sets of open edges
+    nonmanifold_edges: int  # with more than two faces
+    nonmanifold_vertices: int  # at which the faces do not form a single fan or disk
+    inconsistent_edges: int  # along which two faces run in the same direction, so that one of them is flipped
+    degenerate_faces: int  # without area, or with a repeated vertex
+    duplicate_faces: int  # with the same vertices as an earlier one, in the same or in the opposite order
+    duplicate_vertices: int  # at exactly the position of an earlier one
+    unreferenced_vertices: int  # without a face
     area: float
-    lower: tuple[float, ...]
+    lower: tuple[float, ...]  # corners of the bounding box of the faces
     upper: tuple[float, ...]
 
     @property
@@ -82,59 +57,29 @@ class SurfaceReport:
 
 @dataclass(frozen=True)
 class CloudReport:
-    """Counts and properties of a point cloud.
-
-    Attributes
-    ----------
-    n_points : int
-        Number of points.
-    has_normals, has_areas : bool
-        Whether the points have normals, and areas.
-    duplicate_points : int
-        Points at exactly the position of an earlier one.
-    lower, upper : tuple of float
-        Corners of the bounding box.
-    """
+    """Counts and properties of a point cloud."""
 
     n_points: int
     has_normals: bool
     has_areas: bool
-    duplicate_points: int
-    lower: tuple[float, ...]
+    duplicate_points: int  # at exactly the position of an earlier one
+    lower: tuple[float, ...]  # corners of the bounding box
     upper: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class TetReport:
-    """Counts of the elements and defects of a tet mesh.
-
-    Attributes
-    ----------
-    n_vertices, n_tets, parts : int
-        Numbers of vertices, of tets, and of connected components through shared faces.
-    inside_out_tets : int
-        Tets that were given with negative volume; `TetMesh` has turned them.
-    flat_tets : int
-        Tets with nearly zero volume.
-    nonmanifold_faces : int
-        Faces with more than two tets.
-    boundary_faces : int
-        Faces with a single tet.
-    volume : float
-        Sum of the tets' volumes.
-    lower, upper : (3,) float
-        Corners of the bounding box.
-    """
+    """Elements and defects of a tet mesh."""
 
     n_vertices: int
     n_tets: int
-    parts: int
-    inside_out_tets: int
-    flat_tets: int
-    nonmanifold_faces: int
-    boundary_faces: int
+    parts: int  # connected through shared faces
+    inside_out_tets: int  # given with negative volume; `TetMesh` has turned them
+    flat_tets: int  # with nearly zero volume
+    nonmanifold_faces: int  # with more than two tets
+    boundary_faces: int  # with a single tet
     volume: float
-    lower: tuple[float, ...]
+    lower: tuple[float, ...]  # corners of the bounding box
     upper: tuple[float, ...]
 
 

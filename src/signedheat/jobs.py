@@ -18,7 +18,7 @@ RUN = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from importlib import import_module; "
     "module, name = sys.argv[2].split(':'); getattr(import_module(module), name)(*sys.argv[3:])"
 )
-"""Program of such a process: it starts isolated, and then takes over the import path."""
+"""Program of a new process: it starts isolated, and then takes over the import path."""
 
 
 def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:
@@ -58,17 +58,10 @@ def run_limited(job: Callable[[], Any], seconds: float) -> Any:
 
 
 def command_for(entry: str, *arguments: str) -> list[str]:
-    """The command that calls a function in a new Python process.
+    """Make the command that calls a function, given as ``"module:name"``, in a new Python process.
 
     The process can import what this one can, but nothing from the current folder, which ``python -c`` and
     `multiprocessing` would search first.
-
-    Parameters
-    ----------
-    entry : str
-        The function, as ``"module:name"``.
-    arguments : str
-        Arguments of the function.
     """
     path = [os.path.abspath(folder) for folder in sys.path if folder]
     return [sys.executable, "-I", "-c", RUN, json.dumps(path), entry, *arguments]

@@ -23,7 +23,7 @@ Body: TypeAlias = tuple[Floats, Ints]
 
 
 def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
-    """A single shape unchanged, or several meshes as one; tets are replaced by their boundary."""
+    """Join several meshes to one shape; return a single shape as it is, and of tets their boundary."""
     shapes = as_shapes(shape)
     if not shapes:
         raise SourceError("there is no shape", remedy="pass at least one")
@@ -52,7 +52,7 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
 
 
 def joined_triangles(parts: Sequence[TriangleMesh | PolygonMesh], origin: Floats | float = 0.0) -> Body:
-    """Vertices, relative to `origin`, and triangles of all meshes together."""
+    """Return the vertices, relative to `origin`, and the triangles of all meshes together."""
     meshes = [part.triangulation for part in parts]
     return concatenated([(mesh.vertices - origin, mesh.faces) for mesh in meshes])
 

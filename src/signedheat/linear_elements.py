@@ -1,4 +1,4 @@
-"""Functions that are linear in every cell: all that the convex problem of Eq. 17 and Eq. 18 needs of a domain."""
+"""Functions that are linear in every cell: what the convex problem of Eq. 17 and Eq. 18 needs of a domain."""
 
 from __future__ import annotations
 
@@ -14,21 +14,11 @@ from .mesh.tet_shapes import Tetrahedra
 
 @dataclass(frozen=True, eq=False)
 class LinearElements:
-    """Linear finite elements on triangles or tets.
+    """Linear finite elements on triangles or tets."""
 
-    Attributes
-    ----------
-    corners : (m, d + 1) int
-        Unknown at each corner of each cell.
-    sizes : (m,) float
-        Areas or volumes of the cells.
-    slope_matrix : (m d, n) sparse
-        Maps values at the unknowns to the d components of ∇φ in every cell, cell after cell.
-    """
-
-    corners: Ints
-    sizes: Floats
-    slope_matrix: sparse.csr_matrix
+    corners: Ints  # (m, d + 1) unknown at each corner of each cell
+    sizes: Floats  # (m,) areas or volumes of the cells
+    slope_matrix: sparse.csr_matrix  # (m d, n) maps values at the unknowns to the components of ∇φ, cell after cell
 
     @classmethod
     def of(cls, corners: Ints, sizes: Floats, hats: Floats, n: int) -> LinearElements:

@@ -62,7 +62,7 @@ def untouched_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
 
 
 def fitting_count(count: int, estimate: Callable[[int], float], available: float) -> int:
-    """The largest number of elements, up to `count`, whose estimated memory is available."""
+    """Find the largest number of elements, up to `count`, whose estimated memory is available."""
     low, high = 0, count
     while low < high:
         middle = (low + high + 1) // 2
@@ -125,7 +125,7 @@ def _own_limits() -> list[int]:
 
 
 def _text(path: Path | str) -> str:
-    """The text of a system file; empty if it cannot be read."""
+    """Read a system file; return an empty text if that fails."""
     try:
         return Path(path).read_text()
     except OSError:

@@ -447,7 +447,7 @@ def thicken(
 
 
 def _linear(shape: Shapes, values: Floats) -> Reach:
-    """The function that interpolates values at the vertices of a mesh linearly, or is nearest to points of a cloud."""
+    """Interpolate values linearly between the vertices of a mesh, or take that of the nearest point of a cloud."""
     mesh = shape.source if isinstance(shape, Solid) else as_shape(shape)  # type: ignore[arg-type]
     if not isinstance(mesh, TriangleMesh | PolygonMesh | DigitalSurface | PointCloud):
         raise UnsupportedTypeError(
@@ -526,14 +526,14 @@ def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
 
 
 def _field(shape: Sources, domain: Domain) -> Field:
-    """The distance whose level sets are the offsets: to a completed solid on grids in space."""
+    """Compute the distance whose level sets are the offsets: on grids in space, to the completed solid."""
     if isinstance(domain, Grid) and domain.dimension == 3:
         return signed_distance(shape, domain)
     return _sided(domain, shape)
 
 
 def _sided(domain: Domain, shape: Sources) -> Field:
-    """The signed distance to a shape that may have sides but no inside; sharpened on grids."""
+    """Compute the signed distance to a shape that may have sides but no inside; sharpen it on grids."""
     field = SignedHeatSolver(domain).distance(shape)
     return sharpen(field) if isinstance(field, GridField) else field
 
@@ -558,7 +558,7 @@ def _offsets(
 
 
 def _room(shape: Sources, reach: float, resolution: int) -> Grid:
-    """A grid around a shape, with room for offsets."""
+    """Make a grid around a shape, with room for offsets."""
     shapes: list[Source | Sequence[CurveOrPoints]] = as_list(shape)
     if any(isinstance(part, Curve) for part in shapes):
         raise SourceError("a Curve lies on a surface", remedy="pass that surface as the domain")

@@ -40,7 +40,7 @@ class LazyModule:
 
 
 def lazy_module(name: str, purpose: str) -> Any:
-    """A handle that acts as a module, and imports it at the first use of an attribute.
+    """Make a handle that acts as a module, and imports it at the first use of an attribute.
 
     Examples
     --------
@@ -69,6 +69,6 @@ def ensure_installed(package: str, purpose: str) -> None:
 
 
 def missing_package(package: str, purpose: str, cause: str = "is not installed") -> MissingPackageError:
-    """The error for a missing package."""
+    """Make the error for a missing package."""
     remedy = REMEDIES.get(package, f"pip install {package}")
     return MissingPackageError(f"{purpose} need the package {package}, which {cause}", remedy=remedy, element=package)

@@ -26,7 +26,7 @@ GREETING = 1 << 20
 
 
 def n_threads() -> int:
-    """Number of processors available to this process, at most ``NUMBA_NUM_THREADS``."""
+    """Count the processors available to this process, at most ``NUMBA_NUM_THREADS``."""
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
     wanted = os.environ.get("NUMBA_NUM_THREADS", "")
     return min(available, int(wanted)) if wanted.isdigit() and int(wanted) > 0 else available
@@ -57,15 +57,7 @@ def in_chunks(
 
 
 def connected(address: str) -> Any:
-    """Connect to a running Dask cluster, and return the client.
-
-    Raises
-    ------
-    SignedHeatError
-        If no scheduler answers at the address within a minute.
-    MissingPackageError
-        If Dask is not installed.
-    """
+    """Connect to a running Dask cluster, and return the client; raise if no scheduler answers within a minute."""
     comm = distributed.comm  # raises if Dask is missing, before errors are converted
     try:
         if comm.parse_address(address)[0] == "tcp":

@@ -20,7 +20,7 @@ class ShortRepr:
 
 
 def short(value: object) -> str:
-    """A value as text: four digits of numbers, the size of arrays."""
+    """Write a value as a short text: four digits of numbers, the size of arrays."""
     if isinstance(value, np.ndarray):
         if value.ndim == 1 and value.size <= MOST and value.dtype.kind in "biuf":
             return f"[{', '.join(short(entry) for entry in value.tolist())}]"

@@ -17,7 +17,7 @@ from .surfaces.triangle_mesh import TriangleMesh
 
 
 def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0, 0)) -> TriangleMesh:
-    """A sphere: an icosahedron whose faces are split into four `subdivisions` times.
+    """Make a sphere: an icosahedron whose faces are split into four `subdivisions` times.
 
     Examples
     --------
@@ -52,7 +52,7 @@ def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0
 
 
 def torus(major: float = 1.0, minor: float = 0.4, n_around: int = 96, n_across: int = 48) -> TriangleMesh:
-    """A torus around the z axis.
+    """Make a torus around the z axis.
 
     Examples
     --------
@@ -71,7 +71,7 @@ def torus(major: float = 1.0, minor: float = 0.4, n_around: int = 96, n_across: 
 
 
 def duck(n: int = 56) -> TriangleMesh:
-    """A rubber duck of length 2, closed. Its beak is a separate body that intersects the head, as modellers do it.
+    """Make a rubber duck of length 2, closed, whose beak is a separate body that intersects the head.
 
     Parameters
     ----------
@@ -99,19 +99,19 @@ def duck(n: int = 56) -> TriangleMesh:
 
 
 def broken_duck() -> TriangleMesh:
-    """The duck with holes, noise, flipped and duplicate faces; the end of its beak is inside the head."""
+    """Make a duck with holes, noise, flipped and duplicate faces; the end of its beak is inside the head."""
     mesh = without_patches(duck(), n_patches=7, radius=0.26, seed=3)
     mesh = with_noise(mesh, 0.006, seed=1)
     return with_duplicate_faces(with_flipped_faces(mesh, 0.05, seed=2), 0.02, seed=5)
 
 
 def union(*meshes: TriangleMesh) -> TriangleMesh:
-    """One mesh with all faces of several; no vertices are merged."""
+    """Join all faces of several meshes in one; no vertices are merged."""
     return TriangleMesh(*joined_triangles(meshes))
 
 
 def without_patches(mesh: TriangleMesh, n_patches: int, radius: float, seed: int = 0) -> TriangleMesh:
-    """The mesh without the faces within `radius` of some vertices, which are chosen far from each other."""
+    """Remove the faces within `radius` of some vertices, which are chosen far from each other."""
     picked = [int(np.random.default_rng(seed).integers(mesh.n_vertices))]
     nearest = np.linalg.norm(mesh.vertices - mesh.vertices[picked[0]], axis=1)
     while len(picked) < n_patches:
@@ -123,37 +123,37 @@ def without_patches(mesh: TriangleMesh, n_patches: int, radius: float, seed: int
 
 
 def without_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> TriangleMesh:
-    """The mesh without a random fraction of its faces."""
+    """Remove a random fraction of the faces."""
     return TriangleMesh(mesh.vertices, mesh.faces[np.random.default_rng(seed).random(mesh.n_faces) >= fraction])
 
 
 def with_noise(mesh: TriangleMesh, amplitude: float, seed: int = 0) -> TriangleMesh:
-    """The mesh with vertices moved at random; `amplitude` is the standard deviation along each axis."""
+    """Move vertices at random; `amplitude` is the standard deviation along each axis."""
     moves = np.random.default_rng(seed).normal(scale=amplitude, size=mesh.vertices.shape)
     return TriangleMesh(mesh.vertices + moves, mesh.faces)
 
 
 def with_flipped_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> TriangleMesh:
-    """The mesh with the orientation of a random fraction of its faces reversed."""
+    """Reverse the orientation of a random fraction of the faces."""
     flipped = np.random.default_rng(seed).random(mesh.n_faces) < fraction
     return TriangleMesh(mesh.vertices, np.where(flipped[:, None], mesh.faces[:, ::-1], mesh.faces))
 
 
 def with_duplicate_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> TriangleMesh:
-    """The mesh with a random fraction of its faces duplicated."""
+    """Duplicate a random fraction of the faces."""
     doubled = np.random.default_rng(seed).random(mesh.n_faces) < fraction
     return TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, mesh.faces[doubled]]))
 
 
 def soup(mesh: TriangleMesh, jitter: float = 0.0, seed: int = 0) -> TriangleMesh:
-    """The faces of the mesh as a triangle soup: each has three vertices of its own, and is moved by about `jitter`."""
+    """Make a triangle soup: each face gets three vertices of its own, and is moved by about `jitter`."""
     corners = mesh.vertices[mesh.faces]
     corners = corners + np.random.default_rng(seed).normal(scale=jitter or 0.0, size=(mesh.n_faces, 1, 3))
     return TriangleMesh(corners.reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3))
 
 
 def oriented_points(mesh: TriangleMesh, n_points: int, seed: int = 0) -> PointCloud:
-    """Random points on the surface, uniform in area, with the normals of their faces."""
+    """Draw random points on the surface, uniform in area, with the normals of their faces."""
     rng = np.random.default_rng(seed)
     face = rng.choice(mesh.n_faces, size=n_points, p=mesh.face_areas / mesh.face_areas.sum())
     weights = _barycentric(rng, n_points)

@@ -36,30 +36,19 @@ from .tets.tet_field import TetField
 from .validation import finite_number, positive_number
 
 WORSE = 0.1
-"""Mean deviation of slopes from 1, none counted above 1, that sharpening may add. Triangles on their own have .08."""
-
+"""Mean deviation of slopes from 1, each counted as 1 at most, that sharpening may add; .08 on triangles."""
 TO_CURVES = 1e-5
-"""Tolerance of distance to curves: at a tenth of that of `Geodesic`, it changes by less than 1e-6 of its range with the
-order of faces."""
+"""Tolerance of distance to curves. At a tenth of that of `Geodesic`, distance depends on the order of faces by less
+than 1e-6 of its range."""
 
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """The nearest of a source and of the zero set of φ, for each unknown.
+    """The nearest of a source and of the zero set of φ, for each unknown."""
 
-    Attributes
-    ----------
-    distances : (n,) float
-        Without sign; inf where neither is in the same component of the domain.
-    sides : (n,) int
-        1 or −1 where the source decides the sign; 0 where φ does.
-    notes : tuple of Note
-        For the diagnostics.
-    """
-
-    distances: Floats
-    sides: Ints
-    notes: tuple[Note, ...] = ()
+    distances: Floats  # (n,) unsigned; inf where neither is in the same component of the domain
+    sides: Ints  # (n,) 1 or −1 where the source decides the sign; 0 where φ does
+    notes: tuple[Note, ...] = ()  # for the diagnostics
 
 
 @singledispatch
@@ -73,20 +62,9 @@ def nearest(
 ) -> Nearest:
     """Measure to the nearest of a source and the zero set of φ; every kind of domain registers a function of its own.
 
-    Parameters
-    ----------
-    domain : Grid or Discretization
-        What φ lives on.
-    values : (n,) float
-        φ at the unknowns.
-    source : SourceTerm, optional
-        What φ was computed from: unoriented curves and points are measured to though φ does not vanish there.
-    given : curves, points or shapes, optional
-        What is measured to exactly; the zero set counts where these are missing. By default the zero set alone.
-    tolerance : float
-        Of polyhedral distance, see `Geodesic`.
-    report : callable, optional
-        Called every now and then; an exception that it raises ends the search.
+    `values` are φ at the unknowns, and `source` is what φ was computed from: unoriented curves and points count though
+    φ does not vanish there. Distance is exact to what is `given`; the zero set replaces it where it is missing. For
+    `tolerance` see `Geodesic`. `report` is called now and then, and may raise to end the search.
     """
     raise UnsupportedTypeError(f"there are no straight lines on a {type(domain).__name__}", element="method")
 
@@ -94,26 +72,75 @@ def nearest(
 def distance_to_nearest(
     domain: Any, values: Floats, source: SourceTerm | None, given: Any, tolerance: float, progress: Progress | None
 ) -> tuple[Floats, tuple[Note, ...]]:
-    """Signed distance to the nearest of a source and the zero set, for all domains; and notes.
+    """Measure signed distance to the nearest of a source and the zero set, on any domain; also return notes.
 
     The source decides the sign where it can, φ elsewhere. Components with neither keep the values of φ.
     """
     report = None if progress is None else lambda: progress(0.0, "sharpen")
-    found = nearest(domain, values, source, given, tolerance, report)
-    reached = np.isfinite(found.distances)
+    places = nearest(domain, values, source, given, tolerance, report)
+    reached = np.isfinite(places.distances)
     if not reached.any():
         raise OutsideError(
             "the field has one sign everywhere, hence no zero set to measure from",
             remedy="add an offset to its values, or use method=Convex(), which measures from the source "
             "that it was computed from",
         )
-    distances = np.where(reached, found.distances, np.abs(values))
-    signed = np.copysign(distances, np.where(found.sides != 0, found.sides, values))
-    return np.where(np.isnan(values), np.nan, signed), found.notes
+    distances = np.where(reached, places.distances, np.abs(values))
+    signed = np.copysign(distances, np.where(places.sides != 0, places.sides, values))
+    return np.where(np.isnan(values), np.nan, signed), places.notes
+
+
+@runtime_checkable
+class Method(Protocol):
+    """A method of sharpening, for fields on surfaces and tets."""
+
+    def sharpened(
+        self,
+        discretization: Discretization,
+        elements: LinearElements,
+        values: Floats,
+        source: SourceTerm | None,
+        progress: Progress | None,
+    ) -> tuple[Floats, tuple[Note, ...]]:
+        """Sharpen the values of a field on linear elements.
+
+        Parameters
+        ----------
+        discretization : Discretization
+            That of the domain.
+        elements : LinearElements
+            Elements on which φ is linear.
+        values : (n,) float
+            φ at the vertices.
+        source : SourceTerm, optional
+            The source from which φ was computed.
+        progress : callable, optional
+            Called as ``progress(fraction, text)``.
+
+        Returns
+        -------
+        values : (n,) float
+            Sharpened values.
+        notes : tuple of Note
+            Notes for the diagnostics.
+
+        Raises
+        ------
+        SourceError
+            If the method is `Convex`, and the field comes without its source.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> ball = sh.samples.sphere(2)
+        >>> phi = sh.SignedHeatSolver(ball).distance(ball.points_at(0))
+        >>> [len(sh.sharpen(phi, method=method).values) for method in (sh.Geodesic(), sh.Convex())]
+        [162, 162]
+        """
 
 
 @dataclass(frozen=True)
-class Geodesic:
+class Geodesic(Method):
     """Geodesic distance from the zero set of φ, with the signs of φ: the solution of Eq. 17. The default.
 
     On surfaces this is exact polyhedral distance, whatever the shape of the triangles. Distance to unoriented sources
@@ -152,41 +179,11 @@ class Geodesic:
         source: SourceTerm | None,
         progress: Progress | None,
     ) -> tuple[Floats, tuple[Note, ...]]:
-        """Distances to the nearest place of the zero set, with the signs of given values.
-
-        Parameters
-        ----------
-        discretization : Discretization
-            Of the domain.
-        elements : LinearElements
-            On which φ is linear.
-        values : (n,) float
-            φ at the vertices, to begin with.
-        source : SourceTerm, optional
-            Where φ is known.
-        progress : callable, optional
-            Called as ``progress(fraction, text)``.
-
-        Returns
-        -------
-        values : (n,) float
-            Sharpened.
-        notes : tuple of Note
-            What to know about them.
-
-        Examples
-        --------
-        >>> import signedheat as sh
-        >>> ball = sh.samples.sphere(2)
-        >>> phi = sh.SignedHeatSolver(ball).distance(ball.points_at(0))
-        >>> len(sh.sharpen(phi, method=sh.Geodesic()).values) == ball.n_vertices
-        True
-        """
         return distance_to_nearest(discretization, values, source, None, self.tolerance, progress)
 
 
 @dataclass(frozen=True)
-class Convex:
+class Convex(Method):
     """``max Σ A_i sign(φ⁰_i) φ_i`` where ``|∇φ| ≤ 1`` in every cell and φ = 0 on the source, by ADMM (Eq. 17, Eq. 18).
 
     Corrects signs that a long diffusion has made wrong. The result is too small, since a function with gradients of
@@ -230,41 +227,6 @@ class Convex:
         source: SourceTerm | None,
         progress: Progress | None,
     ) -> tuple[Floats, tuple[Note, ...]]:
-        """The maximiser of Eq. 18 of the paper, starting from given values.
-
-        Parameters
-        ----------
-        discretization : Discretization
-            Of the domain.
-        elements : LinearElements
-            On which φ is linear.
-        values : (n,) float
-            φ at the vertices, to begin with.
-        source : SourceTerm, optional
-            Where φ is known.
-        progress : callable, optional
-            Called as ``progress(fraction, text)``.
-
-        Returns
-        -------
-        values : (n,) float
-            Sharpened.
-        notes : tuple of Note
-            What to know about them.
-
-        Raises
-        ------
-        SourceError
-            If the field comes without its source.
-
-        Examples
-        --------
-        >>> import signedheat as sh
-        >>> ball = sh.samples.sphere(2)
-        >>> phi = sh.SignedHeatSolver(ball).distance(ball.points_at(0))
-        >>> len(sh.sharpen(phi, method=sh.Convex()).values) == ball.n_vertices
-        True
-        """
         if source is None or source.interpolation.shape[1] != len(values):
             raise SourceError(
                 "the convex method holds φ at the source, and this field comes without one, or from one "
@@ -298,28 +260,13 @@ class Convex:
 
 
 def at_most_one(vectors: Floats) -> Floats:
-    """Projection of rows on the unit ball: rows longer than one are scaled to length one."""
+    """Project rows on the unit ball: those longer than one are scaled to length one."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1.0)
 
 
 def typical_size(sizes: Floats, dimension: int) -> float:
-    """A length from areas or volumes: a field that varies by less is constant, and has no scale."""
+    """Return the typical size of cells as a length: a field that varies by less is constant, and has no scale."""
     return float(sizes.mean() ** (1 / dimension))
-
-
-@runtime_checkable
-class Method(Protocol):
-    """A method of sharpening, for fields on surfaces and tets."""
-
-    def sharpened(
-        self,
-        discretization: Discretization,
-        elements: LinearElements,
-        values: Floats,
-        source: SourceTerm | None,
-        progress: Progress | None,
-    ) -> tuple[Floats, tuple[Note, ...]]:
-        """Sharpened values at the unknowns, from the old ones, and notes for the diagnostics."""
 
 
 @singledispatch
@@ -339,7 +286,7 @@ def sharpened(
     method: Method | None,
     progress: Progress | None,
 ) -> tuple[Floats, Diagnostics]:
-    """Sharpened values of a field on a surface or on tets, and diagnostics with the slope errors before and after."""
+    """Sharpen the values of a field on a surface or on tets; note the slope errors before and after."""
     if source is not None and method is not None:
         raise UnsupportedTypeError(
             "a method measures to the zero set alone", remedy="leave out the method or the source", element="method"
@@ -371,7 +318,7 @@ def sharpened(
 def timed(
     run: Callable[[], tuple[Floats, tuple[Note, ...]]], before: Diagnostics, progress: Progress | None
 ) -> tuple[Floats, Diagnostics]:
-    """The values that a function makes, and the diagnostics with its notes and its seconds."""
+    """Run a function that makes values and notes; return the values, and diagnostics with the notes and its seconds."""
     begin = time.perf_counter()
     if progress is not None:
         progress(0.0, "sharpen")

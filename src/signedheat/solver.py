@@ -103,7 +103,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         return default_diffusion(discretization) if self.diffusion is None else self.diffusion
 
     def with_diffusion(self, diffusion: Diffusion | None) -> SignedHeatSolver[AnyDomain]:
-        """The same solver with another τ; shares everything that does not depend on τ, such as the factor of C.
+        """Make a solver with another τ, which shares everything that does not depend on τ, such as the factor of C.
 
         Parameters
         ----------
@@ -141,7 +141,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     @overload
     def distance(self, sources: Sources, constraint: Constraint | None = None) -> Field: ...
     def distance(self, sources: Sources, constraint: Constraint | None = None) -> Field:
-        """Signed distance to sources.
+        """Compute the signed distance to sources.
 
         Parameters
         ----------
@@ -211,7 +211,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     @overload
     def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]: ...
     def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]:
-        """Signed distance to each of several sources; faster than one call of `distance` for each.
+        """Compute the signed distance to each of several sources, faster than by one call of `distance` for each.
 
         Parameters
         ----------
@@ -265,7 +265,7 @@ def distance_unwarned(
 @overload
 def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constraint: Constraint | None) -> Field: ...
 def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constraint: Constraint | None) -> Field:
-    """`SignedHeatSolver.distance` for those who measure anew to what it would warn of."""
+    """Compute `SignedHeatSolver.distance` without its warning, for callers that then measure to the curves exactly."""
     return solver._distance(sources, constraint)
 
 
@@ -281,7 +281,7 @@ def _warn_of_one_sided_curves(domain: object, curves: Sequence[Any]) -> None:
 
 
 def checked(constraint: Constraint | None) -> Constraint:
-    """The constraint, or the default for None."""
+    """Return the constraint, or the default for None; refuse anything else."""
     if constraint is None:
         return ZeroSet()
     if isinstance(constraint, type) or not isinstance(constraint, Constraint):

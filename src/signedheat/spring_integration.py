@@ -21,19 +21,14 @@ ANCHOR = 10.0
 
 @dataclass(frozen=True, eq=False)
 class SpringIntegration(DirectIntegration):
-    """As `DirectIntegration`, but `fit` imposes levels by springs.
+    """`DirectIntegration` with a `fit` that imposes levels by springs.
 
-    A function that is linear on cells can be constant along a source that crosses them as it likes only by being
-    constant around it. Springs of a strength adapted to the cells leave a smaller error than exact constraints, on the
-    source and everywhere. At vertices on the source the springs are stiff.
-
-    Parameters
-    ----------
-    strength : float
-        Strength of the springs, in 1/length.
+    Where a source crosses cells, a function that is linear on them is constant along it only if it is constant around
+    it. Springs of a strength adapted to the cells leave a smaller error than exact constraints, on the source and
+    everywhere. At vertices on the source the springs are stiff.
     """
 
-    strength: float = 0.0
+    strength: float = 0.0  # of the springs, in 1/length
 
     @property
     def soft_weight(self) -> float:
@@ -87,5 +82,5 @@ class SpringIntegration(DirectIntegration):
         return np.where(at_vertex, PIN * self.stiffness.diagonal().max(), self.strength * source.weights)
 
     def corrected(self, levels: Floats, solve: Callable[[Floats], Floats], source: SourceTerm) -> tuple[Floats, Floats]:
-        """The levels that the linear interpolant of φ is given, and φ."""
+        """Return the levels that the linear interpolant of φ is given, and φ."""
         return levels, solve(levels)

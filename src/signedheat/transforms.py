@@ -21,9 +21,9 @@ from .validation import LARGEST, SMALLEST, numbers
 def transform(
     shape: TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh | ForeignShape, matrix: ArrayLike
 ) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh | Represented:
-    """A shape under an affine map. Insides stay insides: faces of what is mirrored are turned over.
+    """Move, turn, scale or shear a shape by an affine map.
 
-    A solid stays one: nothing is completed again.
+    Insides stay insides: the faces of a mirrored shape are turned over. A solid stays one: nothing is completed again.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def _(shape: DigitalSurface, linear: Floats, move: Floats) -> PolygonMesh:
 
 @transformed.register
 def _(shape: PointCloud, linear: Floats, move: Floats) -> PointCloud:
-    """Normals become those of the transformed planes, areas those of pieces of them."""
+    # normals become those of the transformed planes, areas those of pieces of them
     normals, areas = shape.normals, shape.areas
     if normals is not None:
         cofactors = normals @ (abs(np.linalg.det(linear)) * np.linalg.inv(linear))

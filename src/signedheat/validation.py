@@ -16,18 +16,18 @@ from .errors import GeometryError, SignedHeatError
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 LARGEST = 1e40
-"""Of coordinates. Squared volumes, the largest powers of lengths that are computed, then stay finite."""
+"""Largest coordinate. Squared volumes, the largest powers of lengths that are computed, then stay finite."""
 SMALLEST = 1e-40
-"""Of the extent of a shape."""
+"""Smallest extent of a shape."""
 SINGLE = 1e-16, 1e17
 """Least step and greatest extent of grids on which squares of lengths are computed with single precision."""
 LEAST_STEP = 1e-13
-"""Of spacings, relative to coordinates: less would leave nodes few digits apart."""
+"""Least spacing, relative to coordinates, so that nodes are more than a few digits apart."""
 _MOST = 2**63
 
 
 def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
-    """The array, contiguous and read-only, so that quantities derived from it stay valid."""
+    """Make the array contiguous and read-only, so that quantities derived from it stay valid."""
     array = np.ascontiguousarray(array)
     array.flags.writeable = False
     return array
@@ -99,7 +99,7 @@ def finite_rows(
 def coordinates(
     values: object, name: str, columns: int | None = None, error: type[SignedHeatError] = GeometryError
 ) -> Floats:
-    """The same, within what can be computed with: powers of lengths must not leave the range of numbers."""
+    """Like `finite_rows`, but refuse coordinates so large or close that powers of lengths overflow or vanish."""
     array = finite_rows(values, name, columns, error)
     if len(array):
         refuse_extreme(array.min(axis=0), array.max(axis=0), name, error)
@@ -141,7 +141,7 @@ def query_points(values: object, columns: int) -> tuple[Floats, tuple[int, ...]]
 
 
 def shaped(values: NDArray[Scalar], shape: tuple[int, ...]) -> NDArray[Scalar]:
-    """(n, ...) values at points in the shape that these were given in; () is that of a single one."""
+    """(n, ...) values in the leading shape of the points that they belong to; () is that of a single point."""
     return values.reshape((*shape, *values.shape[1:]))[()]
 
 
@@ -206,7 +206,7 @@ def flag(value: object, name: str) -> bool:
 
 
 def positive_steps(values: object, count: int) -> Floats:
-    """A spacing, one positive number for all axes or one for each, as one for each."""
+    """Return a spacing, one positive number for all axes or one for each, as one for each."""
     steps = numbers(values, "spacing")
     if steps.shape not in ((), (count,)) or not (np.isfinite(steps).all() and (steps > 0).all()):
         raise GeometryError(
@@ -238,7 +238,7 @@ def element_ids(values: object, name: str, corners: int, n_vertices: int) -> Int
 
 
 def used_bounds(points: Floats, ids: Ints) -> Floats:
-    """(2, d) lower and upper corner of the box around the points that are named, column by column: that is fast."""
+    """(2, d) lower and upper corner of the box around the points with some ids; columns one by one, which is fast."""
     used = np.zeros(len(points), dtype=bool)
     used[ids.ravel()] = True
     columns = (points if used.all() else points[used]).T

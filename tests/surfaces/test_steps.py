@@ -28,7 +28,7 @@ def test_hermitian_sums_keep_their_upper_triangle():
 
 def test_a_step_of_one_voxel_in_a_slope_becomes_straight():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1], [2, 0, 1.0]])
-    vertices = np.concatenate([vertices, vertices + [0, 1, 0]])
+    vertices = np.concatenate([vertices, vertices + np.array([0, 1, 0])])
     corners = np.array([[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6]])
     normals = np.tile([-(0.5**0.5), 0, 0.5**0.5], (3, 1))
     smooth = smoothed_corners(vertices, corners, normals)

@@ -1,13 +1,13 @@
-"""Digital surfaces: the boundary of a set of voxels, and smooth surfaces that separate these from all others.
+"""Digital surfaces: the boundary of a set of voxels, and smooth surfaces that separate the set from all other voxels.
 
 The faces of voxels that separate inside from outside, called surfels, are squares with six possible normals: as a
 surface they overestimate the length of every curve that is not parallel to an axis, however small the voxels. Normals
 estimated over a wider neighbourhood approximate those of the surface that was digitised (Coeurjolly & Lachaud 2022).
 
-A surface net has a vertex in each cell between the centres of eight voxels, not all of which are in the set, and a
-quadrilateral around each line between neighbouring centres of which one is. It is relaxed while vertices stay in their
-cells (Gibson 1998, *Constrained elastic surface nets*), so that the set is found again from the surface. Here what is
-made small is how the net bends, ``Σ |x − mean of neighbours|²``: Gibson's length would shrink it.
+A surface net has a vertex in each cell between the centres of eight voxels that are not all inside or all outside, and
+a quadrilateral around each line between neighbouring centres of which one is inside. It is relaxed while vertices stay
+in their cells (Gibson 1998, *Constrained elastic surface nets*), so that the surface still separates the same voxels.
+It is the bending of the net that is minimised, ``Σ |x − mean of neighbours|²``; Gibson's length would shrink it.
 """
 
 from __future__ import annotations
@@ -163,24 +163,6 @@ class DigitalSurface(Displayed, Surface):
         return self.squares.triangulation
 
     def on_triangulation(self, values: Floats) -> Floats:
-        """Values at the vertices of `triangulation`, from values at the vertices of the surface.
-
-        Parameters
-        ----------
-        values : (n,) float
-            One for each vertex.
-
-        Returns
-        -------
-        (m,) float
-            One for each vertex of the triangulation.
-
-        Examples
-        --------
-        >>> cube = DigitalSurface(np.ones((1, 1, 1), dtype=bool))
-        >>> cube.on_triangulation(np.ones(cube.n_vertices)).max().item()
-        1.0
-        """
         return self.squares.on_triangulation(values)
 
     def _triangle_mask(self, face_mask: Bools) -> Bools:
@@ -215,29 +197,25 @@ STAY = 0.003
 ball, an ellipsoid and a torus of 96 voxels: 1.0° to 1.4°; at .01 1.8° to 2.1°, at .001 .8° to 1.3°; of a box along the
 axes, whose sides bend outwards, 5.5°, 4.4°, 6.5°."""
 REACH = 0.49
-"""Voxels that a vertex may go along each axis, lest two of them come together, in 32 bits either."""
+"""Largest move of a vertex along each axis, in voxels: below a half, so that no two coincide, in single precision
+either."""
 STEP = 0.24
-"""Step of a gradient descent that no bending mode leaves larger: below 2 / (2² + STAY)."""
+"""Step of the gradient descent, at which every bending mode decays: below 2 / (2² + STAY)."""
 MOST = 200
-"""Steps at most; the modes that `STAY` lets in need about 1 / √STAY times four."""
+"""Largest number of steps; the slowest modes that `STAY` allows need about 4 / √STAY."""
 MOVED = 1e-4
-"""Voxels by which the last step moves vertices at most."""
+"""Largest move of a vertex in the last step, in voxels."""
 
 
 def surface_net(volume: Bools) -> tuple[Floats, Ints]:
-    """Vertices and triangles, outward, of a smooth surface between the voxels of a set and all others.
+    """Make a smooth surface between the voxels of a set and all others: vertices, in voxels, and outward triangles.
 
     It is closed and manifold, and passes between the centres of any two neighbours of which one is in the set. Voxels
-    that touch along an edge are connected. Everything beyond the array is outside. Vertices are in voxels; the centre
-    of the first one is at 0.
+    that touch along an edge are connected. Everything beyond the array is outside. The centre of the first voxel is 0.
     """
     padded = np.pad(volume, 2)
-    nodes, axes = [], []
-    for axis in range(3):
-        found = np.argwhere(np.diff(padded, axis=axis))
-        nodes.append(found)
-        axes.append(np.full(len(found), axis))
-    first, along = np.concatenate(nodes), np.concatenate(axes)
+    nodes = [np.argwhere(np.diff(padded, axis=axis)) for axis in range(3)]
+    first, along = np.concatenate(nodes), np.repeat(np.arange(3), [len(part) for part in nodes])
     crossings = Crossings(first, along, padded[tuple(first.T)], np.full(len(first), 0.5))
     cells = dual_cells(crossings, padded.shape, lambda places: np.ones(len(places), dtype=bool))
     middles, room = _rooms(cells, crossings)
@@ -251,10 +229,7 @@ def surface_net(volume: Bools) -> tuple[Floats, Ints]:
 
 
 def _rooms(cells: DualCells, crossings: Crossings) -> tuple[Floats, Floats]:
-    """(v, 3) middle of each piece of the surface in a cell, (v, 1) how far from it the vertex may go along each axis.
-
-    Where several pieces share a cell they stay where they are.
-    """
+    """(v, 3) middle of each piece of the surface in a cell; (v, 1) largest move of its vertex: none in shared cells."""
     count = len(cells.owners)
     crossed = crossings.nodes + 0.5 * np.eye(3)[crossings.axes]
     degrees = np.bincount(cells.quads.ravel(), minlength=count)
@@ -265,7 +240,7 @@ def _rooms(cells: DualCells, crossings: Crossings) -> tuple[Floats, Floats]:
 
 
 def _relaxed(quads: Ints, middles: Floats, room: Floats) -> Floats:
-    """(v, 3) places within rooms where a net bends least, by projected accelerated gradients (Beck & Teboulle 2009).
+    """(v, 3) places at which a net bends least, by projected accelerated gradients (Beck & Teboulle 2009).
 
     Where a step goes back, acceleration starts again (O'Donoghue & Candès 2015).
     """
@@ -298,9 +273,9 @@ ATTACHMENT = 0.1
 def smoothed_corners(vertices: Floats, corners: Ints, normals: Floats) -> Floats:
     """(n, 3) corners p of least ``Σ (n_f · (p_j − p_i))² + ATTACHMENT Σ |p_i − v_i|²``, for the sides ij of squares f.
 
-    The sides of squares become orthogonal to the normals, while corners stay near where they were, after Coeurjolly,
-    Lachaud & Gueth, *Digital surface regularization with guarantees* (2021). The squares then have the lengths of the
-    surface that was digitised, and neighbours agree on them; projected one by one they do not.
+    The sides become orthogonal to the normals, while corners stay near where they were (after Coeurjolly, Lachaud &
+    Gueth, *Digital surface regularization with guarantees*, 2021). The squares then have the lengths of the surface
+    that was digitised, and neighbours agree on them, which they would not if projected one by one.
     """
     m, n = len(corners), len(vertices)
     row, tails, heads = np.arange(4 * m), corners.ravel(), np.roll(corners, -1, axis=1).ravel()
@@ -318,7 +293,10 @@ def smoothed_corners(vertices: Floats, corners: Ints, normals: Floats) -> Floats
 
 
 _STEEPEST = 0.05  # least cosine of the angle between a corrected normal and the square's own
-_WIDEST, _NARROWEST = 1e3, 1e-3  # of blurs, in extents of the volume and in voxels: beyond, the normals are the same
+_WIDEST, _NARROWEST = (
+    1e3,
+    1e-3,
+)  # limits of blurs, in extents of the volume and in voxels: beyond, normals do not change
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,26 +307,22 @@ class Surfels:
     vertices: Ints  # (n, 3) lattice points: corner ``(i, j, k)`` is where voxel ``(i, j, k)`` begins
     voxels: Ints  # (m, 3) the voxel inside each surfel
     axes: Ints  # (m,) axis to which the surfel is orthogonal
-    # (m,) +1 where the outward normal points along the positive axis, −1 where along the negative one
-    signs: Ints
+    signs: Ints  # (m,) 1 where the outward normal points along the positive axis, −1 where along the negative one
 
 
 def boundary_surfels(volume: Bools) -> Surfels:
     """Surfels of a volume, in order of their voxels; everything beyond the array is outside."""
-    voxels, axes, signs = [], [], []
-    for axis in range(3):
-        for sign in (-1, 1):
-            beyond = np.zeros_like(volume)
-            here, there = [slice(None)] * 3, [slice(None)] * 3
-            here[axis], there[axis] = (slice(None, -1), slice(1, None))[::sign]
-            beyond[tuple(here)] = volume[tuple(there)]
-            found = np.argwhere(volume & ~beyond)
-            voxels.append(found)
-            axes.append(np.full(len(found), axis))
-            signs.append(np.full(len(found), sign))
-    all_voxels, all_axes, all_signs = np.concatenate(voxels), np.concatenate(axes), np.concatenate(signs)
-    order = np.lexsort((all_signs, all_axes, *all_voxels.T[::-1]))
-    voxel, along, towards = all_voxels[order], all_axes[order], all_signs[order]
+    parts, ways = [], [(axis, sign) for axis in range(3) for sign in (-1, 1)]
+    for axis, sign in ways:
+        beyond = np.zeros_like(volume)
+        near, far = [slice(None)] * 3, [slice(None)] * 3
+        near[axis], far[axis] = (slice(None, -1), slice(1, None))[::sign]
+        beyond[tuple(near)] = volume[tuple(far)]
+        parts.append(np.argwhere(volume & ~beyond))
+    voxel = np.concatenate(parts)
+    along, towards = np.repeat(ways, [len(part) for part in parts], axis=0).T
+    order = np.lexsort((towards, along, *voxel.T[::-1]))
+    voxel, along, towards = voxel[order], along[order], towards[order]
 
     unit = np.eye(3, dtype=np.int64)
     first, second = unit[(along + 1) % 3], unit[(along + 2) % 3]
@@ -364,7 +338,7 @@ def boundary_surfels(volume: Bools) -> Surfels:
 
 
 def count_surfels(volume: Bools) -> int:
-    """Number of boundary squares of a set of voxels, found slice by slice."""
+    """Count the boundary squares of a set of voxels, slice by slice."""
     total = 0
     for axis in range(3):
         before: Bools | bool = False
@@ -378,8 +352,8 @@ def count_surfels(volume: Bools) -> int:
 def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: float) -> Floats:
     """(m, 3) unit normals: mean area vectors of the surfels around each, by a Gaussian of standard deviation radius/2.
 
-    By the divergence theorem that mean is the negative gradient of the blurred volume, which is how it is computed. A
-    radius of zero returns each surfel's own normal.
+    By the divergence theorem that mean is the negative gradient of the blurred volume. A radius of 0 gives the
+    surfels' own normals.
     """
     own = np.zeros((len(surfels.axes), 3))
     own[np.arange(len(own)), surfels.axes] = surfels.signs
@@ -404,11 +378,10 @@ def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: 
 
 
 def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:
-    """The edges of the triangles of surfels, with two edges in place of one where two voxels touch along it.
+    """Replace each edge along which two voxels touch by two, in the edges of the triangles of surfels.
 
     Four surfels meet there. Surfels that face the same voxel outside share an edge, so that the surface connects the
-    two voxels inside: voxels that touch along an edge are connected. There are four triangles per surfel; edge 0 of
-    each is a side of the surfel.
+    two voxels inside. There are four triangles per surfel; edge 0 of each is a side of the surfel.
     """
     triangles = np.flatnonzero(edges.face_counts[edges.face_edges[:, 0]] > 2)
     surfel = triangles // 4

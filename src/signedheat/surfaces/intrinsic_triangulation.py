@@ -44,7 +44,7 @@ AREA_ERROR = 1e-4
 LARGEST_ANGLE = 30.0
 """Degrees; for larger minimum angles refinement need not terminate."""
 UPWARD = (np.pi / 4) ** np.arange(3)
-"""Direction in which no two different points with coordinates that are algebraic numbers are equally high."""
+"""Direction along which no two points with algebraic coordinates have the same height."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +152,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         )
 
     def in_space(self, faces: Ints, barycentric: Floats) -> Floats:
-        """Positions of points that are given on the mesh.
+        """Compute the positions of points that are given on the mesh.
 
         Parameters
         ----------
@@ -179,7 +179,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return positions
 
     def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[Ints, Floats]:
-        """Faces and barycentric coordinates, on the triangulation, of points given by those on the mesh.
+        """Locate points of the mesh on the triangulation.
 
         Parameters
         ----------
@@ -219,7 +219,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return self._forward(faces, barycentric, np.zeros((len(faces), 0, 3)))[:2]
 
     def gradient(self, values: Floats, faces: Ints, barycentric: Floats) -> Floats:
-        """Gradients in space of a function that is linear on these triangles.
+        """Compute gradients in space of a function that is linear on these triangles.
 
         Parameters
         ----------
@@ -245,7 +245,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return self.gradient_of_corners(values[self.faces], faces, barycentric)
 
     def gradient_of_corners(self, corners: Floats, faces: Ints, barycentric: Floats) -> Floats:
-        """Gradients in space of a function that may jump between these triangles.
+        """Compute gradients in space of a function that may jump between these triangles.
 
         Parameters
         ----------
@@ -275,13 +275,13 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return gradients_along(np.einsum("psk,pkd->psd", sides, self.mesh.vertices[self.mesh.faces[faces]]), rises)
 
     def _forward(self, faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
-        """Points of the mesh, and vectors (p, k, 3) at them, on the triangulation."""
-        below = self.refinement.push_forward(faces, barycentric, vectors)
-        found, weights, moved = self.history.forward(below[0], np.maximum(below[1], 0.0), below[2])
-        return found, weights / weights.sum(axis=1, keepdims=True), moved
+        """Transfer points of the mesh, and vectors (p, k, 3) at them, to the triangulation."""
+        faces, barycentric, vectors = self.refinement.push_forward(faces, barycentric, vectors)
+        faces, barycentric, vectors = self.history.forward(faces, np.maximum(barycentric, 0.0), vectors)
+        return faces, barycentric / barycentric.sum(axis=1, keepdims=True), vectors
 
     def level_set(self, values: Floats, level: float = 0.0) -> list[Curve]:
-        """Level set of a function that is linear on these triangles, as curves on the mesh.
+        """Find a level set of a function that is linear on these triangles, as curves on the mesh.
 
         Larger values are to its left; values equal to the level count as larger. On inconsistently oriented meshes
         it is that of the values at the vertices of the mesh.
@@ -322,30 +322,8 @@ class IntrinsicTriangulation(Displayed, Frozen):
         curves = [Curve(faces, np.maximum(weights, 0.0), closed=closed) for faces, weights, closed in lines]
         return without_repeats(self.mesh, curves)
 
-    def on_triangulation(self, values: Floats) -> Floats:
-        """Values at the vertices of `triangulation`, from values at the vertices of the triangles.
-
-        Parameters
-        ----------
-        values : (n,) float
-            One for each vertex.
-
-        Returns
-        -------
-        (m,) float
-            One for each vertex of the triangulation: the same.
-
-        Examples
-        --------
-        >>> from signedheat import samples
-        >>> better = intrinsic_delaunay(samples.sphere(1))
-        >>> better.on_triangulation(np.ones(better.n_vertices)).shape == (better.n_vertices,)
-        True
-        """
-        return values
-
     def edge_lines(self) -> tuple[Ints, Floats, Floats]:
-        """Edges as polylines on the mesh.
+        """Trace the edges as polylines on the mesh.
 
         Returns
         -------
@@ -434,7 +412,7 @@ def intrinsic_delaunay(
     coarsest: float = np.inf,
     progress: Progress | None = None,
 ) -> IntrinsicTriangulation:
-    """Intrinsic Delaunay triangulation or refinement of a mesh: better angles, the same surface.
+    """Make an intrinsic Delaunay triangulation or refinement of a mesh: better angles, the same surface.
 
     Boundary and nonmanifold edges are not flipped, and neither are the edges of kept curves; refinement may split them.
     The mesh may be nonmanifold, nonorientable, inconsistently oriented, and have nearly degenerate faces.
@@ -521,7 +499,7 @@ def intrinsic_delaunay(
 
 
 def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
-    """Refuse faces whose edge lengths do not determine the area: thinner than about the square root of rounding."""
+    """Refuse faces so thin that rounded edge lengths do not determine their area."""
     before, after = float(mesh.face_areas.sum()), float(triangles.face_areas.sum())
     longest, most = float(triangles.lengths_of_edges.max(initial=0.0)), float(mesh.edge_lengths.sum())
     lost = "" if abs(after - before) <= AREA_ERROR * before else f"area would be {after:.6g}, and it is {before:.6g}"
@@ -536,7 +514,7 @@ def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
 
 
 def triangle_mesh(domain: object) -> TriangleMesh:
-    """The domain, if it is a triangle mesh; others have no intrinsic triangulation."""
+    """Return the domain if it is a triangle mesh; refuse others, which have no intrinsic triangulation."""
     domain = converted(domain)
     if not isinstance(domain, TriangleMesh):
         raise GeometryError(

@@ -55,21 +55,11 @@ _CHUNK = 4096
 
 @dataclass(frozen=True, eq=False)
 class OutwardSigns:
-    """Signs that turn axes outwards.
+    """Signs that turn axes outwards."""
 
-    Attributes
-    ----------
-    signs : (n,) float
-        1 or −1.
-    sided : bool
-        Whether some link decides which side is out.
-    coherence : float
-        Share of the weights of links that the signs agree with, less the share that they contradict.
-    """
-
-    signs: Floats
-    sided: bool
-    coherence: float
+    signs: Floats  # (n,) 1 or −1
+    sided: bool  # whether some link decides which side is out
+    coherence: float  # share of the weights of links that the signs agree with, less the share that they contradict
 
 
 def outward_normals(points: Floats, given: Floats | None = None) -> tuple[Floats, PlaneFits, OutwardSigns]:

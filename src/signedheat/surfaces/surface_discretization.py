@@ -39,37 +39,18 @@ TIMES = 2
 
 @dataclass(frozen=True, eq=False)
 class SurfaceDiscretization:
-    """The discretisation of a surface.
+    """The discretisation of a surface."""
 
-    Parameters
-    ----------
-    domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
-        The domain of the fields returned.
-    triangles : IntrinsicMesh
-        The triangles that the method runs on.
-    restriction : (n,) int, optional
-        Vertex of the triangles for each vertex of the domain, if they are not the same.
-    transfer : callable, optional
-        Maps a source on the domain to the same source on the triangles, if their faces are not those of the domain.
-    positions : (n_vertices, 3) or (m, 3, 3) float, optional
-        Positions in space of the vertices, or of the corners of each face (up to translation) if every face lies in a
-        plane of its own; needed for curves with given normals. By default those of the domain's triangulation.
-    triangulation : IntrinsicTriangulation, optional
-        That of the domain whose vertices are the first of the triangles; φ on it is kept as well.
-    spacing : float, optional
-        h. By default half the mean edge length, the mean distance between neighbouring edge midpoints.
-    notes : tuple of Note
-        Repairs made in building the triangles; they are added to the diagnostics of every field.
-    """
-
-    domain: Any
-    triangles: IntrinsicMesh
-    restriction: Ints | None = None
-    transfer: Callable[[Any], Any] | None = None
+    domain: Any  # of the fields returned: a mesh, a cloud, a digital surface or an intrinsic triangulation
+    triangles: IntrinsicMesh  # on which the method runs
+    restriction: Ints | None = None  # (n,) vertex of the triangles for each vertex of the domain, if they differ
+    transfer: Callable[[Any], Any] | None = None  # from a source on the domain to one on the triangles, if faces differ
+    # (n_vertices, 3) in space, or (m, 3, 3) at the corners, up to translation, if every face lies in a plane of its
+    # own; for curves with given normals. By default those of the domain's triangulation.
     positions: Floats | None = None
-    triangulation: IntrinsicTriangulation | None = None
-    spacing: float = math.nan
-    notes: tuple[Note, ...] = ()
+    triangulation: IntrinsicTriangulation | None = None  # of the domain, whose field is kept as well
+    spacing: float = math.nan  # h: by default half the mean edge length, the distance between midpoints of edges
+    notes: tuple[Note, ...] = ()  # on repairs made in building the triangles, for the diagnostics of every field
     _heats: LastUsed[float, VectorHeat] = field(default_factory=lambda: LastUsed(TIMES), init=False, repr=False)
     _turned: LastUsed[bytes, SurfaceDiscretization] = field(default_factory=LastUsed, init=False, repr=False)
 

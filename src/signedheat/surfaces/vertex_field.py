@@ -86,7 +86,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         array_of(self.values, "values")
 
     def __call__(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
-        """φ at points of the surface, linear between vertices.
+        """Evaluate φ at points of the surface, linearly between vertices.
 
         Parameters
         ----------
@@ -102,11 +102,10 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         faces, weights, shape = self._at(points)
         if isinstance(finest.domain, IntrinsicTriangulation):
             faces, weights = finest.domain.locate(faces, weights)
-            corners = finest.domain.faces[faces]
+            values, triangles = finest.values, finest.domain.faces
         else:
-            corners = finest.domain.triangulation.faces[faces]
-        values = finest.domain.on_triangulation(finest.values)
-        return shaped(np.einsum("ik,ik->i", weights, values[corners]), shape)
+            values, triangles = finest.domain.on_triangulation(finest.values), finest.domain.triangulation.faces
+        return shaped(np.einsum("ik,ik->i", weights, values[triangles[faces]]), shape)
 
     @property
     def finest(self) -> VertexField[SurfaceDomain]:
@@ -117,7 +116,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return cast("VertexField[SurfaceDomain]", finer)
 
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
-        """∇φ in space at points, in the triangles on which φ is linear.
+        """Evaluate ∇φ in space at points, in the triangles on which φ is linear.
 
         Parameters
         ----------
@@ -156,7 +155,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return gradients_along(corners[:, 1:] - corners[:, :1], values[:, 1:] - values[:, :1])
 
     def contour(self, level: float = 0.0) -> list[Curve]:
-        """The level set φ = level, as curves on the surface.
+        """Find the level set φ = level, as curves on the surface.
 
         Parameters
         ----------
@@ -195,7 +194,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return field.domain.level_set(field.values, level)
 
     def with_values(self, values: Floats) -> VertexField[Surface]:
-        """Other values on the same surface, without what belongs to these.
+        """Put other values on the same surface.
 
         Parameters
         ----------
@@ -218,28 +217,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return VertexField(self.domain, values)
 
     def combined_with(self, other: VertexField[Surface], rule: Rule) -> VertexField[Surface]:
-        """The field whose values a rule makes of those of two, also on the finer triangles of one of them.
-
-        Parameters
-        ----------
-        other : VertexField
-            On the same domain.
-        rule : callable
-            Takes two arrays of values and returns one, such as `np.minimum`.
-
-        Returns
-        -------
-        VertexField
-            With the values of the rule.
-
-        Examples
-        --------
-        >>> import signedheat as sh
-        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-        >>> phi = VertexField(mesh, np.array([0.0, 1.0, 2.0]))
-        >>> phi.combined_with(2.0 - phi, np.minimum).values.tolist()
-        [0.0, 1.0, 0.0]
-        """
+        # also on the finer triangles of one of them
         result = self.with_values(rule(self.values, other.values))
         finer = [field.finer for field in (self, other) if field.finest is field.finer]
         if not finer:
@@ -317,7 +295,9 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     @overload
     def restrict(self: VertexField[Embedded]) -> VertexField[Embedded]: ...
     def restrict(self) -> VertexField[EmbeddedSurface]:
-        """On an intrinsic triangulation: φ at the vertices of its mesh. On any other domain: the field itself.
+        """Restrict φ to the vertices of the mesh, if the domain is an intrinsic triangulation of one.
+
+        On any other domain this is the field itself.
 
         Returns
         -------
@@ -336,7 +316,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return self._embedded
 
     def subdivided(self) -> VertexField[EmbeddedSurface]:
-        """φ on flat pieces of the surface, on each of which it is linear, to draw, save or measure in space.
+        """Subdivide the surface into flat pieces on which φ is linear, to draw, save or measure in space.
 
         Where φ was computed on an intrinsic triangulation of the mesh (`finer`), these are the polygons of their
         `common_subdivision`, whose first vertices are those of the mesh; elsewhere the field is returned as it is.
@@ -391,7 +371,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
 
 
 def on_simple_surface(field: VertexField) -> VertexField[SurfaceShape]:
-    """The field on a surface that files support: voxel faces become triangles."""
+    """Put a field on a surface that files support: voxel faces become triangles."""
     domain = field.domain
     if isinstance(domain, TriangleMesh | PolygonMesh | PointCloud):
         return VertexField(domain, field.values)

@@ -24,24 +24,12 @@ LIGHT = np.array([0.25, 0.35, 0.9]) / np.linalg.norm([0.25, 0.35, 0.9])
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A parallel projection.
+    """A parallel projection."""
 
-    Attributes
-    ----------
-    frame : (3, 3) float
-        Right, up and towards the eye.
-    lower : (2,) float
-        Lower left corner of the picture, in units of length.
-    scale : float
-        Pixels per unit of length.
-    width, height : int
-        Size of the picture in pixels.
-    """
-
-    frame: Floats
-    lower: Floats
-    scale: float
-    width: int
+    frame: Floats  # (3, 3) right, up and towards the eye
+    lower: Floats  # (2,) lower left corner of the picture, in units of length
+    scale: float  # pixels per unit of length
+    width: int  # in pixels
     height: int
 
     @classmethod
@@ -84,10 +72,7 @@ def oblique(elevation: float, azimuth: float, up: int = 2) -> Floats:
 def rasterize(corners: Floats, values: Floats, width: int, height: int) -> tuple[Floats, Ints, Floats]:
     """Draw triangles (m, 3, 3), given in pixels and depth, with values (m, 3) at their corners.
 
-    Returns
-    -------
-    depth, face, value : (height, width) arrays
-        Those of the nearest triangle at each pixel; face −1 and value NaN where there is none.
+    Return depth, face and value of the nearest triangle at each pixel; face −1 and value NaN where there is none.
     """
     vertices, frame = read_only(corners.reshape(-1, 3)), read_only(np.eye(3))
     triangles = read_only(np.arange(3 * len(corners)).reshape(-1, 3))
