@@ -14,7 +14,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,20 +21,10 @@ from numpy.typing import NDArray
 from signedheat import TriangleMesh, complete, orientation, samples
 from signedheat.mesh.components import element_components
 from signedheat.mesh.triangles import area_vectors
-from signedheat.solids import bounding, completion, gauss
+from signedheat.solids import bounding, completion, gauss, overlaps
 
-NUMBERS: list[tuple[ModuleType, str]] = [
-    (bounding, "SHEET"),
-    (bounding, "COHERENT"),
-    (bounding, "CHANCE"),
-    (bounding, "ALONG"),
-    (bounding, "REACH"),
-    (bounding, "HINT"),
-    (gauss, "HELD"),
-    (gauss, "AGREEMENT"),
-    (gauss, "MANY"),
-    (gauss, "SLENDER"),
-]
+MODULES = (bounding, gauss, overlaps)
+NUMBERS = ("SHEET", "COHERENT", "CHANCE", "ALONG", "REACH", "HINT", "APART", "HELD", "AGREEMENT", "MANY", "SLENDER")
 CHANGED = 0.01
 """Share of the area by which a scene must change to be printed."""
 
@@ -140,6 +129,25 @@ def nested(rng: Random, share: float) -> Scene:
     return Scene(mesh, np.ones(mesh.n_faces, dtype=bool), rng.random(mesh.n_faces) < share)
 
 
+def overlapping() -> TriangleMesh:
+    """Five balls that overlap, each without some patches, the smaller ones for the most part in the largest."""
+    places = [(0.0, 0, 0), (0.7, 0, 0), (-0.3, 0.8, 0), (0.1, -0.6, 0.6), (0, 0.1, -0.9)]
+    return samples.union(
+        *(
+            samples.without_patches(samples.sphere(3, radius=radius, center=center), 4, 0.3 * radius)
+            for radius, center in zip((1, 0.5, 0.45, 0.4, 0.6), places, strict=True)
+        )
+    )
+
+
+def bowl(rng: Random, width: float) -> Scene:
+    """The outside and the inside of a ball, both open at the top, without the lip between them."""
+    shells = [samples.sphere(3), samples.sphere(3, radius=1 - width)]
+    inner = shells[1].faces[:, ::-1]
+    shells[1] = TriangleMesh(shells[1].vertices, inner)
+    return body(samples.union(*(part_of(shell, lambda at: at[:, 2] < 0.5) for shell in shells)))
+
+
 SCENES: dict[str, Callable[[Random], Scene]] = {
     "ball, 30 % of the triangles gone": lambda rng: body(samples.without_faces(samples.sphere(3), 0.3)),
     "ball, 75 % gone": lambda rng: body(samples.without_faces(samples.sphere(3), 0.75)),
@@ -161,6 +169,11 @@ SCENES: dict[str, Callable[[Random], Scene]] = {
         body(samples.sphere(3)) + sheet(noisy_copies(rng, samples.sphere(3), 0.5))
     ),
     "ball in a ball, a fifth of the faces turned": lambda rng: nested(rng, 0.2),
+    "balls with holes that overlap": lambda rng: Scene(
+        overlapping(), np.ones(overlapping().n_faces, bool), np.zeros(overlapping().n_faces, bool)
+    ),
+    "balls with holes that overlap, half of them turned": lambda rng: body(overlapping()),
+    "bowl without its lip": lambda rng: bowl(rng, 0.2),
     "open box with cards in it": lambda rng: (
         body(sides((2.4, 2.4, 2.4), (5,), (-1.2, -1.2, -1.2))) + sheet(cards(rng, 6, 0.3, 0.3))
     ),
@@ -216,15 +229,17 @@ def main(seeds: int = 2) -> None:
     usual = table(seeds)
     for name, share in usual.items():
         print(f"{name:36s} {share:6.3f}")
-    for module, number in NUMBERS:
-        value = getattr(module, number)
+    for number in NUMBERS:
+        modules = [module for module in MODULES if hasattr(module, number)]
+        value = getattr(modules[0], number)
         for changed in (value / 2, (1 + value) / 2 if 0.5 < value < 1 else 2 * value):
-            setattr(module, number, type(value)(changed))
+            for module in modules:
+                setattr(module, number, type(value)(changed))
             other = table(seeds)
-            setattr(module, number, value)
+            for module in modules:
+                setattr(module, number, value)
             moved = [f"{scene} {other[scene]:.3f}" for scene in usual if abs(other[scene] - usual[scene]) > CHANGED]
-            name = f"{module.__name__.rpartition('.')[2]}.{number}"
-            print(f"{name} {value:g} → {changed:g}: {'; '.join(moved) or 'nothing'}", flush=True)
+            print(f"{number} {value:g} → {changed:g}: {'; '.join(moved) or 'nothing'}", flush=True)
 
     value, errors = completion.TORN, {}
     for changed in (value / 2, value, 2 * value):

@@ -21,10 +21,10 @@ from .grids.polyline import Polyline
 from .kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
 from .mesh.outlines import FillRule
 from .progress import Progress
-from .solids.bounding import Nesting
 from .solids.completion import Completing, Lids
 from .solids.facing import orient
 from .solids.heat_surfaces import Heat
+from .solids.overlaps import Nesting
 from .solids.solid import Solid
 from .solids.solid_distance import distance_to_shapes
 from .solver import SignedHeatSolver

@@ -478,6 +478,54 @@ def test_what_is_nested_is_as_it_was_given_or_as_one_says():
     assert solids["cavities"].inside([[0.0, 0, 0.8], [0, 0, 0.45], [0, 0, 0]]).tolist() == [True, False, True]
 
 
+@pytest.mark.parametrize("gone", [(0, 0.1), (0.1, 0), (0.1, 0.1)])
+def test_what_is_nested_and_has_holes_is_as_it_was_given_or_as_one_says(gone):
+    """A ball without some triangles in a ball without some."""
+    balls = [samples.without_faces(samples.sphere(3, radius), gone[k]) for k, radius in enumerate((1.0, 0.5))]
+    inwards = sh.TriangleMesh(balls[1].vertices, balls[1].faces[:, ::-1])
+    whole, within = (sh.complete(ball).volume for ball in balls)
+    hollow = whole - within
+    for nested, as_body, as_cavity in (
+        ("given", whole, hollow),
+        ("bodies", whole, whole),
+        ("cavities", hollow, hollow),
+    ):
+        for inner, right in ((balls[1], as_body), (inwards, as_cavity)):
+            solid = sh.complete(samples.union(balls[0], inner), nested=nested)
+            assert solid.volume == pytest.approx(right, rel=1e-3)
+
+
+def overlapping_balls():
+    """Balls with holes, two of which lie in the first for the most part and one of which is half outside."""
+    places = [(0.0, 0, 0), (0.65, 0, 0), (-0.3, 0.7, 0), (0, 0.1, -0.9)]
+    return [
+        samples.without_patches(samples.sphere(3, radius=radius, center=center), 4, 0.3 * radius)
+        for radius, center in zip((1, 0.5, 0.45, 0.6), places, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("turned", range(0, 16, 5))
+def test_bodies_with_holes_that_overlap_are_united_whichever_way_they_face(turned):
+    balls = overlapping_balls()
+    faced = [
+        sh.TriangleMesh(ball.vertices, ball.faces[:, ::-1]) if turned >> k & 1 else ball for k, ball in enumerate(balls)
+    ]
+    together, alone = sh.complete(samples.union(*faced)), [sh.complete(ball) for ball in balls]
+    at = np.random.default_rng(0).uniform(-1.5, 1.5, (5000, 3))
+    np.testing.assert_array_equal(together.inside(at), np.any([solid.inside(at) for solid in alone], axis=0))
+
+
+@pytest.mark.parametrize("turned", range(4))
+def test_a_vase_without_its_lip_is_hollow_whichever_way_its_two_sides_face(turned):
+    shells = []
+    for k, radius in enumerate((1.0, 0.8)):
+        ball = samples.sphere(3, radius)
+        faces = ball.faces[ball.vertices[ball.faces][:, :, 2].mean(axis=1) < 0.6]
+        shells.append(sh.TriangleMesh(ball.vertices, faces[:, ::-1] if turned >> k & 1 else faces))
+    solid = sh.complete(samples.union(*shells))
+    assert solid.inside([[0, 0, -0.9], [0.9, 0, 0], [0, 0, 0], [0, 0, -0.7]]).tolist() == [True, True, False, False]
+
+
 def test_flat_lids_close_half_models_flat():
     """Bent lids go on as a ball does."""
     ball = samples.sphere(4)

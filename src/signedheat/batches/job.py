@@ -21,9 +21,9 @@ from ..io.numpy_files import write_npz
 from ..io.shape_files import read, save
 from ..io.voxel_files import LABEL_FORMATS, read_labels
 from ..kinds import ShapeLike
-from ..solids.bounding import Nesting
 from ..solids.completion import Completion, Lids, complete
 from ..solids.heat_surfaces import Heat
+from ..solids.overlaps import Nesting
 from ..solids.sample_set import Layout
 from ..solids.sampling import WIDTHS, sample
 from ..solids.solid_distance import completed_distance

@@ -2,32 +2,28 @@
 
 What closes is kept whole: a complex whose directed edges cancel as given, or a piece whose edges cancel once its faces
 agree. It faces outwards as a whole; within another body it stays to that as it was given. All other pieces are open,
-and Gauss's formula (`gauss`) decides for them together.
+and Gauss's formula (`gauss`) decides for them together; it is told of bodies that overlap (`overlaps`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from ..frozen import Frozen
-from ..mesh.components import connected_components
+from ..mesh.components import connected_components, sums_of
 from ..mesh.triangles import area_vectors
 from ..mesh.unit_vectors import unit
 from ..search.winding_tree import WindingTree
 from .chain import Chain
-from .gauss import Matrix, Pieces, means, sampled, system_of, without_slender
-from .part_levels import levels_within
+from .gauss import Dipoles, Matrix, Pieces, means, sampled, system_of, without_slender
+from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around
+from .part_levels import levels_of_pieces, levels_within
 from .rims import meeting_edges, open_edges
 
-Nesting = Literal["given", "cavities", "bodies"]
-SHEET = 0.146
-"""Level up to which a piece bounds nothing: it explains less than half of what is to be explained, (½ − .146)² = ½ · ¼.
-Flat and wavy sheets have 0, a seventh of a ball .16, half of one .31, all of it ½."""
 COHERENT = 0.7
 """Coherence of the levels of loose pieces from which on they are what is left of a body: .81 to 1 of bodies, however
 little is left of them, .3 to .6 of leaves, cards and strips, however many there are."""
@@ -43,8 +39,6 @@ NEAREST = 9
 """Faces next to each, itself included, that may be of the same cluster."""
 PLACES = 100_000
 """Faces at most that are looked at for this, evenly spread."""
-HINT = 0.5
-"""Share of the area of a closed piece that faces one way, less the rest, from which on it was given that way."""
 PROBES = 16
 """Triangles of a closed piece, spread evenly, at all of which it must lie within others to be nested."""
 
@@ -119,9 +113,17 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     if len(rest):
         names, labels = np.unique(pieces[rest], return_inverse=True)
         triangles = np.where((counts[rest] < 0)[:, None, None], chain.triangles[rest, ::-1], chain.triangles[rest])
-        groups = connected_pieces(chain, rest, labels)
+        edges, owners = open_edges(chain.faces[rest], labels)
+        groups = connected_pieces(chain, rest, labels, edges, owners)
+        ends = chain.positions[edges]
+        rims = Rims(ends.mean(axis=1), np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), owners)
+        around = np.zeros((0, 3, 3))
+        if closed.any() and not as_oriented:
+            facing = _nested(chain, pieces, counts * closed[pieces], closed, flips, nested)[0]
+            around = _directed(chain, counts * (closed * facing)[pieces])
+        given = sums_of(np.sign(counts[rest] * chain.multiplicities[rest]) * chain.areas[rest], labels, len(names))
         signs, bounds[names], loose[names], levels[names] = open_bounding(
-            Pieces(triangles, labels), groups, as_oriented
+            Pieces(triangles, labels), groups, rims, given, around, nested, as_oriented
         )
         flips[names] = np.where(bounds[names], signs, 1.0)
     bodies = cavities = 0
@@ -223,24 +225,35 @@ def _nested(
 
 
 def open_bounding(
-    pieces: Pieces, groups: NDArray[np.int64], as_oriented: bool = False
+    pieces: Pieces,
+    groups: NDArray[np.int64],
+    rims: Rims,
+    given: NDArray[np.float64],
+    closed: NDArray[np.float64],
+    nested: Nesting = "given",
+    as_oriented: bool = False,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.int64], NDArray[np.float64]]:
     """(p,) signs of open pieces; which bound something; clusters of which most is loose, or −1, and their levels.
 
-    Pieces of one group, (p,), hang together, which chance does not make them do.
+    Pieces of one group, (p,), hang together, which chance does not make them do. Of the area of each, `given` faces as
+    it was given, less what does not. `closed` are triangles of closed bodies.
 
     Of the pieces that bound nothing those go that leave most unexplained, and all is solved again.
     """
     n, areas = len(pieces.areas), pieces.areas
-    alone = np.abs(levels_of_pieces(pieces))
     shared = np.bincount(groups, minlength=n)[groups] > 1
+    alone = np.abs(levels_of_pieces(pieces))
     clusters, whole = clusters_of(pieces), system_of(pieces)
     alive, signs = np.ones(n, dtype=bool), np.ones(n)
+    if not as_oriented:
+        signs = signs_of(whole)
+        within = bodies_around(whole, pieces, rims, groups, alone, signs, given, closed, nested)
+        if within.any():
+            whole = replace(whole, within=within)
+            signs = signs_of(whole)
     while alive.any():
         names = np.flatnonzero(alive)
         system = whole.chosen(alive)
-        if not as_oriented:
-            signs[names] = np.where(system.weights() >= 0, 1.0, -1.0)
         values = system.levels(signs[names])
         rows, levels = names[system.owners], np.zeros(n)
         levels[names] = means(values, system.owners, system.areas, len(names))
@@ -261,9 +274,16 @@ def open_bounding(
         if not wrong.any():
             break
         alive &= ~(wrong & (unexplained >= 0.5 * unexplained.max()))
+        if not as_oriented and alive.any():
+            signs[alive] = signs_of(whole.chosen(alive))
     of_loose, of_bodies = (np.bincount(clusters, areas * (alive & mask), n) for mask in (~own, own))
     mostly = alive & (of_loose > of_bodies)[clusters]
     return signs, alive, np.where(mostly, clusters, -1), np.where(mostly, mean[clusters], 0.5)
+
+
+def signs_of(system: Matrix | Dipoles) -> NDArray[np.float64]:
+    """(k,) signs of the weights of pieces."""
+    return np.where(system.weights() >= 0, 1.0, -1.0)
 
 
 def _counted(areas: NDArray[np.float64], groups: NDArray[np.int64], clusters: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -275,16 +295,21 @@ def _counted(areas: NDArray[np.float64], groups: NDArray[np.int64], clusters: ND
     return np.bincount(owners, sums, n) ** 2 / np.maximum(squares, np.finfo(float).tiny)
 
 
-def connected_pieces(chain: Chain, faces: NDArray[np.int64], labels: NDArray[np.int64]) -> NDArray[np.int64]:
+def connected_pieces(
+    chain: Chain,
+    faces: NDArray[np.int64],
+    labels: NDArray[np.int64],
+    edges: NDArray[np.int64],
+    owners: NDArray[np.int64],
+) -> NDArray[np.int64]:
     """(p,) what pieces of some triangles hang together with, by edges that they share or rims along each other.
 
-    Single triangles have no rims, lest noise around a surface hang together.
+    Edges are those where they end. Those of single triangles are none, lest noise around a surface hang together.
     """
     n = int(labels.max()) + 1
     first = np.full(n, -1)
     first[labels[::-1]] = faces[::-1]
     hubs = np.unique(chain.complexes[first], return_inverse=True)[1]
-    edges, owners = open_edges(chain.faces[faces], labels)
     several = np.bincount(labels)[owners] > 1
     ends, owners = chain.positions[edges[several]], np.tile(owners[several], 2)
     one, other = meeting_edges(np.concatenate([ends, ends[:, ::-1]]))  # which way pieces face is not known yet
@@ -313,14 +338,6 @@ def _along(
     owners = clusters[pieces[chosen]]
     inside = means(around, owners, chain.areas[chosen], int(owners.max()) + 1)
     return (clusters >= 0) & (np.abs(inside - np.round(inside)) > ALONG)[clusters]
-
-
-def levels_of_pieces(pieces: Pieces) -> NDArray[np.float64]:
-    """(p,) mean level of each piece by itself."""
-    faces, _ = sampled(pieces, 4096)
-    levels = levels_within(pieces.triangles, pieces.labels, np.ones(len(pieces.labels), dtype=np.int64), faces)
-    owners = pieces.labels[faces]
-    return np.bincount(owners, levels, len(pieces.areas)) / np.bincount(owners, minlength=len(pieces.areas))
 
 
 def clusters_of(pieces: Pieces) -> NDArray[np.int64]:

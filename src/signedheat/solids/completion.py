@@ -25,12 +25,13 @@ from ..search.face_tree import FaceTree
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import flag
-from .bounding import Bounding, Nesting, bounding
+from .bounding import Bounding, bounding
 from .chain import Chain
 from .closing import closed_by, small_lids
 from .fitted_points import mean_gap
 from .heat_surfaces import Heat, heat_surface
 from .mesh_orientation import oriented_as, owners_of
+from .overlaps import Nesting
 from .point_orientation import orient_points
 from .rims import open_edges
 from .seams import seams, small_gaps
@@ -112,8 +113,8 @@ def complete(
     keep_overlaps : bool
         Keep surfaces that lie inside other bodies.
     nested : {"given", "cavities", "bodies"}
-        Meaning of closed pieces within others: by their orientation; cavities, with bodies inside those, as in slicers;
-        or bodies.
+        Meaning of bodies within others: by their orientation; cavities, with bodies inside those, as in slicers; or
+        bodies.
     constraint, diffusion : Constraint, float
         Options of the signed heat method, where that completes.
     progress : callable, optional

@@ -111,6 +111,7 @@ class Matrix:
     normals: NDArray[np.float64]
     owners: NDArray[np.int64]
     areas: NDArray[np.float64]
+    within: NDArray[np.float64]
 
     @classmethod
     def of(cls, pieces: Pieces) -> Matrix:
@@ -137,13 +138,14 @@ class Matrix:
             matrix[own, piece] = tree.behind(rank[faces[own]] - begin, places[own]) - 0.5
         counts = np.bincount(owners, minlength=k)
         normals = unit(area_vectors(pieces.triangles[faces]))
-        return cls(matrix, places, normals, owners, pieces.areas[owners] / counts[owners])
+        return cls(matrix, places, normals, owners, pieces.areas[owners] / counts[owners], np.zeros(len(owners)))
 
     def chosen(self, kept: NDArray[np.bool_]) -> Matrix:
         """The system of some of the pieces, numbered anew."""
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
-        return Matrix(self.matrix[rows][:, kept], self.places[rows], self.normals[rows], owners, self.areas[rows])
+        matrix = self.matrix[rows][:, kept]
+        return Matrix(matrix, self.places[rows], self.normals[rows], owners, self.areas[rows], self.within[rows])
 
     def weights(self) -> NDArray[np.float64]:
         """(k,) weights of least squares, the signs of which orient."""
@@ -153,11 +155,11 @@ class Matrix:
         normal += agreement(self.places, self.normals, shares, self.owners).toarray()
         held = np.bincount(self.owners, shares, self.matrix.shape[1])
         normal[np.diag_indices_from(normal)] += HELD * np.maximum(held, EMPTY)
-        return np.asarray(scipy.linalg.solve(normal, 0.5 * weighted.sum(axis=0), assume_a="pos"))
+        return np.asarray(scipy.linalg.solve(normal, weighted.T @ (0.5 + self.within), assume_a="pos"))
 
     def levels(self, signs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) levels at the samples."""
-        return np.asarray(self.matrix @ signs)
+        """(n,) levels at the samples, less the bodies around them."""
+        return np.asarray(self.matrix @ signs - self.within)
 
     def levels_within(self, signs: NDArray[np.float64], groups: NDArray[np.int64]) -> NDArray[np.float64]:
         """(n,) levels at the samples that the pieces of the same group, (k,), make."""
@@ -257,6 +259,8 @@ class Dipoles:
         Pieces that they are of.
     softening : (n,) float
         Distance below which the field of a dipole levels off.
+    within : (n,) float
+        Bodies around each place.
     """
 
     places: NDArray[np.float64]
@@ -264,6 +268,7 @@ class Dipoles:
     areas: NDArray[np.float64]
     owners: NDArray[np.int64]
     softening: NDArray[np.float64]
+    within: NDArray[np.float64]
 
     @classmethod
     def of_triangles(cls, pieces: Pieces) -> Dipoles:
@@ -276,7 +281,8 @@ class Dipoles:
             areas = areas * (pieces.areas / np.maximum(kept, np.finfo(float).tiny))[pieces.labels]
         triangles = pieces.triangles[faces]
         places = triangles.mean(axis=1)
-        return cls(places, unit(area_vectors(triangles)), areas[faces], pieces.labels[faces], spacing(places))
+        normals, none = unit(area_vectors(triangles)), np.zeros(len(faces))
+        return cls(places, normals, areas[faces], pieces.labels[faces], spacing(places), none)
 
     @cached_property
     def tree(self) -> BoxTree:
@@ -296,7 +302,9 @@ class Dipoles:
         """The system of some of the pieces, numbered anew."""
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
-        return Dipoles(self.places[rows], self.normals[rows], self.areas[rows], owners, self.softening[rows])
+        values = (self.places, self.normals, self.areas, self.softening, self.within)
+        places, normals, areas, softening, within = (array[rows] for array in values)
+        return Dipoles(places, normals, areas, owners, softening, within)
 
     def weights(self) -> NDArray[np.float64]:
         """(k,) weights after some steps of conjugate gradients."""
@@ -305,10 +313,10 @@ class Dipoles:
         held = HELD * np.bincount(self.owners, shares)
 
         def system(weights: NDArray[np.float64]) -> NDArray[np.float64]:
-            return self._adjoint(shares * self.levels(weights)) + smooth @ weights + held * weights
+            return self._adjoint(shares * self._numbers(weights)) + smooth @ weights + held * weights
 
         weights = np.zeros(len(held))
-        rest = self._adjoint(0.5 * shares)
+        rest = self._adjoint((0.5 + self.within) * shares)
         inverse = 1.0 / np.maximum(smooth.diagonal() + held, np.finfo(float).tiny)
         ahead = way = inverse * rest
         steep = float(rest @ ahead)
@@ -322,7 +330,11 @@ class Dipoles:
         return weights
 
     def levels(self, signs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) levels at the places."""
+        """(n,) levels at the places, less the bodies around them."""
+        return self._numbers(signs) - self.within
+
+    def _numbers(self, signs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) winding numbers at the places, of all other dipoles."""
         vectors = self.normals * (self.areas * signs[self.owners])[:, None]
         nodes = self._sums(vectors)
         (sums,) = in_chunks(

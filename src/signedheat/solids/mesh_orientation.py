@@ -15,8 +15,9 @@ from ..frozen import Frozen
 from ..reprs import ShortRepr
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
-from .bounding import Bounding, Nesting, bounding
+from .bounding import Bounding, bounding
 from .chain import Chain
+from .overlaps import Nesting
 
 Mesh = TriangleMesh | PolygonMesh
 

@@ -20,9 +20,9 @@ from ..surfaces.point_cloud import PointCloud
 from ..tets.tet_field import TetField
 from ..tets.tet_mesh import TetMesh
 from ..validation import positive_number
-from .bounding import Nesting
 from .completion import Completing, Completion, Lids, completed
 from .heat_surfaces import Heat
+from .overlaps import Nesting
 from .solid import Solid
 
 
