@@ -39,6 +39,7 @@ from .solids.implicit_surfaces import contour
 from .solids.mesh_orientation import orientation
 from .solids.sampling import sample
 from .solids.solid import Solid
+from .solids.thickness import thickness
 from .solver import SignedHeatSolver
 from .surfaces.digital_surface import DigitalSurface
 from .surfaces.extrapolation import Extrapolated
@@ -116,5 +117,6 @@ __all__ = [
     "sharpen",
     "signed_distance",
     "tetrahedralize",
+    "thickness",
     "transform",
 ]

@@ -7,6 +7,7 @@ from .solids.deviations import Deviation
 from .solids.holes import FilledMesh, FilledPolygonMesh
 from .solids.mesh_orientation import Orientation
 from .solids.sample_set import Samples
+from .solids.thickness import Thickness
 
 __all__ = [
     "Closest",
@@ -17,4 +18,5 @@ __all__ = [
     "FilledPolygonMesh",
     "Orientation",
     "Samples",
+    "Thickness",
 ]

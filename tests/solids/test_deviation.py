@@ -76,10 +76,40 @@ def test_command(tmp_path, capsys):
     outputs = [str(tmp_path / "deviation.pdf"), str(tmp_path / "deviation.ply")]
     assert main([*words, "--json", "-o", outputs[0], "-o", outputs[1]]) == 0
     said = json.loads(capsys.readouterr().out)
-    assert said["within"] == 1.0 and said["percentiles"]["50"] == pytest.approx(0.1, abs=0.02)
+    assert (
+        said["within"] == {"0.2": 1.0}
+        and said["units"] is None
+        and said["percentiles"]["50"] == pytest.approx(0.1, abs=0.02)
+    )
     assert said["output"] == outputs and all(Path(each).exists() for each in outputs)
     assert main(words) == 0
-    assert "100.00% within 0.2" in capsys.readouterr().out
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == "within ±0.2: 100.00%" and len(lines) == 12 and lines[2].startswith("+0.1")
+
+
+def test_the_worst_places_are_apart():
+    """Two dents and a bump of known depths: each is named once, the deepest first."""
+    vertices, faces = terrain(HEIGHTS["panel"], 60)
+    scan = vertices.copy()
+    for x, y, depth in ((2, 2, -0.3), (8, 3, 0.2), (5, 8, -0.1)):
+        scan[:, 2] += depth * np.exp(-(((vertices[:, :2] - [x, y]) ** 2).sum(axis=1)) / 0.1)
+    found = sh.deviation(sh.TriangleMesh(scan, faces), (vertices, faces))
+    worst = found.worst(3)
+    np.testing.assert_allclose(found.points[worst][:, :2], [[2, 2], [8, 3], [5, 8]], atol=0.1)
+    np.testing.assert_allclose(found.distances[worst], [-0.3, 0.2, -0.1], rtol=0.1)
+
+
+def test_files_in_different_units_are_brought_into_one(tmp_path, capsys):
+    """A scan in metres, as in GLB, and a part without a unit, in millimetres."""
+    box((0, 0, 0), (0.02, 0.02, 0.0101)).to_trimesh().export(tmp_path / "scan.glb")
+    sh.save(box((0, 0, 0), (20, 20, 10)), tmp_path / "part.stl")
+    words = ["deviation", str(tmp_path / "scan.glb"), str(tmp_path / "part.stl"), "--units", "mm", "--json"]
+    assert main(words) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["units"] == "mm" and said["worst"][0]["deviation"] == pytest.approx(0.1, rel=1e-4)
+    assert main(["union", *words[1:3], "-o", str(tmp_path / "both.stl"), "--units", "m:mm"]) == 0
+    out = capsys.readouterr().out
+    assert "mm³" in out and float(out.split("volume ")[1].split()[0]) == pytest.approx(20_000**2 * 10_000, rel=1e-6)
 
 
 def terrain(height, n=24):

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, cast
 
+import numpy as np
+
 from ..constraints import Constraint, ZeroSet
 from ..distances import grid_around, plain_distance
 from ..errors import FileFormatError, InexactWarning, SignedHeatError
@@ -18,6 +20,7 @@ from ..io.field_files import BAND_FORMATS
 from ..io.files import distinct_names, extension
 from ..io.key_figures import describe, shape_figures
 from ..io.numpy_files import write_npz
+from ..io.scenes import METRES, scale_to, unit_of
 from ..io.shape_files import read, save
 from ..io.voxel_files import LABEL_FORMATS, read_labels
 from ..kinds import ShapeLike
@@ -32,6 +35,7 @@ from ..solids.watertight import closed_surface, faults_of, figures_of
 from ..solver import checked
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..transforms import transform
 from ..validation import positive_number, whole_number
 from .inputs import Input
 
@@ -243,6 +247,9 @@ class Watertight:
         Move and scale the samples into the unit sphere.
     label : float, optional
         In an image of labels, take the voxels with this label, in the coordinates of the image.
+    units : str, optional
+        Unit of all lengths, such as ``"mm"``, to which files that state theirs are scaled; those that do not are in it
+        already, or, with ``"inch:mm"``, in inches.
 
     Examples
     --------
@@ -264,6 +271,7 @@ class Watertight:
     samples: int | None = None
     normalize: bool = False
     label: float | None = None
+    units: str | None = None
 
     def __post_init__(self) -> None:
         if self.samples is not None:
@@ -272,6 +280,9 @@ class Watertight:
             positive_number(self.thickness, "thickness")
         if self.tolerance is not None:
             positive_number(self.tolerance, "tolerance")
+        for unit in (self.units or "m").split(":"):
+            if unit not in METRES:
+                raise SignedHeatError(f"{unit!r} is no unit", element="units", remedy=f"use {', '.join(METRES)}")
 
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
         """Write the closed mesh of one shape to a file that begins with `stem`; return figures and all notes."""
@@ -279,7 +290,11 @@ class Watertight:
             image = read_labels(path)
             solid = complete(image.to_world(image.surface(self.label)))
         else:
-            solid = complete(read(path))
+            shape = read(path)
+            if self.units is not None:
+                scale = scale_to(path, self.units)
+                shape = transform(shape, np.diag([scale, scale, scale, 1.0]))  # type: ignore[arg-type]
+            solid = complete(shape)
         names = ("thickness", "contoured", "tolerance", "resolution", "spacing")
         options = {name: getattr(self, name) for name in names}
         with warnings.catch_warnings(record=True) as caught:
@@ -297,4 +312,5 @@ class Watertight:
             write_npz(f"{stem}_sdf.npz", **around)
         notes = [str(note) for note in solid.diagnostics.notes] + [str(warning.message) for warning in caught]
         figures = figures_of(surface, solid, 0.5 * (self.thickness or 0.0))
-        return {"way": way, **figures, **faults, "notes": notes}
+        units = unit_of(path) if self.units is None else self.units.rpartition(":")[2]
+        return {"way": way, **figures, **faults, "units": units, "notes": notes}

@@ -23,6 +23,7 @@ from .options import (
     SAMPLING,
     SCHEDULER,
     STEPS,
+    UNITS_OPTION,
     Summary,
     check_grid,
     command,
@@ -136,7 +137,7 @@ def check_watertight(arguments: Namespace) -> None:
     "elsewhere the surface is contoured with its edges and corners. Sheets are refused unless they are given a "
     "thickness.",
     output("a file for one shape; or a folder for the files of many, and manifest.jsonl"),
-    *(*MANY, LABEL),
+    *(*MANY, LABEL, UNITS_OPTION),
     option("--thickness", type=positive, metavar="D", help="of the solids around sheets"),
     option("--contour", action="store_true", help="contour everything: even triangles in place of few"),
     option("--tolerance", type=positive, metavar="D", help="fewer triangles, no farther away than this (manifold3d)"),
@@ -165,6 +166,7 @@ def watertight(arguments: Namespace) -> Summary:
         samples=arguments.sample,
         normalize=arguments.normalize,
         label=arguments.label,
+        units=arguments.units,
     )
     if names_surface(arguments.output):
         return one_watertight(arguments, job)
@@ -210,11 +212,13 @@ def in_words(figures: dict[str, object]) -> str:
     """Describe the figures of a closed mesh in one line."""
     bodies, openings, meeting = (figures[key] for key in ("bodies", "openings", "self_intersections"))
     bad_edges = f"{figures['bad_edges']} edges that two faces do not share, " if figures["bad_edges"] else ""
+    unit = "" if figures["units"] is None else f" {figures['units']}"
+    volume = f"{figures['volume']:.4g}{unit}{'³' if unit else ''}"
     share = 100 * float(str(figures["completed_area"])) / max(float(str(figures["area"])), 1e-300)
     return (
-        f"{bodies} {'body' if bodies == 1 else 'bodies'}, volume {figures['volume']:.4g}, {figures['faces']} faces, "
+        f"{bodies} {'body' if bodies == 1 else 'bodies'}, volume {volume}, {figures['faces']} faces, "
         f"{openings} {'opening' if openings == 1 else 'openings'} completed ({share:.2g} % of the area), "
-        f"{figures['to_faces']:.2g} from the faces and {figures['from_faces']:.2g} back at most, "
+        f"{figures['to_faces']:.2g}{unit} from the faces and {figures['from_faces']:.2g}{unit} back at most, "
         f"{bad_edges}{meeting or 'no'} self-intersections; {figures['way']}"
     )
 

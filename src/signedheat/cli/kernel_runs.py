@@ -19,7 +19,7 @@ from ..sharpening_methods import Convex, Geodesic
 from ..solids.completion import complete
 from ..solids.mesh_orientation import orientation
 from ..solids.sampling import sample
-from ..solids.thickness import thickness
+from ..solids.thickness import widths
 from ..solver import SignedHeatSolver
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.intrinsic_triangulation import intrinsic_delaunay
@@ -53,7 +53,7 @@ def reports() -> None:
     """What `info` and pictures take."""
     ball = samples.sphere(2)
     inspect(ball)
-    thickness(orientation(ball).shape)
+    widths(orientation(ball).shape)
     draw_shape(ball, new_figure(1, 1).add_subplot(1, 1, 1))
 
 

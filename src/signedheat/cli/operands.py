@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..curves.drawings import distance_to_lines
 from ..diagnostics import Diagnostics, SampledSource
@@ -36,12 +36,12 @@ from ..io.field_files import VALUE_FORMATS, save_with_values
 from ..io.files import contents, distinct_names, extension
 from ..io.image_files import CONFIDENCE, NIFTI
 from ..io.key_figures import describe as describe
-from ..io.scenes import METRES, unit_of
+from ..io.scenes import scale_to, unit_of
 from ..io.solid_arrays import holds_solid
 from ..io.voxel_files import LabelImage, read_labels
 from ..memory import refuse_beyond_memory
 from ..progress import Progress, within
-from ..solids.completion import Completion, completed
+from ..solids.completion import Completion, complete, completed
 from ..solids.heat_surfaces import Heat
 from ..solids.solid_distance import completed_distance
 from ..surfaces.digital_surface import DigitalSurface
@@ -80,39 +80,70 @@ def read_source(arguments: Namespace, path: str | None = None) -> Any:
     if is_planar(path):
         if arguments.transform is not None:
             raise SourceError("a matrix moves shapes in space, and not drawings", element="--transform", path=path)
-        scale = 1.0 if arguments.units is None else unit_scale(arguments)
+        scale = 1.0 if arguments.units is None else unit_scale(arguments, path)
         return [Polyline(scale * line.points, line.closed) for line in read_polylines(path)]
     shape = read(path)
     if isinstance(shape, DigitalSurface):
         shape = shape.smooth_surface
-    matrix = placement(arguments)
+    matrix = placement(arguments, path)
     with prefix_errors(path):
         return shape if matrix is None else transform(shape, matrix)
 
 
-def placement(arguments: Namespace) -> NDArray[np.float64] | None:
+def unit_in_use(arguments: Namespace, *paths: str) -> str | None:
+    """The unit of the lengths that a command prints and writes: of ``--units``, or of its files; None if nobody says.
+
+    Where only some files state one, or they state different ones, the first counts for all.
+    """
+    if arguments.units is None:
+        stated = [unit_of(path) for path in paths]
+        if len(set(stated)) == 1:
+            return stated[0]
+        arguments.units = next(filter(None, stated))
+    return str(arguments.units.rpartition(":")[2])
+
+
+def named(unit: str | None, power: str = "") -> str:
+    """A unit after a length, or ``power="³"`` after a volume; nothing if it is unknown."""
+    return "" if unit is None else f" {unit}{power}"
+
+
+def place(coordinates: Iterable[float]) -> str:
+    """A place, in a line."""
+    return f"({', '.join(f'{x:.4g}' for x in coordinates)})"
+
+
+def solid_of(arguments: Namespace, path: str) -> Any:
+    """The shape in a file, completed as the options say; what matters about it goes to standard error."""
+    repair = {name: getattr(arguments, name) for name in ("as_oriented", "keep_overlaps", "lids", "nested")}
+    with prefix_errors(path), ProgressBar(is_quiet(arguments)) as progress:
+        solid = complete(read_source(arguments, path), **repair, progress=progress)
+    say_important(arguments, solid.diagnostics, path)
+    return solid
+
+
+def placement(arguments: Namespace, path: str) -> Floats | None:
     """The map of ``--units`` and ``--transform``, units first; None if neither is given."""
     if arguments.units is None and arguments.transform is None:
         return None
     matrix = np.eye(4)
     if arguments.units is not None:
-        matrix[:3] *= unit_scale(arguments)
+        matrix[:3] *= unit_scale(arguments, path)
     if arguments.transform is not None:
         matrix = matrix_of(arguments.transform) @ matrix
     return matrix
 
 
-def unit_scale(arguments: Namespace) -> float:
+def unit_scale(arguments: Namespace, path: str) -> float:
     """What ``--units`` multiplies lengths by: 1 where neither it nor the file names the units that the file is in."""
-    own, _, wanted = arguments.units.rpartition(":")
-    own = own or unit_of(arguments.shape)
-    if own is None and not is_quiet(arguments):
-        cause = f"{printable(arguments.shape)} does not say its units"
+    assumed, _, wanted = arguments.units.rpartition(":")
+    if not assumed and unit_of(path) is None and not is_quiet(arguments):
+        cause = f"{printable(path)} does not say its units"
         say(f"signedheat: {cause}: taken as {wanted} (else --units inch:{wanted})")
-    return METRES[own or wanted] / METRES[wanted]
+    return scale_to(path, arguments.units)
 
 
-def matrix_of(words: list[str]) -> NDArray[np.float64]:
+def matrix_of(words: list[str]) -> Floats:
     """(4, 4) from 16 or 12 numbers, row by row, or from a text file that has them."""
     if len(words) == 1:
         words = contents(words[0])[:10_000].decode("utf-8", "replace").replace(",", " ").split()
@@ -231,9 +262,9 @@ def hint(field: GridField) -> str:
     )
 
 
-def range_in_words(summary: dict[str, Any]) -> str:
+def range_in_words(summary: dict[str, Any], unit: str | None) -> str:
     """The least and the greatest value of a field that `describe` described."""
-    return f"φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}"
+    return f"φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}{named(unit)}"
 
 
 def on_tets(arguments: Namespace) -> tuple[Any, TetField]:

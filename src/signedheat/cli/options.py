@@ -305,15 +305,16 @@ LABEL = option(
     help="in an image of labels (.nrrd .nii .nii.gz .vti .npy), take the voxels with this one; the result has the "
     "coordinates of the image",
 )
+UNITS_OPTION = option(
+    "--units",
+    type=units,
+    metavar="[FROM:]TO",
+    help="units of all numbers: mm, cm, m, inch, foot, micron; FROM: units of files that do not state theirs, as .3mf, "
+    ".glb and .step do",
+)
 PLACE = group(
     "place of the shape (by default that of the file, in its units)",
-    option(
-        "--units",
-        type=units,
-        metavar="[FROM:]TO",
-        help="units of all numbers: mm, cm, m, inch, foot, micron; FROM: units of the file, if they differ and it does "
-        "not state them, as .3mf and .glb do",
-    ),
+    UNITS_OPTION,
     option("--transform", nargs="+", metavar="M", help="16 numbers of a matrix by rows, or 12, or a file of them"),
 )
 ROOM = group(

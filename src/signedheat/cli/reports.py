@@ -28,7 +28,7 @@ from ..mesh.triangles import face_areas
 from ..mesh.welding import indexed
 from ..solids.mesh_orientation import Orientation, orientation
 from ..solids.solid import Solid
-from ..solids.thickness import Thickness, thickness
+from ..solids.thickness import Widths, widths
 from ..solids.tiles import BYTES_AT_WORK, BYTES_PER_NODE
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.source_segments import segments_of
@@ -74,9 +74,9 @@ def report(file: str, arguments: Namespace) -> Summary:
     if solid is not None and solid.bounding.any():
         outwards = TriangleMesh(*indexed(solid.outward))
     if outwards is not None:
-        widths = thickness(outwards)
-        summary["thickness"] = {**asdict(widths), "spacing": widths.spacing}
-        rows |= _widths_text(widths)
+        measured = widths(outwards)
+        summary["thickness"] = {**asdict(measured), "spacing": measured.spacing}
+        rows |= _widths_text(measured)
     extra: dict[str, object] = {"memory_bytes": {str(n): _memory(shape, n) for n in arguments.resolution}}
     extra["least_spacing"] = _least_spacing(shape)
     summary |= extra
@@ -287,7 +287,7 @@ def _count(number: int, name: str) -> str:
     return f"{number} {name}" if number == 1 else f"{number} {name}s"
 
 
-def _widths_text(widths: Thickness) -> dict[str, str]:
+def _widths_text(widths: Widths) -> dict[str, str]:
     rows = {}
     for name, least, typical in (
         ("thinnest wall", widths.wall, widths.typical_wall),
@@ -295,6 +295,9 @@ def _widths_text(widths: Thickness) -> dict[str, str]:
     ):
         if least is not None:
             rows[name] = f"{least:.4g}" + (f" (typical {typical:.4g})" if typical is not None else "")
+    if widths.thinnest is not None and widths.thinnest_place is not None:
+        place = ", ".join(f"{x:.4g}" for x in widths.thinnest_place)
+        rows["thinnest place"] = f"{widths.thinnest:.4g} at ({place})"
     if widths.spacing is not None:
         rows["spacing they need"] = f"{widths.spacing:.4g}"
     return rows

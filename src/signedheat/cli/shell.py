@@ -18,7 +18,7 @@ from .late_imports import compiled, kernel_runs, parallel
 from .options import Command, Summary, command, is_quiet
 from .solid_commands import contour, fill, intersect, morph, offset, sample, subtract, union, volume
 from .terminal import ProgressBar, say
-from .view_commands import demo, deviation, info, view
+from .view_commands import demo, deviation, info, thickness, view
 
 TICK = 0.5
 """Seconds after which the progress of compiling is drawn again."""
@@ -91,6 +91,7 @@ COMMANDS: tuple[Command, ...] = (
         subtract,
         sample,
         deviation,
+        thickness,
         batch,
     ),
     *(info, view, demo, warmup),

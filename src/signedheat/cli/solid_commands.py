@@ -27,6 +27,7 @@ from .options import (
     STEPS,
     SURFACES,
     TILES,
+    UNITS_OPTION,
     Command,
     Summary,
     check_grid,
@@ -36,7 +37,6 @@ from .options import (
     format_option,
     group,
     is_planar,
-    is_quiet,
     option,
     output,
     positive,
@@ -44,7 +44,6 @@ from .options import (
     shape_option,
     whole_number,
 )
-from .terminal import ProgressBar
 
 DISTANCES = {
     "dilate": (1, 1),
@@ -99,10 +98,12 @@ def volume(arguments: Namespace) -> Summary:
         image.save(field, arguments.output)
     if arguments.preview:
         sh.view.save_slices(field, arguments.preview, shape)
+    unit = shapes.unit_in_use(arguments, arguments.shape)
     summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), **shapes.place_of(image)}
+    summary["units"] = unit
     nodes = " × ".join(map(str, field.grid.shape))
     there = "" if arguments.band is None else f" ({summary['nodes']:,} of them there)"
-    text = f"{printable(arguments.output)}: {nodes} nodes{there}, {shapes.range_in_words(summary)}"
+    text = f"{printable(arguments.output)}: {nodes} nodes{there}, {shapes.range_in_words(summary, unit)}"
     return summary, text + shapes.hint(field)
 
 
@@ -114,9 +115,10 @@ def _on_tets(arguments: Namespace) -> Summary:
     field.save(arguments.output)
     if arguments.preview:
         sh.view.save_slices(field, arguments.preview, shape)
-    n_tets = field.mesh.n_tets
+    n_tets, unit = field.mesh.n_tets, shapes.unit_in_use(arguments, arguments.shape)
     summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), "n_tets": n_tets}
-    return summary, f"{printable(arguments.output)}: {n_tets} tets, {shapes.range_in_words(summary)}"
+    summary["units"] = unit
+    return summary, f"{printable(arguments.output)}: {n_tets} tets, {shapes.range_in_words(summary, unit)}"
 
 
 def check_offset(arguments: Namespace) -> None:
@@ -165,9 +167,16 @@ def offset(arguments: Namespace) -> Summary:
         {"distance": distance, "output": path, **shapes.counts(what)}
         for distance, path, what in zip(arguments.distances, outputs, found, strict=True)
     ]
-    kind = "{lines} lines ({closed} closed), length {length:.6g}" if planar else "closed surface, {faces} faces"
-    text = "\n".join(f"{w['output']}: at {w['distance']:+g}, {kind.format(**w)}" for w in written)
-    summary = {"input": arguments.shape, "lines" if planar else "surfaces": written, "field": shapes.describe(field)}
+    unit = shapes.unit_in_use(arguments, arguments.shape)
+    kind = f"{{lines}} lines ({{closed}} closed), length {{length:.6g}}{shapes.named(unit)}"
+    kind = kind if planar else "closed surface, {faces} faces"
+    text = "\n".join(f"{w['output']}: at {w['distance']:+g}{shapes.named(unit)}, {kind.format(**w)}" for w in written)
+    summary = {
+        "units": unit,
+        "input": arguments.shape,
+        "lines" if planar else "surfaces": written,
+        "field": shapes.describe(field),
+    }
     return summary | shapes.place_of(image), text + shapes.hint(field)
 
 
@@ -283,16 +292,12 @@ def combined(combine: Callable[[sh.Solid, sh.Solid], sh.Solid], arguments: Names
     """Check that the result can be written, read and complete each shape, combine, write."""
     path = arguments.output
     sh.io.ensure_writable(path, (sh.io.SHAPE_FORMATS | {".npz"}) - {".xyz", ".pc"}, "a surface or a solid")
-    repair = {name: getattr(arguments, name) for name in ("as_oriented", "keep_overlaps", "lids", "nested")}
-    solids = []
-    for file in arguments.files:
-        with shapes.prefix_errors(file), ProgressBar(is_quiet(arguments)) as progress:
-            solids.append(sh.complete(shapes.read_source(arguments, file), **repair, progress=progress))
-        shapes.say_important(arguments, solids[-1].diagnostics, file)
-    result = reduce(combine, solids)
+    unit = shapes.unit_in_use(arguments, *arguments.files)
+    result = reduce(combine, [shapes.solid_of(arguments, file) for file in arguments.files])
     result.save(path)
-    figures = {"volume": result.volume, "area": result.area}
-    text = f"{printable(path)}: volume {figures['volume']:.6g}, area {figures['area']:.6g}"
+    text = f"{printable(path)}: volume {result.volume:.6g}{shapes.named(unit, '³')}"
+    text += f", area {result.area:.6g}{shapes.named(unit, '²')}"
+    figures = {"volume": result.volume, "area": result.area, "units": unit}
     return {"inputs": arguments.files, "output": path, **figures}, text
 
 
@@ -303,8 +308,9 @@ def combining(name: str) -> Command:
         name,
         help,
         f"A closed surface around {help}, broken or not. Faces are kept, and cut where they cross.",
-        option("files", metavar="SHAPE", nargs="+", help="surfaces or oriented points, in one place and units; .npz"),
+        option("files", metavar="SHAPE", nargs="+", help="surfaces or oriented points, in one place; solids: .npz"),
         output(f"{SURFACES}; solid: .npz"),
+        UNITS_OPTION,
         REPAIR,
         format_option("stl"),
         check=check_combined,

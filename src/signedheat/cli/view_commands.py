@@ -1,4 +1,4 @@
-"""Commands that report and draw: `info`, `view`, `deviation` and `demo`."""
+"""Commands that report and draw: `info`, `view`, `deviation`, `thickness` and `demo`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,19 @@ from ..errors import FileFormatError, MissingPackageError, SignedHeatError, prin
 from ..jobs import run_limited
 from .late_imports import inputs, inspection, reports, samples
 from .late_imports import operands as shapes
-from .options import UP, Summary, command, is_quiet, option, positive, whole_number
+from .options import (
+    PLACE,
+    REPAIR,
+    UNITS_OPTION,
+    UP,
+    Option,
+    Summary,
+    command,
+    is_quiet,
+    option,
+    positive,
+    whole_number,
+)
 from .terminal import ProgressBar, say, say_error
 
 PATIENCE = 5.0
@@ -164,62 +176,104 @@ def shape_or_field(path: str) -> Any:
     return shape
 
 
-def check_deviation(arguments: Namespace) -> None:
-    """Take SCAN and NOMINAL from the end of the outputs if they follow ``-o``; exit if they are missing."""
-    shapes_named = [name for name in (arguments.scan, arguments.nominal) if name is not None]
-    missing = 2 - len(shapes_named)
+def outputs(help: str) -> Option:
+    """The option that names any number of outputs."""
+    return option("-o", "--output", metavar="OUT", nargs="+", action="extend", default=[], help=help)
+
+
+def take_inputs(arguments: Namespace, *names: str) -> None:
+    """Take inputs that follow ``-o`` from the end of the outputs; exit if some are missing."""
+    given = [getattr(arguments, name) for name in names if getattr(arguments, name) is not None]
+    missing = len(names) - len(given)
     if missing:
-        shapes_named += arguments.output[-missing:]
+        given += arguments.output[-missing:]
         del arguments.output[-missing:]
-    if len(shapes_named) != 2:
-        arguments.parser.error("the following arguments are required: SCAN, NOMINAL")
-    arguments.scan, arguments.nominal = shapes_named
+    if len(given) != len(names):
+        arguments.parser.error(f"the following arguments are required: {', '.join(names).upper()}")
+    vars(arguments).update(zip(names, given, strict=True))
 
 
 @command(
     "deviation",
     "deviation of a scan from a nominal part",
-    "Signed distances of a scan's points to a nominal part, positive outside: percentiles, and optionally the scan in "
-    "colours, a picture with a histogram, or a table. The scan must be aligned with the part.",
+    "Signed distances of a scan's points to a nominal part, positive outside: percentiles, shares within tolerances, "
+    "the worst places, and optionally the scan in colours, a picture with a histogram, or a table. The scan must be "
+    "aligned with the part.",
     option(
         "scan", metavar="SCAN", nargs="?", help="mesh or points: .stl .obj .ply .off .vtp .glb .xyz .pcd .las .laz .e57"
     ),
     option("nominal", metavar="NOMINAL", nargs="?", help="the part as it should be, broken or not, also .step"),
+    outputs("any of: coloured .ply, picture .png .pdf .svg .jpg, table .csv"),
     option(
-        "-o",
-        "--output",
-        metavar="OUT",
-        nargs="+",
-        action="extend",
-        default=[],
-        help="any of: coloured .ply, picture .png .pdf .svg .jpg, table .csv",
+        "--tolerance", type=positive, metavar="T", action="append", default=[], help="share of points within; again"
     ),
-    option("--tolerance", type=positive, metavar="T", help="report the share of points within this distance"),
-    check=check_deviation,
-    usage="SCAN NOMINAL [-o OUT ...] [--tolerance T]",
+    option("--worst", type=whole_number(0), metavar="N", default=10, help="list the places that are farthest off (10)"),
+    UNITS_OPTION,
+    check=lambda arguments: take_inputs(arguments, "scan", "nominal"),
+    usage="SCAN NOMINAL [-o OUT ...] [--tolerance T ...]",
 )
 def deviation(arguments: Namespace) -> Summary:
     """Read, check that the result can be written, measure, write."""
     for output in arguments.output:
         sh.io.ensure_writable(output, sh.view.DEVIATION_FORMATS, "deviations")
-    scan, nominal = sh.read(arguments.scan), sh.read(arguments.nominal)
+    unit = shapes.unit_in_use(arguments, arguments.scan, arguments.nominal)
+    scan, nominal = (shapes.read_source(arguments, path) for path in (arguments.scan, arguments.nominal))
     with shapes.prefix_errors(arguments.nominal), ProgressBar(is_quiet(arguments)) as progress:
-        deviations = sh.deviation(scan, nominal, progress)
-    summary: dict[str, Any] = {"scan": arguments.scan, "nominal": arguments.nominal, **deviations.figures}
-    low, median, high = deviations.percentiles((1, 50, 99))
-    n_points = len(deviations.of_surface)
-    text = f"{printable(arguments.scan)}: {n_points} points, 98 % of them {low:.4g} to {high:.4g} off "
-    text += f"{arguments.nominal}, median {median:.4g}, root mean square {deviations.rms:.4g}"
-    if arguments.tolerance is not None:
-        share = deviations.within(arguments.tolerance)
-        summary |= {"tolerance": arguments.tolerance, "within": share}
-        text += f", {share:.2%} within {arguments.tolerance:g}"
-    if deviations.beyond_rim.any():
-        text += f"; {summary['beyond_rim']:.2%} beyond its rim"
+        found = sh.deviation(scan, nominal, progress)
+    low, median, high = found.percentiles((1, 50, 99))
+    worst = [
+        {"deviation": float(found.distances[k]), "at": found.points[k].tolist()} for k in found.worst(arguments.worst)
+    ]
+    summary: dict[str, Any] = {"scan": arguments.scan, "nominal": arguments.nominal, **found.figures}
+    summary |= {"units": unit, "within": {f"{t:g}": found.within(t) for t in arguments.tolerance}, "worst": worst}
+    lines = [
+        f"{printable(arguments.scan)}: {len(found.of_surface)} points, 98 % of them {low:.4g} to {high:.4g}"
+        f"{shapes.named(unit)} off {printable(arguments.nominal)}, median {median:.4g}, "
+        f"root mean square {found.rms:.4g}"
+    ]
+    if found.beyond_rim.any():
+        lines[0] += f"; {summary['beyond_rim']:.2%} beyond its rim"
+    lines += [f"within ±{t}{shapes.named(unit)}: {share:.2%}" for t, share in summary["within"].items()]
+    lines += [f"{row['deviation']:+.4g}{shapes.named(unit)} at {shapes.place(row['at'])}" for row in worst]
     for output in arguments.output:
-        deviations.save(output)
-        text += f"; {output}"
-    return summary | {"output": arguments.output}, text
+        found.save(output)
+    lines += [printable(output) for output in arguments.output]
+    return summary | {"output": arguments.output}, "\n".join(lines)
+
+
+@command(
+    "thickness",
+    "thickness of walls, and where they are thinnest",
+    "The diameter of the largest ball behind each place of a shape, broken or not: the thickness of walls. Optionally "
+    "the shape in colours, arrays, or a picture.",
+    option("shape", metavar="SHAPE", nargs="?", help="surface or oriented points: .stl .obj .ply .off .vtp .glb .3mf"),
+    outputs("any of: coloured .ply, arrays .npz, picture .png .pdf .svg .jpg"),
+    option("--least", type=positive, metavar="T", help="report how much of the area has thinner walls"),
+    option("--resolution", type=whole_number(1), metavar="N", help="values along the longest side (64)"),
+    PLACE,
+    REPAIR,
+    check=lambda arguments: take_inputs(arguments, "shape"),
+    usage="SHAPE [-o OUT ...] [--least T] [options]",
+)
+def thickness(arguments: Namespace) -> Summary:
+    """Check that the result can be written, read, complete, measure, write."""
+    for output in arguments.output:
+        sh.io.ensure_writable(output, sh.view.THICKNESS_FORMATS, "thickness")
+    solid, unit = shapes.solid_of(arguments, arguments.shape), shapes.unit_in_use(arguments, arguments.shape)
+    with shapes.prefix_errors(arguments.shape):
+        found = sh.thickness(solid, resolution=arguments.resolution or 64)
+        least, place = found.thinnest
+    low, median, high = found.percentiles([5.0, 50.0, 95.0]).tolist()
+    summary: dict[str, Any] = {"input": arguments.shape, "output": arguments.output, "units": unit}
+    summary |= {"thinnest": least, "at": place.tolist(), "percentiles": {"5": low, "50": median, "95": high}}
+    text = f"{printable(arguments.shape)}: thinnest {least:.4g}{shapes.named(unit)} at {shapes.place(place)}; "
+    text += f"90 % of the area {low:.4g} to {high:.4g}, median {median:.4g}"
+    if arguments.least is not None:
+        summary["below"] = found.below(arguments.least)
+        text += f"; {summary['below']:.2%} thinner than {arguments.least:g}"
+    for output in arguments.output:
+        found.save(output)
+    return summary, "\n".join([text, *map(printable, arguments.output)])
 
 
 @command(

@@ -13,7 +13,7 @@ from ..grids.grid_field import GridField
 from ..inspection import inspect
 from ..kinds import Shape
 from ..solids.mesh_orientation import orientation
-from ..solids.thickness import thickness
+from ..solids.thickness import widths
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -61,7 +61,7 @@ def shape_figures(shape: Shape) -> dict[str, object]:
     figures: dict[str, object] = {"kind": type(shape).__name__, **asdict(inspect(counted))}
     if isinstance(shape, TriangleMesh | PolygonMesh):
         found = orientation(shape)
-        widths = thickness(found.shape)
+        found_widths = widths(found.shape)
         figures["orientation"] = found.summary
-        figures["thickness"] = {**asdict(widths), "spacing": widths.spacing}
+        figures["thickness"] = {**asdict(found_widths), "spacing": found_widths.spacing}
     return figures

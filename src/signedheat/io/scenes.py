@@ -96,9 +96,12 @@ def read_3mf(path: PathLike) -> TriangleMesh:
 
 
 def unit_of(path: PathLike) -> str | None:
-    """The unit of length of a file: what a 3MF file says, metres in glTF; None where formats do not say."""
-    if extension(path) in (".glb", ".gltf"):
-        return "m"
+    """The unit of length of a file: what a 3MF file says, metres in glTF; None where formats do not say.
+
+    Of STEP millimetres, since it is read so whatever it says.
+    """
+    if extension(path) in (".glb", ".gltf", ".step", ".stp"):
+        return "mm" if extension(path).startswith(".st") else "m"
     if extension(path) != ".3mf":
         return None
     with reading(path):
@@ -107,6 +110,15 @@ def unit_of(path: PathLike) -> str | None:
         if unit not in METRES:
             raise damaged(f"it has the unit '{unit}', which 3MF does not know")
         return unit
+
+
+def scale_to(path: PathLike, units: str) -> float:
+    """What multiplies the lengths of a file, so that they are in TO of the units ``TO`` or ``FROM:TO``.
+
+    Files that do not state their unit are in FROM, or in TO already.
+    """
+    assumed, _, wanted = units.rpartition(":")
+    return METRES[unit_of(path) or assumed or wanted] / METRES[wanted]
 
 
 class _Package:

@@ -1,1 +1,1 @@
-"""What is near or around a place: nearest faces, their features, winding numbers, lines through all faces."""
+"""What is near or around a place: nearest faces, their features, winding numbers."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..errors import SourceError
 from ..foreign import SurfaceShape, as_shape
 from ..frozen import Frozen
@@ -29,7 +30,7 @@ from ..tets.tet_mesh import TetMesh
 from .completion import complete
 from .solid import Solid
 
-pictures: Any = lazy_module("signedheat.view.deviation_pictures", "pictures")
+pictures: Any = lazy_module("signedheat.view.measured_pictures", "pictures")
 
 PERCENTILES = (0.0, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 100.0)
 """Percentiles of deviations in summaries."""
@@ -39,6 +40,8 @@ BINS = 40
 """Default number of bins of histograms."""
 OPEN = 0.25
 """Completed share of the surface above which a nominal part is measured as an open surface."""
+APART = 0.05
+"""Distance between the worst places, over the diagonal of the box around a scan, below which they are one."""
 TIE = 1e-9
 """Relative difference below which distances are equal."""
 STRAIGHT = 1 - 1e-6
@@ -74,23 +77,27 @@ class Deviation(Frozen):
     """
 
     scan: PointCloud | TriangleMesh | PolygonMesh
-    distances: NDArray[np.float64]
-    nearest: NDArray[np.float64]
-    completed: NDArray[np.bool_]
-    beyond_rim: NDArray[np.bool_]
+    distances: Floats
+    nearest: Floats
+    completed: Bools
+    beyond_rim: Bools
 
     @property
-    def points(self) -> NDArray[np.float64]:
+    def points(self) -> Floats:
         """(n, 3) positions of the scan's points or vertices."""
         return self.scan.points if isinstance(self.scan, PointCloud) else self.scan.vertices
 
     @cached_property
-    def of_surface(self) -> NDArray[np.float64]:
+    def of_surface(self) -> Floats:
         """(m,) distances of all points, or of the vertices that faces use."""
+        return self.distances[self._ids]
+
+    @cached_property
+    def _ids(self) -> Ints:
+        """(m,) all points, or the vertices that faces use."""
         if isinstance(self.scan, PointCloud):
-            return self.distances
-        corners = self.scan.faces if isinstance(self.scan, TriangleMesh) else self.scan.corners
-        return self.distances[np.unique(corners)]
+            return np.arange(len(self.distances))
+        return np.unique(self.scan.faces if isinstance(self.scan, TriangleMesh) else self.scan.corners)
 
     @property
     def rms(self) -> float:
@@ -125,7 +132,7 @@ class Deviation(Frozen):
         """
         return float((np.abs(self.of_surface) <= tolerance).mean())
 
-    def percentiles(self, percents: ArrayLike = PERCENTILES) -> NDArray[np.float64]:
+    def percentiles(self, percents: ArrayLike = PERCENTILES) -> Floats:
         """Compute percentiles of the deviations.
 
         Parameters
@@ -148,7 +155,7 @@ class Deviation(Frozen):
         """
         return np.asarray(np.percentile(self.of_surface, np.asarray(percents, dtype=np.float64)))
 
-    def histogram(self, bins: int = BINS) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def histogram(self, bins: int = BINS) -> tuple[Ints, Floats]:
         """Count points by deviation; those beyond `extreme` count in the first or last bin.
 
         Parameters
@@ -176,6 +183,35 @@ class Deviation(Frozen):
         inside = np.clip(self.of_surface, -reach, reach)
         counts, limits = np.histogram(inside, bins, (-reach, reach))
         return counts.astype(np.int64), limits
+
+    def worst(self, n: int = 10) -> Ints:
+        """Find the places with the largest deviations, each a twentieth of the scan's size from the others.
+
+        Parameters
+        ----------
+        n : int
+            Number of places at most.
+
+        Returns
+        -------
+        (k,) int
+            Points or vertices, from the largest absolute deviation on.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> scan, part = sh.samples.sphere(2, radius=1.1), sh.samples.sphere(4)
+        >>> off = sh.deviation(scan, part)
+        >>> len(off.worst(3)), bool(abs(off.distances[off.worst(1)[0]]) == abs(off.distances).max())
+        (3, True)
+        """
+        ids = self._ids[np.argsort(-np.abs(self.of_surface), kind="stable")]
+        reach = APART * float(np.linalg.norm(np.ptp(self.points[ids], axis=0)))
+        found: list[int] = []
+        while len(ids) and len(found) < n:
+            found.append(int(ids[0]))
+            ids = ids[np.linalg.norm(self.points[ids] - self.points[ids[0]], axis=1) > reach]
+        return np.array(found, dtype=np.int64)
 
     @property
     def figures(self) -> dict[str, object]:
@@ -303,7 +339,7 @@ def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, Face
     return is_open, FaceFeatures.of(mesh.vertices, _agreeing(mesh)[np.isin(owners, solid.origins[has_sides])])
 
 
-def _agreeing(mesh: TriangleMesh) -> NDArray[np.int64]:
+def _agreeing(mesh: TriangleMesh) -> Ints:
     """(m, 3) faces, turned where most of the area of their component faces the other way."""
     heads = np.roll(mesh.faces, -1, axis=1).ravel()
     ids = welded_vertices(mesh.vertices, mesh.faces.ravel(), heads)
@@ -314,7 +350,7 @@ def _agreeing(mesh: TriangleMesh) -> NDArray[np.int64]:
     return np.where(turned[:, None], faces[:, ::-1], faces)
 
 
-def _beyond_rim(surface: FaceFeatures, front: NearestFaces) -> NDArray[np.bool_]:
+def _beyond_rim(surface: FaceFeatures, front: NearestFaces) -> Bools:
     """(n,) whether the nearest place of a point is on the rim, and the point not straight above or below it."""
     rim_edges = np.bincount(surface.edges.ravel()) == 1
     rim_vertices = np.zeros(len(surface.vertices), dtype=bool)

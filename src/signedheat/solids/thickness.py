@@ -1,49 +1,85 @@
-"""Measure the thickness of walls and the width of gaps of a shape."""
+"""Thickness of walls and width of gaps: diameters of the largest balls that touch a surface without crossing a wall.
+
+At a point of the surface, that ball is tangent from within; it is the local thickness of Hildebrand & Rüegsegger (1997)
+there. Only faces that look the other way count as walls, so that edges and rough faces do not make the ball small. The
+ball through a place q is tangent at p if its diameter is |p − q|² / ((p − q) · n); the least of these is found by
+Dinkelbach's method (1967), each step of which asks for the nearest place to the middle of a ball.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..mesh.triangles import area_vectors
+from ..arrays import Floats, Ints
+from ..compiled import compiled
+from ..errors import SourceError
+from ..frozen import Frozen
+from ..kinds import ShapeLike
+from ..mesh.box_tree import LEAF
+from ..mesh.components import connected_components, sums_of
+from ..mesh.edges import edge_table
+from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import unit
-from ..mesh.welding import same_positions
-from ..search.stabbing_lines import LineCrossings, stabbing_lines
+from ..mesh.welding import indexed
+from ..packages import lazy_module
+from ..parallel import in_chunks
+from ..search.face_tree import FaceTree
+from ..search.nearest_triangles import foot_on_triangle, weights_in
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import positive_number, whole_number
+from .completion import complete
 from .mesh_orientation import Mesh
+from .sampling import evenly_on
 
-N_LINES = 30_000
-"""Number of lines through a shape."""
-N_DIRECTIONS = 8
-"""Number of directions of these lines."""
+pictures: Any = lazy_module("signedheat.view.measured_pictures", "pictures")
+
+N_PLACES = 10_000
+"""Number of places at which walls and gaps of a shape are measured."""
 SHARE = 0.01
 """Quantile of the widths of walls, or gaps, that is reported."""
-OPPOSITE = -0.9
-"""Cosine between the normals of faces below which they are opposite, rather than a wedge."""
+OPPOSITE = -0.5
+"""Cosine between the normals of faces below which they are opposite sides of a wall."""
 COINCIDENT = 1e-6
 """Width, over the largest coordinate, up to which faces coincide but for the rounding of single precision."""
-STEEP = 0.7
-"""Least cosine between a line and the normals at which it measures a width."""
+SMOOTH = np.cos(np.deg2rad(25.0))
+"""Cosine between the normals of two faces above which the surface is smooth across their edge."""
+SLACK = 4e-3
+"""Share of the square of its radius by which a round wall may reach into a ball."""
+FINER = 1e-2
+"""By how much less it may around the place that the ball touches, again and again."""
+SETTLED = 1e-12
+"""The same share for flat walls."""
+STEPS = 60
+"""Most steps towards a diameter."""
 
 
 @dataclass(frozen=True)
-class Thickness:
-    """Walls and gaps of a shape, measured on lines through it, without the least 1 %.
+class Widths:
+    """Walls and gaps of a shape, at places spread evenly over it.
 
     Attributes
     ----------
     wall, gap : float or None
-        First percentile of the thickness of walls and of the width of gaps; None if no faces are opposite, as in a
-        wedge.
+        First percentile of the thickness of walls and of the width of gaps; None if no faces are opposite each other.
     typical_wall, typical_gap : float or None
         Medians.
+    thinnest : float or None
+        Least thickness of all.
+    thinnest_place : (3,) tuple of float, or None
+        Where it is.
     """
 
     wall: float | None
     gap: float | None
     typical_wall: float | None
     typical_gap: float | None
+    thinnest: float | None
+    thinnest_place: tuple[float, ...] | None
 
     @property
     def spacing(self) -> float | None:
@@ -52,12 +88,166 @@ class Thickness:
         return 0.5 * min(widths) if widths else None
 
 
-def thickness(shape: Mesh) -> Thickness:
-    """Measure walls and gaps between faces opposite each other.
+@dataclass(frozen=True, eq=False)
+class Thickness(Frozen):
+    """A map of the thickness of a solid: a value at the middle of each face.
 
-    Lines are laid through the shape. Between a face that a line enters by and the next, by which it leaves, there is a
-    wall; between leaving and entering, a gap. Its width is the way along the line times the mean of the cosines at both
-    ends. Faces that share a vertex are a fold, and have no width between them. Takes O(n) time.
+    Attributes
+    ----------
+    mesh : TriangleMesh
+        What bounds the solid, facing outwards; large faces are cut.
+    values : (m,) float
+        Thickness behind each face, NaN where no wall is opposite.
+    origins : (m,) int
+        Face of the shape that each face is part of; −1 in the completion.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> walls = sh.thickness(sh.samples.sphere(3))
+    >>> walls.percentiles([0, 50, 100]).round(1).tolist(), walls.below(1.5)
+    ([2.0, 2.0, 2.0], 0.0)
+    """
+
+    mesh: TriangleMesh
+    values: Floats
+    origins: Ints
+
+    @cached_property
+    def thinnest(self) -> tuple[float, Floats]:
+        """The least thickness, and (3,) the middle of the face where it is."""
+        if np.isnan(self.values).all():
+            raise SourceError("no wall has an opposite side", remedy="measure a solid", element="thickness")
+        face = int(np.nanargmin(self.values))
+        return float(self.values[face]), self.mesh.vertices[self.mesh.faces[face]].mean(axis=0)
+
+    def below(self, least: float) -> float:
+        """Compute the share of the area where walls are thinner than a length.
+
+        Parameters
+        ----------
+        least : float
+            A length, such as the thinnest wall that a printer makes.
+
+        Returns
+        -------
+        float
+            From 0 to 1.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.thickness(sh.samples.sphere(2)).below(3.0)
+        1.0
+        """
+        areas = self.mesh.face_areas
+        return float(areas[self.values < positive_number(least, "least")].sum() / areas.sum())
+
+    def percentiles(self, percents: Floats | list[float]) -> Floats:
+        """Compute percentiles of the thickness, by area.
+
+        Parameters
+        ----------
+        percents : (k,) float
+            From 0 to 100.
+
+        Returns
+        -------
+        (k,) float
+            Lengths.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.thickness(sh.samples.torus(major=1.0, minor=0.4)).percentiles([50]).round(1).tolist()
+        [0.8]
+        """
+        known = np.flatnonzero(~np.isnan(self.values))
+        order = known[np.argsort(self.values[known])]
+        ends = np.cumsum(self.mesh.face_areas[order])
+        ranks = np.searchsorted(ends, 0.01 * np.asarray(percents, dtype=np.float64) * ends[-1])
+        return self.values[order[np.minimum(ranks, len(order) - 1)]]
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the map to a file, in the format given by its extension.
+
+        Parameters
+        ----------
+        path : str or path
+            ``.ply`` for the faces in colours, thin ones red, with a property ``thickness``; ``.npz`` for arrays
+            ``vertices``, ``faces``, ``thickness`` and ``origins``; ``.png``, ``.pdf``, ``.svg`` or ``.jpg`` for a
+            picture of the outside and the thinnest place.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is unknown, or the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     sh.thickness(sh.samples.sphere(2)).save(f"{folder}/walls.ply")
+        """
+        pictures.save_thickness(self, path)
+
+    def __repr__(self) -> str:
+        if np.isnan(self.values).all():
+            return f"Thickness({len(self.values)} faces, none opposite another)"
+        low, median, high = self.percentiles([0, 50, 100])
+        return f"Thickness({len(self.values)} faces, {low:.3g} to {high:.3g}, median {median:.3g})"
+
+
+def thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
+    """Measure the thickness of a solid behind each of its faces.
+
+    It is the diameter of the largest ball that touches the face from within and crosses no wall: the thickness of slabs
+    and tubes, the diameter of balls and rods. Walls are faces whose normals are more than 120° apart, so that a box has
+    its whole width up to its edges, and what tapers by less than 60° is as thin as it is there.
+
+    Parameters
+    ----------
+    shape : shape or Solid
+        A shape, broken or not; completed here unless it is a solid.
+    resolution : int
+        Faces larger than squares are cut, so many of which are as long as the box around the solid.
+
+    Returns
+    -------
+    Thickness
+        The faces and their values, in the units of the shape.
+
+    Raises
+    ------
+    SourceError
+        If the shape bounds nothing.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> plate = samples.union(samples.sphere(3), samples.sphere(3, radius=0.2, center=(3.0, 0.0, 0.0)))
+    >>> least, place = thickness(plate).thinnest
+    >>> round(least, 1), round(float(place[0])) in (3, 4)
+    (0.4, True)
+    """
+    parts = whole_number(resolution, "resolution", 1)
+    solid = complete(shape)
+    if not solid.bounding.any():
+        raise SourceError("the shape is a sheet, which has no thickness", remedy="thicken it, or close it")
+    largest = float(np.ptp(solid.bounds, axis=0).max()) / parts
+    triangles, owners = _cut(solid.outward, largest)
+    places = triangles.mean(axis=1)
+    walls = solid.bounding[solid.features.ids]
+    facing = np.where(walls[:, None], solid.features.face_normals, 0.0)
+    values, _ = _diameters(solid.tree, facing, places, _normals_at(solid.outward, owners, places))
+    return Thickness(TriangleMesh(*indexed(triangles)), values, solid.origins[solid.bounding][owners])
+
+
+def widths(shape: Mesh) -> Widths:
+    """Measure walls and gaps between faces opposite each other, at places spread evenly over a shape.
+
+    Faces that share a vertex are a fold, and have no width between them.
 
     Parameters
     ----------
@@ -67,42 +257,196 @@ def thickness(shape: Mesh) -> Thickness:
     Examples
     --------
     >>> from signedheat import samples
-    >>> found = thickness(samples.torus(major=1.0, minor=0.4))
-    >>> 0.75 < found.wall < 0.8, 1.0 < found.gap < 1.2
+    >>> found = widths(samples.torus(major=1.0, minor=0.4))
+    >>> 0.77 < found.wall < 0.8, 1.19 < found.gap < 1.22
     (True, True)
     """
     mesh, exponent = shape.triangulation, int(np.frexp(np.abs(shape.bounds).max())[1])
-    corners = np.ldexp(mesh.vertices, -exponent)  # so that no product leaves the range of numbers
-    bounds = np.ldexp(shape.bounds, -exponent)
-    lines = stabbing_lines(corners, mesh.faces, bounds, N_LINES, N_DIRECTIONS)
-    names = same_positions(mesh.vertices)[mesh.faces]
-    (walls, n_walls), (gaps, n_gaps) = (_widths(corners[mesh.faces], names, lines, wall) for wall in (True, False))
-    unit = float(np.ldexp(1.0, exponent))
-    return Thickness(
-        wall=_quantile(walls * unit, SHARE * n_walls),
-        gap=_quantile(gaps * unit, SHARE * n_gaps),
-        typical_wall=_quantile(walls * unit, 0.5 * len(walls)),
-        typical_gap=_quantile(gaps * unit, 0.5 * len(gaps)),
+    triangles = np.ldexp(mesh.vertices, -exponent)[mesh.faces]  # so that no product leaves the range of numbers
+    size = float(np.ldexp(1.0, exponent))
+    triangles = triangles[face_areas(triangles) > 0]
+    if not len(triangles):
+        return Widths(None, None, None, None, None, None)
+    places, faces = evenly_on(triangles, N_PLACES, np.random.default_rng(0))
+    normals, tree = _normals_at(triangles, faces, places), FaceTree.of_triangles(triangles)
+    facing = tree.features.face_normals
+    names, ids = indexed(triangles)[1], tree.features.ids
+    found = []
+    for side in (1.0, -1.0):
+        diameters, touched = _diameters(tree, side * facing, places, side * normals)
+        folds = (names[faces][:, :, None] == names[ids[touched]][:, None, :]).any(axis=(1, 2))
+        found.append(np.where(folds, np.nan, size * diameters))
+    walls, gaps = found
+    thinnest = None if np.isnan(walls).all() else int(np.nanargmin(walls))
+    return Widths(
+        wall=_quantile(walls, SHARE),
+        gap=_quantile(gaps, SHARE),
+        typical_wall=_quantile(walls, 0.5),
+        typical_gap=_quantile(gaps, 0.5),
+        thinnest=None if thinnest is None else float(walls[thinnest]),
+        thinnest_place=None if thinnest is None else tuple((size * places[thinnest]).tolist()),
     )
 
 
-def _widths(
-    triangles: NDArray[np.float64], names: NDArray[np.int64], lines: LineCrossings, wall: bool
-) -> tuple[NDArray[np.float64], int]:
-    """Widths of walls, or gaps, between opposite faces along lines; and how many are crossed in all."""
-    last = np.zeros(len(lines.crossed), dtype=bool)
-    last[lines.starts[1:][np.diff(lines.starts) > 0] - 1] = True
-    here = np.flatnonzero(~last[:-1] & (lines.entering[:-1] == wall) & (lines.entering[1:] != wall))
-    one, other = lines.crossed[here], lines.crossed[here + 1]
-    normals = unit(area_vectors(triangles[one])), unit(area_vectors(triangles[other]))
-    opposite = np.einsum("ij,ij->i", *normals) < OPPOSITE
-    opposite &= np.minimum(lines.cosines[here], lines.cosines[here + 1]) > STEEP
-    widths = (lines.depths[here + 1] - lines.depths[here]) * 0.5 * (lines.cosines[here] + lines.cosines[here + 1])
-    apart = ~(names[one, :, None] == names[other, None, :]).any(axis=(1, 2))
-    apart &= widths > COINCIDENT * np.abs(triangles).max()
-    return widths[opposite & apart], int(apart.sum())
+def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) -> tuple[Floats, Ints]:
+    """(n,) diameters of the largest balls behind (n, 3) places on a surface, away from their unit normals.
+
+    And the face of the tree that each touches.
+
+    `facing` are unit normals of the faces of the tree, zero of those that are no walls. They and `normals` all point
+    out of a solid, or all into it. NaN and face 0 where nothing is opposite.
+    """
+    lower, upper = tree.tree.bounds[1, :3], tree.tree.bounds[1, 3:]
+    extent = float(np.linalg.norm(upper - lower))
+    least = COINCIDENT * float(np.abs(tree.tree.bounds[1]).max())
+
+    ways = _ways(facing, tree.tree.items)
+
+    def measured(at: Floats) -> tuple[Floats, Ints]:
+        """At places, with their normals."""
+        found, touched = np.full(len(at), extent), np.zeros(len(at), dtype=np.int64)
+        rows, boxes = tree.features.rows, tree.tree
+        _descend(rows, facing, boxes.bounds, tree.discs, ways, boxes.items, at, least, found, touched)
+        return found, touched
+
+    found, touched = in_chunks(measured, np.column_stack([places, normals]))
+    return np.where(found < extent, found, np.nan), touched
 
 
-def _quantile(widths: NDArray[np.float64], rank: float) -> float | None:
-    """The width of a rank; None if there are fewer."""
-    return float(np.partition(widths, int(rank))[int(rank)]) if int(rank) < len(widths) else None
+def _ways(normals: Floats, items: Ints) -> Floats:
+    """(2 · leaves, 6) least and greatest components of the normals of all faces below each node of a tree."""
+    own = normals[items].reshape(-1, LEAF, 3)
+    within = np.where((items >= 0).reshape(-1, LEAF, 1), own, 0.0)
+    levels = [np.concatenate([within.min(axis=1), within.max(axis=1)], axis=1)]
+    while len(levels[-1]) > 1:
+        one, other = levels[-1].reshape(-1, 2, 6).swapaxes(0, 1)
+        lower, upper = np.minimum(one[:, :3], other[:, :3]), np.maximum(one[:, 3:], other[:, 3:])
+        levels.append(np.concatenate([lower, upper], axis=1))
+    return np.concatenate([np.zeros((1, 6)), *levels[::-1]])
+
+
+def _normals_at(triangles: Floats, faces: Ints, places: Floats) -> Floats:
+    """(n, 3) unit normals at places on faces, mixed of those at corners, which are means across smooth edges.
+
+    Without, balls behind places off the middle of a face would be tilted, and too small by as much.
+    """
+    ids = indexed(triangles)[1]
+    flat, pairs = unit(area_vectors(triangles)), edge_table(ids).pairs
+    pairs = pairs[np.einsum("ij,ij->i", *flat[pairs // 3].swapaxes(0, 1)) > SMOOTH]
+    following = np.roll(np.arange(ids.size).reshape(-1, 3), -1, axis=1).ravel()
+    one, other = pairs.T
+    fans = connected_components(ids.size, np.append(one, following[one]), np.append(following[other], other))
+    sides = unit(np.roll(triangles, -1, axis=1) - triangles)
+    angles = np.arccos(np.clip(-np.einsum("mki,mki->mk", sides, np.roll(sides, 1, axis=1)), -1.0, 1.0))
+    weighted = angles.reshape(-1, 1) * np.repeat(flat, 3, axis=0)
+    corners = unit(sums_of(weighted, fans, ids.size))[fans].reshape(-1, 3, 3)
+    return unit(np.einsum("nk,nki->ni", weights_in(triangles[faces], places), corners[faces]))
+
+
+def _quantile(widths: Floats, share: float) -> float | None:
+    """A quantile of what is known; None if nothing is."""
+    known = np.sort(widths[~np.isnan(widths)])
+    return float(known[int(share * len(known))]) if len(known) else None
+
+
+def _cut(triangles: Floats, longest: float) -> tuple[Floats, Ints]:
+    """Triangles, cut across their longest sides until half a square has their area, and which each is part of."""
+    owners, kept, whose = np.arange(len(triangles)), [], []
+    while len(triangles):
+        sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+        small = face_areas(triangles) <= 0.5 * longest * longest
+        kept.append(triangles[small])
+        whose.append(owners[small])
+        triangles, owners, first = triangles[~small], owners[~small], sides[~small].argmax(axis=1)
+        a, b, c = (triangles[np.arange(len(triangles)), (first + k) % 3] for k in range(3))
+        middle = 0.5 * (a + b)
+        triangles = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+        owners = np.tile(owners, 2)
+    order = np.argsort(np.concatenate(whose), kind="stable")
+    return np.concatenate(kept)[order], np.concatenate(whose)[order]
+
+
+@compiled
+def _descend(
+    rows: Floats,
+    facing: Floats,
+    bounds: Floats,
+    discs: Floats,
+    ways: Floats,
+    items: Ints,
+    places: Floats,
+    least: float,
+    out: Floats,
+    touched: Ints,
+) -> None:
+    """Diameters, no more than in `out`, at (n, 6) places and their normals: what reaches into a ball makes it smaller.
+
+    What reaches into it by less than `SLACK` is left out first, since a ball that fits a round wall touches all of it.
+    Then what is around the place that it touches counts `FINER`, and so on: where a wall is flat, to the last digit.
+    """
+    leaves, stack = len(bounds) // 2, np.empty(66, dtype=np.int64)
+    for p in range(len(places)):
+        x, y, z = places[p, 0], places[p, 1], places[p, 2]
+        nx, ny, nz = places[p, 3], places[p, 4], places[p, 5]
+        diameter, tx, ty, tz, reach, slack = out[p], x, y, z, np.inf, SLACK
+        while slack > SETTLED:
+            stack[0], depth = 1, 1
+            while depth > 0:
+                depth -= 1
+                node = stack[depth]
+                radius = 0.5 * diameter
+                mx, my, mz = x - radius * nx, y - radius * ny, z - radius * nz
+                limit = radius * radius * (1.0 - slack)
+                if not _square(bounds, node, mx, my, mz) < limit or _square(bounds, node, tx, ty, tz) > reach:
+                    continue
+                least_cosine = 0.0
+                for k, along in ((0, nx), (1, ny), (2, nz)):
+                    least_cosine += min(along * ways[node, k], along * ways[node, 3 + k])
+                if least_cosine >= OPPOSITE:
+                    continue
+                if discs[node, 7] >= 0.0:
+                    dx, dy, dz = mx - discs[node, 0], my - discs[node, 1], mz - discs[node, 2]
+                    along = dx * discs[node, 3] + dy * discs[node, 4] + dz * discs[node, 5]
+                    height = max(abs(along) - discs[node, 7], 0.0)
+                    across = np.sqrt(max(dx * dx + dy * dy + dz * dz - along * along, 0.0))
+                    outside = max(across - discs[node, 6], 0.0)
+                    if not height * height + outside * outside < limit:
+                        continue
+                if node < leaves:  # that which is nearer to the place is the first
+                    first = _square(bounds, 2 * node, x, y, z) <= _square(bounds, 2 * node + 1, x, y, z)
+                    stack[depth] = 2 * node + 1 if first else 2 * node
+                    stack[depth + 1] = stack[depth] ^ 1
+                    depth += 2
+                    continue
+                for item in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
+                    f = items[item]
+                    if f < 0 or not facing[f, 0] * nx + facing[f, 1] * ny + facing[f, 2] * nz < OPPOSITE:
+                        continue
+                    best, qx, qy, qz = diameter, tx, ty, tz
+                    for _ in range(STEPS):
+                        radius = 0.5 * best
+                        mx, my, mz = x - radius * nx, y - radius * ny, z - radius * nz
+                        square, _, fx, fy, fz = foot_on_triangle(rows, f, mx, my, mz)
+                        if not square < radius * radius * (1.0 - SETTLED):
+                            break
+                        dx, dy, dz = x - fx, y - fy, z - fz
+                        ahead, square = dx * nx + dy * ny + dz * nz, dx * dx + dy * dy + dz * dz
+                        if not square > least * least or not ahead > 0.0:
+                            best = diameter
+                            break
+                        if not square / ahead < best:
+                            break
+                        best, qx, qy, qz = square / ahead, fx, fy, fz
+                    if best < diameter:
+                        diameter, tx, ty, tz, touched[p] = best, qx, qy, qz, f
+            reach, slack = 4.0 * slack * diameter * diameter, slack * FINER
+        out[p] = diameter
+
+
+@compiled
+def _square(bounds: Floats, node: int, x: float, y: float, z: float) -> float:
+    """Squared distance of a place to a box; infinite to an empty one."""
+    dx = max(bounds[node, 0] - x, x - bounds[node, 3], 0.0)
+    dy = max(bounds[node, 1] - y, y - bounds[node, 4], 0.0)
+    dz = max(bounds[node, 2] - z, z - bounds[node, 5], 0.0)
+    return dx * dx + dy * dy + dz * dz

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..frozen import read_only
-from ..search.stabbing_lines import crossings_at_pixels
+from ..compiled import compiled
 
 SIZE = 900
 """Pixels along the longer side."""
@@ -74,13 +73,9 @@ def rasterize(corners: Floats, values: Floats, width: int, height: int) -> tuple
 
     Return depth, face and value of the nearest triangle at each pixel; face −1 and value NaN where there is none.
     """
-    vertices, frame = read_only(corners.reshape(-1, 3)), read_only(np.eye(3))
-    triangles = read_only(np.arange(3 * len(corners)).reshape(-1, 3))
-    shape, none = np.array([width, height]), np.zeros(3)
-    ids, _, places = crossings_at_pixels(vertices, triangles, frame, none, 1.0, none[:2], shape, 0)
-    order = np.argsort(places[:, 0], kind="stable")  # the nearest is written last
-    depth, face, shown = np.full(height * width, -np.inf), np.full(height * width, -1), np.full(height * width, np.nan)
-    depth[ids[order, 0]], face[ids[order, 0]] = places[order, 0], ids[order, 1]
+    depth, face = np.full(height * width, -np.inf), np.full(height * width, -1)
+    shown = np.full(height * width, np.nan)
+    _draw(np.ascontiguousarray(corners), width, height, depth, face)
     pixels = np.flatnonzero(face >= 0)
     a, b, c = (corners[face[pixels], k, :2] @ [1, 1j] for k in range(3))
     away = pixels % width + 1j * (pixels // width) - a
@@ -88,3 +83,47 @@ def rasterize(corners: Floats, values: Floats, width: int, height: int) -> tuple
     u, v = (np.conj(away) * (c - a)).imag / area, (np.conj(b - a) * away).imag / area
     shown[pixels] = (np.stack([1 - u - v, u, v], axis=1) * values[face[pixels]]).sum(axis=1)
     return depth.reshape(height, width), face.reshape(height, width), shown.reshape(height, width)
+
+
+@compiled
+def _draw(corners: Floats, width: int, height: int, depth: Floats, face: Ints) -> None:
+    """Depth and face of the nearest triangle at each pixel of a picture, row after row; the later one of equals.
+
+    In each row a triangle has the pixels from one of its sides on to before the next, so that two triangles with a
+    common side leave none out, and share none.
+    """
+    for t in range(len(corners)):
+        ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
+        bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
+        cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
+        double = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if double == 0.0:
+            continue
+        slope_x = ((bz - az) * (cy - ay) - (cz - az) * (by - ay)) / double
+        slope_y = ((cz - az) * (bx - ax) - (bz - az) * (cx - ax)) / double
+        least, most = min(az, bz, cz), max(az, bz, cz)
+        for row in range(max(np.int64(np.ceil(min(ay, by, cy))), 0), min(np.int64(np.ceil(max(ay, by, cy))), height)):
+            left, right = np.inf, -np.inf
+            if (ay < row) != (by < row):
+                x = _crossed(ax, ay, bx, by, row)
+                left, right = min(left, x), max(right, x)
+            if (by < row) != (cy < row):
+                x = _crossed(bx, by, cx, cy, row)
+                left, right = min(left, x), max(right, x)
+            if (cy < row) != (ay < row):
+                x = _crossed(cx, cy, ax, ay, row)
+                left, right = min(left, x), max(right, x)
+            if not left < right:
+                continue
+            for column in range(max(np.int64(np.ceil(left)), 0), min(np.int64(np.ceil(right)), width)):
+                z = min(max(az + slope_x * (column - ax) + slope_y * (row - ay), least), most)
+                if z >= depth[row * width + column]:
+                    depth[row * width + column], face[row * width + column] = z, t
+
+
+@compiled
+def _crossed(ax: float, ay: float, bx: float, by: float, y: float) -> float:
+    """Where a row crosses a side: the same number whichever way round the side is given."""
+    if ay > by:
+        ax, ay, bx, by = bx, by, ax, ay
+    return ax + (bx - ax) * ((y - ay) / (by - ay))

@@ -46,8 +46,14 @@ def save_scene(shape: Shape | ForeignShape, path: PathLike, up: int = 2) -> None
         draw_shape(shape, figure.add_subplot(), up=up)
 
 
-def draw_shape(shape: Shape | ForeignShape, axes: Axes, view: tuple[float, float] = (18, -58), up: int = 2) -> None:
-    """Draw a shape into axes, seen from an elevation and an azimuth in degrees."""
+def draw_shape(
+    shape: Shape | ForeignShape,
+    axes: Axes,
+    view: tuple[float, float] = (18, -58),
+    up: int = 2,
+    colors: Floats | None = None,
+) -> None:
+    """Draw a shape into axes, seen from an elevation and an azimuth in degrees; triangles in (m, 3) colours, if any."""
     shape = outside_of(shape)
     direction = oblique(*view, up)
     axes.set_axis_off()
@@ -59,7 +65,8 @@ def draw_shape(shape: Shape | ForeignShape, axes: Axes, view: tuple[float, float
     corners = camera.pixels(mesh.vertices)[mesh.faces]
     _, face, _ = rasterize(corners, np.zeros((mesh.n_faces, 3)), camera.width, camera.height)
     outwards = mesh.face_area_vectors @ camera.frame[2] > 0
-    colors = np.where(outwards[:, None], OUTER_COLOR, INNER_COLOR) * camera.shades(mesh.face_area_vectors)[:, None]
+    colors = np.where(outwards[:, None], OUTER_COLOR, INNER_COLOR) if colors is None else colors
+    colors = colors * camera.shades(mesh.face_area_vectors)[:, None]
     axes.imshow(np.where((face >= 0)[..., None], colors[face], 1.0), origin="lower", interpolation="antialiased")
 
 
