@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..mesh.box_tree import BoxTree
 from ..mesh.components import connected_components, sums_of
 from ..mesh.edges import edge_table
@@ -41,10 +41,10 @@ UNBENT = 1e-6
 class Samples:
     """Places on faces near a rim: (k, 3) positions, (k, 3) unit normals, (k,) areas and smooth patches they are of."""
 
-    positions: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    areas: NDArray[np.float64]
-    patches: NDArray[np.int64]
+    positions: Floats
+    normals: Floats
+    areas: Floats
+    patches: Ints
 
 
 def width_of(lid: Lid) -> float:
@@ -54,7 +54,7 @@ def width_of(lid: Lid) -> float:
     return max(4.0 * float(face_areas(lid.vertices[lid.faces]).sum()) / length, NARROWEST * length)
 
 
-def smooth_patches(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> NDArray[np.int64]:
+def smooth_patches(triangles: Floats, ids: Ints) -> Ints:
     """(m,) which faces hang together across edges that are not sharp."""
     table = edge_table(ids)
     normals, (one, other) = unit(area_vectors(triangles)), table.pairs.T // 3
@@ -62,9 +62,7 @@ def smooth_patches(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> ND
     return connected_components(len(ids), one[smooth], other[smooth])
 
 
-def samples_near(
-    triangles: NDArray[np.float64], tree: BoxTree, patches: NDArray[np.int64], rim: scipy.spatial.cKDTree, reach: float
-) -> Samples:
+def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spatial.cKDTree, reach: float) -> Samples:
     """Samples of triangles in a tree within reach of a rim, at most reach / `SAMPLES` apart, unless too many are."""
     size = reach / SAMPLES
     some = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
@@ -93,9 +91,7 @@ def samples_near(
     return Samples(found.mean(axis=1)[proper], normals, areas[proper], np.concatenate(labels)[proper])
 
 
-def continuation(
-    lid: Lid, samples: Samples, patches: NDArray[np.int64], width: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def continuation(lid: Lid, samples: Samples, patches: Ints, width: float) -> tuple[Floats, Floats, Floats]:
     """Normals and curvatures with which the surface would continue over its rim, and how much that counts.
 
     Across an opening of width W a surface that meets the flat lid at angle β must turn by 2 sin β, the chord of a
@@ -118,7 +114,7 @@ def continuation(
     along = unit(np.roll(loop, -m, axis=0) - np.roll(loop, m, axis=0))
     rows, near = _within(samples, loop, patches, reach)
 
-    def means(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def means(values: Floats) -> Floats:
         """Over the samples near each place."""
         return sums_of(np.einsum("k,k...->k...", weights, values), rows, n)
 
@@ -146,9 +142,7 @@ def continuation(
     return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(held, m), 0.0)
 
 
-def _within(
-    samples: Samples, loop: NDArray[np.float64], patches: NDArray[np.int64], reach: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _within(samples: Samples, loop: Floats, patches: Ints, reach: float) -> tuple[Ints, Ints]:
     """Pairs of a place of a rim and a sample within reach of it, of the patch that ends there."""
     if not len(samples.positions):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)

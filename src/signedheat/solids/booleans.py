@@ -8,8 +8,8 @@ are subtracted, across which such a sum passes ½; a box around both, turned ins
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..diagnostics import Diagnostics
 from ..errors import SourceError
 from ..joining import concatenated
@@ -44,7 +44,7 @@ def intersection(a: Solid, b: Solid) -> Solid:
     return _combination(a, b, turned=False, around=corners[inwards])
 
 
-def _combination(a: Solid, b: Solid, turned: bool, around: NDArray[np.float64] | None = None) -> Solid:
+def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None) -> Solid:
     """The solid whose winding number is the sum of those of `a`, of `b`, turned or not, and of triangles `around`."""
     (first, of_first), (second, of_second) = ((x.triangles[x.bounding], np.flatnonzero(x.bounding)) for x in (a, b))
     triangles = np.concatenate([first, second[:, ::-1] if turned else second])

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..frozen import Frozen
 from ..mesh.components import connected_components, sums_of
 from ..mesh.triangles import area_vectors
@@ -73,20 +73,20 @@ class Bounding(Frozen):
         Closed pieces within others, those that face outwards and those that face inwards.
     """
 
-    pieces: NDArray[np.int64]
-    turned: NDArray[np.bool_]
-    counts: NDArray[np.int64]
-    closed: NDArray[np.bool_]
-    loose: NDArray[np.int64]
-    levels: NDArray[np.float64]
-    as_given: NDArray[np.bool_]
-    inner: NDArray[np.bool_]
-    orientable: NDArray[np.bool_]
+    pieces: Ints
+    turned: Bools
+    counts: Ints
+    closed: Bools
+    loose: Ints
+    levels: Floats
+    as_given: Bools
+    inner: Bools
+    orientable: Bools
     disagreeing: int
     bodies: int
     cavities: int
 
-    def to_turn(self, chain: Chain) -> NDArray[np.bool_]:
+    def to_turn(self, chain: Chain) -> Bools:
         """(k,) which of the triangles that were given must turn; those on fewer than three places need not."""
         as_given, turned = (np.append(values, False)[chain.numbers] for values in (self.as_given, self.turned))
         return np.asarray((chain.numbers >= 0) & ((~as_given & chain.reversed) != turned))
@@ -152,7 +152,7 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     )
 
 
-def whole_complexes(chain: Chain) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def whole_complexes(chain: Chain) -> tuple[Ints, Bools]:
     """(m,) how often triangles are there, and which are of complexes that close as they were given.
 
     All pieces of such a complex have a positive level in it, or all a negative one. Where it closes once each triangle
@@ -179,13 +179,8 @@ def whole_complexes(chain: Chain) -> tuple[NDArray[np.int64], NDArray[np.bool_]]
 
 
 def _nested(
-    chain: Chain,
-    pieces: NDArray[np.int64],
-    counts: NDArray[np.int64],
-    closed: NDArray[np.bool_],
-    flips: NDArray[np.float64],
-    nested: Nesting,
-) -> tuple[NDArray[np.float64], int, int]:
+    chain: Chain, pieces: Ints, counts: Ints, closed: Bools, flips: Floats, nested: Nesting
+) -> tuple[Floats, int, int]:
     """(p,) signs by which pieces turn, those of open ones given; bodies and cavities among closed ones within others.
 
     What is closed faces outwards. Within others it stays to the outermost as it was given, if that is clear, and else
@@ -226,13 +221,13 @@ def _nested(
 
 def open_bounding(
     pieces: Pieces,
-    groups: NDArray[np.int64],
+    groups: Ints,
     rims: Rims,
-    given: NDArray[np.float64],
-    closed: NDArray[np.float64],
+    given: Floats,
+    closed: Floats,
     nested: Nesting = "given",
     as_oriented: bool = False,
-) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.int64], NDArray[np.float64]]:
+) -> tuple[Floats, Bools, Ints, Floats]:
     """(p,) signs of open pieces; which bound something; clusters of which most is loose, or −1, and their levels.
 
     Pieces of one group, (p,), hang together, which chance does not make them do. Of the area of each, `given` faces as
@@ -281,12 +276,12 @@ def open_bounding(
     return signs, alive, np.where(mostly, clusters, -1), np.where(mostly, mean[clusters], 0.5)
 
 
-def signs_of(system: Matrix | Dipoles) -> NDArray[np.float64]:
+def signs_of(system: Matrix | Dipoles) -> Floats:
     """(k,) signs of the weights of pieces."""
     return np.where(system.weights() >= 0, 1.0, -1.0)
 
 
-def _counted(areas: NDArray[np.float64], groups: NDArray[np.int64], clusters: NDArray[np.int64]) -> NDArray[np.float64]:
+def _counted(areas: Floats, groups: Ints, clusters: Ints) -> Floats:
     """(p,) groups of each cluster of pieces, as if all were alike."""
     n = len(areas)
     keys, inverse = np.unique(clusters * n + groups, return_inverse=True)
@@ -295,13 +290,7 @@ def _counted(areas: NDArray[np.float64], groups: NDArray[np.int64], clusters: ND
     return np.bincount(owners, sums, n) ** 2 / np.maximum(squares, np.finfo(float).tiny)
 
 
-def connected_pieces(
-    chain: Chain,
-    faces: NDArray[np.int64],
-    labels: NDArray[np.int64],
-    edges: NDArray[np.int64],
-    owners: NDArray[np.int64],
-) -> NDArray[np.int64]:
+def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owners: Ints) -> Ints:
     """(p,) what pieces of some triangles hang together with, by edges that they share or rims along each other.
 
     Edges are those where they end. Those of single triangles are none, lest noise around a surface hang together.
@@ -319,19 +308,14 @@ def connected_pieces(
     )[:n]
 
 
-def _directed(chain: Chain, counts: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.float64]:
+def _directed(chain: Chain, counts: Floats | Ints) -> Floats:
     """(k, 3, 3) the triangles of a chain as often as they are there, reversed where that is negative."""
     there = np.repeat(np.arange(len(counts)), np.abs(counts).astype(np.int64))
     triangles = chain.triangles[there]
     return np.where((counts[there] < 0)[:, None, None], triangles[:, ::-1], triangles)
 
 
-def _along(
-    chain: Chain,
-    pieces: NDArray[np.int64],
-    clusters: NDArray[np.int64],
-    counts: NDArray[np.float64] | NDArray[np.int64],
-) -> NDArray[np.bool_]:
+def _along(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | Ints) -> Bools:
     """(p,) clusters of loose pieces that lie along closed ones, as noisy copies do: half inside, half outside."""
     chosen = np.flatnonzero(clusters[pieces] >= 0)
     around = WindingTree.of(_directed(chain, counts)).numbers(chain.triangles[chosen].mean(axis=1))
@@ -340,7 +324,7 @@ def _along(
     return (clusters >= 0) & (np.abs(inside - np.round(inside)) > ALONG)[clusters]
 
 
-def clusters_of(pieces: Pieces) -> NDArray[np.int64]:
+def clusters_of(pieces: Pieces) -> Ints:
     """(p,) cluster of each piece: those of which faces are near each other, for the size of the smaller, are of one."""
     n = len(pieces.areas)
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)

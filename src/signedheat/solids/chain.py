@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..frozen import Frozen
 from ..mesh.components import element_components
 from ..mesh.edges import EdgeTable, FaceOrientation, edge_table, orient_faces, pair_halfedges
@@ -40,11 +41,11 @@ class Chain(Frozen):
         Which of them run the other way.
     """
 
-    positions: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    firsts: NDArray[np.int64]
-    numbers: NDArray[np.int64]
-    reversed: NDArray[np.bool_]
+    positions: Floats
+    faces: Ints
+    firsts: Ints
+    numbers: Ints
+    reversed: Bools
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Chain:
@@ -64,17 +65,17 @@ class Chain(Frozen):
         return cls(positions, ids[distinct], distinct, numbers[first], backwards)
 
     @cached_property
-    def triangles(self) -> NDArray[np.float64]:
+    def triangles(self) -> Floats:
         """(m, 3, 3) corners."""
         return self.positions[self.faces]
 
     @cached_property
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """(m,) areas."""
         return np.linalg.norm(area_vectors(self.triangles), axis=1)
 
     @cached_property
-    def multiplicities(self) -> NDArray[np.int64]:
+    def multiplicities(self) -> Ints:
         """(m,) how often each triangle is there as it is, less how often reversed."""
         there = self.numbers >= 0
         ways = np.where(self.reversed[there], -1, 1)
@@ -86,11 +87,11 @@ class Chain(Frozen):
         return edge_table(self.faces)
 
     @cached_property
-    def complexes(self) -> NDArray[np.int64]:
+    def complexes(self) -> Ints:
         """(m,) what hangs together by edges, however many faces these have."""
         return element_components(self.edges.face_edges) if len(self.faces) else np.zeros(0, dtype=np.int64)
 
-    def unbalanced(self, weights: NDArray[np.integer], groups: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def unbalanced(self, weights: NDArray[np.integer], groups: Ints) -> Bools:
         """(g,) which groups of triangles, each there so often, have directed edges that do not cancel."""
         n = len(self.edges.vertices)
         keys = (groups[:, None] * n + self.edges.face_edges).ravel()
@@ -101,7 +102,7 @@ class Chain(Frozen):
         result[sides[open_sides] // n] = True
         return result
 
-    def walls(self) -> NDArray[np.bool_]:
+    def walls(self) -> Bools:
         """(m,) walls between closed cells, which bound nothing: see `inner_walls`."""
         if not len(self.faces) or not (self.edges.face_counts > 2).any():
             return np.zeros(len(self.faces), dtype=bool)
@@ -113,7 +114,7 @@ class Chain(Frozen):
         normals = unit(area_vectors(self.triangles))
         return inner_walls(self.positions, pairs, tails, heads, owners, normals, self.areas, volumes)
 
-    def pieces(self, used: NDArray[np.bool_]) -> FaceOrientation:
+    def pieces(self, used: Bools) -> FaceOrientation:
         """Triangles that hang together across edges that two of those used have, and how they agree.
 
         Most of the area of each piece stays as it was given.

@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from ..arrays import Floats, Ints
 from ..frozen import Frozen
 from ..mesh.box_tree import BoxTree
 from ..mesh.components import element_components
@@ -24,9 +24,7 @@ NONE = np.empty((0, 2), dtype=np.int64)
 """No edges."""
 
 
-def closed_by(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], *, bent: bool = True, outlines: NDArray[np.int64] = NONE
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def closed_by(vertices: Floats, faces: Ints, *, bent: bool = True, outlines: Ints = NONE) -> tuple[Floats, Ints]:
     """Close the boundary of a chain of directed triangles, whatever the parts that they belong to.
 
     Small holes are closed by the triangles between their corners that bend least, where these continue the surface;
@@ -87,12 +85,12 @@ def closed_by(
 class _Surface(Frozen):
     """A chain of triangles, and what is asked of it where it ends."""
 
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    outlines: NDArray[np.int64] = field(default_factory=lambda: NONE)
+    vertices: Floats
+    faces: Ints
+    outlines: Ints = field(default_factory=lambda: NONE)
 
     @cached_property
-    def loops(self) -> list[NDArray[np.int64]]:
+    def loops(self) -> list[Ints]:
         """Closed loops around the gaps that are to be closed."""
         edges, n = boundary(self.faces), len(self.vertices)
         keys, left = edges @ [n, 1], np.sort(self.outlines @ [n, 1])
@@ -101,27 +99,27 @@ class _Surface(Frozen):
         return loops(self.vertices, self.faces, edges)
 
     @cached_property
-    def triangles(self) -> NDArray[np.float64]:
+    def triangles(self) -> Floats:
         """(m, 3, 3) corners."""
         return self.vertices[self.faces]
 
     @cached_property
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """(m,) areas."""
         return face_areas(self.triangles)
 
     @cached_property
-    def normals(self) -> NDArray[np.float64]:
+    def normals(self) -> Floats:
         """(m, 3) unit normals."""
         return unit(area_vectors(self.triangles))
 
     @cached_property
-    def parts(self) -> NDArray[np.int64]:
+    def parts(self) -> Ints:
         """(m,) faces that share edges hang together."""
         return element_components(edge_table(self.faces).face_edges)
 
     @cached_property
-    def patches(self) -> NDArray[np.int64]:
+    def patches(self) -> Ints:
         """(m,) faces that hang together across edges that are not sharp."""
         return bending.smooth_patches(self.triangles, self.faces)
 
@@ -131,7 +129,7 @@ class _Surface(Frozen):
         return BoxTree.of(self.triangles.min(axis=1), self.triangles.max(axis=1))
 
     @cached_property
-    def _sides(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _sides(self) -> tuple[Ints, Ints]:
         """Sorted keys of the directed sides of faces, and the sides: of several, that which `behind` takes first."""
         keys = (self.faces * len(self.vertices) + np.roll(self.faces, -1, axis=1)).ravel()
         table = edge_table(self.faces)
@@ -141,7 +139,7 @@ class _Surface(Frozen):
         order = np.lexsort((-np.repeat(self.areas, 3), np.repeat(closed, 3), keys))
         return keys[order], order
 
-    def behind(self, loop: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def behind(self, loop: Ints) -> tuple[Ints, Ints]:
         """(n,) the face behind each edge of a loop, and its third vertex.
 
         Of several it is one of a piece that does not close by itself, and of these the largest.
@@ -151,9 +149,7 @@ class _Surface(Frozen):
         return face, self.faces[face, (side + 2) % 3]
 
 
-def small_lids(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], outlines: NDArray[np.int64] = NONE
-) -> NDArray[np.int64]:
+def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
     """(k, 3) triangles that close the small holes of a surface, and its gaps without area, between their vertices."""
     surface = _Surface(vertices, faces, outlines)
     triangles, chosen, corners = [np.empty((0, 3), dtype=np.int64)], [], []
@@ -184,7 +180,7 @@ def small_lids(
     return np.concatenate(triangles)
 
 
-def _with_sides(loop: NDArray[np.int64], places: NDArray[np.int64], lid: NDArray[np.int64]) -> NDArray[np.int64]:
+def _with_sides(loop: Ints, places: Ints, lid: Ints) -> Ints:
     """Triangles between the corners of a loop, at these places, divided at the points of its straight sides."""
     for begin, end in zip(places, [*places[1:], places[0] + len(loop)], strict=True):
         side = loop[np.arange(begin, end + 1) % len(loop)]
@@ -195,14 +191,12 @@ def _with_sides(loop: NDArray[np.int64], places: NDArray[np.int64], lid: NDArray
     return lid
 
 
-def _fan(points: NDArray[np.int64]) -> NDArray[np.int64]:
+def _fan(points: Ints) -> Ints:
     """(k − 2, 3) triangles from the first of some points to the others."""
     return np.stack([np.full(len(points) - 2, points[0]), points[1:-1], points[2:]], axis=1)
 
 
-def strips(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], outlines: NDArray[np.int64] = NONE
-) -> NDArray[np.int64]:
+def strips(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
     """(k, 3) triangles between vertices of rims that run along each other, along stretches or all around."""
     surface = _Surface(vertices, faces, outlines)
     chain = np.concatenate([faces, *walls.seams(_rims(surface))])
@@ -226,7 +220,7 @@ def _rims(surface: _Surface) -> list[walls.Rim]:
     return rims
 
 
-def _lid(surface: _Surface, loop: NDArray[np.int64], bent: bool) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
     """The lid of a loop: the points that it adds to the loop's, and triangles."""
     corners = surface.vertices[loop]
     if len(loop) == 3:
@@ -239,9 +233,7 @@ def _lid(surface: _Surface, loop: NDArray[np.int64], bent: bool) -> tuple[NDArra
     raise AssertionError("a disc has room for every loop")
 
 
-def _spanned(
-    surface: _Surface, loop: NDArray[np.int64], frame: Frame | None, bent: bool
-) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+def _spanned(surface: _Surface, loop: Ints, frame: Frame | None, bent: bool) -> tuple[Floats, Ints] | None:
     """The lid of a loop, triangulated in a plane or without one in a disc; None if it crosses itself in that plane."""
     corners, behind = surface.vertices[loop], surface.behind(loop)[0]
     rim = lids.SmoothRim.of(corners)

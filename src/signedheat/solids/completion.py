@@ -9,8 +9,8 @@ from typing import Literal, get_args
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..constraints import Constraint
 from ..diagnostics import Diagnostics, FacesRestored, Note, OrientedPoints
 from ..errors import SignedHeatError, SourceError
@@ -226,21 +226,13 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
     return united(surfaces, options.keep_overlaps, notes)
 
 
-def _made_from(
-    places: NDArray[np.float64], faces: NDArray[np.int64], added: NDArray[np.int64], origins: NDArray[np.int64]
-) -> Surface:
+def _made_from(places: Floats, faces: Ints, added: Ints, origins: Ints) -> Surface:
     """A closed surface of faces and those added to them; only the first faces have origins."""
     whole = np.concatenate([faces, added])
     return Surface(places[whole], whole, np.append(origins, np.full(len(whole) - len(origins), -1)), True)
 
 
-def _torn(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    origins: NDArray[np.int64],
-    scatter: float,
-    method: Heat,
-) -> list[Surface]:
+def _torn(vertices: Floats, faces: Ints, origins: Ints, scatter: float, method: Heat) -> list[Surface]:
     """Complete a torn body by the zero set of φ; return that alone if the faces scatter around it."""
     triangles = vertices[faces]
     given = Surface(triangles, faces, origins, False)
@@ -265,7 +257,7 @@ def _torn(
     return [_made_from(places, whole, added, origins)]
 
 
-def scatter_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> float:
+def scatter_of(triangles: Floats, labels: Ints) -> float:
     """The distance of corners that noise has separated, if it has separated most of them; otherwise 0."""
     points = triangles.reshape(-1, 3)
     owners = np.repeat(labels, 3)

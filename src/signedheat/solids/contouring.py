@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..errors import InexactWarning, OutsideError, warn_user
 from ..field_levels import NodeValues, on_level
 from ..grids.blocks import SIDE, Blocks, BlockValues
@@ -51,7 +51,7 @@ def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
     values = np.empty((len(blocks), SIDE, SIDE, SIDE), dtype=np.float32)
     level = offset.level
 
-    def solve(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    def solve(rows: Ints) -> Ints:
         places = blocks.places[rows].astype(np.int64)
         if level is not None:
             values[rows] = solved(tree, windings, grid, places)[0].astype(np.float64) - level
@@ -84,13 +84,8 @@ def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) 
 
 
 def traced(
-    offset: ImplicitSurface,
-    grid: Grid,
-    values: NodeValues,
-    crossings: Crossings,
-    cells: DualCells,
-    report: Progress,
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    offset: ImplicitSurface, grid: Grid, values: NodeValues, crossings: Crossings, cells: DualCells, report: Progress
+) -> tuple[Floats, Ints]:
     """Vertices and faces of a surface, from the edges of a grid that it crosses and its pieces in cells."""
     report(0.4, "edges")
     nodes, axes = crossings.nodes, crossings.axes
@@ -106,7 +101,7 @@ def traced(
     return divided_along_creases(offset, grid.spacing, grid.origin + vertices * grid.spacing, faces)
 
 
-def announce_lost(offset: Offset, grid: Grid, vertices: NDArray[np.float64]) -> None:
+def announce_lost(offset: Offset, grid: Grid, vertices: Floats) -> None:
     """Warn where the contour of a surface, with (n, 3) vertices, misses whole parts of it or a share of its area."""
     parts, lost = _lost(offset, grid, vertices)
     n_parts = len(np.unique(parts))
@@ -118,7 +113,7 @@ def announce_lost(offset: Offset, grid: Grid, vertices: NDArray[np.float64]) -> 
     warn_user(f"cells of {grid.spacing.max():.3g} are too large for {missing}, lost here: {remedy}", InexactWarning)
 
 
-def _lost(offset: Offset, grid: Grid, vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
     """Parts of a solid that places on a surface belong to, and which places have no vertex of its contour nearby.
 
     Places are taken on the faces of the solid, and moved along their normals, either way, if that leads to the surface.
@@ -170,7 +165,7 @@ def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCe
     return done, crossings, found
 
 
-def blocks_at(offset: Offset, grid: Grid) -> NDArray[np.int64]:
+def blocks_at(offset: Offset, grid: Grid) -> Ints:
     """(n, 3) places of the blocks of a grid with nodes near a surface, found from coarse to fine.
 
     Heights change by no more than one goes, so that the one at the middle of a block says how near the surface is.
@@ -202,7 +197,7 @@ def crossed_edges(band: BlockValues) -> Crossings:
     return joined_crossings(parts)
 
 
-def crossings_in(heights: NDArray[np.float64], first: NDArray[np.int64]) -> list[Crossings]:
+def crossings_in(heights: Floats, first: Ints) -> list[Crossings]:
     """Crossed edges between the nodes of a window of a grid that begins at a node, along each axis."""
     below, held, found = heights < 0, ~np.isnan(heights), []
     for axis in range(3):

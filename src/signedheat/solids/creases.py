@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..mesh.unit_vectors import unit
 from .lids import SmoothRim
 from .rims import corners_of
@@ -26,8 +26,8 @@ MOST_RUNS = 16
 class _Side:
     """A straight part of a rim, or a crease."""
 
-    points: NDArray[np.int64]  # (k,) without its end
-    normal: NDArray[np.float64]  # (3,) sum over its edges of length times unit normal of the surface
+    points: Ints  # (k,) without its end
+    normal: Floats  # (3,) sum over its edges of length times unit normal of the surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +36,11 @@ class _Run:
 
     first: int  # index of the first side
     count: int
-    points: NDArray[np.int64]  # (k,) with the end
-    opening: NDArray[np.float64]  # (3,) area vector of a lid in the plane
+    points: Ints  # (k,) with the end
+    opening: Floats  # (3,) area vector of a lid in the plane
 
 
-def is_flat(points: NDArray[np.float64]) -> bool:
+def is_flat(points: Floats) -> bool:
     """Whether points lie in a plane.
 
     Examples
@@ -53,14 +53,12 @@ def is_flat(points: NDArray[np.float64]) -> bool:
     return bool(np.abs(around @ normal).max() <= FLAT * np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def flat_lid(loop: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+def flat_lid(loop: Floats) -> tuple[Floats, Ints] | None:
     """The lid of a planar loop, as added points and triangles; None if it crosses itself."""
     return _filled(loop, len(loop), [np.arange(len(loop))])
 
 
-def creased(
-    loop: NDArray[np.float64], normals: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+def creased(loop: Floats, normals: Floats) -> tuple[Floats, Ints] | None:
     """The lid of flat faces that closes a rim, as added points and triangles; None if there is none.
 
     Consecutive sides in a plane are closed in that plane by a straight crease, if the sides before and after them lie
@@ -69,7 +67,7 @@ def creased(
     at the edges that begin at each point, or 0 if unknown.
     """
     points, sides = loop, _sides(loop, normals)
-    polygons: list[NDArray[np.int64]] = []
+    polygons: list[Ints] = []
     while len(sides) > 2:
         rest = np.concatenate([side.points for side in sides])
         if is_flat(points[rest]):
@@ -88,7 +86,7 @@ def creased(
     return None
 
 
-def _sides(loop: NDArray[np.float64], normals: NDArray[np.float64]) -> list[_Side]:
+def _sides(loop: Floats, normals: Floats) -> list[_Side]:
     """Straight parts of a loop."""
     corners = corners_of(loop)
     weighted = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)[:, None] * normals
@@ -99,7 +97,7 @@ def _sides(loop: NDArray[np.float64], normals: NDArray[np.float64]) -> list[_Sid
     return [_Side(places, total) for places, total in zip(np.split(order, cuts[1:]), sums, strict=True)]
 
 
-def _runs(points: NDArray[np.float64], sides: list[_Side]) -> list[_Run]:
+def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
     """The longest runs of two or more sides in a plane, the largest first; none if there are too many.
 
     Those whose lid would be folded back over the surface are left out.
@@ -125,9 +123,7 @@ def _runs(points: NDArray[np.float64], sides: list[_Side]) -> list[_Run]:
     return sorted(runs, key=lambda run: -float(np.linalg.norm(run.opening)))
 
 
-def _peak(
-    points: NDArray[np.float64], runs: list[_Run], n_sides: int
-) -> tuple[NDArray[np.float64], tuple[_Run, _Run, _Run]] | None:
+def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple[_Run, _Run, _Run]] | None:
     """The point near a loop of three runs where their planes meet, and the runs."""
     following = {run.first: run for run in runs}
     for one in runs:
@@ -147,7 +143,7 @@ def _peak(
     return None
 
 
-def _closed_by_a_crease(points: NDArray[np.float64], sides: list[_Side], runs: list[_Run]) -> _Run | None:
+def _closed_by_a_crease(points: Floats, sides: list[_Side], runs: list[_Run]) -> _Run | None:
     """The first run whose ends lie in a plane with the sides before and after it."""
     n = len(sides)
     for run in runs:
@@ -161,9 +157,7 @@ def _closed_by_a_crease(points: NDArray[np.float64], sides: list[_Side], runs: l
     return None
 
 
-def _filled(
-    points: NDArray[np.float64], n_rim: int, polygons: list[NDArray[np.int64]]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+def _filled(points: Floats, n_rim: int, polygons: list[Ints]) -> tuple[Floats, Ints] | None:
     """Points after those of a rim, and triangles of planar polygons; None if one crosses itself."""
     vertices, faces, count = [points], [], len(points)
     for polygon in polygons:

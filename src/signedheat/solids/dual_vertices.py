@@ -6,8 +6,8 @@ from typing import Protocol
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..grids.grid import Grid
 from ..grids.marching import CLEARANCE
 from ..mesh.components import sums_of
@@ -46,17 +46,17 @@ AHEAD = 0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5
 class ImplicitSurface(Protocol):
     """The zero set of a function of (n, 3) points that grows outwards."""
 
-    def distance(self, points: NDArray[np.float64], /) -> NDArray[np.float64]:
+    def distance(self, points: Floats, /) -> Floats:
         """(n,) values, negative inside."""
 
-    def slopes(self, points: NDArray[np.float64], /) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def slopes(self, points: Floats, /) -> tuple[Floats, Floats]:
         """(n,) distances from the surface, negative inside, and (n, 3) unit vectors along which they grow."""
 
-    def planes(self, points: NDArray[np.float64], /) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def planes(self, points: Floats, /) -> tuple[Floats, Floats]:
         """(n, 3) places on the surface near points, and its normals there."""
 
 
-def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats) -> Floats:
     """(3, v, 3) candidates for the vertex of each piece of a level, in cells: the best, in its cell, in its middle.
 
     The best is on a crease or corner, even outside the cell. `points` are the (e, 3) crossings of edges of the grid.
@@ -85,10 +85,10 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: NDArra
     return np.stack([np.where(taken[:, None], wider, vertices), vertices, middles])
 
 
-def _apart(cells: DualCells, vertices: NDArray[np.float64], wider: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
     """(v,) whether to take the wider candidate: of those near each other, the one that moves the least."""
     away = np.where(np.isnan(wider[:, 0]), np.inf, np.linalg.norm(wider - vertices, axis=1))
-    taken: NDArray[np.bool_] = (np.floor(wider) == cells.places[cells.owners]).all(axis=1)
+    taken: Bools = (np.floor(wider) == cells.places[cells.owners]).all(axis=1)
     rows = np.flatnonzero(np.isfinite(away) & ~taken)
     if len(rows):
         rows = rows[np.argsort(away[rows], kind="stable")]
@@ -101,13 +101,8 @@ def _apart(cells: DualCells, vertices: NDArray[np.float64], wider: NDArray[np.fl
 
 
 def _vertices(
-    offset: ImplicitSurface,
-    grid: Grid,
-    places: NDArray[np.int64],
-    alone: NDArray[np.bool_],
-    owners: NDArray[np.int64],
-    points: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    offset: ImplicitSurface, grid: Grid, places: Ints, alone: Bools, owners: Ints, points: Floats
+) -> tuple[Floats, Floats, Floats]:
     """Vertices of some pieces in their cells, their middles, and wider candidates up to `BEYOND` outside, or NaN."""
     count = len(places)
     step = float(grid.spacing.max())
@@ -142,9 +137,7 @@ def _vertices(
     return middles + found, middles, wider
 
 
-def _probes(
-    along: NDArray[np.float64], across: NDArray[np.float64], spacing: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _probes(along: Floats, across: Floats, spacing: Floats) -> Floats:
     """(n, p, 3) offsets of probes from vertices on creases: around them, and on both sides along the crease."""
     around = np.broadcast_to(0.5 * spacing * (2 * np.array(list(np.ndindex(2, 2, 2))) - 1), (len(along), 8, 3))
     length = np.linalg.norm(across, axis=1)[:, None]
@@ -154,8 +147,8 @@ def _probes(
 
 
 def divided_along_creases(
-    offset: ImplicitSurface, spacing: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    offset: ImplicitSurface, spacing: Floats, vertices: Floats, faces: Ints
+) -> tuple[Floats, Ints]:
     """Divide bent edges that are off the level, with new vertices on the level, unless triangles would intersect.
 
     This restores creases through cells whose edges the level does not cross, and which thus have no vertex.
@@ -178,9 +171,7 @@ def divided_along_creases(
     return vertices, faces
 
 
-def _creases_off(
-    offset: ImplicitSurface, spacing: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _creases_off(offset: ImplicitSurface, spacing: Floats, vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:
     """(k, 2) halfedges of bent edges off the level, one per face, and (k, 3) places on creases or the level."""
     step = float(spacing.max())
     normals, edges = unit(area_vectors(vertices[faces])), edge_table(faces).pairs
@@ -206,9 +197,7 @@ def _creases_off(
     return edges[alone], points[alone]
 
 
-def _divided(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: NDArray[np.int64], points: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _divided(vertices: Floats, faces: Ints, edges: Ints, points: Floats) -> tuple[Floats, Ints]:
     """Insert a point on each of (k, 2) halfedges, and divide the faces on both sides."""
     rows, corners = edges.ravel() // 3, edges.ravel() % 3
     new = np.repeat(len(vertices) + np.arange(len(edges)), 2)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+
+from ..arrays import Floats, Ints
 
 NEIGHBOURS = 30
 """Number of nearest points of each node."""
@@ -20,9 +21,7 @@ CHUNK = 50_000
 """Batch size for nodes."""
 
 
-def fitted_to_points(
-    phi: NDArray[np.float64], steps: NDArray[np.float64], points: NDArray[np.float64], normals: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats) -> Floats:
     """φ, with its zero set moved onto a smooth surface through oriented points where there are any.
 
     Near the zero set φ becomes the weighted mean of ``½ (n_i + n) · (x − p_i)`` over the nearest points, n the weighted
@@ -57,7 +56,7 @@ def fitted_to_points(
     return result
 
 
-def _slopes(phi: NDArray[np.float64], nodes: NDArray[np.int64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
+def _slopes(phi: Floats, nodes: Ints, steps: Floats) -> Floats:
     """(k, 3) differences of φ at nodes, one-sided at the walls."""
     slopes = np.empty((len(nodes), 3))
     for axis, step in enumerate(steps):
@@ -68,20 +67,15 @@ def _slopes(phi: NDArray[np.float64], nodes: NDArray[np.int64], steps: NDArray[n
     return slopes
 
 
-def mean_gap(points: NDArray[np.float64]) -> float:
+def mean_gap(points: Floats) -> float:
     """Side of a square that each of (n, 3) points would have on a plane, from the disks that hold their six nearest."""
     reach = scipy.spatial.cKDTree(points).query(points, k=[min(7, len(points))])[0]
     return float(np.median(reach) * np.sqrt(np.pi / 7.0))
 
 
 def _fit(
-    places: NDArray[np.float64],
-    ahead: NDArray[np.float64],
-    reach: NDArray[np.float64],
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    gap: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    places: Floats, ahead: Floats, reach: Floats, points: Floats, normals: Floats, gap: float
+) -> tuple[Floats, Floats]:
     """Height of each place above the surface through the (k, n, 3) points around it, and how far it counts."""
     cosines = np.einsum("pki,pi->pk", normals, ahead)
     facing = cosines > ALIKE

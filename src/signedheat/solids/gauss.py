@@ -20,9 +20,9 @@ from functools import cached_property
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..frozen import Frozen
 from ..mesh.box_tree import LEAF, BoxTree, morton_codes
@@ -73,16 +73,16 @@ class Pieces(Frozen):
         Piece of each, from 0 on.
     """
 
-    triangles: NDArray[np.float64]
-    labels: NDArray[np.int64]
+    triangles: Floats
+    labels: Ints
 
     @cached_property
-    def face_areas(self) -> NDArray[np.float64]:
+    def face_areas(self) -> Floats:
         """(m,) areas."""
         return face_areas(self.triangles)
 
     @cached_property
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """(k,) area of each piece."""
         return np.bincount(self.labels, self.face_areas).astype(np.float64)
 
@@ -94,9 +94,7 @@ def system_of(pieces: Pieces) -> Matrix | Dipoles:
     return Dipoles.of_triangles(pieces) if many or len(areas) > DENSE else Matrix.of(pieces)
 
 
-def means(
-    values: NDArray[np.float64], groups: NDArray[np.int64], weights: NDArray[np.float64], n: int
-) -> NDArray[np.float64]:
+def means(values: Floats, groups: Ints, weights: Floats, n: int) -> Floats:
     """(n,) weighted means of values in groups."""
     total = np.bincount(groups, weights, n)
     return np.bincount(groups, weights * values, n) / np.maximum(total, np.finfo(float).tiny)
@@ -106,12 +104,12 @@ def means(
 class Matrix:
     """W of few pieces, by exact solid angles."""
 
-    matrix: NDArray[np.float64]
-    places: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    owners: NDArray[np.int64]
-    areas: NDArray[np.float64]
-    within: NDArray[np.float64]
+    matrix: Floats
+    places: Floats
+    normals: Floats
+    owners: Ints
+    areas: Floats
+    within: Floats
 
     @classmethod
     def of(cls, pieces: Pieces) -> Matrix:
@@ -140,14 +138,14 @@ class Matrix:
         normals = unit(area_vectors(pieces.triangles[faces]))
         return cls(matrix, places, normals, owners, pieces.areas[owners] / counts[owners], np.zeros(len(owners)))
 
-    def chosen(self, kept: NDArray[np.bool_]) -> Matrix:
+    def chosen(self, kept: Bools) -> Matrix:
         """The system of some of the pieces, numbered anew."""
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
         matrix = self.matrix[rows][:, kept]
         return Matrix(matrix, self.places[rows], self.normals[rows], owners, self.areas[rows], self.within[rows])
 
-    def weights(self) -> NDArray[np.float64]:
+    def weights(self) -> Floats:
         """(k,) weights of least squares, the signs of which orient."""
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
         weighted = self.matrix * shares[:, None]
@@ -157,11 +155,11 @@ class Matrix:
         normal[np.diag_indices_from(normal)] += HELD * np.maximum(held, EMPTY)
         return np.asarray(scipy.linalg.solve(normal, weighted.T @ (0.5 + self.within), assume_a="pos"))
 
-    def levels(self, signs: NDArray[np.float64]) -> NDArray[np.float64]:
+    def levels(self, signs: Floats) -> Floats:
         """(n,) levels at the samples, less the bodies around them."""
         return np.asarray(self.matrix @ signs - self.within)
 
-    def levels_within(self, signs: NDArray[np.float64], groups: NDArray[np.int64]) -> NDArray[np.float64]:
+    def levels_within(self, signs: Floats, groups: Ints) -> Floats:
         """(n,) levels at the samples that the pieces of the same group, (k,), make."""
         result = np.empty(len(self.owners))
         for group in np.unique(groups):
@@ -187,7 +185,7 @@ def without_slender(pieces: Pieces) -> Pieces:
     return Pieces(triangles, labels)
 
 
-def sampled(pieces: Pieces, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
     """Faces and (n, 3) places on them: one for each piece and `count` more, half by area, half alike for all."""
     areas, k = pieces.face_areas, len(pieces.areas)
     order = np.lexsort((morton_codes(pieces.triangles.mean(axis=1)), pieces.labels))
@@ -214,13 +212,7 @@ def sampled(pieces: Pieces, count: int) -> tuple[NDArray[np.int64], NDArray[np.f
 
 @compiled
 def _small_pieces(
-    corners: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    vectors: NDArray[np.float64],
-    balls: NDArray[np.float64],
-    places: NDArray[np.float64],
-    own: NDArray[np.int64],
-    matrix: NDArray[np.float64],
+    corners: Floats, starts: Ints, vectors: Floats, balls: Floats, places: Floats, own: Ints, matrix: Floats
 ) -> None:
     """Winding numbers of pieces of few faces at places, each of which lies on a face of its own.
 
@@ -263,12 +255,12 @@ class Dipoles:
         Bodies around each place.
     """
 
-    places: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    areas: NDArray[np.float64]
-    owners: NDArray[np.int64]
-    softening: NDArray[np.float64]
-    within: NDArray[np.float64]
+    places: Floats
+    normals: Floats
+    areas: Floats
+    owners: Ints
+    softening: Floats
+    within: Floats
 
     @classmethod
     def of_triangles(cls, pieces: Pieces) -> Dipoles:
@@ -290,7 +282,7 @@ class Dipoles:
         return BoxTree.of(self.places, self.places)
 
     @cached_property
-    def balls(self) -> NDArray[np.float64]:
+    def balls(self) -> Floats:
         """(2 · leaves, 4) middle of the box of each node, and the squared distance from which on it is one dipole."""
         low, high = self.tree.bounds[:, :3], self.tree.bounds[:, 3:]
         with np.errstate(invalid="ignore"):  # of nothing
@@ -298,7 +290,7 @@ class Dipoles:
             balls = np.concatenate([0.5 * (low + high), (OPENING * radii[:, None]) ** 2], axis=1)
         return np.where(np.isfinite(balls), balls, 0.0)
 
-    def chosen(self, kept: NDArray[np.bool_]) -> Dipoles:
+    def chosen(self, kept: Bools) -> Dipoles:
         """The system of some of the pieces, numbered anew."""
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
@@ -306,13 +298,13 @@ class Dipoles:
         places, normals, areas, softening, within = (array[rows] for array in values)
         return Dipoles(places, normals, areas, owners, softening, within)
 
-    def weights(self) -> NDArray[np.float64]:
+    def weights(self) -> Floats:
         """(k,) weights after some steps of conjugate gradients."""
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
         smooth = agreement(self.places, self.normals, shares, self.owners)
         held = HELD * np.bincount(self.owners, shares)
 
-        def system(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        def system(weights: Floats) -> Floats:
             return self._adjoint(shares * self._numbers(weights)) + smooth @ weights + held * weights
 
         weights = np.zeros(len(held))
@@ -329,11 +321,11 @@ class Dipoles:
             way = ahead + steep / max(before, np.finfo(float).tiny) * way
         return weights
 
-    def levels(self, signs: NDArray[np.float64]) -> NDArray[np.float64]:
+    def levels(self, signs: Floats) -> Floats:
         """(n,) levels at the places, less the bodies around them."""
         return self._numbers(signs) - self.within
 
-    def _numbers(self, signs: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _numbers(self, signs: Floats) -> Floats:
         """(n,) winding numbers at the places, of all other dipoles."""
         vectors = self.normals * (self.areas * signs[self.owners])[:, None]
         nodes = self._sums(vectors)
@@ -343,11 +335,11 @@ class Dipoles:
         )
         return sums / (4.0 * np.pi)
 
-    def levels_within(self, signs: NDArray[np.float64], groups: NDArray[np.int64]) -> NDArray[np.float64]:
+    def levels_within(self, signs: Floats, groups: Ints) -> Floats:
         """(n,) levels at the places that the pieces of the same group, (k,), make: of loose triangles none."""
         return np.zeros(len(self.owners))
 
-    def _adjoint(self, charges: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _adjoint(self, charges: Floats) -> Floats:
         """(k,) what the transpose of W makes of values at the places: the field of charges there, at each dipole."""
         away = self.places - self.balls[1, :3]
         nodes = self._sums(np.c_[charges, charges[:, None] * away])
@@ -359,7 +351,7 @@ class Dipoles:
         flux = self.areas * (field * self.normals).sum(axis=1) / (4.0 * np.pi)
         return np.bincount(self.owners, flux).astype(np.float64)
 
-    def _sums(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _sums(self, values: Floats) -> Floats:
         """(2 · leaves, d) sums of (n, d) values over what is below each node."""
         leaves = len(self.tree.items) // LEAF
         sums = np.zeros((2 * leaves, values.shape[1]))
@@ -372,9 +364,7 @@ class Dipoles:
         return sums
 
 
-def agreement(
-    places: NDArray[np.float64], normals: NDArray[np.float64], shares: NDArray[np.float64], owners: NDArray[np.int64]
-) -> sparse.csr_array:
+def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> sparse.csr_array:
     """(k, k) Laplacian with signs, times μ, of pieces of which neighbours lie in one plane, more or less.
 
     Places have normals, and a share of the area; those off each other's plane count less, and so do those of two
@@ -400,7 +390,7 @@ def agreement(
     return (sparse.diags_array(held) - links).tocsr()
 
 
-def spacing(places: NDArray[np.float64]) -> NDArray[np.float64]:
+def spacing(places: Floats) -> Floats:
     """(n,) mean distance of each place to its four nearest neighbours."""
     k = min(4, len(places) - 1)
     distances = scipy.spatial.cKDTree(places).query(places, k + 1, workers=-1)[0].reshape(len(places), -1)
@@ -409,14 +399,8 @@ def spacing(places: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @compiled
 def _potentials(
-    places: NDArray[np.float64],
-    softening: NDArray[np.float64],
-    vectors: NDArray[np.float64],
-    items: NDArray[np.int64],
-    balls: NDArray[np.float64],
-    nodes: NDArray[np.float64],
-    at: NDArray[np.int64],
-) -> NDArray[np.float64]:
+    places: Floats, softening: Floats, vectors: Floats, items: Ints, balls: Floats, nodes: Floats, at: Ints
+) -> Floats:
     """Sums at some places of ``v · d / (|d|² + ε²)^(3/2)`` over all others, d the way there."""
     leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.zeros(len(at))
     for row in range(len(at)):
@@ -449,14 +433,8 @@ def _potentials(
 
 @compiled
 def _fields(
-    places: NDArray[np.float64],
-    softening: NDArray[np.float64],
-    charges: NDArray[np.float64],
-    items: NDArray[np.int64],
-    balls: NDArray[np.float64],
-    nodes: NDArray[np.float64],
-    at: NDArray[np.int64],
-) -> NDArray[np.float64]:
+    places: Floats, softening: Floats, charges: Floats, items: Ints, balls: Floats, nodes: Floats, at: Ints
+) -> Floats:
     """Sums at places of ``c d / (|d|² + ε²)^(3/2)`` over all others, d the way from there; ε is the place's own."""
     leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.zeros((len(at), 3))
     for row in range(len(at)):

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from ..area_elements import sample_on_grid
+from ..arrays import Floats, Ints
 from ..constraints import Constraint, ZeroSet
 from ..discretization import discretize
 from ..errors import OutsideError
@@ -42,9 +42,7 @@ class Heat:
     diffusion: float = 1.0
 
 
-def heat_surface(
-    shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0.0
-) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0.0) -> tuple[Floats, Ints] | None:
     """Vertices and faces of the zero set of φ around a shape, closed; None where the shape bounds nothing.
 
     Cells are as large as noise is wide, or a share of the gaps between points, within bounds; 0 means the smallest.

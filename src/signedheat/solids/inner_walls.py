@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..mesh.components import connected_components
 from ..mesh.edges import HalfedgePairs
 from ..mesh.unit_vectors import axes_across, unit
@@ -22,15 +23,15 @@ turns all six walls of a cell inwards, and so all of that, once in 64 times."""
 
 
 def inner_walls(
-    positions: NDArray[np.float64],
+    positions: Floats,
     pairs: HalfedgePairs,
-    tails: NDArray[np.int64],
-    heads: NDArray[np.int64],
+    tails: Ints,
+    heads: Ints,
     owners: NDArray[np.integer],
-    normals: NDArray[np.float64],
-    areas: NDArray[np.float64],
-    volumes: NDArray[np.float64],
-) -> NDArray[np.bool_]:
+    normals: Floats,
+    areas: Floats,
+    volumes: Floats,
+) -> Bools:
     """(p,) which faces have a closed cell on both sides, in complexes where some edges have three or more faces.
 
     A complex is what is connected by edges; a cell that lacks a wall is part of the outside. In two cases faces with a
@@ -75,13 +76,7 @@ def inner_walls(
     return chosen & inside[front] & inside[back] & (cavities[front] == cavities[back])
 
 
-def _angles(
-    positions: NDArray[np.float64],
-    tails: NDArray[np.int64],
-    heads: NDArray[np.int64],
-    forward: NDArray[np.bool_],
-    normals: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _angles(positions: Floats, tails: Ints, heads: Ints, forward: Bools, normals: Floats) -> Floats:
     """Angles of faces around their edges, right-handed about the direction from the lower vertex to the higher."""
     along = unit(positions[heads] - positions[tails])
     into = np.cross(normals, along)
@@ -90,7 +85,7 @@ def _angles(
     return np.where((x != 0) | (y != 0), np.arctan2(y, x), np.nan)
 
 
-def _cavities(shells: NDArray[np.int64], inside: NDArray[np.bool_], areas: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _cavities(shells: Ints, inside: Bools, areas: Floats) -> Bools:
     """Which shells are those of cavities: faces face into them, where the whole complex was given facing outwards."""
     front, back = shells.T
     outer = inside[front] != inside[back]

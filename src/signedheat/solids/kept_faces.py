@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError
 from ..mesh.arrangement import arranged, meeting_faces
 from ..mesh.components import by_first_use, connected_components, element_components, sums_of
@@ -52,13 +52,13 @@ class Joined:
         Whether there are any of the former.
     """
 
-    points: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    bad: NDArray[np.int64]
+    points: Floats
+    faces: Ints
+    bad: Ints
     open: bool
 
     @classmethod
-    def of(cls, points: NDArray[np.float64], faces: NDArray[np.int64]) -> Joined:
+    def of(cls, points: Floats, faces: Ints) -> Joined:
         """Look at triangles."""
         table = edge_table(faces)
         gaps = table.vertices[table.balance != 0]
@@ -72,9 +72,7 @@ class Joined:
         return TriangleMesh(*split_at_pinches(self.points[used], faces.reshape(-1, 3)))
 
 
-def given_surface(
-    solid: Evaluated, contour: Callable[[], TriangleMesh], cell: float
-) -> tuple[TriangleMesh, NDArray[np.float64]]:
+def given_surface(solid: Evaluated, contour: Callable[[], TriangleMesh], cell: float) -> tuple[TriangleMesh, Floats]:
     """Triangles of a solid that have the inside behind them only, joined into a closed mesh.
 
     Those that join already stay as they are, in their order. Where triangles do not join, the surface of `contour`,
@@ -128,7 +126,7 @@ def _conforming(whole: Joined, windings: Windings) -> Joined:
     return Joined.of(pieces.points, _without_doubles(faces))
 
 
-def _without_doubles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def _without_doubles(faces: Ints) -> Ints:
     """Faces without pairs on the same vertices that face opposite ways, and without those on fewer than three."""
     first, reverse = coincident_faces(faces.ravel(), np.arange(0, faces.size + 1, 3))
     proper = first >= 0
@@ -136,23 +134,23 @@ def _without_doubles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     return faces[proper & ~((forth == 1) & (back == 1))[first]]
 
 
-def unjoined(places: NDArray[np.float64]) -> str:
+def unjoined(places: Floats) -> str:
     """Where a contour was taken, for messages."""
     x, y, z = places[0]
     around = "one place" if len(places) == 1 else f"{len(places)} places, the first"
     return f"around {around} at ({x:.4g}, {y:.4g}, {z:.4g}), where they do not join: contoured there"
 
 
-def _along(edges: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+def _along(edges: Floats, step: float) -> Floats:
     """(n, 3) points on edges, (m, 2, 3), as far apart as that at most."""
     pieces = np.maximum(np.ceil(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1) / step), 1).astype(np.int64)
     row = np.repeat(np.arange(len(edges)), pieces + 1)
     share = (np.arange(len(row)) - np.repeat(np.cumsum(pieces + 1) - pieces - 1, pieces + 1)) / pieces[row]
-    points: NDArray[np.float64] = edges[row, 0] + share[:, None] * (edges[row, 1] - edges[row, 0])
+    points: Floats = edges[row, 0] + share[:, None] * (edges[row, 1] - edges[row, 0])
     return points
 
 
-def _far(surface: TriangleMesh, triangles: NDArray[np.float64], distance: float) -> NDArray[np.float64]:
+def _far(surface: TriangleMesh, triangles: Floats, distance: float) -> Floats:
     """(n, 3) vertices and centres of a surface that are that far from all triangles."""
     points = np.concatenate([surface.vertices, surface.vertices[surface.faces].mean(axis=1)])
     tree = FaceTree.of_triangles(triangles)
@@ -201,12 +199,12 @@ class Boxes:
         In cells, of the grid against the origin.
     """
 
-    places: NDArray[np.int64]
+    places: Ints
     cell: float
-    shift: NDArray[np.float64]
+    shift: Floats
 
     @classmethod
-    def around(cls, points: NDArray[np.float64], cell: float, shift: NDArray[np.float64]) -> Boxes:
+    def around(cls, points: Floats, cell: float, shift: Floats) -> Boxes:
         """The cells that points are in, and all that touch them."""
         return cls(np.unique(np.floor(points / cell - shift).astype(np.int64), axis=0), cell, shift).grown
 
@@ -216,12 +214,12 @@ class Boxes:
         near = self.places[:, None] + np.array(list(np.ndindex(3, 3, 3))) - 1
         return Boxes(np.unique(near.reshape(-1, 3), axis=0), self.cell, self.shift)
 
-    def have(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def have(self, points: Floats) -> Bools:
         """(m,) which of (m, 3) points are in them."""
         return _among(np.floor(points / self.cell - self.shift).astype(np.int64), self.places)
 
     @cached_property
-    def walls(self) -> NDArray[np.float64]:
+    def walls(self) -> Floats:
         """(k, 3, 3) triangles of their sides towards other cells, which face outwards."""
         found = []
         for axis in range(3):
@@ -234,7 +232,7 @@ class Boxes:
         return self.cell * (np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) + self.shift)
 
     @property
-    def middles(self) -> NDArray[np.float64]:
+    def middles(self) -> Floats:
         """(k, 3) of their connected parts."""
         corners = (self.places[:, None] + np.array(list(np.ndindex(2, 2, 2)))).reshape(-1, 3)
         _, ids = np.unique(corners, axis=0, return_inverse=True)
@@ -243,16 +241,14 @@ class Boxes:
         return self.cell * (sums_of(self.places + 0.5, parts, len(counts)) / counts[:, None] + self.shift)
 
 
-def _among(places: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _among(places: Ints, others: Ints) -> Bools:
     """(n,) which of (n, 3) cells are among others."""
     both = np.concatenate([others, places])
     keys = np.ravel_multi_index(tuple((both - both.min(axis=0)).T), tuple(np.ptp(both, axis=0) + 1))
     return np.isin(keys[len(others) :], keys[: len(others)])
 
 
-def split_at_pinches(
-    points: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def split_at_pinches(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
     """Give parts of a closed mesh that touch along edges or at vertices their own: what is inside stays apart.
 
     Around an edge of more than two faces each is paired with the one that bounds the same wedge of the inside. Edges of
@@ -283,7 +279,7 @@ def split_at_pinches(
         points, faces = _split(points, divided_at(faces, rows, corners, middles))
 
 
-def _split(points: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _split(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
     table = edge_table(faces)
     starts, halfedges = table.halfedges
     edges = table.face_edges.ravel()

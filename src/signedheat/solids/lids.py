@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Floats, Ints
 from ..mesh.components import sums_of
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import unit
@@ -44,8 +44,8 @@ class Lid:
         How many points the rim has.
     """
 
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    vertices: Floats
+    faces: Ints
     n_rim: int
 
 
@@ -61,8 +61,8 @@ class Film(Lid):
         Share of the loop's length at which each point of its rim comes.
     """
 
-    plane: NDArray[np.float64]
-    places: NDArray[np.float64]
+    plane: Floats
+    places: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,19 +83,19 @@ class SmoothRim:
     """
 
     length: float
-    starts: NDArray[np.float64]
-    points: NDArray[np.float64]
-    places: NDArray[np.float64]
+    starts: Floats
+    points: Floats
+    places: Floats
 
     @classmethod
-    def of(cls, corners: NDArray[np.float64]) -> SmoothRim:
+    def of(cls, corners: Floats) -> SmoothRim:
         """That of a loop."""
         sides = np.roll(corners, -1, axis=0) - corners
         starts, length = spanning.shares_of(corners)
         steps = np.diff(starts)[:, None]
         sums = np.concatenate([np.zeros((1, 3)), np.cumsum(steps * (corners + 0.5 * sides), axis=0)])
 
-        def integral(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+        def integral(shares: Floats) -> Floats:
             """That of positions along the loop, from its first corner."""
             turns, rest = np.divmod(shares, 1.0)
             k = np.minimum(np.searchsorted(starts, rest, side="right") - 1, len(starts) - 2)
@@ -109,12 +109,12 @@ class SmoothRim:
         ends = integral(places[:-1] + 0.5 * SMOOTH), integral(places[:-1] - 0.5 * SMOOTH)
         return cls(length, starts, (ends[0] - ends[1]) / SMOOTH, places)
 
-    def edges_at(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
+    def edges_at(self, places: Floats) -> Ints:
         """(m,) corner that comes last before each of these places."""
         return np.minimum(np.searchsorted(self.starts, places % 1.0, side="right") - 1, len(self.starts) - 2)
 
 
-def cut_to_pieces(loop: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
     """Places around a closed loop, none farther from the next than its length over `PIECES`: its vertices, and more.
 
     Returns
@@ -151,13 +151,11 @@ def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:
     )
 
 
-def _around_disc(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+def _around_disc(shares: Floats) -> Floats:
     return np.stack([np.cos(2 * np.pi * shares), np.sin(2 * np.pi * shares)], axis=1)
 
 
-def draped(
-    loop: NDArray[np.float64], starts: NDArray[np.float64], frame: Frame | None, over: Film
-) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tuple[Floats, Ints] | None:
     """A lid that spans a loop and follows another: the points that it adds to the loop's, and triangles.
 
     It is triangulated in the same plane, or the same disc, around which the vertices of the loop come after these
@@ -206,9 +204,7 @@ def film(pattern: Film) -> Film:
     return Film(vertices, faces, n, plane, pattern.places)
 
 
-def _membrane(
-    vertices: NDArray[np.float64], n: int, ends: NDArray[np.int64], weights: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _membrane(vertices: Floats, n: int, ends: Ints, weights: Floats) -> Floats:
     """Vertices of which all but the first n are the weighted means of those that edges join them to."""
     here, there = np.concatenate([ends, ends[::-1]], axis=1)
     both = np.concatenate([weights, weights])
@@ -222,9 +218,7 @@ def _membrane(
     return np.concatenate([vertices[:n], sparse.linalg.splu(matrix).solve(sums)])
 
 
-def plate(
-    lid: Film, normals: NDArray[np.float64], curvatures: NDArray[np.float64], held: NDArray[np.float64], width: float
-) -> Film | None:
+def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: float) -> Film | None:
     """A lid bent as a thin plate whose shape at rest is as curved as the surface behind its rim (Helfrich 1973).
 
     ``min Σ |(L x)_v − m_v κ_v n_v − Σ_e ½ |e| g_e|² / (m_v + s_v)``. L is the cotangent Laplacian, m the areas of
@@ -269,7 +263,7 @@ def plate(
     return lid
 
 
-def _load(rim: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+def _load(rim: Floats, normals: Floats) -> Floats:
     """(n, 3) the sum over both edges at each point of a rim of half their length along −g, see `plate`."""
     sides = np.roll(rim, -1, axis=0) - rim
     lengths = np.linalg.norm(sides, axis=1)
@@ -279,25 +273,25 @@ def _load(rim: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.
     return load
 
 
-def _harmonic(lid: Lid, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _harmonic(lid: Lid, values: Floats) -> Floats:
     """Values at the rim, one or several for each point, and between them harmonic on the lid."""
     n, matrix = lid.n_rim, stiffness(lid)
     inner = sparse.linalg.splu(matrix[n:, n:].tocsc()).solve(-(matrix[n:, :n] @ values))
     return np.concatenate([values, inner])
 
 
-def _sides(faces: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+def _sides(faces: Ints, n: int) -> Ints:
     """(m, 3) numbers of the edges across from the corners of triangles."""
     one, other = np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)
     return np.minimum(one, other) * n + np.maximum(one, other)
 
 
-def _cotangents(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def _cotangents(vertices: Floats, faces: Ints) -> Floats:
     """(m, 3) half the cotangents of the corners of triangles, bounded where they are flat."""
     corners = vertices[faces]
     u, v = np.roll(corners, -1, axis=1) - corners, np.roll(corners, -2, axis=1) - corners
     cosine, sine = (u * v).sum(axis=2), np.linalg.norm(np.cross(u, v), axis=2)
-    halves: NDArray[np.float64] = 0.5 * cosine / np.maximum(np.maximum(sine, np.abs(cosine) / 100.0), 1e-300)
+    halves: Floats = 0.5 * cosine / np.maximum(np.maximum(sine, np.abs(cosine) / 100.0), 1e-300)
     return halves
 
 
@@ -310,13 +304,13 @@ def stiffness(lid: Lid) -> sparse.csr_array:
     return sparse.coo_array((entries, places), shape=(n, n)).tocsr()
 
 
-def vertex_normals(lid: Lid) -> NDArray[np.float64]:
+def vertex_normals(lid: Lid) -> Floats:
     """(n, 3) unit normals, means by area of those of the triangles around each vertex."""
     vectors = np.repeat(area_vectors(lid.vertices[lid.faces]), 3, axis=0)
     return unit(sums_of(vectors, lid.faces.ravel(), len(lid.vertices)))
 
 
-def running_mean(values: NDArray[np.float64], reach: int) -> NDArray[np.float64]:
+def running_mean(values: Floats, reach: int) -> Floats:
     """(n,) values along a loop, each the mean of those up to so many places away."""
     window = np.ones(2 * reach + 1) / (2 * reach + 1)
     return np.convolve(np.concatenate([values[len(values) - reach :], values, values[:reach]]), window, mode="valid")

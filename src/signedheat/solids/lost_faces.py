@@ -9,8 +9,8 @@ Liepa 2003).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 
 MOST_SIDES = 16
@@ -20,13 +20,7 @@ BENT = np.deg2rad(70.0)
 a tube it is 90°."""
 
 
-def least_bent(
-    vertices: NDArray[np.float64],
-    loops: list[NDArray[np.int64]],
-    normals: NDArray[np.float64],
-    taken: NDArray[np.int64],
-    most: float,
-) -> list[NDArray[np.int64]]:
+def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints, most: float) -> list[Ints]:
     """(n − 2, 3) triangles on the vertices of each loop of n; none where they do not continue the surface around it.
 
     Parameters
@@ -56,13 +50,8 @@ def least_bent(
 
 @compiled
 def _least_bent(
-    corners: NDArray[np.float64],
-    ids: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    taken: NDArray[np.int64],
-    most: float,
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    corners: Floats, ids: Ints, normals: Floats, starts: Ints, taken: Ints, most: float
+) -> tuple[Ints, Bools]:
     """Triangles, by places in their loops, and whether each loop's bend at its rim at most by an angle.
 
     `cost[i, j]` is how much the best lid between the i-th and the j-th corner bends, but for the edge that joins the
@@ -125,14 +114,12 @@ def _least_bent(
 
 
 @compiled
-def _length(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+def _length(a: Floats, b: Floats) -> float:
     return float(np.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2))
 
 
 @compiled
-def _normal(
-    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], normal: NDArray[np.float64]
-) -> None:
+def _normal(a: Floats, b: Floats, c: Floats, normal: Floats) -> None:
     """Write the unit normal of a triangle; 0 if it has no area."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
@@ -143,7 +130,7 @@ def _normal(
 
 
 @compiled
-def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+def _angle(a: Floats, b: Floats) -> float:
     """The angle between two unit vectors; 0 where one of them is 0."""
     if (a[0] == 0 and a[1] == 0 and a[2] == 0) or (b[0] == 0 and b[1] == 0 and b[2] == 0):
         return 0.0
@@ -151,7 +138,7 @@ def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 
 
 @compiled
-def _is_among(taken: NDArray[np.int64], i: int, j: int) -> bool:
+def _is_among(taken: Ints, i: int, j: int) -> bool:
     key = (min(i, j) << 32) | max(i, j)
     at = np.searchsorted(taken, key)
     return bool(at < len(taken) and taken[at] == key)

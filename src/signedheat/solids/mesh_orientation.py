@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Ints
 from ..diagnostics import ShapeOriented
 from ..errors import GeometryError
 from ..foreign import ForeignShape, converted
@@ -67,11 +68,11 @@ class Orientation(Frozen, ShortRepr):
     """
 
     shape: Mesh
-    faces: NDArray[np.int64]
-    turned: NDArray[np.bool_]
-    parts: NDArray[np.int64]
-    undecided: NDArray[np.bool_]
-    inner: NDArray[np.bool_]
+    faces: Ints
+    turned: Bools
+    parts: Ints
+    undecided: Bools
+    inner: Bools
     n_parts: int
     closed_parts: int
     turned_parts: int
@@ -136,8 +137,7 @@ def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Ori
     if not isinstance(shape, TriangleMesh | PolygonMesh):
         kind = type(shape).__name__
         raise GeometryError(
-            f"faces are oriented here, and a {kind} has none",
-            remedy="pass a TriangleMesh or PolygonMesh",
+            f"faces are oriented here, and a {kind} has none", remedy="pass a TriangleMesh or PolygonMesh"
         )
     chain = Chain.of(shape.triangulation)
     return oriented_as(shape, chain, bounding(chain, nested))
@@ -155,7 +155,7 @@ def oriented_as(shape: Mesh, chain: Chain, decided: Bounding) -> Orientation:
 
     areas, as_given, inside = given(chain.areas, 0), given(decided.as_given, 0), given(decided.inner, 0)
 
-    def most(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def most(mask: Bools) -> Bools:
         """(n,) faces of which most of the area is in a mask of triangles."""
         return np.bincount(owners, np.where(mask, areas, -areas), n) > 0
 
@@ -201,12 +201,12 @@ def oriented_as(shape: Mesh, chain: Chain, decided: Bounding) -> Orientation:
     )
 
 
-def owners_of(shape: Mesh) -> NDArray[np.int64]:
+def owners_of(shape: Mesh) -> Ints:
     """(m,) face that each triangle of a mesh is part of."""
     return shape.refinement.face_polygons if isinstance(shape, PolygonMesh) else np.arange(shape.n_faces)
 
 
-def _turned_mesh(shape: Mesh, kept: NDArray[np.int64], flipped: NDArray[np.bool_]) -> Mesh:
+def _turned_mesh(shape: Mesh, kept: Ints, flipped: Bools) -> Mesh:
     """Some faces of a mesh, some of them turned; the mesh itself where nothing changes."""
     if not flipped.any() and len(kept) == (shape.n_faces if isinstance(shape, TriangleMesh) else shape.n_polygons):
         return shape

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..grids.blocks import SIDE
 from ..grids.grid import Grid
@@ -32,8 +33,8 @@ ALONG_A_CURVE = np.stack(
 
 
 def distances_in(
-    tree: FaceTree, windings: Windings, grid: Grid, first: NDArray[np.int64], places: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    tree: FaceTree, windings: Windings, grid: Grid, first: Ints, places: Ints
+) -> tuple[Floats, NDArray[np.float32]]:
     """(a, b, c) signed distances at the nodes of blocks of a grid, NaN between these; and confidence.
 
     `first` is the first node of the box around them; `places` are the first nodes of the blocks, divided by `SIDE`.
@@ -57,7 +58,7 @@ def distances_in(
 
 
 def solved(
-    tree: FaceTree, windings: Windings, grid: Grid, places: NDArray[np.int64]
+    tree: FaceTree, windings: Windings, grid: Grid, places: Ints
 ) -> tuple[NDArray[np.float32], NDArray[np.float16]]:
     """(n, 8, 8, 8) signed distances at the nodes of blocks near each other, and confidence; NaN beyond the grid."""
     first = places.min(axis=0)
@@ -71,7 +72,7 @@ def solved(
     return values, confidence
 
 
-def _inside(windings: Windings, grid: Grid, first: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _inside(windings: Windings, grid: Grid, first: Ints, values: Floats) -> Bools:
     """Which nodes are inside, computed once for nodes that no surface separates: those farther than half a step."""
     origin, steps = grid.origin + first * grid.spacing, grid.spacing
     inside = np.zeros(values.shape, dtype=bool)
@@ -89,7 +90,7 @@ def _inside(windings: Windings, grid: Grid, first: NDArray[np.int64], values: ND
 
 
 @compiled
-def _farthest(values: NDArray[np.float64], groups: NDArray[np.int32], count: int) -> NDArray[np.int64]:
+def _farthest(values: Floats, groups: NDArray[np.int32], count: int) -> Ints:
     """(count,) flat index of the node of each group from 1 on with the greatest value."""
     result = np.full(count, -1, dtype=np.int64)
     most = np.zeros(count)
@@ -106,20 +107,20 @@ def _farthest(values: NDArray[np.float64], groups: NDArray[np.int32], count: int
 
 @compiled
 def _fill(
-    rows: NDArray[np.float64],
-    bounds: NDArray[np.float64],
-    discs: NDArray[np.float64],
-    items: NDArray[np.int64],
-    origin: NDArray[np.float64],
-    steps: NDArray[np.float64],
-    limits: NDArray[np.int64],
-    firsts: NDArray[np.int64],
+    rows: Floats,
+    bounds: Floats,
+    discs: Floats,
+    items: Ints,
+    origin: Floats,
+    steps: Floats,
+    limits: Ints,
+    firsts: Ints,
     start: NDArray[np.int32],
-    window: NDArray[np.int64],
-    eighths: NDArray[np.int64],
-    out_squares: NDArray[np.float64],
+    window: Ints,
+    eighths: Ints,
+    out_squares: Floats,
     out_faces: NDArray[np.int32],
-) -> NDArray[np.bool_]:
+) -> Bools:
     """Write the nearest faces of all nodes of blocks, and squared distances; return which blocks are too crowded.
 
     `start` has the nearest face to the centre of each block, and `window` the first node of the results. `eighths` is
@@ -176,13 +177,7 @@ def _fill(
 
 @compiled
 def _nearest(
-    rows: NDArray[np.float64],
-    faces: NDArray[np.int32],
-    count: int,
-    places: NDArray[np.float64],
-    away: NDArray[np.float64],
-    best: NDArray[np.float64],
-    which: NDArray[np.int64],
+    rows: Floats, faces: NDArray[np.int32], count: int, places: Floats, away: Floats, best: Floats, which: Ints
 ) -> None:
     """The nearest of some faces to each place: writes the ways to all faces, the least squares, and their faces."""
     for e in range(len(best)):
@@ -199,12 +194,12 @@ def _nearest(
 def _divide(
     faces: NDArray[np.int32],
     count: int,
-    away: NDArray[np.float64],
-    best: NDArray[np.float64],
-    which: NDArray[np.int64],
-    half: NDArray[np.float64],
+    away: Floats,
+    best: Floats,
+    which: Ints,
+    half: Floats,
     out: NDArray[np.int32],
-    counts: NDArray[np.int64],
+    counts: Ints,
 ) -> None:
     """The faces that can be nearest to a node of each of eight boxes, by a bound on squared distance.
 
@@ -232,13 +227,7 @@ def _divide(
 
 
 @compiled
-def _leaves_of_tree(
-    bounds: NDArray[np.float64],
-    discs: NDArray[np.float64],
-    box: NDArray[np.float64],
-    stack: NDArray[np.int64],
-    out: NDArray[np.int64],
-) -> int:
+def _leaves_of_tree(bounds: Floats, discs: Floats, box: Floats, stack: Ints, out: Ints) -> int:
     """Write the leaves that can be nearest to a node of a box; returns how many, or one more than there is room for."""
     leaves = len(bounds) // 2
     kept, depth = 0, 1
@@ -259,9 +248,7 @@ def _leaves_of_tree(
 
 
 @compiled
-def _can_be_nearest(
-    bounds: NDArray[np.float64], discs: NDArray[np.float64], node: int, box: NDArray[np.float64]
-) -> bool:
+def _can_be_nearest(bounds: Floats, discs: Floats, node: int, box: Floats) -> bool:
     """Whether a place y in the box or disc of a node is as near to some x of a box as the foot q of its centre.
 
     Around the centre ``|x − y|² − |x − q|²`` at the worst x is the sum over the axes of ``y² − q² − 2 e |y − q|``, e

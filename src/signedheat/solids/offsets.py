@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..errors import SignedHeatError
 from ..mesh.box_tree import LEAF
@@ -17,7 +17,7 @@ from ..parallel import in_chunks
 from ..search.nearest_triangles import foot_on_triangle
 from .tiles import Evaluated
 
-Reach: TypeAlias = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Reach: TypeAlias = Callable[[Floats], Floats]
 """Signed distance of the surface from each of (n, 3) places of the solid."""
 TOGETHER = 1e-7
 """Distance, over the size of a solid, up to which triangles meet at a place: `keeping.TOGETHER`."""
@@ -55,14 +55,14 @@ class Offset:
         """What it is, for messages."""
         return "the distance that varies" if callable(self.reach) else f"level {self.reach:g}"
 
-    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def distance(self, points: Floats) -> Floats:
         """(n,) heights of (n, 3) points above the surface, negative inside; distances, unless these vary."""
         if self.level is not None:
-            heights: NDArray[np.float64] = self.solid.distance(points) - self.level
+            heights: Floats = self.solid.distance(points) - self.level
             return heights
         return self._heights(points)[0]
 
-    def slopes(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def slopes(self, points: Floats) -> tuple[Floats, Floats]:
         """(n,) distances from the surface, negative inside, and (n, 3) unit vectors along which they grow."""
         heights, gradients = self._heights(points)
         if callable(self.reach):
@@ -71,7 +71,7 @@ class Offset:
             heights, gradients = heights / lengths, gradients / lengths[:, None]
         return heights, gradients
 
-    def _heights(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _heights(self, points: Floats) -> tuple[Floats, Floats]:
         """(n,) heights, and their (n, 3) gradients as if the distance did not vary."""
         closest = self.solid.closest(points)
         heights, gradients = closest.distances, closest.gradients
@@ -80,7 +80,7 @@ class Offset:
             heights, gradients = self._mitred(points - closest.points, closest.points, heights, gradients, reach)
         return heights - reach, gradients
 
-    def planes(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def planes(self, points: Floats) -> tuple[Floats, Floats]:
         """(n, 3) places on the surface near points, and its normals there; at level 0 those of nearest triangles."""
         if self.level == 0:
             tree = self.solid.tree
@@ -90,13 +90,8 @@ class Offset:
         return points - heights[:, None] * gradients, gradients
 
     def _mitred(
-        self,
-        away: NDArray[np.float64],
-        places: NDArray[np.float64],
-        heights: NDArray[np.float64],
-        gradients: NDArray[np.float64],
-        reach: NDArray[np.float64],
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        self, away: Floats, places: Floats, heights: Floats, gradients: Floats, reach: Floats
+    ) -> tuple[Floats, Floats]:
         """Distance from the planes around the nearest places in place of that from these, and its gradients."""
         far = np.abs(heights)
         near = np.flatnonzero((heights * reach > 0) & (far >= np.abs(reach)) & (far < 2 * self.limit * np.abs(reach)))
@@ -106,10 +101,8 @@ class Offset:
         features, tree = self.solid.tree.features, self.solid.tree.tree
         slack = TOGETHER * float(np.ptp(tree.bounds[1].reshape(2, 3), axis=0).max())
 
-        def part(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-            found: tuple[NDArray[np.float64], NDArray[np.int64]] = _steepest(
-                features.rows, tree.bounds, tree.items, self._normals, rows, slack
-            )
+        def part(rows: Floats) -> tuple[Floats, Ints]:
+            found: tuple[Floats, Ints] = _steepest(features.rows, tree.bounds, tree.items, self._normals, rows, slack)
             return found
 
         above, faces = in_chunks(part, np.concatenate([places[near], sides[:, None] * away[near]], axis=1))
@@ -121,25 +114,25 @@ class Offset:
         return heights, gradients
 
     @cached_property
-    def _normals(self) -> NDArray[np.float64]:
+    def _normals(self) -> Floats:
         """Of the triangles of the tree; 0 where they do not have the inside behind them only."""
         features = self.solid.tree.features
         return np.where(self.solid.bounding[features.ids][:, None], features.face_normals, 0.0)
 
-    def _variation(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _variation(self, points: Floats) -> Floats:
         """(n, 3) gradients of the distance of the surface, at the nearest places of points."""
         assert callable(self.reach)
         step = STEP * float(np.ptp(self.solid.tree.tree.bounds[1].reshape(2, 3), axis=0).max())
         around = (points[:, None] + step * ALONG_AXES).reshape(-1, 3)
         found = self.reach(self.solid.tree.search(around).places).reshape(-1, 2, 3)
-        result: NDArray[np.float64] = (found[:, 0] - found[:, 1]) / (2 * step)
+        result: Floats = (found[:, 0] - found[:, 1]) / (2 * step)
         return result
 
 
 def checked_reach(reach: Reach) -> Reach:
     """The function, refused where it does not give a finite number for each place."""
 
-    def called(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def called(places: Floats) -> Floats:
         values = np.asarray(reach(places), dtype=np.float64)
         if values.shape != (len(places),) or not np.isfinite(values).all():
             raise SignedHeatError(
@@ -154,13 +147,8 @@ def checked_reach(reach: Reach) -> Reach:
 
 @compiled
 def _steepest(
-    rows: NDArray[np.float64],
-    bounds: NDArray[np.float64],
-    items: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    places: NDArray[np.float64],
-    slack: float,
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    rows: Floats, bounds: Floats, items: Ints, normals: Floats, places: Floats, slack: float
+) -> tuple[Floats, Ints]:
     """Of the triangles at each place the one above which a point is the highest, and this height; −1 if there is none.
 
     Places are given with the ways from them to the points, (n, 6).

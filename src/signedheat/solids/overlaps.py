@@ -11,9 +11,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Bools, Floats, Ints
 from ..search.winding_tree import WindingTree
 from .gauss import Dipoles, Matrix, Pieces
 from .part_levels import levels_of_pieces
@@ -32,9 +32,9 @@ lies within."""
 class Rims(NamedTuple):
     """Edges where pieces end: their middles (k, 3), lengths (k,) and pieces (k,)."""
 
-    middles: NDArray[np.float64]
-    lengths: NDArray[np.float64]
-    owners: NDArray[np.int64]
+    middles: Floats
+    lengths: Floats
+    owners: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,19 +51,12 @@ class Bodies:
         Which were clearly given as bodies that face outwards.
     """
 
-    numbers: NDArray[np.int64]
-    facing: NDArray[np.float64]
-    as_given: NDArray[np.bool_]
+    numbers: Ints
+    facing: Floats
+    as_given: Bools
 
     @classmethod
-    def of(
-        cls,
-        pieces: Pieces,
-        directed: NDArray[np.float64],
-        groups: NDArray[np.int64],
-        alone: NDArray[np.float64],
-        given: NDArray[np.float64],
-    ) -> Bodies:
+    def of(cls, pieces: Pieces, directed: Floats, groups: Ints, alone: Floats, given: Floats) -> Bodies:
         """Those of directed pieces, of whose area so much faces as it was given."""
         n = len(groups)
         itself = np.abs(alone) >= SHEET
@@ -81,13 +74,13 @@ def bodies_around(
     system: Matrix | Dipoles,
     pieces: Pieces,
     rims: Rims,
-    groups: NDArray[np.int64],
-    alone: NDArray[np.float64],
-    signs: NDArray[np.float64],
-    given: NDArray[np.float64],
-    closed: NDArray[np.float64],
+    groups: Ints,
+    alone: Floats,
+    signs: Floats,
+    given: Floats,
+    closed: Floats,
     nested: Nesting,
-) -> NDArray[np.float64]:
+) -> Floats:
     """(n,) how many open bodies lie around each place of a system, as bodies and not as what it is a cavity in.
 
     `closed` are triangles of closed bodies, (k, 3, 3), which are not in the system: if a place is of a cavity in one
@@ -109,9 +102,7 @@ def bodies_around(
     weights = np.where(own, np.concatenate([system.areas, rims.lengths]), 0.0)
     on_rim = np.arange(len(places)) >= n
 
-    def share(
-        chosen: NDArray[np.bool_], level: float, one: NDArray[np.int64], other: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
+    def share(chosen: Bools, level: float, one: Ints, other: Ints) -> Floats:
         """Of the chosen places of one body, how much has this winding number in the other, for each pair."""
         shape = (count + 1, count + 1)
         sums = sparse.coo_array(
@@ -131,13 +122,8 @@ def bodies_around(
 
 
 def _windings(
-    places: NDArray[np.float64],
-    homes: NDArray[np.int64],
-    triangles: NDArray[np.float64],
-    bodies: NDArray[np.int64],
-    facing: NDArray[np.float64],
-    closed: NDArray[np.float64],
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    places: Floats, homes: Ints, triangles: Floats, bodies: Ints, facing: Floats, closed: Floats
+) -> tuple[Ints, Ints, Floats]:
     """Places, other bodies whose box they lie in, and their winding numbers; what is closed is one more body."""
     count = len(facing)
     order = np.argsort(bodies, kind="stable")

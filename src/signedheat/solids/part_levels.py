@@ -7,8 +7,8 @@ on one that faces inwards, and 0 on a flat sheet; between, it says how much of a
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..search.winding_tree import WindingTree, mean_angle
 from .gauss import Pieces, sampled
@@ -17,9 +17,7 @@ FEW = 16
 """Triangles of a group whose level is wanted up to which all of the group are summed one by one."""
 
 
-def levels_within(
-    triangles: NDArray[np.float64], groups: NDArray[np.int64], counts: NDArray[np.int64], faces: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) -> Floats:
     """(n,) levels at the centres of some triangles, each in its own group.
 
     Triangles, (m, 3, 3), are there as often as `counts` says, (m,), reversed if that is negative.
@@ -55,7 +53,7 @@ def levels_within(
     return levels
 
 
-def levels_of_pieces(pieces: Pieces) -> NDArray[np.float64]:
+def levels_of_pieces(pieces: Pieces) -> Floats:
     """(p,) mean level of each piece by itself."""
     faces, _ = sampled(pieces, 4096)
     levels = levels_within(pieces.triangles, pieces.labels, np.ones(len(pieces.labels), dtype=np.int64), faces)
@@ -64,13 +62,7 @@ def levels_of_pieces(pieces: Pieces) -> NDArray[np.float64]:
 
 
 @compiled
-def _among_few(
-    corners: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    counts: NDArray[np.int64],
-    faces: NDArray[np.int64],
-    groups: NDArray[np.int64],
-) -> NDArray[np.float64]:
+def _among_few(corners: Floats, starts: Ints, counts: Ints, faces: Ints, groups: Ints) -> Floats:
     levels = np.zeros(len(faces))
     for row in range(len(faces)):
         i, group = faces[row], groups[row]

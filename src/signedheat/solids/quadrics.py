@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..mesh.components import sums_of
 
 FLAT = 0.05
@@ -31,13 +31,11 @@ class Quadrics:
         b.
     """
 
-    products: NDArray[np.float64]
-    sides: NDArray[np.float64]
+    products: Floats
+    sides: Floats
 
     @classmethod
-    def of(
-        cls, owners: NDArray[np.int64], places: NDArray[np.float64], normals: NDArray[np.float64], count: int
-    ) -> Quadrics:
+    def of(cls, owners: Ints, places: Floats, normals: Floats, count: int) -> Quadrics:
         """Sums of planes, each through a place, relative to the centre of its owner, with a normal of length 1."""
         along = (normals * places).sum(axis=1)[:, None]
         products = sums_of(normals[:, :, None] * normals[:, None, :], owners, count)
@@ -46,13 +44,11 @@ class Quadrics:
     def __add__(self, other: Quadrics) -> Quadrics:
         return Quadrics(self.products + other.products, self.sides + other.sides)
 
-    def __getitem__(self, rows: NDArray[np.int64] | slice) -> Quadrics:
+    def __getitem__(self, rows: Ints | slice) -> Quadrics:
         return Quadrics(self.products[rows], self.sides[rows])
 
 
-def minimizers(
-    quadrics: Quadrics, lower: NDArray[np.float64], upper: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats, Ints, Floats]:
     """The points of least error of n quadrics within boxes, whose (n, 3) corners are relative to the centres.
 
     A minimum outside of its box moves along the direction in which the error grows the least, that of a crease, until
@@ -97,9 +93,7 @@ def minimizers(
     return np.clip(points, lower, upper), ranks, vectors[:, :, 0]
 
 
-def _way_into(
-    points: NDArray[np.float64], along: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _way_into(points: Floats, along: Floats, lower: Floats, upper: Floats) -> Floats:
     """The shortest moves along directions into boxes; 0 where a line misses its box."""
     slow = np.where(np.abs(along) > 1e-12, along, 1e-12)
     first, second = (lower - points) / slow, (upper - points) / slow
@@ -108,9 +102,7 @@ def _way_into(
     return way[:, None] * along
 
 
-def _solved(
-    values: NDArray[np.float64], vectors: NDArray[np.float64], sides: NDArray[np.float64], least: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _solved(values: Floats, vectors: Floats, sides: Floats, least: Floats) -> Floats:
     """A⁻¹ b without eigenvalues below `least`."""
     inverse = np.where(values > least[:, None], 1.0 / np.where(values > least[:, None], values, 1.0), 0.0)
     return np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, sides, optimize=True)

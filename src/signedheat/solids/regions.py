@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.arrangement import TOUCHING, Arrangement
 from ..mesh.components import sums_of
@@ -39,9 +39,9 @@ class Regions:
         Whether another face on the same corners stands for it.
     """
 
-    behind: NDArray[np.bool_]
-    ahead: NDArray[np.bool_]
-    doubled: NDArray[np.bool_]
+    behind: Bools
+    ahead: Bools
+    doubled: Bools
 
     @classmethod
     def of(cls, pieces: Arrangement, windings: Windings) -> Regions:
@@ -65,13 +65,7 @@ class Regions:
         return cls(behind, ahead, doubled)
 
 
-def _windings(
-    points: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    times: NDArray[np.int64],
-    windings: Windings,
-) -> NDArray[np.float64]:
+def _windings(points: Floats, faces: Ints, normals: Floats, times: Ints, windings: Windings) -> Floats:
     """(m, 2) winding numbers behind each face and in front of it; faces of different corners, each there so often."""
     n = len(faces)
     one, other = _around_edges(points, faces, normals, times)
@@ -95,9 +89,7 @@ def _windings(
     return levels + np.round(medians)[labels, None]
 
 
-def _around_edges(
-    points: NDArray[np.float64], faces: NDArray[np.int64], normals: NDArray[np.float64], times: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> tuple[Ints, Ints]:
     """Pairs of sides, 2 f behind face f and 2 f + 1 in front of it, that face each other around edges.
 
     First those around edges of two faces, then the others, the clearer the order of their faces is the earlier. Where
@@ -130,14 +122,12 @@ def _around_edges(
     return np.concatenate([one, beside[0]]), np.concatenate([other, beside[1]])
 
 
-def _ways(table: EdgeTable, halfedges: NDArray[np.int64]) -> NDArray[np.int64]:
+def _ways(table: EdgeTable, halfedges: Ints) -> Ints:
     """1 where a halfedge runs along its edge, −1 where it runs against it."""
     return np.where(table.forward.ravel()[halfedges], 1, -1)
 
 
-def _facing(
-    table: EdgeTable, turning: NDArray[np.int64], reached: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _facing(table: EdgeTable, turning: Ints, reached: Ints) -> tuple[Ints, Ints]:
     """Sides that face each other from halfedges to those that follow counterclockwise around their edge.
 
     Faces that run along the edge are left at their front, and reached at their back.
@@ -147,9 +137,7 @@ def _facing(
 
 
 @compiled
-def _levels(
-    n: int, one: NDArray[np.int64], other: NDArray[np.int64], steps: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _levels(n: int, one: Ints, other: Ints, steps: Ints) -> tuple[Ints, Ints]:
     """Levels of n nodes that fall by a step from the first to the second of each pair; and what hangs together.
 
     A pair that contradicts those before it does not count. Trees have their least node as root.
@@ -182,22 +170,22 @@ def _levels(
     return rises, labels
 
 
-def _slack(points: NDArray[np.float64]) -> float:
+def _slack(points: Floats) -> float:
     """Distance from faces at which their sides are looked at, at least."""
     return NEAR * TOUCHING * float(np.ptp(points, axis=0).max())
 
 
-def widest(pieces: Arrangement) -> NDArray[np.float64]:
+def widest(pieces: Arrangement) -> Floats:
     """(p, 3) for each piece the middle of the widest one in its cell."""
     triangles = pieces.points[pieces.faces]
     order = np.lexsort((-_widths(triangles), pieces.cells))
     first = order[np.searchsorted(pieces.cells[order], np.arange(int(pieces.cells.max()) + 1))]
-    middles: NDArray[np.float64] = triangles[first].mean(axis=1)[pieces.cells]
+    middles: Floats = triangles[first].mean(axis=1)[pieces.cells]
     return middles
 
 
-def _widths(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+def _widths(triangles: Floats) -> Floats:
     """(m,) areas of triangles over their longest sides."""
     longest = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2).max(axis=1)
-    widths: NDArray[np.float64] = face_areas(triangles) / np.maximum(longest, 1e-300)
+    widths: Floats = face_areas(triangles) / np.maximum(longest, 1e-300)
     return widths

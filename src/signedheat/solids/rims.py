@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..mesh.components import grouped, sums_of
 from ..mesh.edges import edge_table
@@ -25,7 +25,7 @@ STRAIGHT = 1e-5
 """Angles between consecutive edges up to which the vertex between them is no corner, in radians."""
 
 
-def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:
     """Edges that the faces of each part lack, directed as the missing faces would run along them.
 
     Two faces that run along an edge in opposite directions cancel. If k more faces run along it in one direction than
@@ -56,7 +56,7 @@ def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDAr
     return np.repeat(missing, np.abs(excess), axis=0), np.repeat(sides // n, np.abs(excess))
 
 
-def boundary(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def boundary(faces: Ints) -> Ints:
     """(k, 2) tails and heads of the directed edges that faces lack: with them, each edge is balanced by opposite ones.
 
     An edge that k more faces run along in one direction than in the other is listed k times.
@@ -73,7 +73,7 @@ def boundary(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.repeat(np.where(excess[:, None] > 0, edges[:, ::-1], edges), np.abs(excess), axis=0)
 
 
-def loops(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
     """Closed loops around the gaps of faces, along all of their boundary edges; none passes a vertex twice.
 
     Where several loops meet at a vertex, each edge that arrives there goes on along the edge at the other side of the
@@ -109,7 +109,7 @@ def loops(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: NDArra
     return np.split(tails[walks], stops[:-1])
 
 
-def _normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def _normals(vertices: Floats, faces: Ints) -> Floats:
     """(n, 3) unit normals at vertices: means over the faces there, by their angles."""
     corners = vertices[faces]
     ahead, back = unit(np.roll(corners, -1, axis=1) - corners), unit(np.roll(corners, 1, axis=1) - corners)
@@ -119,7 +119,7 @@ def _normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray
 
 
 @compiled
-def _across_gaps(starts: NDArray[np.int64], names: NDArray[np.int64]) -> NDArray[np.int64]:
+def _across_gaps(starts: Ints, names: Ints) -> Ints:
     """The edge that follows each one, by the edges that leave each vertex and, as −1 − e, arrive, counterclockwise.
 
     Gaps are nested as parentheses are: each begins at an edge that leaves, and ends at one that arrives.
@@ -140,9 +140,7 @@ def _across_gaps(starts: NDArray[np.int64], names: NDArray[np.int64]) -> NDArray
 
 
 @compiled
-def _simple_loops(
-    tails: NDArray[np.int64], following: NDArray[np.int64], order: NDArray[np.int64], n_vertices: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) -> tuple[Ints, Ints]:
     """Edges loop by loop, and where each loop stops; walks begin at the edges that come first in an order."""
     n = len(tails)
     place, walk, passed = np.full(n_vertices, -1), np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
@@ -169,7 +167,7 @@ def _simple_loops(
     return edges, stops[:n_loops].copy()
 
 
-def corners_of(points: NDArray[np.float64]) -> NDArray[np.int64]:
+def corners_of(points: Floats) -> Ints:
     """(k,) which points of a closed loop are corners: the loop does not go straight on there.
 
     Examples
@@ -181,7 +179,7 @@ def corners_of(points: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.flatnonzero(np.linalg.norm(ahead - np.roll(ahead, 1, axis=0), axis=1) > STRAIGHT)
 
 
-def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
     """Pairs of edges that run along each other in opposite directions, as where patches with other vertices meet.
 
     Edges with the same ends are no pairs: if there are three or more faces, it is unclear which belong together.

@@ -6,9 +6,7 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..arrays import Bools, Floats
 from ..packages import lazy_module
 
 files: Any = lazy_module("signedheat.io.solid_files", "files")
@@ -48,12 +46,12 @@ class Samples:
     True
     """
 
-    points: NDArray[np.float64]
-    distances: NDArray[np.float64]
-    gradients: NDArray[np.float64]
-    near: NDArray[np.bool_]
-    completed: NDArray[np.bool_]
-    center: NDArray[np.float64]
+    points: Floats
+    distances: Floats
+    gradients: Floats
+    near: Bools
+    completed: Bools
+    center: Floats
     radius: float
 
     def normalized(self) -> Samples:

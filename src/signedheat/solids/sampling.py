@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..errors import OutsideError, SignedHeatError, SourceError
 from ..grids.grid_field import GridField
 from ..kinds import Shapes
@@ -97,9 +97,7 @@ def sample(
     return Samples(points, closest.distances, closest.gradients, is_near, closest.completed, center, radius)
 
 
-def evenly_on(
-    triangles: NDArray[np.float64], n: int, random: np.random.Generator
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def evenly_on(triangles: Floats, n: int, random: np.random.Generator) -> tuple[Floats, Ints]:
     """(n, 3) points on triangles, stratified by area; and the triangle of each."""
     a, b, c = triangles.transpose(1, 0, 2)
     areas = np.cumsum(face_areas(triangles))

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from .rims import boundary, loops
 
 SIDES = 16
 """Sides of a gap between rim and border up to which triangles without other vertices close it."""
 
 
-def seams(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], patches: NDArray[np.int64], step: float
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def seams(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Floats, Ints]:
     """Points on the rims of faces, (k, 3), and triangles, (m, 3), from there to the borders of patches.
 
     Rims get points at most `step` apart, by triangles without area. Each vertex of a border is joined to the nearest of
@@ -45,16 +43,13 @@ def seams(
     nearest = np.zeros(len(vertices), dtype=np.int64)
     nearest[border] = ends[scipy.spatial.cKDTree(places[ends]).query(vertices[border])[1]]
     strip = np.concatenate(
-        [
-            np.stack([tails, heads, nearest[heads]], axis=1),
-            np.stack([tails, nearest[heads], nearest[tails]], axis=1),
-        ]
+        [np.stack([tails, heads, nearest[heads]], axis=1), np.stack([tails, nearest[heads], nearest[tails]], axis=1)]
     )
     a, b, c = strip.T
     return points, np.concatenate([slivers, strip[(a != b) & (b != c) & (c != a)]])
 
 
-def small_gaps(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def small_gaps(vertices: Floats, faces: Ints) -> Ints:
     """(k, 3) triangles that close the gaps of few sides that seams leave."""
     around = [loop for loop in loops(vertices, faces, boundary(faces)) if len(loop) <= SIDES]
     fans = [np.stack([np.full(len(loop) - 2, loop[0]), loop[1:-1], loop[2:]], axis=1) for loop in around]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..compiled import compiled
 from ..errors import GeometryError, InexactWarning, warn_user
 from ..mesh.self_intersections import self_intersections
@@ -94,7 +95,7 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
     return False
 
 
-def _divided(pieces: NDArray[np.float64], rows: NDArray[np.float64], least: float) -> NDArray[np.float64]:
+def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
     """(k, 3, 3) parts of (n, 3, 3) pieces, each of which is cut by a plane upright on one side of a triangle.
 
     It is the side that leaves most on both of its sides. Pieces much larger than their triangle, and those that no side
@@ -114,7 +115,7 @@ def _divided(pieces: NDArray[np.float64], rows: NDArray[np.float64], least: floa
     return np.concatenate([_cut(pieces[cut], beyond[row, side][cut]), _halved(pieces[~cut], sides[~cut])])
 
 
-def _cut(pieces: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cut(pieces: Floats, heights: Floats) -> Floats:
     """(3 n, 3, 3) parts of pieces whose corners have (n, 3) heights of both signs, none of which has both."""
     above = heights > 0
     alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), above.argmin(axis=1))
@@ -126,7 +127,7 @@ def _cut(pieces: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[n
     return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 3)
 
 
-def _halved(pieces: NDArray[np.float64], sides: NDArray[np.float64]) -> NDArray[np.float64]:
+def _halved(pieces: Floats, sides: Floats) -> Floats:
     """(2 n, 3, 3) halves of pieces whose sides are that long, divided at the middle of the longest."""
     turn = (np.argmax(sides, axis=1)[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(pieces, turn[:, :, None], axis=1).swapaxes(0, 1)
@@ -136,7 +137,7 @@ def _halved(pieces: NDArray[np.float64], sides: NDArray[np.float64]) -> NDArray[
 
 
 @compiled
-def _bounds(rows: NDArray[np.float64], pieces: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
+def _bounds(rows: Floats, pieces: Floats, faces: NDArray[np.int32]) -> Floats:
     """(n,) square of the distance of the farthest corner of each of (n, 3, 3) pieces from a face of its own."""
     result = np.zeros(len(pieces))
     for p in range(len(pieces)):

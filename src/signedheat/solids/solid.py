@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..diagnostics import Diagnostics
 from ..errors import InexactWarning, SignedHeatError, SourceError, warn_user
 from ..exchange import Displayed
@@ -97,10 +98,10 @@ class Solid(Displayed, Represented, Frozen):
     ([True, False], True)
     """
 
-    triangles: NDArray[np.float64]
-    origins: NDArray[np.int64]
+    triangles: Floats
+    origins: Ints
     confidence: NDArray[np.float32]
-    bounding: NDArray[np.bool_]
+    bounding: Bools
     windings: Windings
     source: TriangleMesh | None = None
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
@@ -124,13 +125,13 @@ class Solid(Displayed, Represented, Frozen):
         return FaceTree.of(self.features)
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Floats:
         """(2, 3) lower and upper corner of the box around all triangles."""
         points = self.triangles.reshape(-1, 3)
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
     @cached_property
-    def outward(self) -> NDArray[np.float64]:
+    def outward(self) -> Floats:
         """(k, 3, 3) triangles that bound the inside, counter-clockwise as seen from outside."""
         return self.triangles[self.bounding]
 
@@ -168,7 +169,7 @@ class Solid(Displayed, Represented, Frozen):
         """All faces, including the completion and sheets, as one mesh."""
         return _mesh(self.triangles)
 
-    def distance(self, points: ArrayLike, *, signed: bool = True) -> NDArray[np.float64]:
+    def distance(self, points: ArrayLike, *, signed: bool = True) -> Floats:
         """Compute exact signed distances of points, negative inside, in time O(n log m) on all threads.
 
         Unsigned ones are to the same surface, and positive inside, too: for sheets, for clearances, and for networks
@@ -205,7 +206,7 @@ class Solid(Displayed, Represented, Frozen):
             (result[order],) = in_chunks(measure, places[order])
         return shaped(result, shape)
 
-    def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
+    def inside(self, points: ArrayLike) -> Bools:
         """Find which points are inside.
 
         Parameters
@@ -602,14 +603,14 @@ class Solid(Displayed, Represented, Frozen):
         """
         files.save_solid(self, path)
 
-    def _lengths(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
+    def _lengths(self, points: Floats) -> tuple[Floats]:
         return (self.tree.search(points).distances,)
 
-    def _distances(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
+    def _distances(self, points: Floats) -> tuple[Floats]:
         found = self.tree.search(points)
         return (np.where(self._inside(points, found), -found.distances, found.distances),)
 
-    def _inside(self, points: NDArray[np.float64], found: NearestFaces) -> NDArray[np.bool_]:
+    def _inside(self, points: Floats, found: NearestFaces) -> Bools:
         """(n,) whether points are inside: by the normal at the nearest place, or the winding number if in doubt."""
         clear = found.regular & self.bounding[self.features.ids[found.faces]] & (np.abs(found.cosines) > SLANT)
         clear &= found.distances > CLEAR * float(np.abs(self.tree.tree.bounds[1]).max())
@@ -618,7 +619,7 @@ class Solid(Displayed, Represented, Frozen):
             inside[~clear] = self.windings.inside(points[~clear])
         return inside
 
-    def _closest(self, points: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
+    def _closest(self, points: Floats) -> tuple[NDArray[Any], ...]:
         found = self.tree.search(points)
         ids = self.features.ids[found.faces]
         signs = np.where(self._inside(points, found), -1.0, 1.0)
@@ -635,7 +636,7 @@ class Solid(Displayed, Represented, Frozen):
         return signs * lengths, found.places, origins, weights, gradients, self.confidence[ids]
 
 
-def _mesh(triangles: NDArray[np.float64]) -> TriangleMesh:
+def _mesh(triangles: Floats) -> TriangleMesh:
     if not len(triangles):
         raise SourceError("this part of the solid has no triangles", element="solid")
     points, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
@@ -643,10 +644,10 @@ def _mesh(triangles: NDArray[np.float64]) -> TriangleMesh:
 
 
 @transformed.register
-def _(shape: Solid, linear: NDArray[np.float64], move: NDArray[np.float64]) -> Solid:
+def _(shape: Solid, linear: Floats, move: Floats) -> Solid:
     corners = slice(None, None, 1 if np.linalg.det(linear) > 0 else -1)
 
-    def moved(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    def moved(triangles: Floats) -> Floats:
         """Each corner by itself, so that corners at the same place stay at the same one to the last bit."""
         places = sum((triangles[..., k, None] * linear[:, k] for k in range(3)), start=np.zeros(3)) + move
         return np.ascontiguousarray(places[:, corners])

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..mesh.components import connected_components
 from ..mesh.edges import edge_keys, edge_table
 
@@ -19,7 +19,7 @@ SPLITS = 8
 """How often edges of a rim are halved at most until all are edges of its triangulation."""
 MOVED = 1e-9
 """Over the size of a loop, how far points are moved to choose among equal triangles: rounding moves them by 1e-15."""
-Frame = tuple[NDArray[np.float64], NDArray[np.float64]]
+Frame = tuple[Floats, Floats]
 """Origin and (3, 2) axes of a plane."""
 
 
@@ -38,18 +38,18 @@ class Spanned:
         Counterclockwise; the points of the rim come first.
     """
 
-    edges: NDArray[np.int64]
-    shares: NDArray[np.float64]
-    inner: NDArray[np.int64]
-    faces: NDArray[np.int64]
+    edges: Ints
+    shares: Floats
+    inner: Ints
+    faces: Ints
 
-    def rim(self, loop: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rim(self, loop: Floats) -> Floats:
         """(r, d) positions of the points of the rim on a loop of that many vertices."""
         ways = np.roll(loop, -1, axis=0) - loop
-        points: NDArray[np.float64] = loop[self.edges] + self.shares[:, None] * ways[self.edges]
+        points: Floats = loop[self.edges] + self.shares[:, None] * ways[self.edges]
         return points
 
-    def balanced(self) -> NDArray[np.int64]:
+    def balanced(self) -> Ints:
         """(p, 3) faces whose boundary is the loop: triangles without area close the seams along edges that were halved.
 
         The vertices of the loop come first, then the other points of the rim, then those inside.
@@ -66,7 +66,7 @@ class Spanned:
         return np.concatenate([number[self.faces], fans])
 
 
-def frame_of(rim: NDArray[np.float64]) -> Frame | None:
+def frame_of(rim: Floats) -> Frame | None:
     """The plane of a loop's area, in which it runs counterclockwise; None if it has none."""
     normal = area_vector(rim)
     length = np.linalg.norm(normal)
@@ -81,7 +81,7 @@ def frame_of(rim: NDArray[np.float64]) -> Frame | None:
     return rim[0], np.stack([first, np.cross(normal, first)], axis=1)
 
 
-def farthest(loop: NDArray[np.float64], away: NDArray[np.float64]) -> int:
+def farthest(loop: Floats, away: Floats) -> int:
     """The point of a closed loop that is farthest away; of several, that from which on the loop stays away longest.
 
     So loops that are symmetric begin at the same point, or at its image, whichever point comes first.
@@ -95,21 +95,21 @@ def farthest(loop: NDArray[np.float64], away: NDArray[np.float64]) -> int:
     return int(ties[np.lexsort(np.rint(1e6 * far).T[::-1])[-1]])
 
 
-def shares_of(loop: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+def shares_of(loop: Floats) -> tuple[Floats, float]:
     """(n + 1,) share of the length of a closed loop at which each corner comes, and 1; and that length."""
     lengths = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
     along = np.concatenate([[0.0], np.cumsum(lengths)])
     return along / along[-1], float(along[-1])
 
 
-def area_vector(loop: NDArray[np.float64]) -> NDArray[np.float64]:
+def area_vector(loop: Floats) -> Floats:
     """(3,) the area that a closed loop encloses, along its normal."""
     around = loop - loop.mean(axis=0)
-    vector: NDArray[np.float64] = 0.5 * np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
+    vector: Floats = 0.5 * np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
     return vector
 
 
-def spanned(loop: NDArray[np.float64], inner: NDArray[np.float64]) -> Spanned | None:
+def spanned(loop: Floats, inner: Floats) -> Spanned | None:
     """Delaunay triangles of a polygon in the plane with points inside; None if it crosses itself.
 
     Points that are not inside are left out.
@@ -145,7 +145,7 @@ def spanned(loop: NDArray[np.float64], inner: NDArray[np.float64]) -> Spanned | 
     return None
 
 
-def _to_the_left(faces: NDArray[np.int64], n: int) -> NDArray[np.int64] | None:
+def _to_the_left(faces: Ints, n: int) -> Ints | None:
     """Those of the triangles of a plane that a loop around points 0 to n − 1 encloses; None if it crosses itself."""
     table = edge_table(faces)
     tails, heads = table.vertices.T
@@ -159,11 +159,11 @@ def _to_the_left(faces: NDArray[np.int64], n: int) -> NDArray[np.int64] | None:
     left, right = labels[leftward.any(axis=1)], labels[(at_rim & ~leftward).any(axis=1)]
     if int(leftward.sum()) != n or np.isin(left, right).any():
         return None
-    kept: NDArray[np.int64] = faces[np.isin(labels, left)]
+    kept: Ints = faces[np.isin(labels, left)]
     return kept
 
 
-def counterclockwise(points: NDArray[np.float64]) -> NDArray[np.int64]:
+def counterclockwise(points: Floats) -> Ints:
     """Delaunay triangles of points in the plane; where four lie on a circle, no rounding chooses: points are moved."""
     numbers = np.arange(len(points))[:, None]
     moves = (numbers * 0.5 * (5**0.5 - 1) * np.array([1.0, 2**0.5])) % 1.0 - 0.5
@@ -176,7 +176,7 @@ def counterclockwise(points: NDArray[np.float64]) -> NDArray[np.int64]:
     return faces
 
 
-def points_inside(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+def points_inside(polygon: Floats) -> Floats:
     """Points within a polygon of few sides, as dense as its corners at its rim, the less dense the farther from it."""
     steps = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1)
     size = float(np.quantile(steps, 0.9))
@@ -198,17 +198,17 @@ def points_inside(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
     return points[_inside(points, polygon)]
 
 
-def _inside(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _inside(points: Floats, polygon: Floats) -> Bools:
     """(k,) whether points lie inside a polygon: by the parity of crossings."""
     x, y = points.T
     (ax, ay), (bx, by) = polygon.T[..., None], np.roll(polygon, -1, axis=0).T[..., None]
     rise = np.where(by == ay, 1.0, by - ay)  # what is level is not crossed
     crosses = ((ay > y) != (by > y)) & (x < ax + (y - ay) * (bx - ax) / rise)
-    inside: NDArray[np.bool_] = np.logical_xor.reduce(crosses, axis=0)
+    inside: Bools = np.logical_xor.reduce(crosses, axis=0)
     return inside
 
 
-def points_in_disc(n: int) -> NDArray[np.float64]:
+def points_in_disc(n: int) -> Floats:
     """Points within the unit circle, as dense at its rim as n points around it, the less dense the farther from it."""
     rings, radius, step, turn = [np.zeros((1, 2))], 1.0, 2 * np.pi / n, 0.0
     while (radius := radius - step * 0.87) >= step:

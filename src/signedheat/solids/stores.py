@@ -21,6 +21,7 @@ import numpy as np
 from numpy.lib.format import open_memmap
 from numpy.typing import NDArray
 
+from ..arrays import Ints
 from ..cache import fingerprint
 from ..diagnostics import Note
 from ..errors import FileFormatError, SignedHeatError
@@ -72,7 +73,7 @@ def in_store(
     windings: Windings,
     grid: Grid,
     blocks: Blocks,
-    tiles: list[NDArray[np.int64]],
+    tiles: list[Ints],
     scheduler: Scheduler,
     progress: Progress | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float16], TilesComputed]:
@@ -153,7 +154,7 @@ def blocks_held(folder: Path) -> int:
 
 
 @lru_cache(maxsize=1)
-def _plan(folder: str, key: str) -> tuple[FaceTree, Windings, Grid, dict[str, NDArray[np.int64]]]:
+def _plan(folder: str, key: str) -> tuple[FaceTree, Windings, Grid, dict[str, Ints]]:
     """The input of the tiles of a folder, read once per process."""
     with np.load(Path(folder) / "plan.npz", allow_pickle=False) as file:
         plan = dict(file)

@@ -14,6 +14,7 @@ from typing import Any, Literal, Protocol, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..diagnostics import Diagnostics
 from ..errors import MemoryLimitError, OutsideError, UnsupportedTypeError
 from ..grids.blocks import NODES, SIDE, Blocks
@@ -48,11 +49,11 @@ class Evaluated(SolidQueries, Protocol):
     """The part of `Solid` that is used here; importing the class would be circular."""
 
     @property
-    def origins(self) -> NDArray[np.int64]:
+    def origins(self) -> Ints:
         """(m,) face of the source of each triangle; −1 in the completion."""
 
     @property
-    def bounding(self) -> NDArray[np.bool_]:
+    def bounding(self) -> Bools:
         """(m,) whether a triangle has the inside behind it only."""
 
     @property
@@ -87,7 +88,7 @@ def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Grid
     firsts = np.stack(np.meshgrid(*(np.arange(0, n, EDGE) for n in n_blocks), indexing="ij"), axis=-1).reshape(-1, 3)
     tree, windings = prepared(solid)
 
-    def tile(first: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    def tile(first: Ints) -> tuple[Floats, NDArray[np.float32]]:
         stop = np.minimum(first + EDGE, n_blocks)
         axes = (np.arange(*ends) for ends in zip(first, stop, strict=True))
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -141,7 +142,7 @@ def band_field(
         values: NDArray[Any] = np.empty((len(blocks), SIDE, SIDE, SIDE), dtype=np.float32)
         confidence: NDArray[Any] = np.empty(values.shape, dtype=np.float16)
 
-        def solve(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        def solve(rows: Ints) -> Ints:
             values[rows], confidence[rows] = solved(tree, windings, grid, blocks.places[rows].astype(np.int64))
             return rows
 
@@ -155,7 +156,7 @@ def band_field(
     return cast("GridField[Literal[3]]", field)
 
 
-def tiles_of(blocks: Blocks) -> list[NDArray[np.int64]]:
+def tiles_of(blocks: Blocks) -> list[Ints]:
     """Rows of the blocks of each tile."""
     tiles = blocks.places.astype(np.int64) // EDGE
     _, owners = np.unique(tiles, axis=0, return_inverse=True)
@@ -168,16 +169,14 @@ def coarser(grid: Grid, factor: int) -> Grid:
     return Grid(grid.origin, factor * grid.spacing, [max(2, 1 - (-(n - 1) // factor)) for n in grid.shape])
 
 
-def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> NDArray[np.int64] | None:
+def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> Ints | None:
     """(n, 3) places of the blocks that may have a node within reach of a face; None if there are more than a limit."""
     diagonal = float(np.linalg.norm(grid.spacing))
     found = blocks_where(grid, lambda centres, half: tree.distances(centres) <= reach + half * diagonal, limit)
     return found if len(found) <= limit else None
 
 
-def blocks_where(
-    grid: Grid, near: Callable[[NDArray[np.float64], float], NDArray[np.bool_]], limit: float = math.inf
-) -> NDArray[np.int64]:
+def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: float = math.inf) -> Ints:
     """(n, 3) places of blocks, found from coarse to fine; no further once there are more than a limit.
 
     `near` says of cubes of nodes, by their centres and half the nodes along their edges, which may be wanted.
@@ -222,7 +221,7 @@ def prepared(solid: Evaluated) -> tuple[FaceTree, Windings]:
     return tree, windings
 
 
-def in_threads(solve: Callable[[NDArray[np.int64]], Result], places: Iterable[NDArray[np.int64]]) -> Iterator[Result]:
+def in_threads(solve: Callable[[Ints], Result], places: Iterable[Ints]) -> Iterator[Result]:
     """Yield results in order, and hold few at a time."""
     with ThreadPoolExecutor(n_threads()) as pool:
         jobs: deque[Future[Result]] = deque()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..mesh.edges import edge_table
 from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -47,7 +48,7 @@ def training_points(
     for name, (middles, _) in zip(("random_near", "sharp_near"), on.values(), strict=True):
         widths = radius * np.resize(WIDTHS, len(middles))
         around[name] = middles + widths[:, None] * random.normal(size=middles.shape)
-    labelled: dict[str, NDArray[np.float64]] = {}
+    labelled: dict[str, Floats] = {}
     for name, points in around.items():
         labelled |= {f"{name}_points": points, f"{name}_label": solid.distance(points)}
     kept = {name: np.concatenate(both, axis=1).astype(np.float32) for name, both in on.items()}
@@ -55,8 +56,8 @@ def training_points(
 
 
 def _on_sharp_edges(
-    surface: TriangleMesh, normals: NDArray[np.float64], n: int, random: np.random.Generator
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    surface: TriangleMesh, normals: Floats, n: int, random: np.random.Generator
+) -> tuple[Floats, Floats]:
     """(n, 3) places uniform along sharp edges, and means of the normals on both sides."""
     pairs = edge_table(surface.faces).pairs
     pairs = pairs[normals[pairs // 3].prod(axis=1).sum(axis=1) < np.cos(SHARP)]

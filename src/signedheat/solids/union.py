@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..diagnostics import BoundsNothing, CompletedArea, Diagnostics, LeftOut, Note
 from ..mesh.arrangement import Arrangement, arranged, meeting_faces
 from ..mesh.triangles import face_areas
@@ -37,18 +38,18 @@ class Surface:
         Whether they count in the winding number.
     """
 
-    triangles: NDArray[np.float64]
-    ids: NDArray[np.int64]
-    origins: NDArray[np.int64]
+    triangles: Floats
+    ids: Ints
+    origins: Ints
     closing: bool
 
     @classmethod
-    def made(cls, triangles: NDArray[np.float64], closing: bool = True) -> Surface:
+    def made(cls, triangles: Floats, closing: bool = True) -> Surface:
         """Triangles that were not given; their vertices have negative numbers."""
         ids = -1 - same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)
         return cls(triangles, ids, np.full(len(triangles), -1), closing)
 
-    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64], closing: bool) -> Surface:
+    def select(self, chosen: Bools | Ints, closing: bool) -> Surface:
         """Some of its triangles."""
         return Surface(self.triangles[chosen], self.ids[chosen], self.origins[chosen], closing)
 
@@ -57,7 +58,7 @@ def united(
     surfaces: list[Surface],
     keep_overlaps: bool,
     notes: Sequence[Note] = (),
-    points: NDArray[np.float64] | None = None,
+    points: Floats | None = None,
     copies: int = 0,
 ) -> Solid:
     """The solid that surfaces close: without what lies inside, where bodies overlap, and without idle completion."""
@@ -84,7 +85,7 @@ def united(
     return Solid(triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics)
 
 
-def _cut(whole: Surface, closing: NDArray[np.bool_]) -> Arrangement:
+def _cut(whole: Surface, closing: Bools) -> Arrangement:
     """Faces divided where they meet: those that close by each other, all others by these."""
     ids = whole.ids
     first = np.full(int(ids.max()) + 1, -1)
@@ -114,12 +115,7 @@ def _cut(whole: Surface, closing: NDArray[np.bool_]) -> Arrangement:
     )
 
 
-def _arranged(
-    points: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    chosen: NDArray[np.int64],
-    pairs: NDArray[np.int64],
-) -> Arrangement:
+def _arranged(points: Floats, faces: Ints, chosen: Ints, pairs: Ints) -> Arrangement:
     """Some faces, divided where pairs of them meet."""
     if not len(pairs):
         return Arrangement(points, faces[chosen], chosen, np.arange(len(chosen)))
@@ -127,14 +123,7 @@ def _arranged(
     return pieces._replace(origins=chosen[pieces.origins])
 
 
-def _notes(
-    triangles: NDArray[np.float64],
-    origins: NDArray[np.int64],
-    kept: NDArray[np.bool_],
-    buried: NDArray[np.bool_],
-    bounds: NDArray[np.bool_],
-    copies: int,
-) -> list[Note]:
+def _notes(triangles: Floats, origins: Ints, kept: Bools, buried: Bools, bounds: Bools, copies: int) -> list[Note]:
     notes: list[Note] = []
     areas, given = face_areas(triangles), origins >= 0
     total = max(float(areas[given].sum()), np.finfo(float).tiny)
@@ -154,9 +143,7 @@ def _notes(
     return notes
 
 
-def _confidence(
-    triangles: NDArray[np.float64], given: NDArray[np.bool_], whole: Surface, points: NDArray[np.float64] | None
-) -> NDArray[np.float32]:
+def _confidence(triangles: Floats, given: Bools, whole: Surface, points: Floats | None) -> NDArray[np.float32]:
     """(m,) 1 where surface was given; where it was completed less, the farther from what was given."""
     confidence = np.ones(len(triangles), dtype=np.float32)
     if points is None:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..mesh.components import connected_components
 from ..mesh.unit_vectors import unit
 from .lids import cut_to_pieces
@@ -42,22 +42,16 @@ class Rim:
         Area vector of a lid.
     """
 
-    ids: NDArray[np.int64]
-    corners: NDArray[np.float64]
-    onward: NDArray[np.float64]
-    parts: NDArray[np.int64]
-    centre: NDArray[np.float64]
+    ids: Ints
+    corners: Floats
+    onward: Floats
+    parts: Ints
+    centre: Floats
     radius: float
-    opening: NDArray[np.float64]
+    opening: Floats
 
     @classmethod
-    def of(
-        cls,
-        ids: NDArray[np.int64],
-        corners: NDArray[np.float64],
-        behind: NDArray[np.float64],
-        parts: NDArray[np.int64],
-    ) -> Rim:
+    def of(cls, ids: Ints, corners: Floats, behind: Floats, parts: Ints) -> Rim:
         """The rim around a loop of vertices; behind each edge, the face's third corner lies."""
         along = np.roll(corners, -1, axis=0) - corners
         away = corners - behind
@@ -67,7 +61,7 @@ class Rim:
         return cls(ids, corners, unit(away), parts, centre, radius, area_vector(corners))
 
 
-def seams(rims: list[Rim]) -> list[NDArray[np.int64]]:
+def seams(rims: list[Rim]) -> list[Ints]:
     """(k, 3) vertices of the triangles of strips between stretches of rims that run along each other.
 
     A stretch consists of whole straight sides. What lies between two of them must be a gap: where faces of one part
@@ -123,9 +117,7 @@ def seams(rims: list[Rim]) -> list[NDArray[np.int64]]:
     return strips
 
 
-def _stretches(
-    one: NDArray[np.int64], other: NDArray[np.int64], following: NDArray[np.int64], lengths: NDArray[np.float64]
-) -> list[NDArray[np.int64]]:
+def _stretches(one: Ints, other: Ints, following: Ints, lengths: Floats) -> list[Ints]:
     """(k, 2) pairs of sides that meet, each with its reverse, by stretches: from one to the next; the longest first."""
     if not len(one):
         return []
@@ -146,7 +138,7 @@ def _stretches(
     return sorted(groups, key=lambda pairs: -float(lengths[np.unique(pairs[:, 0])].sum()))
 
 
-def _run(sides: NDArray[np.int64], following: NDArray[np.int64]) -> NDArray[np.int64]:
+def _run(sides: Ints, following: Ints) -> Ints:
     """Sides in the order in which they follow each other; none if they do not."""
     begins = sides[~np.isin(sides, following[sides])]
     if len(begins) > 1 or not len(sides):
@@ -157,14 +149,14 @@ def _run(sides: NDArray[np.int64], following: NDArray[np.int64]) -> NDArray[np.i
     return np.array(run)
 
 
-def _places(rim: Rim, corners: NDArray[np.int64], sides: NDArray[np.int64]) -> NDArray[np.int64]:
+def _places(rim: Rim, corners: Ints, sides: Ints) -> Ints:
     """Places around a rim of all vertices of some of its sides, one after another, with both ends."""
     begin, stop = corners[sides[0]], corners[(sides[-1] + 1) % len(corners)]
     count = (stop - begin) % len(rim.ids) or len(rim.ids)
     return (begin + np.arange(count + 1)) % len(rim.ids)
 
 
-def wall_ends(rims: list[Rim], areas: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+def wall_ends(rims: list[Rim], areas: Floats) -> list[Ints]:
     """(k, 3) vertices of the triangles of strips between whole rims that are near each other all around.
 
     Such as those of a bowl's outside and inside without its lip. `areas` are those of the parts.
@@ -172,7 +164,7 @@ def wall_ends(rims: list[Rim], areas: NDArray[np.float64]) -> list[NDArray[np.in
     return [strip(rims[i], rims[j]) for i, j in facing(rims, areas)]
 
 
-def facing(rims: list[Rim], areas: NDArray[np.float64]) -> list[tuple[int, int]]:
+def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
     """Pairs of rims that run opposite ways, of parts with these areas: the strip between them is narrow enough."""
     if len(rims) < 2:
         return []
@@ -213,7 +205,7 @@ def _way(rim: Rim, other: Rim) -> tuple[float, float]:
     return float(lengths @ np.linalg.norm(way, axis=1)), float(lengths @ (way * rim.onward).sum(axis=1))
 
 
-def strip(one: Rim, other: Rim) -> NDArray[np.int64]:
+def strip(one: Rim, other: Rim) -> Ints:
     """(n + m, 3) vertices of triangles between rims that run opposite ways, from their nearest two corners on."""
     away, at = scipy.spatial.cKDTree(other.corners).query(one.corners)
     start = int(np.argmin(away))
@@ -222,9 +214,7 @@ def strip(one: Rim, other: Rim) -> NDArray[np.int64]:
     return _zipped(one.ids[i], one.corners[i], other.ids[j], other.corners[j])
 
 
-def _zipped(
-    one: NDArray[np.int64], points: NDArray[np.float64], other: NDArray[np.int64], across: NDArray[np.float64]
-) -> NDArray[np.int64]:
+def _zipped(one: Ints, points: Floats, other: Ints, across: Floats) -> Ints:
     """Triangles between two chains, along the first and against the other: the shorter diagonal that comes next."""
     a, b, faces = 0, 0, []
     while a < len(one) - 1 or b < len(other) - 1:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import GeometryError, SourceError
 from ..grids.grid import Grid
 from ..mesh.components import element_components
@@ -94,12 +94,12 @@ def faults_of(surface: TriangleMesh) -> dict[str, object]:
     }
 
 
-def _places(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    places: NDArray[np.float64] = np.einsum("pk,mkj->mpj", PARTS, triangles).reshape(-1, 3)
+def _places(triangles: Floats) -> Floats:
+    places: Floats = np.einsum("pk,mkj->mpj", PARTS, triangles).reshape(-1, 3)
     return places
 
 
-def _openings(completion: NDArray[np.float64]) -> int:
+def _openings(completion: Floats) -> int:
     """Connected parts of what completes."""
     if not len(completion):
         return 0

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats
 from ..errors import GeometryError
 from ..frozen import Frozen
 from ..mesh.edges import edge_table
@@ -38,7 +38,7 @@ class Windings(Frozen):
         If an edge is not balanced.
     """
 
-    triangles: NDArray[np.float64]
+    triangles: Floats
 
     def __post_init__(self) -> None:
         ends = open_edges_of(self.triangles)
@@ -56,16 +56,16 @@ class Windings(Frozen):
         """Search tree over the triangles, of which there is at least one."""
         return WindingTree.of(self.triangles)
 
-    def numbers(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def numbers(self, points: Floats) -> Floats:
         """(n,) winding numbers."""
         return self.tree.numbers(points) if len(self.triangles) else np.zeros(len(points))
 
-    def inside(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def inside(self, points: Floats) -> Bools:
         """(n,) whether points are inside."""
-        result: NDArray[np.bool_] = self.numbers(points) > INSIDE
+        result: Bools = self.numbers(points) > INSIDE
         return result
 
-    def sides(self, triangles: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def sides(self, triangles: Floats) -> tuple[Bools, Bools]:
         """(n,) whether places just behind (n, 3, 3) triangles are inside; and the same just in front of them."""
         vectors = 2.0 * area_vectors(triangles)
         areas = np.linalg.norm(vectors, axis=1)
@@ -74,11 +74,11 @@ class Windings(Frozen):
         return self.inside(centres - step), self.inside(centres + step)
 
 
-def open_edges_of(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+def open_edges_of(triangles: Floats) -> Floats:
     """(n, 2, 3) ends of unbalanced edges."""
     corners = triangles.reshape(-1, 3)
     faces = same_positions(corners)[np.arange(len(corners)).reshape(-1, 3)]
     a, b, c = faces.T
     table = edge_table(faces[(a != b) & (b != c) & (c != a)])
-    ends: NDArray[np.float64] = corners[table.vertices[table.balance != 0]]
+    ends: Floats = corners[table.vertices[table.balance != 0]]
     return ends
