@@ -69,7 +69,7 @@ def test_sharpening_is_the_same_whoever_watches(seen):
 
 def test_sharpening_stops_when_asked_to(monkeypatch):
     """However long the search for straight lines takes."""
-    monkeypatch.setattr("signedheat.grids.grid_sharpening.redistance", lambda *_: time.sleep(20))
+    monkeypatch.setattr("signedheat.grids.redistancing.redistance", lambda *_: time.sleep(20))
     calls = []
 
     def progress(fraction, step):

@@ -19,11 +19,10 @@ import scipy
 from .arrays import Floats, Ints
 from .errors import CancellingNormalsError, SourceError
 from .foreign import what_to_pass
-from .grids.binning import merge_in_cells
 from .grids.grid import Grid
-from .grids.node_sources import NodeSources
+from .grids.node_sources import NodeSources, merge_in_cells
 from .grids.polyline import Polyline
-from .grids.wavefront import padded_shape
+from .grids.stencil import padded_shape
 from .mesh.components import element_components
 from .mesh.triangles import area_vectors
 from .mesh.unit_vectors import unit

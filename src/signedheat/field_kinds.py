@@ -13,9 +13,8 @@ from scipy import sparse
 from .arrays import Bools, Floats
 from .diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
 from .errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
-from .grids.grid_discretization import GridDiscretization
+from .grids.grid_discretization import GridDiscretization, GridSource
 from .grids.grid_field import GridField
-from .grids.grid_source import GridSource
 from .mesh.components import connected_components
 from .surfaces.point_cloud import PointCloud
 from .surfaces.surface_discretization import SurfaceDiscretization

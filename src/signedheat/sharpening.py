@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TypeVar, overload
 
 from .field_kinds import Field
-from .grids import grid_sharpening  # noqa: F401  registers how its fields are sharpened
+from .grids import redistancing  # noqa: F401  registers how its fields are sharpened
 from .grids.grid import Dimension
 from .grids.grid_field import GridField
 from .kinds import Shapes

@@ -2,10 +2,10 @@
 
 Windows propagate from face to face in order of distance (Mitchell, Mount & Papadimitriou 1987; Chen & Han 1990), and
 windows that a path through a vertex undercuts are dropped (Xin & Wang 2009). A window is an interval of an edge whose
-points see one source along straight lines: a point, or, since sources here are segments too, a parallel beam at right
-angles to a segment. Each vertex splits windows, so that their number per edge would grow with distance; neighbouring
-windows that one circular or straight wave front approximates are therefore merged (Surazhsky et al. 2005), and the work
-stays in proportion to the number of faces.
+points see one source along straight lines: a point, or, since sources here are segments too, a parallel beam
+perpendicular to a segment. Each vertex splits windows, so that their number per edge would grow with distance;
+neighbouring windows that one circular or straight wave front approximates are therefore merged (Surazhsky et al. 2005),
+and the work stays in proportion to the number of faces.
 """
 
 from __future__ import annotations
@@ -56,28 +56,27 @@ from .geodesic_windows import (
 from .heap_kernels import Queue, pop, push
 
 WINDOWS_PER_EDGE, FEW_WINDOWS, ON_SMALL = 100, 4_000_000, 1000
-"""A search that makes more windows than this, on average, is cut short; on smooth surfaces ten are usual. Small meshes
-of many sheets take more, which is little in all."""
+"""Average number of windows per edge, and numbers on small meshes, above which a search is cut short; ten per edge are
+usual on smooth surfaces. Small meshes of many sheets make more, which is little in all."""
 MANY_PER_EDGE, MANY_WINDOWS = 30, 50_000
-"""A search that makes more windows than this goes on in Delaunay triangles: through the long edges of slivers every
-segment of a curve is seen."""
+"""Number of windows above which a search goes on in Delaunay triangles: through the long edges of slivers every segment
+of a curve is seen."""
 Report: TypeAlias = Callable[[], None]
-"""Called every tenth of a second or so; an exception that it raises ends the search."""
+"""Function that is called about every tenth of a second; an exception that it raises ends the search."""
 _CHUNK = 1 << 16
+"""Windows between two reports."""
 
 
 def distance_to_zero_line(
     triangles: IntrinsicMesh, values: Floats, tolerance: float = 1e-4, report: Report | None = None
 ) -> tuple[Floats, int]:
-    """Distance of every vertex to the zero set of a function that is linear in every face; and the number of windows.
+    """Return the distance of every vertex to the zero set of a function linear in faces, and the number of windows.
 
     Any surface will do, nonmanifold and nonorientable ones too. Faces with a NaN corner contain no part of the zero
-    set. Windows are merged where that changes distances by less than `tolerance` of the edge; 0 is exact. `report` is
-    called between short stretches of work; an exception that it raises ends the search.
-
-    Distances are inf where the zero set is not connected to the vertex. The number of windows is a measure of the work:
-    if it is as large as `window_limit`, the search was cut short, and some distances are lengths of paths that run
-    along edges from where it ended.
+    set. Windows are merged where that changes distances by less than `tolerance` of the edge; 0 is exact. Distances are
+    inf where the zero set is not connected to the vertex. The number of windows is a measure of the work: if it is as
+    large as `window_limit`, the search was cut short, and some distances are lengths of paths that run along edges from
+    where it ended.
     """
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
     return distance_to_segments(triangles, [zero_line(triangles, values)], tolerance, report)
@@ -86,7 +85,7 @@ def distance_to_zero_line(
 def distance_to_segments(
     triangles: IntrinsicMesh, placed: Sequence[PlacedSegments], tolerance: float = 1e-4, report: Report | None = None
 ) -> tuple[Floats, int]:
-    """Distance of every vertex to segments and points: in faces, along edges, at vertices; the rest is as above."""
+    """Return the distance of every vertex to segments and points as `distance_to_zero_line` does."""
     limit = window_limit(triangles)
     placed = [through_vertices(triangles, each) for each in placed]
     many = min(MANY_PER_EDGE * triangles.n_edges + MANY_WINDOWS, limit)
@@ -101,7 +100,7 @@ def distance_to_segments(
 
 
 def cleared(triangles: IntrinsicMesh, values: Floats, least: float) -> Floats:
-    """Values moved away from zero by `least`, so that the zero set crosses edges and passes no vertex.
+    """Move values away from zero by `least`, so that the zero set crosses edges and passes no vertex.
 
     A vertex with value zero gets the sign that fewer of its neighbours have: where both sides of a source have the same
     sign, the zero set then runs around the source.
@@ -114,7 +113,7 @@ def cleared(triangles: IntrinsicMesh, values: Floats, least: float) -> Floats:
 
 
 def is_pseudosource(triangles: IntrinsicMesh) -> Bools:
-    """(n,) vertices that shortest paths can pass through: on a boundary, or with a total angle of more than 2π."""
+    """Return (n,) whether shortest paths can pass through a vertex: on a boundary, or with a total angle above 2π."""
     angles = np.arctan2(1.0, triangles.corner_cotangents)
     total = np.bincount(triangles.corner_vertices.ravel(), angles.ravel(), triangles.n_vertices)
     special = total > 2 * np.pi + 1e-9
@@ -123,7 +122,7 @@ def is_pseudosource(triangles: IntrinsicMesh) -> Bools:
 
 
 def window_limit(triangles: IntrinsicMesh) -> int:
-    """Number of windows after which a search is cut short."""
+    """Return the number of windows at which a search is cut short."""
     return min(ON_SMALL * 3 * triangles.n_faces, WINDOWS_PER_EDGE * triangles.n_edges + FEW_WINDOWS)
 
 
@@ -132,14 +131,14 @@ class PausedSearch:
     """A search on some triangles, in short calls of kernels between which it can be ended."""
 
     triangles: IntrinsicMesh
-    search: Search  # what it has found; going on changes it
+    search: Search  # its state, which changes as it goes on
     tolerance: float  # see `distance_to_zero_line`
 
     @classmethod
     def start(cls, triangles: IntrinsicMesh, placed: Sequence[PlacedSegments], tolerance: float) -> PausedSearch:
-        """With the windows that leave the sources."""
-        each = [part.sources(triangles) for part in placed]
-        sources = GeodesicSources(*(np.concatenate(arrays) for arrays in zip(*each, strict=True)))
+        """Start with the windows that leave the sources."""
+        parts = [part.sources(triangles) for part in placed]
+        sources = GeodesicSources(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
         pseudosources = is_pseudosource(triangles)
         pseudosources[sources.vertices] = True
         faces, room = Faces.of(triangles), 1024
@@ -157,11 +156,11 @@ class PausedSearch:
 
     @property
     def windows(self) -> int:
-        """How many it has made."""
+        """Number of windows made so far."""
         return int(self.search.counts[MADE])
 
     def until(self, limit: int, report: Report | None) -> PausedSearch:
-        """Go on to the end, or until so many windows have been made; returns the same search."""
+        """Go on to the end, or until this many windows have been made; return the same search."""
         faces, search, slack = Faces.of(self.triangles), self.search, ROUND + 2.0 * self.tolerance
         while search.queue.size[0] > 0 and search.counts[MADE] < limit:
             if report is not None:
@@ -172,7 +171,7 @@ class PausedSearch:
         return self
 
     def distance(self) -> Floats:
-        """(n,) of every vertex; along edges from what was reached, where it was not."""
+        """Return (n,) distances of all vertices; of those not reached, along edges from those that were."""
         distance = self.search.distance
         if self.has_ended and np.isfinite(distance).all():
             return distance
@@ -184,7 +183,7 @@ class PausedSearch:
 
 
 def distances_along_edges(triangles: IntrinsicMesh, vertices: Ints, offsets: Floats) -> Floats:
-    """(n,) distance of every vertex along edges from vertices (k,) that have distances of their own; inf if none.
+    """Return (n,) distances along edges from vertices (k,) that have distances of their own; inf if unconnected.
 
     A vertex that is given several times starts with the least of its distances.
     """
@@ -201,13 +200,13 @@ def distances_along_edges(triangles: IntrinsicMesh, vertices: Ints, offsets: Flo
 
 
 FLIPPED = 0.05
-"""Share of the edges that are not Delaunay from which other triangles are worth their making."""
+"""Share of edges that are not Delaunay above which the search makes Delaunay triangles."""
 
 
 def in_delaunay_triangles(
     triangles: IntrinsicMesh, placed: Sequence[PlacedSegments]
 ) -> tuple[IntrinsicMesh, list[PlacedSegments]] | None:
-    """The surface in Delaunay triangles along whose edges the sources run; None if there is nothing to gain.
+    """Return the surface in Delaunay triangles along whose edges the sources run; None if there is nothing to gain.
 
     The triangles are cut where segments cross them, and all edges that are no part of a source are flipped. Distances
     are those on the triangles given, whose vertices come first.
@@ -223,15 +222,16 @@ def in_delaunay_triangles(
 
 
 def share_to_flip(triangles: IntrinsicMesh) -> float:
-    """Share of the edges that have two faces, with opposite angles that sum to more than π."""
+    """Return the share of the edges that have two faces, with opposite angles that sum to more than π."""
     opposite = np.roll(triangles.corner_cotangents, 1, axis=1)  # the corner facing edge k is k + 2
     sums = np.bincount(triangles.edges.face_edges.ravel(), opposite.ravel(), triangles.n_edges)
     return float(((sums < -1e-9) & (triangles.edges.face_counts == 2)).mean())
 
 
 ROUND = 1e-10
+"""Rounding error of distances, relative to the length of an edge."""
 MANY = 4
-"""Windows on a halfedge, the comparing of which with each other counts as the making of one."""
+"""Number of windows on a halfedge whose comparison with each other is as much work as making one."""
 
 
 @compiled
@@ -247,10 +247,10 @@ def _reach(distance: Floats, pseudosources: Bools, queue: Queue, first: int, v: 
 def _collect(
     search: Search, halfedge: int, at_tail: float, at_head: float, length: float, slack: float, tolerance: float
 ) -> tuple[Floats, int]:
-    """The windows queued for a halfedge, in order along it, trimmed against each other and merged where possible.
+    """Return the windows queued for a halfedge, in order along it, trimmed against each other and merged if possible.
 
-    Only what is nearer than the windows that crossed the halfedge before is left, and joins them: without this, waves
-    multiply without end where many faces share edges.
+    Only what is nearer than the windows that crossed the halfedge before is left: without this, waves multiply without
+    end where many faces share edges.
     """
     _, _, _, queued, settled, windows, following, counts = search
     count, row = 0, queued[halfedge]
@@ -294,7 +294,7 @@ def _collect(
 
 @compiled
 def _left(windows: Floats, following: Ints, row: int, w: Floats, length: float) -> bool:
-    """Trim a window against those of a list; whether anything is left."""
+    """Trim a window against those of a list; return whether anything is left."""
     while row >= 0:
         trim_by(windows[row], w, ROUND * length)
         if not w[S1] - w[S0] > 1e-12 * length:
@@ -305,7 +305,7 @@ def _left(windows: Floats, following: Ints, row: int, w: Floats, length: float) 
 
 @compiled
 def _settle(search: Search, halfedge: int, chosen: Floats, count: int) -> None:
-    """Add windows to those that have crossed a halfedge, instead of the ones that they outdo."""
+    """Add windows to those that have crossed a halfedge, in place of those that they outdo."""
     _, _, _, _, settled, windows, following, counts = search
     row, before = settled[halfedge], -1
     while row >= 0:
@@ -330,7 +330,7 @@ def _settle(search: Search, halfedge: int, chosen: Floats, count: int) -> None:
 
 @compiled
 def start_search(faces: Faces, sources: GeodesicSources, search: Search, slack: float) -> None:
-    """Distances at the sources, and the first windows, as far as there is room."""
+    """Set distances at the sources, and make the first windows, as far as there is room."""
     initial_windows(faces, sources, search, slack)
     for v in range(len(search.distance)):
         if search.pseudosources[v] and search.distance[v] < np.inf:
@@ -339,7 +339,7 @@ def start_search(faces: Faces, sources: GeodesicSources, search: Search, slack: 
 
 @compiled
 def _most_windows(faces: Faces, queued: Ints, following: Ints, item: int) -> int:
-    """The most windows that one item of the queue can make."""
+    """Return the largest number of windows that one item of the queue can make."""
     most, n_halfedges = 0, len(queued)
     if item >= n_halfedges:
         v = item - n_halfedges
@@ -385,8 +385,8 @@ def continue_search(faces: Faces, search: Search, slack: float, tolerance: float
         edge = faces.edges[face, side]
         length = faces.lengths[edge]
         tail, head = faces.edge_vertices[edge]
-        here, n_here = _collect(search, halfedge, distance[tail], distance[head], length, slack * length, tolerance)
-        _settle(search, halfedge, here, n_here)
+        front, n_front = _collect(search, halfedge, distance[tail], distance[head], length, slack * length, tolerance)
+        _settle(search, halfedge, front, n_front)
         a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
         ahead = faces.forward[face, side]
         origin, unit = (a, (b - a) / length) if ahead else (b, (a - b) / length)
@@ -394,8 +394,8 @@ def continue_search(faces: Faces, search: Search, slack: float, tolerance: float
         apex = (faces.positions[face, (side + 2) % 3] - origin) * unit.conjugate()
         cx, cy = apex.real, abs(apex.imag)
         tail_side, head_side = ((side + 2) % 3, (side + 1) % 3) if ahead else ((side + 1) % 3, (side + 2) % 3)
-        for k in range(n_here):
-            w = here[k]
+        for k in range(n_front):
+            w = front[k]
             if w[KIND] == FOCUS and w[Q] <= cy:
                 straighten(w)
             s0, s1 = w[S0], w[S1]

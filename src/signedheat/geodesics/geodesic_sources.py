@@ -35,13 +35,12 @@ from ..mesh.surface_points import (
 class GeodesicSources(NamedTuple):
     """Where distance is zero, and the directions in which it grows. Positions are in the layouts of the faces."""
 
-    vertices: Ints  # (v,) vertices at which distance is zero; those of curves among them
+    vertices: Ints  # (v,) vertices at which distance is zero, including those of curves
     # (b,) segments from which a parallel beam leaves to the left
     beam_faces: Ints
     beam_starts: Complexes
     beam_stops: Complexes
-    # (a,) points from which circular waves leave, in directions of more than 90° from the first and the second given; 0
-    # for none
+    # (a,) points from which circular waves leave, in directions of more than 90° from the first and second; 0 for none
     fan_faces: Ints
     fan_points: Complexes
     fan_firsts: Complexes
@@ -54,18 +53,16 @@ class PlacedSegments:
 
     nodes: LocatedPoints  # (s,) distinct points
     ends: Ints  # (k, 2) the nodes that each segment joins
-    # (k,) the face that each segment lies in. A segment along an edge is listed once for every face at the edge.
-    faces: Ints
-    # (k, 2) of both ends, in the layout of the face; along an edge in the direction that has the face to its left
+    faces: Ints  # (k,) the face of each; a segment along an edge is listed once for every face at the edge
+    # (k, 2) both ends, in the layout of the face; along an edge in the direction that has the face to its left
     positions: Complexes
     along_edge: Bools  # (k,) whether the segment runs along an edge of its face
-    # (k,) 1 where φ grows to the left of the segment, −1 where it grows to the right, 0 where it does so on both sides
-    sides: Ints
+    sides: Ints  # (k,) 1 where φ grows to the left of the segment, −1 where it grows to the right, 0 on both sides
     given: Ints  # (k,) index of the segment among those given
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> PlacedSegments:
-        """Place the segments of curves that run as they like: across faces, along edges and through vertices."""
+        """Place the segments of curves, which may cross faces and run along edges and through vertices."""
         merged = MergedSources.of(parts)
         oriented = np.array([part.oriented for part in parts])[merged.owners]
         both = cls._inside(triangles, merged, oriented), cls._adjacent(triangles, merged, oriented)
@@ -120,7 +117,7 @@ class PlacedSegments:
         return np.abs(self.positions[:, 1] - self.positions[:, 0])
 
     def sources(self, triangles: IntrinsicMesh) -> GeodesicSources:
-        """The waves that leave the segments, and points that no segment ends at."""
+        """Return the waves that leave the segments, and points at which no segment ends."""
         inside = np.flatnonzero(~self.along_edge)
         faces = np.concatenate([self.faces, self.faces[inside]])
         starts = np.concatenate([self.positions[:, 0], self.positions[inside, 1]])
@@ -129,7 +126,7 @@ class PlacedSegments:
         return GeodesicSources(self.nodes.elements[at_vertex], faces, starts, stops, *self._fans(triangles))
 
     def _fans(self, triangles: IntrinsicMesh) -> tuple[Ints, Complexes, Complexes, Complexes]:
-        """Fans at nodes inside faces and on edges; at the latter one in every face at the edge."""
+        """Return fans at nodes inside faces and on edges, at the latter one in every face at the edge."""
         nodes = self.nodes
         first, second = self._directions(triangles)
         inside, on_edge = np.flatnonzero(nodes.kinds == FACE), np.flatnonzero(nodes.kinds == EDGE)
@@ -145,10 +142,10 @@ class PlacedSegments:
         return np.concatenate([home, faces]), np.concatenate([points, across]), firsts, seconds
 
     def _directions(self, triangles: IntrinsicMesh) -> tuple[Complexes, Complexes]:
-        """(s,) directions away from each node of the first and of the last segment that ends there.
+        """Return (s,) directions away from each node of the first and of the last segment that ends there, 0 for none.
 
-        As complex numbers in the layout of the node's face, or in the frame of its edge; 0 where there is no segment.
-        At an edge of three faces or more, segments inside faces count as none: how they go on there is ambiguous.
+        They are complex numbers in the layout of the node's face, or in the frame of its edge. At an edge of three
+        faces or more, segments inside faces count as none: how they go on there is ambiguous.
         """
         nodes, kinds = self.nodes, self.nodes.kinds
         steps = self.positions[:, 1] - self.positions[:, 0]
@@ -171,15 +168,17 @@ class PlacedSegments:
         away, node = away[away != 0], node[away != 0]
         starts, order = grouped(node, len(nodes))
         has = np.flatnonzero(np.diff(starts))  # of a segment along an edge both copies have the same direction
-        found = np.zeros((2, len(nodes)), dtype=np.complex128)
-        found[0, has], found[1, has] = away[order[starts[has]]], away[order[starts[has + 1] - 1]]
-        return found[0], found[1]
+        directions = np.zeros((2, len(nodes)), dtype=np.complex128)
+        directions[0, has], directions[1, has] = away[order[starts[has]]], away[order[starts[has + 1] - 1]]
+        return directions[0], directions[1]
 
 
 def zero_line(triangles: IntrinsicMesh, values: Floats, among: Bools | None = None) -> PlacedSegments:
-    """Zero set, within faces `among`, of a function linear in faces: zero at no vertex, NaN where it is not known."""
-    here = values[triangles.corner_vertices]
-    faces, sides = crossed_sides(here > 0, ~np.isnan(here).any(axis=1) & (True if among is None else among))
+    """Return the zero set, within faces `among`, of a function linear in faces: 0 at no vertex, NaN if unknown."""
+    corner_values = values[triangles.corner_vertices]
+    faces, sides = crossed_sides(
+        corner_values > 0, ~np.isnan(corner_values).any(axis=1) & (True if among is None else among)
+    )
     edges = triangles.edges.face_edges[faces[:, None], sides]
     used, first, ends = np.unique(edges, return_index=True, return_inverse=True)
     tail, head = values[triangles.edges.vertices[used]].T
@@ -201,25 +200,25 @@ def zero_line(triangles: IntrinsicMesh, values: Floats, among: Bools | None = No
 
 
 def halfedges_of(triangles: IntrinsicMesh, edges: Ints) -> tuple[Ints, Ints]:
-    """All halfedges ``3 face + side`` of each of some edges, as pairs: index into `edges`, and halfedge."""
+    """Return all halfedges ``3 face + side`` of edges, as pairs: index into `edges`, and halfedge."""
     return members_of(*triangles.edges.halfedges, edges)
 
 
 def on_sides(triangles: IntrinsicMesh, faces: Ints, sides: Ints, along: Floats) -> Complexes:
-    """(n, k) positions at fractions (n, k) along the edges, tail to head, that are given sides of faces."""
+    """Return (n, k) positions at fractions (n, k) along the edges, tail to head, that are given sides of faces."""
     share = np.where(triangles.edges.forward[faces, sides][:, None], along, 1 - along)
     return triangles.corner_positions[faces, sides][:, None] + share * triangles.edge_vectors[faces, sides][:, None]
 
 
 def fractions_along_edges(triangles: IntrinsicMesh, located: LocatedPoints, edges: Ints) -> Floats:
-    """(n,) fraction of the way from tail to head at which point k lies on edge k."""
+    """Return (n,) the fraction of the way from tail to head at which point k lies on edge k."""
     return np.where(
         located.kinds == EDGE, located.along, (triangles.edges.vertices[edges, 0] != located.elements).astype(float)
     )
 
 
 def best_match(triangles: IntrinsicMesh, face: int, nodes: LocatedPoints, ends: Ints, length: float) -> Complexes:
-    """(2,) the positions of two nodes in a face that are closest to a given distance apart.
+    """Return (2,) the positions of two nodes in a face that are closest to a given distance apart.
 
     In intrinsic triangulations a vertex may be two corners of one face, and an edge two of its sides.
     """
@@ -240,11 +239,11 @@ def best_match(triangles: IntrinsicMesh, face: int, nodes: LocatedPoints, ends: 
 
 
 NEAR = 1e-6
-"""Barycentric coordinates below which a point of a source is put on the edge or at the vertex."""
+"""Barycentric coordinate below which a point of a source is put on the edge or at the vertex."""
 
 
 def through_vertices(triangles: IntrinsicMesh, placed: PlacedSegments) -> PlacedSegments:
-    """Segments through the vertices that they all but pass, and along edges; without sides where any moves."""
+    """Move segments to vertices and edges that they all but pass; moved ones lose their sides."""
     nodes = placed.nodes
     on_edge, inside = nodes.kinds == EDGE, nodes.kinds == FACE
     near = on_edge & (np.minimum(nodes.along, 1 - nodes.along) < NEAR) | inside & (nodes.barycentric < NEAR).any(axis=1)
@@ -253,28 +252,29 @@ def through_vertices(triangles: IntrinsicMesh, placed: PlacedSegments) -> Placed
 
 
 def as_curve(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSegments | None:
-    """Placed segments as a curve without sides, each once, and its points; None where a face is glued to itself."""
+    """Return placed segments, each once, and points as a curve without sides; None if a face is glued to itself."""
     once = np.unique(placed.given, return_index=True)[1]
     faces, nodes = placed.faces[once], placed.nodes
-    at = np.stack([barycentric_in(triangles, faces, nodes[placed.ends[once, k]]) for k in range(2)])
+    end_weights = np.stack([barycentric_in(triangles, faces, nodes[placed.ends[once, k]]) for k in range(2)])
     corners = triangles.corner_positions[faces]
-    apart = np.abs((at * corners).sum(axis=2) - placed.positions[once].T)
+    apart = np.abs((end_weights * corners).sum(axis=2) - placed.positions[once].T)
     if (apart > NEAR * triangles.edge_lengths[faces].max(axis=1)).any():
         return None
-    at = rounded(at)
+    end_weights = rounded(end_weights)
     alone = np.setdiff1d(np.arange(len(nodes)), placed.ends)
-    ends = locate_points(triangles, np.tile(faces, 2), at.reshape(-1, 3))
+    ends = locate_points(triangles, np.tile(faces, 2), end_weights.reshape(-1, 3))
     points = locate_points(triangles, nodes.faces[alone], rounded(nodes.barycentric[alone]))
     located = concatenated([ends, points])
     first, who = unique_points(located)
     joined = who[: 2 * len(faces)].reshape(2, -1).T
-    steps = ((at[1] - at[0]) * corners).sum(axis=1)
-    edges, _ = edges_between(triangles, faces, *at)
+    steps = ((end_weights[1] - end_weights[0]) * corners).sum(axis=1)
+    edges, _ = edges_between(triangles, faces, *end_weights)
     normals = 1j * np.where(edges < 0, steps, np.abs(steps))  # in the layout of the face, or in the frame of the edge
     kept = (joined[:, 0] != joined[:, 1]) & (np.abs(steps) > 0)
     return CurveSegments(located[first], joined[kept], faces[kept], edges[kept], normals[kept], False)
 
 
 def rounded(barycentric: Floats) -> Floats:
+    """Set barycentric coordinates below `NEAR` to zero."""
     kept = np.where(barycentric < NEAR, 0.0, barycentric)
     return kept / kept.sum(axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Kernels: windows on the edges of a polyhedral surface, the initial ones among them.
+"""Windows on the edges of a polyhedral surface, and how they propagate; the initial ones among them.
 
 In the frame of an edge, its tail is at the origin, its head on the positive x axis; waves arrive from below. A window
 is a row ``(s0, s1, p, q, sigma, kind)``: the interval [s0, s1] of the edge, and the wave. Kind `POINT`: circular waves
@@ -26,14 +26,14 @@ S0, S1, P, Q, SIGMA, KIND = range(6)
 
 @compiled
 def put(window: Floats, rows: Floats, k: int) -> None:
-    """Write a window to row k, entry by entry: assignments to slices of arrays take long to compile."""
+    """Write a window to row k, entry by entry, since assignments to slices of arrays take long to compile."""
     for i in range(6):
         rows[k, i] = window[i]
 
 
 @compiled
 def arrival(w: Floats, x: float, y: float) -> float:
-    """Distance from the source of a window to a point in the frame of its edge."""
+    """Return the distance from the source of a window to a point in the frame of its edge."""
     if w[KIND] == BEAM:
         return w[SIGMA] + w[P] * x + w[Q] * y
     return w[SIGMA] + w[KIND] * np.sqrt((x - w[P]) ** 2 + (y - w[Q]) ** 2)
@@ -41,7 +41,7 @@ def arrival(w: Floats, x: float, y: float) -> float:
 
 @compiled
 def ray(w: Floats, x: float) -> tuple[float, float]:
-    """Direction of propagation at a point of the edge; of any length."""
+    """Return the direction of propagation at a point of the edge, of any length."""
     if w[KIND] == BEAM:
         return w[P], w[Q]
     return w[KIND] * (x - w[P]), -w[KIND] * w[Q]
@@ -49,7 +49,7 @@ def ray(w: Floats, x: float) -> tuple[float, float]:
 
 @compiled
 def outrun(w: Floats, at_tail: float, at_head: float, length: float, slack: float) -> bool:
-    """Whether paths through an end of the edge are shorter everywhere in the window."""
+    """Return whether paths through an end of the edge are shorter everywhere in the window."""
     if at_tail + w[S1] < arrival(w, w[S1], 0.0) - slack:
         return True
     return at_head + length - w[S0] < arrival(w, w[S0], 0.0) - slack
@@ -87,7 +87,7 @@ def trim(a: Floats, b: Floats) -> None:
 
 @compiled
 def trim_by(old: Floats, w: Floats, slack: float) -> None:
-    """Trim a window to where it is nearer, by more than `slack`, than an older one; from the middle nothing is cut."""
+    """Trim a window to where it is nearer than an older one by more than `slack`; its middle is not cut out."""
     low, high = max(old[S0], w[S0]), min(old[S1], w[S1])
     if not high > low:
         return
@@ -118,7 +118,7 @@ def trim_by(old: Floats, w: Floats, slack: float) -> None:
 
 @compiled
 def outdoes(w: Floats, old: Floats) -> bool:
-    """Whether a window covers another one and is nearer at its ends and in its middle."""
+    """Return whether a window covers another one and is nearer at its ends and in its middle."""
     if w[S0] > old[S0] or w[S1] < old[S1]:
         return False
     for k in range(3):
@@ -130,7 +130,7 @@ def outdoes(w: Floats, old: Floats) -> bool:
 
 @compiled
 def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
-    """Merge window b into a, if they are neighbours and one wave approximates both; whether it was done."""
+    """Merge window b into a if they are neighbours and one wave approximates both; return whether it was done."""
     if abs(a[S1] - b[S0]) > 1e-6 * length:
         return False
     s0, between, s1 = a[S0], a[S1], b[S1]
@@ -168,7 +168,7 @@ def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
 
 @compiled
 def straighten(w: Floats) -> None:
-    """Make a wave straight, nowhere nearer at the edge, which would pass its focus in the face ahead."""
+    """Replace a wave that would pass its focus in the face ahead by a straight one, nowhere nearer at the edge."""
     x, y = ray(w, 0.5 * (w[S0] + w[S1]))
     norm = np.sqrt(x * x + y * y)
     begin, end = arrival(w, w[S0], 0.0), arrival(w, w[S1], 0.0)
@@ -178,7 +178,7 @@ def straighten(w: Floats) -> None:
 
 @compiled
 def clip(s0: float, s1: float, at_start: float, slope: float) -> tuple[float, float]:
-    """The part of [s0, s1] where ``at_start + slope s ≤ 0``."""
+    """Return the part of [s0, s1] where ``at_start + slope s ≤ 0``."""
     if slope > 0.0:
         s1 = min(s1, -at_start / slope)
     elif slope < 0.0:
@@ -190,7 +190,7 @@ def clip(s0: float, s1: float, at_start: float, slope: float) -> tuple[float, fl
 
 @compiled
 def hit(x0: float, dx: float, dy: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """Fraction of the way from a to b at which the ray from (x0, 0) along (dx, dy) meets the line through both."""
+    """Return the fraction of the way from a to b at which the ray from (x0, 0) along (dx, dy) meets their line."""
     ex, ey = bx - ax, by - ay
     det = dx * ey - dy * ex
     if det == 0.0:
@@ -199,6 +199,7 @@ def hit(x0: float, dx: float, dy: float, ax: float, ay: float, bx: float, by: fl
 
 
 BYTES_PER_WINDOW = 56.0
+"""Size of a row of windows, and of the link to the next."""
 
 
 class Faces(NamedTuple):
@@ -217,7 +218,7 @@ class Faces(NamedTuple):
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh) -> Faces:
-        """The arrays of an intrinsic mesh."""
+        """Collect the arrays of an intrinsic mesh."""
         table, (first_halfedge, halfedges) = triangles.edges, triangles.edges.halfedges
         first_corner, corners = grouped(triangles.corner_vertices.ravel(), triangles.n_vertices)
         return cls(
@@ -235,10 +236,10 @@ class Faces(NamedTuple):
 
 
 class Search(NamedTuple):
-    """What a search knows: distances so far, and windows in lists by halfedge, queued to go on or settled.
+    """The state of a search: distances so far, and windows in lists by halfedge, queued to go on or settled.
 
     Windows are rows of one array; `following` links those of a list, and those that are free. Row 0 is for scratch. The
-    queue holds halfedges, then vertices that paths bend around. `counts` are those at `USED`, `FREE`, ….
+    queue holds halfedges, followed by vertices that paths bend around. `counts` are those at `USED`, `FREE`, ….
     """
 
     distance: Floats
@@ -252,7 +253,7 @@ class Search(NamedTuple):
 
     @classmethod
     def start(cls, n_faces: int, pseudosources: Bools, room: int) -> Search:
-        """Nothing known yet, and room for so many windows."""
+        """Start with nothing known, and room for this many windows."""
         n = len(pseudosources)
         lists = np.full(3 * n_faces, -1), np.full(3 * n_faces, -1)
         windows, following = np.empty((room, 6)), np.empty(room, dtype=np.int64)
@@ -260,7 +261,7 @@ class Search(NamedTuple):
         return cls(np.full(n, np.inf), pseudosources, Queue.empty(3 * n_faces + n), *lists, windows, following, counts)
 
     def larger(self) -> Search:
-        """The same with at least the room that was wanted, in place: a copy would need twice the memory."""
+        """Enlarge this search to at least the room that was wanted, in place: a copy would need twice the memory."""
         room = len(self.windows) + max(len(self.windows) // 2, int(self.counts[WANTED]))
         refuse_beyond_memory(
             "exact distance along the surface",
@@ -274,12 +275,12 @@ class Search(NamedTuple):
 
 
 USED, FREE, MADE, WANTED = range(4)
-"""Rows ever used, the first free one of these, windows made so far, and rows that were missing."""
+"""Rows ever used, the first free row among them, windows made so far, and rows that were missing."""
 
 
 @compiled
 def has_room(counts: Ints, size: int, n: int) -> bool:
-    """Whether n more windows fit into an array of so many rows; otherwise notes how many were wanted."""
+    """Return whether n more windows fit into an array of this many rows; otherwise note how many were wanted."""
     if counts[USED] + n <= size:
         return True
     counts[WANTED] = n
@@ -288,7 +289,7 @@ def has_room(counts: Ints, size: int, n: int) -> bool:
 
 @compiled
 def take_row(counts: Ints, following: Ints) -> int:
-    """A row for a window; there must be room."""
+    """Take a row for a window; there must be room."""
     row = counts[FREE]
     if row >= 0:
         counts[FREE] = following[row]
@@ -319,9 +320,9 @@ def propagate_across(
     sigma: float,
     slack: float,
 ) -> None:
-    """Propagate distance across a side of a face, from within, to the faces beyond; nothing where there is no room.
+    """Propagate distance across a side of a face, from within, to the faces beyond; do nothing where there is no room.
 
-    In the layout of the face: the interval of the side from fraction t0 to t1 sees the source, which is a point whose
+    In the layout of the face, the interval of the side from fraction t0 to t1 sees the source, which is a point whose
     own distance is σ, or a beam along a normal whose distance at a point is σ.
     """
     edge = faces.edges[face, side]
@@ -366,7 +367,7 @@ def propagate_across(
 
 @compiled
 def _reach_corners(faces: Faces, distance: Floats, face: int, start: complex, end: complex) -> None:
-    """Distance of the corners of a face to a segment or a point in it."""
+    """Lower the distance of the corners of a face to that from a segment or a point in it."""
     along = end - start
     square = abs(along) ** 2
     for k in range(3):
@@ -377,7 +378,7 @@ def _reach_corners(faces: Faces, distance: Floats, face: int, start: complex, en
 
 @compiled
 def _first_beam(faces: Faces, search: Search, face: int, start: complex, end: complex, slack: float) -> None:
-    """Parallel beam from a segment in a face, to the left of it, to the sides of the face that it meets."""
+    """Send a parallel beam from a segment in a face, to the left of it, to the sides of the face that it meets."""
     along = (end - start) / abs(end - start)
     normal = 1j * along
     for side in range(3):
@@ -399,7 +400,7 @@ def _first_beam(faces: Faces, search: Search, face: int, start: complex, end: co
 def _first_fan(
     faces: Faces, search: Search, face: int, point: complex, first: complex, second: complex, slack: float
 ) -> None:
-    """Circular waves from a point in a face, in directions of more than 90° from two given ones."""
+    """Send circular waves from a point in a face, in directions of more than 90° from two given ones."""
     for side in range(3):
         a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
         if ((point - a) * (1j * (b - a)).conjugate()).real <= 1e-9 * abs(b - a) ** 2:  # the point lies on this side

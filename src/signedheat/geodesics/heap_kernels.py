@@ -1,4 +1,4 @@
-"""Kernels: a priority queue of numbered items, each in it at most once, so that its size is known beforehand."""
+"""A priority queue of numbered items, each in it at most once, so that its size is known beforehand."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class Queue(NamedTuple):
 
     @classmethod
     def empty(cls, n_items: int) -> Queue:
-        """A queue for items 0 to n_items − 1."""
+        """Make a queue for items 0 to n_items − 1."""
         return cls(np.empty(n_items, np.int64), np.full(n_items, -1), np.empty(n_items), np.zeros(1, np.int64))
 
 
 @compiled
 def before(keys: Floats, a: int, b: int) -> bool:
-    """Whether item a leaves the queue before item b; equal keys go by number, so results are the same each time."""
+    """Return whether item a leaves the queue before item b; equal keys go by number, for reproducible results."""
     return bool(keys[a] < keys[b] or (keys[a] == keys[b] and a < b))
 
 

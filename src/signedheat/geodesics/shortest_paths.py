@@ -1,12 +1,12 @@
 """Geodesic paths: shortest paths across faces, between points that share no face.
 
-A *sleeve* is a sequence of faces: each is left through a halfedge, and the next one entered through another halfedge of
-the same edge. Halfedge ``3 f + k`` of face f runs from corner k to corner k + 1.
+A *sleeve* is a sequence of faces: each is left through a halfedge, and the next one is entered through another halfedge
+of the same edge. Halfedge ``3 f + k`` of face f runs from corner k to corner k + 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -33,10 +33,10 @@ from .heap_kernels import Queue, pop, push
 def join(
     triangles: IntrinsicMesh, located: LocatedPoints, start: Ints, end: Ints, name: str
 ) -> tuple[LocatedPoints, Ints, Ints, Ints]:
-    """Join pairs of points, by geodesic paths where the two share no face, as segments that lie in one face each.
+    """Join pairs of points by segments that lie in one face each: by geodesic paths where the two share no face.
 
     Returns all points, the given ones first; the two that each segment (s,) joins, in order; and the pair that it
-    belongs to. `name` is what the points belong to, for messages.
+    belongs to. `name` is the source of the points, for messages.
     """
     apart = np.flatnonzero(shared_faces(triangles, located[start], located[end]) < 0)
     added = np.zeros(len(start), dtype=np.int64)
@@ -52,7 +52,7 @@ def join(
 
 
 def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> Ints:
-    """Indices of the segments of a curve through points whose two ends share no face."""
+    """Return the indices of the segments of a curve through points whose two ends share no face."""
     start = np.arange(len(located) if closed else len(located) - 1)
     return np.flatnonzero(shared_faces(triangles, located[start], located[(start + 1) % len(located)]) < 0)
 
@@ -60,18 +60,14 @@ def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> Ints
 def geodesic_paths(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
 ) -> tuple[LocatedPoints, Ints]:
-    """Points at which the shortest paths between k starts and ends cross edges or pass vertices.
+    """Return the points at which shortest paths between k starts and ends cross edges or pass vertices, and counts.
 
     Paths are locally shortest: none becomes shorter by passing a vertex on its other side. The first guess is the
     shortest path through midpoints of edges; its faces are unfolded, the shortest path inside them is found (funnel
-    algorithm), and wherever it bends around a vertex the other side is tried. `name` is what the points belong to, for
-    messages.
-
-    Returned: located, counts (k,).
+    algorithm), and wherever it bends around a vertex the other side is tried.
     """
-    starts, ends = faces_at(triangles, start), faces_at(triangles, end)
-    queue = Queue.empty(triangles.n_edges)
-    sides, fractions, counts = shortest_lines(Faces.of(triangles), queue, *starts, *ends)
+    starts, ends = Places.of(triangles, start), Places.of(triangles, end)
+    sides, fractions, counts = _shortest_lines(Faces.of(triangles), Routes.of(triangles.n_edges), starts, ends)
     located = locate_points(triangles, sides // 3, barycentric_on_sides(sides % 3, fractions), name)
     blocked = np.flatnonzero(counts < 0)
     if not len(blocked):
@@ -81,30 +77,54 @@ def geodesic_paths(
         if counts[k] >= 0:
             parts.append(located[np.arange(begin[k], begin[k] + counts[k])])
             continue
-        here = np.array([k])
-        parts.append(path_through_vertices(triangles, start[here], end[here], name))
+        pair = np.array([k])
+        parts.append(path_through_vertices(triangles, start[pair], end[pair], name))
         counts[k] = len(parts[-1])
     return concatenated(parts), counts
 
 
-def faces_at(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[Ints, Complexes, Ints]:
-    """All faces that contain each point, its position in their layouts, and where the faces of each point begin."""
-    which, faces = incident_faces(triangles, located)
-    order = np.lexsort([faces, which])
-    which, faces = which[order], faces[order]
-    weights = barycentric_in(triangles, faces, located[which])
-    points = (weights * triangles.corner_positions[faces]).sum(axis=1)
-    return faces, points, np.searchsorted(which, np.arange(len(located) + 1))
+class Places(NamedTuple):
+    """Points by the faces that contain them: those at point i are ``faces[first[i] : first[i + 1]]``."""
+
+    faces: Ints
+    points: Complexes  # the position of the point in the layout of each face
+    first: Ints
+
+    @classmethod
+    def of(cls, triangles: IntrinsicMesh, located: LocatedPoints) -> Places:
+        """Find all faces that contain each point."""
+        which, faces = incident_faces(triangles, located)
+        order = np.lexsort([faces, which])
+        which, faces = which[order], faces[order]
+        weights = barycentric_in(triangles, faces, located[which])
+        points = (weights * triangles.corner_positions[faces]).sum(axis=1)
+        return cls(faces, points, np.searchsorted(which, np.arange(len(located) + 1)))
+
+
+class Routes(NamedTuple):
+    """Work space of Dijkstra's method on edges, restored after each use."""
+
+    cost: Floats  # (e,) length of the path to the middle of each edge
+    # (e,) halfedge through which the last face of that path is left, and the one through which it was entered
+    leave: Ints
+    enter: Ints
+    queue: Queue  # of edges
+
+    @classmethod
+    def of(cls, n_edges: int) -> Routes:
+        """Make work space for this many edges."""
+        sides = np.empty(n_edges, dtype=np.int64), np.empty(n_edges, dtype=np.int64)
+        return cls(np.full(n_edges, np.inf), *sides, Queue.empty(n_edges))
 
 
 def path_through_vertices(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str
 ) -> LocatedPoints:
-    """The path between two points that are connected only through vertices at which fans of faces touch."""
+    """Find the path between two points that are connected only through vertices at which fans of faces touch."""
     edges, n = triangles.edges, triangles.n_vertices
     arcs, lengths = [edges.vertices], [triangles.lengths_of_edges]
     for node, place in ((n, start), (n + 1, end)):
-        faces, points, _ = faces_at(triangles, place)
+        faces, points, _ = Places.of(triangles, place)
         corners = triangles.corner_vertices[faces].ravel()
         arcs.append(np.stack([np.full(len(corners), node), corners], axis=1))
         lengths.append(np.abs(triangles.corner_positions[faces] - points[:, None]).ravel())
@@ -131,45 +151,36 @@ def path_through_vertices(
 
 
 TIE = 1e-9
-"""How much dearer ways are through one edge than through another of the same length: of ways around a symmetric peak,
-whose lengths differ by 1e-16, the same one is always found. Any number from 1e-12 to 1e-6 does."""
+"""Relative range of extra costs of edges: of paths around a symmetric peak, whose lengths differ by 1e-16, the same one
+is then always found. Any number from 1e-12 to 1e-6 does."""
 
 
 @compiled
 def middle(faces: Faces, h: int) -> complex:
-    """Midpoint of a halfedge, in the layout of its face."""
+    """Return the midpoint of a halfedge, in the layout of its face."""
     return 0.5 * (faces.positions[h // 3, h % 3] + faces.positions[h // 3, (h % 3 + 1) % 3])
 
 
 @compiled
 def toll(e: int) -> float:
-    """What a way through an edge costs in addition to its length: evenly spread numbers, by the golden ratio."""
+    """Return the factor that makes paths through an edge more expensive: evenly spread, by the golden ratio."""
     return 1.0 + TIE * ((e * 0.6180339887498949) % 1.0)
 
 
 @compiled
-def find_sleeve(
-    faces: Faces,
-    starts: Ints,
-    start_points: Complexes,
-    ends: Ints,
-    end_points: Complexes,
-    cost: Floats,
-    leave: Ints,
-    enter: Ints,
-    queue: Queue,
-) -> tuple[Ints, Ints]:
-    """The faces between two sets of faces on the shortest path through midpoints of edges (Dijkstra).
+def _find_sleeve(faces: Faces, routes: Routes, starts: Places, ends: Places, pair: int) -> tuple[Ints, Ints]:
+    """Find the faces between the ends of a pair on the shortest path through midpoints of edges (Dijkstra).
 
     Returns the halfedges through which all faces but the last are left, and those through which all but the first are
-    entered; empty if there is no path. `cost`, `leave`, `enter` and `queue` are work space, restored before returning.
+    entered; empty if there is no path.
     """
+    cost, leave, enter, queue = routes
     edge_of, touched = faces.edges.ravel(), [0]
     touched.pop()
-    for s in range(len(starts)):
+    for s in range(starts.first[pair], starts.first[pair + 1]):
         for k in range(3):
-            h, e = 3 * starts[s] + k, edge_of[3 * starts[s] + k]
-            d = abs(middle(faces, h) - start_points[s]) * toll(e)
+            h, e = 3 * starts.faces[s] + k, edge_of[3 * starts.faces[s] + k]
+            d = abs(middle(faces, h) - starts.points[s]) * toll(e)
             if d < cost[e]:
                 cost[e], leave[e], enter[e] = d, h, -1
                 touched.append(e)
@@ -185,9 +196,9 @@ def find_sleeve(
             if h == leave[e]:
                 continue
             here = middle(faces, h)
-            for s in range(len(ends)):
-                if ends[s] == h // 3 and d + abs(here - end_points[s]) < best:
-                    best, last = d + abs(here - end_points[s]), h
+            for s in range(ends.first[pair], ends.first[pair + 1]):
+                if ends.faces[s] == h // 3 and d + abs(here - ends.points[s]) < best:
+                    best, last = d + abs(here - ends.points[s]), h
             for turn in range(1, 3):
                 out = h - h % 3 + (h + turn) % 3
                 to = edge_of[out]
@@ -215,7 +226,7 @@ def find_sleeve(
 def unfold(faces: Faces, left: Ints, entered: Ints) -> tuple[Complexes, Ints, Complexes]:
     """Unfold a sleeve into the plane of its first face: tail and head of each halfedge left, and the last face.
 
-    Also whether each face, the last one included, is turned over in that plane.
+    Also returns whether each face, including the last, is turned over in that plane.
     """
     portals, over = np.empty((len(left), 2), np.complex128), np.zeros(len(left) + 1, np.int64)
     placed = faces.positions[left[0] // 3].copy()
@@ -234,7 +245,7 @@ def unfold(faces: Faces, left: Ints, entered: Ints) -> tuple[Complexes, Ints, Co
 
 @compiled
 def on_base(corners: Complexes, side: int, over: int, point: complex, a: complex, b: complex) -> complex:
-    """Where a point of a face is if a side of the face is from a to b, and the face perhaps turned over."""
+    """Return where a point of a face is if a side of the face is from a to b, and the face perhaps turned over."""
     base = corners[(side + 1) % 3] - corners[side]
     ratio = (point - corners[side]) / base if abs(base) > 0 else 0j
     return a + (np.conj(ratio) if over else ratio) * (b - a)
@@ -242,13 +253,13 @@ def on_base(corners: Complexes, side: int, over: int, point: complex, a: complex
 
 @compiled
 def turns(a: complex, b: complex) -> float:
-    """Cross product of plane vectors: positive where b is counter-clockwise of a."""
+    """Return the cross product of plane vectors, which is positive where b is counter-clockwise of a."""
     return a.real * b.imag - a.imag * b.real
 
 
 @compiled
 def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tuple[list[int], list[int], float]:
-    """Shortest path inside an unfolded sleeve, by the simple stupid funnel algorithm.
+    """Find the shortest path inside an unfolded sleeve, by the simple stupid funnel algorithm.
 
     Returns the portals at which the path bends, whether it bends at their tail (0) or head (1), and its length.
     """
@@ -282,7 +293,7 @@ def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tupl
 def other_way(
     faces: Faces, left: Ints, entered: Ints, portals: Complexes, bend: int, point: complex
 ) -> tuple[Ints, Ints]:
-    """The sleeve that passes the vertex of a bend on its other side; empty where no faces connect there."""
+    """Return the sleeve that passes the vertex of a bend on its other side; empty where no faces connect there."""
     first = last = bend
     while first > 0 and (portals[first - 1, 0] == point or portals[first - 1, 1] == point):
         first -= 1
@@ -297,10 +308,20 @@ def other_way(
         h = out[k]
         e = faces.edges[h // 3, h % 3]
         for across in faces.halfedges[faces.first_halfedge[e] : faces.first_halfedge[e + 1]]:
-            if across // 3 == h // 3 or is_among(into, across, 0, len(into)) or is_among(left, across, first, last + 1):
+            if across // 3 == h // 3 or across in into or (left[first : last + 1] == across).any():
                 continue
             if across // 3 == goal:
-                return spliced(left, entered, first, last, out, into, before, k, across)
+                steps, j = 1, k
+                while before[j] >= 0:
+                    steps, j = steps + 1, before[j]
+                new_left, new_entered = np.empty(steps, np.int64), np.empty(steps, np.int64)
+                for i in range(steps - 1, -1, -1):
+                    new_left[i], new_entered[i] = out[k], across
+                    across, k = into[k], before[k]
+                return (
+                    np.concatenate((left[:first], new_left, left[last + 1 :])),
+                    np.concatenate((entered[:first], new_entered, entered[last + 1 :])),
+                )
             same = faces.forward[h // 3, h % 3] == faces.forward[across // 3, across % 3]
             at_tail = (tail_there[k] == 1) == same
             out.append(turned(across, at_tail))
@@ -312,79 +333,42 @@ def other_way(
 
 
 @compiled
-def is_among(values: Sequence[int] | Ints, value: int, begin: int, end: int) -> bool:
-    """Whether a value is among some of others."""
-    for k in range(begin, end):
-        if values[k] == value:
-            return True
-    return False
-
-
-@compiled
-def spliced(
-    left: Ints,
-    entered: Ints,
-    first: int,
-    last: int,
-    out: list[int],
-    into: list[int],
-    before: list[int],
-    k: int,
-    across: int,
-) -> tuple[Ints, Ints]:
-    """A sleeve whose crossings `first` to `last` are exchanged for those of a walk, which ends at its entry k."""
-    n, j = 1, k
-    while before[j] >= 0:
-        n, j = n + 1, before[j]
-    size = first + n + len(left) - 1 - last
-    new_left, new_entered = np.empty(size, np.int64), np.empty(size, np.int64)
-    for i in range(first):
-        new_left[i], new_entered[i] = left[i], entered[i]
-    for i in range(last + 1, len(left)):
-        new_left[first + n + i - last - 1], new_entered[first + n + i - last - 1] = left[i], entered[i]
-    for i in range(first + n - 1, first - 1, -1):
-        new_left[i], new_entered[i] = out[k], across
-        across, k = into[k], before[k]
-    return new_left, new_entered
-
-
-@compiled
 def turned(h: int, at_tail: bool) -> int:
-    """The other halfedge of the face at the tail of a halfedge, or at its head."""
+    """Return the other halfedge of the face at the tail of a halfedge, or at its head."""
     return h - h % 3 + (h + 2) % 3 if at_tail else h - h % 3 + (h + 1) % 3
 
 
 @compiled
-def point_in(faces: Ints, points: Complexes, face: int) -> complex:
-    """The point listed for a face, in its layout."""
-    for s in range(len(faces)):
-        if faces[s] == face:
-            return points[s]
-    return points[0]
+def _point_in(places: Places, pair: int, face: int) -> complex:
+    """Return the position of the point of a pair in the layout of a face that contains it."""
+    for s in range(places.first[pair], places.first[pair + 1]):
+        if places.faces[s] == face:
+            return places.points[s]
+    return places.points[places.first[pair]]
 
 
 @compiled
-def path_in(
-    faces: Faces, left: Ints, entered: Ints, starts: Ints, start_points: Complexes, ends: Ints, end_points: Complexes
+def _path_in(
+    faces: Faces, left: Ints, entered: Ints, starts: Places, ends: Places, pair: int
 ) -> tuple[Complexes, complex, complex, list[int], list[int], float]:
-    """The shortest path in a sleeve: its portals, its two ends, the bends as `funnel` returns them, and its length."""
+    """Return the shortest path in a sleeve: its portals, its two ends, the bends as of `funnel`, and its length."""
     portals, over, placed = unfold(faces, left, entered)
     last = entered[-1] // 3
-    begin, end = point_in(starts, start_points, left[0] // 3), point_in(ends, end_points, last)
+    begin, end = _point_in(starts, pair, left[0] // 3), _point_in(ends, pair, last)
     end = on_base(faces.positions[last], 0, over[-1], end, placed[0], placed[1])
     bends, at, length = funnel(portals, over, begin, end)
     return portals, begin, end, bends, at, length
 
 
 @compiled
-def straighten(
-    faces: Faces, left: Ints, entered: Ints, starts: Ints, start_points: Complexes, ends: Ints, end_points: Complexes
+def _straighten(
+    faces: Faces, left: Ints, entered: Ints, starts: Places, ends: Places, pair: int
 ) -> tuple[Ints, Floats]:
-    """The shortest path in a sleeve, improved as long as passing a vertex on its other side makes it shorter.
+    """Improve the shortest path in a sleeve as long as passing a vertex on its other side makes it shorter.
 
     Returns the halfedges crossed and the fraction along each.
     """
-    portals, begin, end, bends, at, length = path_in(faces, left, entered, starts, start_points, ends, end_points)
+    portals, begin, end, bends, at, length = _path_in(faces, left, entered, starts, ends, pair)
     k = 0
     while k < len(bends):
         point = portals[bends[k], at[k]]
@@ -392,10 +376,10 @@ def straighten(
         k += 1
         if len(try_left) == 0:
             continue
-        found = path_in(faces, try_left, try_entered, starts, start_points, ends, end_points)
-        if found[5] < length * (1 - 1e-12):
+        path = _path_in(faces, try_left, try_entered, starts, ends, pair)
+        if path[5] < length * (1 - 1e-12):
             left, entered, k = try_left, try_entered, 0
-            portals, begin, end, bends, at, length = found
+            portals, begin, end, bends, at, length = path
     fractions = np.empty(len(left))
     here, k = begin, 0
     for i in range(len(left)):
@@ -414,37 +398,22 @@ def straighten(
 
 
 @compiled
-def shortest_lines(
-    faces: Faces,
-    queue: Queue,
-    starts: Ints,
-    start_points: Complexes,
-    start_at: Ints,
-    ends: Ints,
-    end_points: Complexes,
-    end_at: Ints,
-) -> tuple[Ints, Floats, Ints]:
-    """Shortest paths for many pairs of points: halfedges crossed, fractions along them, their number for each pair.
+def _shortest_lines(faces: Faces, routes: Routes, starts: Places, ends: Places) -> tuple[Ints, Floats, Ints]:
+    """Return the halfedges that shortest paths cross, fractions along them, and their number for each pair of points.
 
-    The faces at the i-th start are ``starts[start_at[i] : start_at[i + 1]]``, and `start_points` has its position in
-    the layout of each; likewise for ends; `queue` is an empty one of edges. The number is −1 where there is no path.
+    The number is −1 where there is no path.
     """
-    n_edges = len(queue.places)
-    cost = np.full(n_edges, np.inf)
-    leave, enter = np.empty(n_edges, np.int64), np.empty(n_edges, np.int64)
-    counts = np.empty(len(start_at) - 1, np.int64)
+    counts = np.empty(len(starts.first) - 1, np.int64)
     sides, fractions = [0], [0.0]
     sides.pop()
     fractions.pop()
-    for job in range(len(counts)):
-        some, others = slice(start_at[job], start_at[job + 1]), slice(end_at[job], end_at[job + 1])
-        places = starts[some], start_points[some], ends[others], end_points[others]
-        left, entered = find_sleeve(faces, *places, cost, leave, enter, queue)
+    for pair in range(len(counts)):
+        left, entered = _find_sleeve(faces, routes, starts, ends, pair)
         if len(left) == 0:
-            counts[job] = -1
+            counts[pair] = -1
             continue
-        crossed, where = straighten(faces, left, entered, *places)
-        counts[job] = len(crossed)
+        crossed, where = _straighten(faces, left, entered, starts, ends, pair)
+        counts[pair] = len(crossed)
         for k in range(len(crossed)):
             sides.append(crossed[k])
             fractions.append(where[k])

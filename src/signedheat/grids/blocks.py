@@ -1,7 +1,7 @@
-"""Sparse grids: blocks of 8³ nodes where there is something, and tables that find them.
+"""Sparse grids: blocks of 8³ nodes near a surface, and tables that find them.
 
-A grid of any size is divided into blocks of `SIDE` nodes along each axis, those into cubes of `CUBE` blocks. Cubes that
-hold blocks have a table of their own: memory grows with the blocks, not with the grid.
+A grid of any size is divided into blocks of `SIDE` nodes along each axis, and those into cubes of `CUBE` blocks. Cubes
+that hold blocks have a table of their own: memory grows with the blocks, not with the grid.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ SIDE = 8
 CUBE = 16
 """Blocks along each edge of a cube."""
 NODES = SIDE**3
-"""Nodes of a block."""
+"""Nodes in a block."""
 
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Which blocks of a grid are there."""
+    """The blocks of a grid that exist."""
 
-    # (n, 3) their first nodes, divided by `SIDE`, in the order of cubes and within each of rows
+    # (n, 3) their first nodes, divided by `SIDE`, in order of cubes, and of rows within each cube
     places: NDArray[np.int32]
     shape: tuple[int, int, int]  # nodes of the grid along each axis
 
     @classmethod
     def of(cls, places: NDArray[np.integer], shape: tuple[int, ...]) -> Blocks:
-        """Blocks at (n, 3) places, each once, in order."""
+        """Make blocks at (n, 3) places, in order and without repetition."""
         cubes = -(-np.array(shape) // (SIDE * CUBE))
         ranked = np.asarray(places, dtype=np.int64).reshape(-1, 3)
         cube = np.ravel_multi_index(tuple((ranked // CUBE).T), tuple(cubes))
@@ -47,7 +47,7 @@ class Blocks:
 
     @cached_property
     def tables(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Number of each cube, −1 where it holds nothing; and (cubes, 16, 16, 16) the block in each place of a cube."""
+        """Number of each cube, −1 where it holds nothing; and (cubes, 16, 16, 16) the block at each place in a cube."""
         cubes = np.full(tuple(-(-n // (SIDE * CUBE)) for n in self.shape), -1, dtype=np.int32)
         if not len(self):
             return cubes, np.full((0, CUBE, CUBE, CUBE), -1, dtype=np.int32)
@@ -61,24 +61,24 @@ class Blocks:
         return cubes, rows
 
     def rows(self, places: NDArray[np.integer]) -> NDArray[np.int32]:
-        """(k,) number of the block at each of (k, 3) places; −1 where there is none, or no grid."""
-        at = np.asarray(places, dtype=np.int64)
+        """Return (k,) the number of the block at each of (k, 3) places; −1 where there is none, or no grid."""
+        wanted = np.asarray(places, dtype=np.int64)
         limit = -(-np.array(self.shape) // SIDE)
-        inside = np.flatnonzero(((at >= 0) & (at < limit)).all(axis=1))
+        inside = np.flatnonzero(((wanted >= 0) & (wanted < limit)).all(axis=1))
         cubes, rows = self.tables
-        result = np.full(len(at), -1, dtype=np.int32)
-        number = cubes[tuple((at[inside] // CUBE).T)]
+        result = np.full(len(wanted), -1, dtype=np.int32)
+        number = cubes[tuple((wanted[inside] // CUBE).T)]
         held = number >= 0
-        a, b, c = (at[inside[held]] % CUBE).T
+        a, b, c = (wanted[inside[held]] % CUBE).T
         result[inside[held]] = rows[number[held], a, b, c]
         return result
 
 
 @dataclass(frozen=True, eq=False)
 class BlockValues:
-    """Values at the nodes of blocks, indexed by nodes as an array of the whole grid is."""
+    """Values at the nodes of blocks, indexed by nodes like an array of the whole grid."""
 
-    blocks: Blocks  # which nodes have a value
+    blocks: Blocks  # the blocks whose nodes have values
     values: NDArray[np.floating[Any]]  # (n, 8, 8, 8) their values; NaN where they have none
 
     @property
@@ -87,24 +87,24 @@ class BlockValues:
         return self.blocks.shape
 
     def __getitem__(self, nodes: tuple[NDArray[np.integer], ...]) -> Floats:
-        """(k,) values at nodes, given by their three indices; NaN where there is no block."""
-        at = np.stack(nodes, axis=1)
-        row = self.blocks.rows(at // SIDE)
+        """Return (k,) values at nodes, given by their three indices; NaN where there is no block."""
+        wanted = np.stack(nodes, axis=1)
+        row = self.blocks.rows(wanted // SIDE)
         result = np.full(len(row), np.nan)
         held = row >= 0
-        a, b, c = (at[held] % SIDE).T
+        a, b, c = (wanted[held] % SIDE).T
         result[held] = self.values[row[held], a, b, c]
         return result
 
     def interpolated(self, points: Floats) -> Floats:
-        """(k,) linear interpolation at (k, 3) points in cells; NaN where one of the nodes around has no value."""
+        """Interpolate linearly at (k, 3) points in cells; NaN where one of the nodes around has no value."""
         result = np.empty(len(points))
         limit = np.array(self.shape, dtype=np.float64) - 1
         _interpolate(*self.blocks.tables, self.values, np.ascontiguousarray(points, dtype=np.float64), limit, result)
         return result
 
     def window(self, first: NDArray[np.integer], shape: tuple[int, int, int]) -> NDArray[np.float32]:
-        """(*shape) values in a box of nodes from `first` on; NaN where there are none."""
+        """Return values in a box of nodes from `first` on; NaN where there are none."""
         result = np.full(shape, np.nan, dtype=np.float32)
         _gather(*self.blocks.tables, self.values, np.asarray(first, dtype=np.int64), np.array(self.shape), result)
         return result
@@ -112,7 +112,7 @@ class BlockValues:
 
 @compiled
 def row_of_node(cubes: NDArray[np.int32], rows: NDArray[np.int32], i: int, j: int, k: int) -> np.int32:
-    """The block that holds a node; −1 if there is none. The node is on the grid."""
+    """Return the block that holds a node of the grid; −1 if there is none."""
     cube = cubes[i // 128, j // 128, k // 128]
     return rows[cube, i // 8 % 16, j // 8 % 16, k // 8 % 16] if cube >= 0 else np.int32(-1)
 

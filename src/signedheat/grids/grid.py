@@ -32,9 +32,9 @@ from ..validation import (
 from .polyline import Polyline
 
 RESOLUTION = 128
-"""Nodes along the longest side of a grid, if nothing else is said."""
+"""Default number of nodes along the longest side of a grid."""
 ROOM = 0.2
-"""Share of its longest side by which a shape is padded on every side."""
+"""Padding on every side of a shape, relative to its longest side."""
 if TYPE_CHECKING:
     import pyvista
     from typing_extensions import TypeVar
@@ -112,7 +112,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         padding: float | None = None,
         spacing: ArrayLike | None = None,
     ) -> Grid[int]:
-        """A grid centred on a shape, on several or on a box, with padding on every side.
+        """Make a grid centred on a shape, on several or on a box, with padding on every side.
 
         Parameters
         ----------
@@ -192,7 +192,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
 
     def contains(self, points: ArrayLike) -> Bools:
-        """Whether points lie within the bounding box of the nodes.
+        """Return whether points lie within the bounding box of the nodes.
 
         Parameters
         ----------
@@ -249,13 +249,13 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
 
 
 def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = ROOM) -> float:
-    """Padding that leaves room around a box for what has to be completed, and for offsets up to `reach`."""
+    """Return the padding of a box that leaves room for its completion, and for offsets up to `reach`."""
     lower, upper = np.asarray(bounds, dtype=np.float64)
     return share * float((upper - lower).max()) + 1.05 * reach
 
 
 def _box(bounds: Any) -> Any:
-    """The box around a shape or several; anything else as it is."""
+    """Return the box around a shape or several, and anything else as it is."""
     boxes = [getattr(shape, "bounds", None) for shape in as_shapes(bounds)]
     if not boxes or any(box is None for box in boxes):
         return bounds

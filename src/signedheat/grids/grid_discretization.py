@@ -12,41 +12,38 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import lsqr
 
-from ..area_elements import sample_on_grid
-from ..arrays import Floats
+from ..area_elements import AreaSamples, sample_on_grid
+from ..arrays import Floats, Ints
 from ..discretization import DiffusesEach, Levels, SolvesEach, discretize
 from ..errors import MemoryLimitError, SourceError
 from ..linear.conjugate_gradients import conjugate_gradients
 from ..memory import available_memory, libraries, refuse_beyond_memory
 from .grid import Grid
-from .grid_source import GridSource
 from .multilevel import Level, collapse, diffuse_multilevel, quotients, skip_finest, unit_vectors
 from .node_sources import NodeSources
-from .stencil import divergence, interpolation_stencil, laplacian, solve_poisson
-from .wavefront import padded_shape
+from .stencil import divergence, interpolation_stencil, laplacian, padded_shape, solve_poisson
 
 BYTES_PER_NODE, BYTES_PER_AREA = {1: 42, 2: 42, 3: 25, 4: 42}, 930
-"""Measured peak memory of a distance computation, by dimension; and what each square cell of surface adds in space."""
+"""Measured peak memory of a distance computation for each node, by dimension; and for each square cell of surface in
+space."""
 MOST_PER_NODE = 22
-"""What surface adds for each node where it is everywhere."""
+"""Most bytes that surface adds for each node, where it is everywhere."""
 ROOM = 1.08
-"""By how much the suggested spacing is larger than it must be: what is free changes from run to run."""
+"""Factor by which the suggested spacing is larger than needed, since free memory changes from run to run."""
 
 
 def memory_estimate(grid: Grid, per_node: float | None = None, extra: float = 0.0) -> int:
-    """Estimated peak memory of a distance computation on the grid, in bytes; of others, if `per_node` is given.
-
-    `extra` bytes, needed for neither nodes nor libraries, are added.
-    """
+    """Estimate the peak memory of a distance computation on a grid; others have `per_node` and `extra` bytes."""
     if per_node is None:
         per_node = BYTES_PER_NODE[grid.dimension]
     return int(per_node * grid.n_nodes + extra) + libraries()
 
 
 def bytes_of_area(area: float, spacing: Floats, n_nodes: float) -> float:
-    """What so much surface adds on a grid of this spacing, in space."""
+    """Estimate the memory that surface of this area adds on a grid of this spacing, in space."""
     if len(spacing) != 3:
         return 0.0
     cells = float(area / float(np.prod(spacing)) ** (2 / 3))
@@ -54,7 +51,7 @@ def bytes_of_area(area: float, spacing: Floats, n_nodes: float) -> float:
 
 
 def refuse_large_grid(grid: Grid, per_node: float | None = None, extra: float = 0.0, area: float = 0.0) -> None:
-    """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing.
+    """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory, before allocating any.
 
     For φ alone, the area of the surface makes the estimate better.
     """
@@ -76,7 +73,7 @@ def refuse_large_grid(grid: Grid, per_node: float | None = None, extra: float = 
 def fitting_spacing(
     grid: Grid, available: int, per_node: float | None = None, extra: float = 0.0, area: float = 0.0
 ) -> Floats:
-    """(d,) about the least spacing, in the proportions of the grid's own, at which its box fits into memory."""
+    """Return (d,) about the least spacing, in the proportions of the grid's, at which its box fits into memory."""
     base = memory_estimate(grid, 0.0, extra)
     whole = memory_estimate(grid, per_node, extra) - base
     spacing: Floats = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
@@ -92,8 +89,67 @@ def fitting_spacing(
 
 
 @dataclass(frozen=True, eq=False)
+class GridSource:
+    """Sources on a grid: samples of their area elements, and X₀ at the nodes."""
+
+    samples: AreaSamples  # area elements, merged in each cell and component, and X₀
+    grid: Grid
+    diffusion: float  # τ in ``t = τ max(h, h_source)²``
+
+    def time_on(self, spacing: float) -> float:
+        """Return t on a coarser grid of this mean spacing: as on this grid, but large enough that √t spans a cell."""
+        return self.time if spacing <= self._step else max(self.time, spacing**2)
+
+    @property
+    def time(self) -> float:
+        return self.diffusion * max(self._step, self.samples.spacing) ** 2
+
+    @property
+    def finest(self) -> int:
+        """How often the grid can be coarsened until √t spans one cell: finer grids add no accuracy."""
+        return max(0, int(np.log2(np.sqrt(self.time) / self._step) + 1e-6))
+
+    @property
+    def _step(self) -> float:
+        return float(self.grid.spacing.mean())
+
+    @property
+    def vectors(self) -> NodeSources:
+        return self.samples.nodes
+
+    @property
+    def weights(self) -> Floats:
+        return self.samples.weights
+
+    @property
+    def components(self) -> Ints:
+        return self.samples.components
+
+    @property
+    def source_ids(self) -> Ints:
+        return self.samples.source_ids
+
+    @cached_property
+    def stencil(self) -> tuple[Ints, Floats]:
+        """(s, 2^d) nodes and weights of multilinear interpolation at each sample."""
+        return interpolation_stencil(self.samples.positions, self.grid.shape)
+
+    @cached_property
+    def interpolation(self) -> csr_matrix:
+        nodes, weights = self.stencil
+        starts = np.arange(len(nodes) + 1) * nodes.shape[1]
+        size = (len(nodes), self.grid.n_nodes)
+        return csr_matrix((weights.ravel(), nodes.ravel(), starts), shape=size)
+
+    def at_samples(self, values: Floats) -> Floats:
+        """Return (s,) node values interpolated at the samples."""
+        nodes, weights = self.stencil
+        return np.einsum("ij,ij->i", values.ravel()[nodes], weights)
+
+
+@dataclass(frozen=True, eq=False)
 class GridDiscretization(DiffusesEach):
-    """A grid, as the three steps see it."""
+    """A grid as a discretisation."""
 
     grid: Grid
 
@@ -105,13 +161,13 @@ class GridDiscretization(DiffusesEach):
         return self, sources
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> GridSource:
-        """X₀ and the rows that interpolate φ on the source: Eq. 11 in space, area vectors spread to the nodes."""
+        """Compute X₀ and the rows that interpolate φ on the source (Eq. 11 in space): area vectors spread to nodes."""
         samples = sample_on_grid(sources, self.grid)
         refuse_large_grid(self.grid, area=float(samples.weights.sum()))
         return GridSource(samples, self.grid, diffusion)
 
     def diffuse(self, source: GridSource) -> list[Level]:
-        """Solve ``(1 − tΔ) X = X₀`` (Eq. 12): in flat space each component of X diffuses by itself."""
+        """Solve ``(1 − tΔ) X = X₀`` (Eq. 12); in flat space each component of X diffuses by itself."""
         return diffuse_multilevel(source.vectors, source.time_on, source.finest)
 
     def to_cells(self, vectors: list[Level]) -> NDArray[np.float32]:
@@ -120,7 +176,7 @@ class GridDiscretization(DiffusesEach):
         return np.moveaxis(directions.reshape(dimension, *self.grid.shape), 0, -1)
 
     def divergence(self, directions: NDArray[np.floating]) -> Floats:
-        """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
+        """Compute b, the right-hand side of ``C φ = b`` (Eq. 13)."""
         return divergence(directions, self.grid.spacing)
 
 
@@ -137,13 +193,13 @@ TOLERANCE = 1e-6
 STIFFNESS = 10.0
 """Penalty of the augmented Lagrangian, in 1/h."""
 LEAST, STIFFEST = 1e-6, 30.0
-"""Of penalties, relative to the default: in the preconditioner, and as a penalty."""
+"""Least penalty in the preconditioner, and largest penalty, relative to the default."""
 MULTIPLIER_STEPS = 5
 """Steps of the augmented Lagrangian."""
 BYTES_IF_EXACT = 83
-"""Measured peak memory for each node, beyond what is held already, of imposing rows exactly."""
+"""Measured peak memory for each node, beyond what is held already, of imposing levels exactly."""
 NEGLIGIBLE = 1e-6
-"""Rows of samples that differ by less are taken as equal, and their levels as contradictory."""
+"""Difference below which rows of samples are equal, and their levels contradict each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +220,7 @@ class GridIntegration(SolvesEach):
         return phi
 
     def fit(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
-        """Subtract from φ a smooth function that takes its error at the samples (in place of Eq. 14).
+        """Subtract from φ a smooth function that takes φ's error at the samples (in place of Eq. 14).
 
         At a node it is the mean of the errors of all samples, weighted by area and nearness: errors and areas are
         diffused as the normals were, and divided.
@@ -177,8 +233,8 @@ class GridIntegration(SolvesEach):
     def penalize(self, divergence: Floats, source: GridSource, strength: float) -> Floats:
         """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas of the samples.
 
-        What is as good as nothing imposes nothing. Beyond `STIFFEST`, where conjugate gradients would not end, the
-        level is imposed exactly.
+        A negligible λ imposes nothing. Beyond `STIFFEST`, where conjugate gradients would not converge, the level is
+        imposed exactly.
         """
         levels = Levels(np.zeros(len(source.weights)))
         if strength < LEAST**2 * self.soft_weight:
@@ -189,10 +245,10 @@ class GridIntegration(SolvesEach):
         return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
 
     def fit_exactly(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
-        """Solve Eq. 14 by an augmented Lagrangian, then the least correction at the nodes around the samples.
+        """Solve Eq. 14 by an augmented Lagrangian, then by the least correction at the nodes around the samples.
 
-        The multipliers take up what the penalty leaves, except for what nearly dependent rows hide from it: that is
-        small, and corrected directly. Rows that contradict each other are met in the least-squares sense.
+        The multipliers take up what the penalty leaves, except for the small part that nearly dependent rows hide from
+        it; that is corrected directly. Rows that contradict each other are met in the least-squares sense.
         """
         refuse_beyond_memory(
             f"the zero set imposed exactly on {self.grid.n_nodes:,} nodes",
@@ -246,7 +302,7 @@ class GridIntegration(SolvesEach):
 
 
 def deviation(values: Floats, source: GridSource, levels: Levels) -> Floats:
-    """(s,) values at the samples minus their levels; with groups, also minus the mean of the group."""
+    """Return (s,) values at the samples minus their levels; with groups, also minus the mean of the group."""
     excess = values - levels.values
     if levels.groups is not None:
         sums = np.bincount(levels.groups, source.weights * excess)
@@ -256,28 +312,28 @@ def deviation(values: Floats, source: GridSource, levels: Levels) -> Floats:
 
 
 def diffused_mean(source: GridSource, values: Floats) -> NDArray[np.float32]:
-    """(*grid.shape) mean of values at the samples, weighted by area and by heat: diffused as the normals are.
+    """Return means of values at the samples over the grid, weighted by area and by heat, diffused as the normals are.
 
-    It varies slowly, so the finest level of the hierarchy is skipped.
+    They vary slowly, so the finest level of the hierarchy is skipped.
     """
     largest = np.abs(values).max()
     if largest == 0.0:
         return np.zeros(source.grid.shape, dtype=np.float32)
-    finest, axes = source.vectors, slice(-source.grid.dimension, None)
-    left_out, shape, steps = skip_finest(finest.shape, finest.steps, max(1, source.finest))
-    ratios = finest.steps[axes] / np.where(steps[axes] > 0, steps[axes], np.inf)
+    vectors, axes = source.vectors, slice(-source.grid.dimension, None)
+    left_out, shape, steps = skip_finest(vectors.shape, vectors.steps, max(1, source.finest))
+    ratios = vectors.steps[axes] / np.where(steps[axes] > 0, steps[axes], np.inf)
     stencil = interpolation_stencil(source.samples.positions * ratios, shape[axes])
     weights = source.weights / source.weights.max()
     pairs = np.stack([weights, weights * values / largest], axis=1)
     nodes = NodeSources.scattered(shape, steps, *stencil, pairs)
     levels = left_out + diffuse_multilevel(nodes, source.time_on, rounds=1)
-    mean = collapse(levels, finest.shape, 1, quotients).reshape(source.grid.shape)
+    mean = collapse(levels, vectors.shape, 1, quotients).reshape(source.grid.shape)
     mean *= np.float32(largest)
     return mean
 
 
 def least_correction(values: Floats, source: GridSource) -> Floats:
-    """(n_nodes,) grid function of least norm that interpolates these values at the samples, in least squares."""
+    """Return (n_nodes,) the grid function of least norm that interpolates values at the samples, by least squares."""
     touched = np.unique(source.interpolation.indices)
     change = np.zeros(source.grid.n_nodes)
     columns = source.interpolation[:, touched]

@@ -190,7 +190,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return shaped(slopes, shape)
 
     def closest(self, points: ArrayLike) -> Closest:
-        """The nearest place of the solid's surface for points in space: `Solid.closest`.
+        """Find the nearest place of the solid's surface for points in space: `Solid.closest`.
 
         Parameters
         ----------
@@ -216,7 +216,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         """
         if self.solid is None:
             raise SourceError(
-                "the field has no solid that it is the distance to",
+                "the field has no solid whose distance it is",
                 remedy="take it from signed_distance or Solid.field, not from a file",
                 element="field",
             )
@@ -244,7 +244,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     @overload
     def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]: ...
     def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]:
-        """The level set φ = level.
+        """Extract the level set φ = level.
 
         In space, a surface: closed, manifold, with normals pointing to greater φ. Where it leaves the grid, as the
         completion of an open shape may do, it is closed along the box of the grid (1 % of a cell outside); where it
@@ -293,7 +293,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return TriangleMesh(vertices, faces if refine is None else flipped_along_creases(vertices, faces))
 
     def _refined(self, level: float) -> Refine | None:
-        """A function that moves points of a level onto it; None if the field has no solid."""
+        """Return a function that moves points of a level onto it; None if the field has no solid."""
         if self.solid is None:
             return None
         distance = self.solid.distance
@@ -301,7 +301,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return lambda points: on_level(distance, points, values, self.grid, level)
 
     def _placed(self, refine: Refine | None) -> Refine:
-        """From points in cells to places in space, moved onto the level if there is a way to."""
+        """Return a function from points in cells to places in space, moved onto the level if `refine` does that."""
 
         def placed(cells: Floats) -> Floats:
             points = self.grid.origin + cells * self.grid.spacing
@@ -360,7 +360,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return ply.write_parts(parts, path)
 
     def dense(self) -> GridField[Dimension]:
-        """The field at all nodes of its grid, those beyond a band interpolated from the coarse ones.
+        """Return the field at all nodes of its grid, those beyond a band interpolated from the coarse ones.
 
         Returns
         -------
@@ -392,7 +392,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     @overload
     def offset(self, distance: float) -> TriangleMesh | list[Polyline]: ...
     def offset(self, distance: float) -> TriangleMesh | list[Polyline]:
-        """The offset of the shape at a signed distance: `contour`, but refused if the grid is too small for it.
+        """Offset the shape by a signed distance: `contour`, but refused if the grid is too small for it.
 
         Parameters
         ----------
@@ -424,12 +424,12 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return self.contour(distance)
 
     def with_values(self, values: Floats) -> GridField[Dimension]:
-        """Other values on the same grid, without what belongs to these.
+        """Return other values on the same grid, without what belongs to the present ones.
 
         Parameters
         ----------
         values : (n,) float
-            Of the shape of `values`.
+            In the shape of `values`.
 
         Returns
         -------
@@ -445,7 +445,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return GridField(self.grid, values)
 
     def combined_with(self, other: GridField[Dimension], rule: Rule) -> GridField[Dimension]:
-        """The field whose values a rule makes of those of two fields on one grid.
+        """Combine the values of two fields on one grid by a rule.
 
         Parameters
         ----------
@@ -484,7 +484,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return GridField(self.grid, values, blocks=self.blocks, coarse=coarse, width=self.width)
 
     def _scaled(self, factor: float) -> GridField[Dimension]:
-        """The field times a number; exact as this one is, if it is neither 0 nor infinite."""
+        """Return the field times a number; it is exact if this one is and the number is neither 0 nor infinite."""
         solid = None if self.solid is None or not factor or not math.isfinite(factor) else scaled(self.solid, factor)
         coarse = None if self.coarse is None else self.coarse._scaled(factor)
         return replace(
@@ -525,7 +525,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return image
 
     def confidence_at(self, points: ArrayLike) -> NDArray[np.float32]:
-        """How far the surface that is nearest was there (1), or had to be completed (less), interpolated.
+        """Interpolate how far the surface that is nearest was there (1), or had to be completed (less).
 
         Parameters
         ----------
@@ -551,12 +551,12 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         inside = self._into_box(places)
         index = (inside - self.grid.origin) / self.grid.spacing
         if self.blocks is None:
-            found = scipy.ndimage.map_coordinates(self.confidence, index.T, np.float32, order=1, mode="nearest")
+            values = scipy.ndimage.map_coordinates(self.confidence, index.T, np.float32, order=1, mode="nearest")
         else:
-            found = BlockValues(self.blocks, self.confidence.astype(np.float32)).interpolated(index)
-            beyond = np.isnan(found)
-            found[beyond] = self.whole.confidence_at(inside[beyond])
-        return shaped(np.clip(found, 0, 1).astype(np.float32), shape)
+            values = BlockValues(self.blocks, self.confidence.astype(np.float32)).interpolated(index)
+            beyond = np.isnan(values)
+            values[beyond] = self.whole.confidence_at(inside[beyond])
+        return shaped(np.clip(values, 0, 1).astype(np.float32), shape)
 
     @property
     def surface_confidence(self) -> float | None:
@@ -596,7 +596,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return np.clip(points, self.grid.origin, self.grid.upper)
 
     def _values_at(self, points: Floats) -> tuple[Floats]:
-        """φ at (n, d) points, within the box and outside of it."""
+        """Return φ at (n, d) points, within the box and outside of it."""
         inside = self._into_box(points)
         values = self._interpolate(inside)
         away = points - inside
@@ -627,7 +627,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return None if defined.all() else (np.where(defined, self.values, 0.0), defined.astype(np.float64))
 
     def _slopes(self, points: Floats) -> Floats:
-        """Central differences of the interpolant, which are those at the nodes, interpolated."""
+        """Return central differences of the interpolant, which are those at the nodes, interpolated."""
         slopes = np.empty_like(points)
         for axis, step in enumerate(self.grid.spacing):
             ahead, behind = points.copy(), points.copy()

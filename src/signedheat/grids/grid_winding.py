@@ -1,8 +1,8 @@
-"""Winding numbers on a grid: one Poisson equation says how often a shape winds around every node.
+"""Winding numbers on a grid, from one Poisson equation.
 
 The winding number of a surface falls by one where it is crossed along its normal and is harmonic elsewhere (Jacobson et
-al. 2013), so that ``−Δw = ∇·(n δ)``, n δ the area vectors spread over the nodes around them. On the walls of the box
-w is the far field of the area vectors.
+al. 2013), so that ``−Δw = ∇·(n δ)``, n δ the area vectors spread over the nodes around them. On the walls of the box w
+is the far field of the area vectors.
 """
 
 from __future__ import annotations
@@ -20,20 +20,17 @@ from .node_sources import STRETCH, NodeSources
 from .stencil import solve_poisson
 
 BLOCK = 4
-"""Cells along the edge of the blocks whose area vectors are one dipole to the walls."""
+"""Edge of the blocks, in cells, whose area vectors are one dipole as seen from the walls."""
 PATCH = 8
-"""Nodes along the edge of the patches of the walls to which dipoles are evaluated."""
+"""Edge of the patches of the walls, in nodes, at whose corners the field of dipoles is evaluated."""
 CORE = 2.0
 """Distance in cells within which a dipole's field is that of a ball."""
 CLEARANCE = 10
-"""Cells between the shape and the walls that the far field needs; fewer are made up for."""
+"""Cells that the far field needs between the shape and the walls; missing ones are added."""
 
 
 def winding_numbers(nodes: NodeSources, shape: tuple[int, ...], positions: Floats, vectors: Floats) -> Floats:
-    """(*shape) winding number of a shape around the nodes of a grid, smooth over two cells across the shape.
-
-    Shapes: `positions` (s, d), `vectors` (s, d); returned: an array (*shape).
-    """
+    """Return winding numbers around the nodes of a grid of a shape with area vectors (s, d), smooth over two cells."""
     dimension = len(shape)
     spacing = nodes.steps[4 - dimension :]
     room = _room(nodes, dimension)
@@ -65,7 +62,7 @@ def winding_numbers(nodes: NodeSources, shape: tuple[int, ...], positions: Float
 
 
 def _room(nodes: NodeSources, dimension: int) -> list[tuple[int, int]]:
-    """Layers of nodes to add before and behind along each axis, so that no vectors are close to the walls."""
+    """Return layers of nodes to add before and behind along each axis, so that no vectors are close to the walls."""
     taken = nodes.nonzero()[0][:, 4 - dimension :]
     before, behind = taken.min(axis=0), np.array(nodes.shape[4 - dimension :]) - 1 - taken.max(axis=0)
     rooms = np.maximum(0, CLEARANCE - np.stack([before, behind], axis=1))
@@ -73,7 +70,7 @@ def _room(nodes: NodeSources, dimension: int) -> list[tuple[int, int]]:
 
 
 def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Floats]:
-    """Mean positions and sums of the area vectors in each block of `BLOCK` cells."""
+    """Return mean positions and sums of the area vectors in each block of `BLOCK` cells."""
     blocks = np.floor(positions / BLOCK).astype(np.int64)
     blocks -= blocks.min(axis=0)
     which = blocks[:, 0]
@@ -89,7 +86,7 @@ def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Float
 
 
 def _sources(nodes: NodeSources, shape: tuple[int, ...], below: list[int], spacing: Floats) -> Floats:
-    """(*shape) ∇·(n δ), with these layers of nodes before the grid's own; no vectors are at its walls."""
+    """Return ∇·(n δ) on a grid with these layers of nodes before its own; there are no vectors at its walls."""
     dimension = len(shape)
     right = np.zeros((1,) * (4 - dimension) + shape)
     first, scales = np.zeros(4, dtype=np.int64), np.zeros(4)
@@ -104,7 +101,7 @@ def _sources(nodes: NodeSources, shape: tuple[int, ...], below: list[int], spaci
 def _add_divergence(
     stretches: Ints, places: NDArray[np.int32], sums: NDArray[np.float32], first: Ints, scales: Floats, right: Floats
 ) -> None:
-    """Differences of the vectors in some stretches, between the nodes before and behind."""
+    """Add differences of the vectors in some stretches, between the nodes before and behind."""
     skipped = 0
     while scales[skipped] == 0.0:
         skipped += 1
@@ -121,7 +118,7 @@ def _add_divergence(
 
 
 def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, Floats]:
-    """A lattice of places, in cells, on a wall of the box: half a cell beyond its last nodes."""
+    """Return a lattice of places, in cells, on a wall of the box, half a cell beyond its last nodes."""
     lines = [
         np.array([shape[d] - 0.5 if end else -0.5])
         if d == axis
@@ -133,7 +130,7 @@ def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, Floats
 
 
 def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
-    """Values on a wall's lattice, interpolated to its nodes."""
+    """Interpolate values on a wall's lattice to its nodes."""
     for d, n in enumerate(m for k, m in enumerate(shape) if k != axis):
         place = (np.arange(n) + 0.5) / n * (values.shape[d] - 1)
         below = np.minimum(place.astype(np.int64), values.shape[d] - 2)
@@ -144,7 +141,7 @@ def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
 
 @compiled
 def _far_field(places: Floats, dipoles: Floats, strengths: Floats, axis: int, core: float) -> tuple[Floats, Floats]:
-    """Winding number at places, and its derivative along an axis."""
+    """Return the winding number at places, and its derivative along an axis."""
     dimension = places.shape[1]
     sphere = 2.0 * np.pi if dimension == 2 else 4.0 * np.pi
     value, slope = np.zeros(len(places)), np.zeros(len(places))

@@ -1,6 +1,6 @@
 """Level sets on grids: closed manifold surfaces in space, polylines in the plane.
 
-On sparse grids cubes are marched through window by window, and vertices of neighbouring windows merged.
+On sparse grids marching cubes runs window by window, and vertices of neighbouring windows are merged.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from .blocks import SIDE, BlockValues
 measure: Any = lazy_module("skimage.measure", "contours")
 
 CLEARANCE = 1e-3
-"""Crossings stay this fraction of a cell away from the nodes, so that no two vertices of a surface coincide."""
+"""Least distance of crossings from the nodes, in cells, so that no two vertices of a surface coincide."""
 CAP = 0.01
-"""Fraction of a cell by which a surface that is closed along the box lies outside the box."""
+"""Distance, in cells, from the box to a surface that is closed along it outside."""
 
 
 def closed_surface(
     values: Floats, origin: Floats, spacing: Floats, level: float, refine: Callable[[Floats], Floats] | None = None
 ) -> tuple[Floats, Ints]:
-    """Marching cubes (Lewiner et al. 2003), with closed, manifold, outward-oriented output for every input.
+    """Extract a closed, manifold, outward-oriented surface from any values, by marching cubes (Lewiner et al. 2003).
 
     Values are those at ``origin + (i, j, k) * spacing``. `refine` moves (n, 3) points of the level set along the edges
     of the grid that they lie on. Faces are counter-clockwise as seen from the side of greater values.
@@ -51,7 +51,7 @@ def closed_surface(
 
 
 def level_lines(values: Floats, origin: Floats, spacing: Floats, level: float) -> list[tuple[Floats, bool]]:
-    """Marching squares: points (k, 2) of each line, greater values to the left, and whether it closes.
+    """Return points (k, 2) of each line of a level set, greater values to the left, and whether it closes.
 
     Lines are closed, unless they end at the box or at NaN values.
 
@@ -63,11 +63,11 @@ def level_lines(values: Floats, origin: Floats, spacing: Floats, level: float) -
     """
     lines = measure.find_contours(heights_above(values, spacing, level), 0.0, positive_orientation="high")
     closed = [len(line) > 3 and bool((line[0] == line[-1]).all()) for line in lines]
-    return [(origin + at * spacing, end) for at, end in zip(lines, closed, strict=True)]
+    return [(origin + line * spacing, closes) for line, closes in zip(lines, closed, strict=True)]
 
 
 def heights_above(values: Floats, spacing: Floats, level: float) -> Floats:
-    """Values minus the level, kept away from zero so that crossings respect `CLEARANCE`."""
+    """Return values minus the level, kept away from zero so that crossings respect `CLEARANCE`."""
     height = values - level
     finite = height[np.isfinite(height)]
     low, high = float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
@@ -86,7 +86,7 @@ def heights_above(values: Floats, spacing: Floats, level: float) -> Floats:
 
 
 def closed_without_values(height: Floats) -> Floats:
-    """Nodes without a value made positive, so that crossings lie about `CAP` cells from neighbours that have one."""
+    """Make nodes without a value positive, so that crossings lie about `CAP` cells from neighbours with a value."""
     unknown = np.isnan(height)
     if not unknown.any():
         return height
@@ -101,13 +101,13 @@ def closed_without_values(height: Floats) -> Floats:
 
 
 def wall_signs(height: Floats) -> set[bool]:
-    """Signs of the nodes on the walls of the box: {True} if all are positive, {False} if all are negative, or both."""
+    """Return signs of the nodes on the walls of the box: {True} if all are positive, {False} if none is, or both."""
     walls = [height.take(end, axis=axis) for axis in range(height.ndim) for end in (0, -1)]
     return {bool(sign) for wall in walls for sign in ((wall > 0).any(), (wall > 0).all())}
 
 
 def capped(height: Floats) -> Floats:
-    """One more layer of nodes all around, positive, so that crossings lie `CAP` cells outside the walls."""
+    """Add a layer of positive nodes all around, so that crossings lie `CAP` cells outside the walls."""
     padded = np.pad(height, 1, mode="edge")
     for axis in range(height.ndim):
         for end in (0, -1):
@@ -119,14 +119,14 @@ def capped(height: Floats) -> Floats:
 WINDOW = 8
 """Blocks along each edge of a window."""
 BITS = 20
-"""Of the number of a node along an axis."""
+"""Bits of the index of a node along an axis."""
 Refine = Callable[[Floats], Floats]
 
 
 def block_contour(
     values: BlockValues, spacing: Floats, level: float, refine: Refine | None = None
 ) -> tuple[Floats, Ints]:
-    """Marching cubes (Lewiner et al. 2003) in the cells whose nodes all have a value: closed where those around do.
+    """Extract the level set in the cells whose nodes all have a value, closed where the values around it are.
 
     Neighbouring windows share nodes, and so find the same points on the edges between them; these become one. Where the
     level set leaves the grid it is closed along the walls, `CAP` cells outside. `refine` moves (n, 3) points, in cells,
@@ -138,9 +138,9 @@ def block_contour(
 
 
 def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Iterator[tuple[Ints, Floats, Ints]]:
-    """The place of each window of `WINDOW` blocks through which the level set goes, in order, with that part of it.
+    """Yield the place of each window of `WINDOW` blocks that the level set passes, in order, and its part of the set.
 
-    Vertices are in cells from the first node of the grid, and those on walls between windows are in each of these.
+    Vertices are in cells from the first node of the grid; those on walls between windows are in each of these.
     """
     least = CLEARANCE * float(spacing.min())
     capped = _reaches_walls(values, level)
@@ -162,18 +162,18 @@ def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Itera
 
 
 def _window_surface(height: NDArray[np.float32]) -> tuple[Floats, NDArray[np.int32]] | None:
-    """Vertices in cells and faces, in cells whose nodes all have a value; None if there are none."""
+    """Return vertices and faces, in cells whose nodes all have a value; None if there are none."""
     finite = ~np.isnan(height)
     whole = np.zeros(height.shape, dtype=bool)  # cells, at their last nodes
     inner = np.ones(tuple(n - 1 for n in height.shape), dtype=bool)
-    some, every = np.zeros_like(inner), np.ones_like(inner)
+    any_inside, all_inside = np.zeros_like(inner), np.ones_like(inner)
     inside = height < 0
     for corner in np.ndindex(2, 2, 2):
         part = tuple(slice(c, n - 1 + c) for c, n in zip(corner, height.shape, strict=True))
         inner &= finite[part]
-        some |= inside[part]
-        every &= inside[part]
-    inner &= some & ~every
+        any_inside |= inside[part]
+        all_inside &= inside[part]
+    inner &= any_inside & ~all_inside
     if not inner.any():
         return None
     whole[1:, 1:, 1:] = inner
@@ -183,7 +183,7 @@ def _window_surface(height: NDArray[np.float32]) -> tuple[Floats, NDArray[np.int
 
 
 def edges_of(vertices: Floats) -> tuple[Bools, Ints]:
-    """(n,) whether vertices, in cells, lie on edges of the grid, and numbers that those on the same edge share."""
+    """Return (n,) whether vertices, in cells, lie on edges of the grid, and numbers shared on the same edge."""
     base = np.floor(vertices)
     crossed = vertices > base
     on_edge = crossed.sum(axis=1) == 1
@@ -192,7 +192,7 @@ def edges_of(vertices: Floats) -> tuple[Bools, Ints]:
 
 
 def _reaches_walls(values: BlockValues, level: float) -> bool:
-    """Whether the level set leaves the grid: nodes on its walls lie on both sides."""
+    """Return whether the level set leaves the grid: nodes on its walls lie on both sides."""
     signs: set[bool] = set()
     for axis, n in enumerate(values.shape):
         for node in (0, n - 1):
@@ -203,26 +203,26 @@ def _reaches_walls(values: BlockValues, level: float) -> bool:
 
 
 def _close_at_walls(height: NDArray[np.float32], first: Ints, limit: Ints) -> None:
-    """Values for the layer of nodes beyond the walls, outside, so that crossings lie `CAP` cells beyond the walls."""
+    """Write the layer of nodes beyond the walls, outside, so that crossings lie `CAP` cells beyond the walls."""
     for axis in range(3):
         for beyond, wall in ((-1, 0), (int(limit[axis]), int(limit[axis]) - 1)):
-            at, from_ = beyond - int(first[axis]), wall - int(first[axis])
-            if 0 <= at < height.shape[axis] and 0 <= from_ < height.shape[axis]:
+            target, source = beyond - int(first[axis]), wall - int(first[axis])
+            if 0 <= target < height.shape[axis] and 0 <= source < height.shape[axis]:
                 layers: NDArray[np.float32] = np.moveaxis(height, axis, 0)
-                layer = layers[from_]
-                layers[at] = np.where(layer < 0, -layer * np.float32(1 / CAP - 1), layer)
+                layer = layers[source]
+                layers[target] = np.where(layer < 0, -layer * np.float32(1 / CAP - 1), layer)
 
 
 Part = tuple[Floats, Ints]
-"""Vertices, (n, 3), and faces, (m, 3), which count the vertices of all parts before."""
+"""Vertices, (n, 3), and faces, (m, 3), whose ids count the vertices of all parts before."""
 _Seam = tuple[Ints, Ints]
 """Keys of the vertices on the walls of a window, ascending, and the numbers of these vertices."""
 
 
 def contour_parts(values: BlockValues, spacing: Floats, level: float, refine: Refine | None = None) -> Iterator[Part]:
-    """The vertices and faces of `block_contour`, window by window: new vertices, and faces that use these and older.
+    """Yield the vertices and faces of `block_contour` window by window: new vertices, and faces of new and old ones.
 
-    Only the vertices on walls between windows are kept, as long as neighboring windows are to come.
+    Only the vertices on walls between windows are kept, as long as neighbouring windows are to come.
     """
     seams: dict[tuple[int, ...], _Seam] = {}
     count = 0
@@ -249,7 +249,7 @@ def contour_parts(values: BlockValues, spacing: Floats, level: float, refine: Re
 
 
 def _looked_up(seam: _Seam, keys: Ints) -> Ints:
-    """(k,) number of the vertex with each key, −1 where there is none."""
+    """Return (k,) the number of the vertex with each key, −1 where there is none."""
     held, numbers = seam
     if not len(held):
         return np.full(len(keys), -1, dtype=np.int64)

@@ -1,18 +1,18 @@
 """Diffusion from sources on a grid, on a hierarchy of coarser grids.
 
-Each is solved by line Gauss–Seidel sweeps: ``(1 − tΔ) X = B``, with directions right however small X becomes. The
-matrix has no positive off-diagonal entry, so neither the elimination within a line nor the sweeps subtract: X decays
-over many decades and keeps its relative accuracy. Lines along the last axis are solved exactly; along all other axes
-lines are updated in order, in every combination of directions.
+Each level is solved by line Gauss–Seidel sweeps: ``(1 − tΔ) X = B``, with accurate directions however small X becomes.
+The matrix has no positive off-diagonal entry, so neither the elimination within a line nor the sweeps subtract: X
+decays over many decades and keeps its relative accuracy. Lines along the last axis are solved exactly; along all other
+axes lines are updated in order, in every combination of directions.
 
 X falls by a factor of e over the length √t. Farther than a few √t from the source its direction varies slowly, and a
 grid of twice the spacing, with the diffusion time of its own spacing (``t = τ max(h, h_source)²``, as on the finest
 grid), continues it at an eighth of the cost in space. So every level is swept only within `BAND` of its sources, and
 the coarsest level everywhere.
 
-A coarser level takes the values that the finer one found within its band: the directions of X, with lengths raised to
-the power that turns the decay rate of the finer level into its own, so that a path from the source to a node has the
-same weight wherever it leaves the band. Where a level is skipped, its sources are restricted to the next by the
+A coarser level starts from the values that the finer one found within its band: the directions of X, with lengths
+raised to the power that turns the decay rate of the finer level into its own, so that a path from the source to a node
+has the same weight wherever it leaves the band. Where a level is skipped, its sources are restricted to the next by the
 transpose of linear interpolation, which keeps sums and first moments: the two sides of a sheet thinner than a coarse
 cell do not cancel.
 """
@@ -20,7 +20,10 @@ cell do not cancel.
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import product
+from typing import Any
 
 import numpy as np
 import scipy
@@ -29,26 +32,26 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..memory import untouched_zeros
+from ..parallel import n_threads
 from .node_sources import STRETCH, NodeSources
-from .stencil import by_slabs
-from .wavefront import sweep_lines
+from .stencil import FEW_NODES, by_slabs
 
 BAND = 14.0
 """Half width, in √t, of the band around the source in which a level is swept."""
 MARGIN = 3
-"""Width, in nodes, of the rim of the band whose values are taken from the coarser level."""
+"""Width, in nodes, of the rim of the band that takes its values from the coarser level."""
 SMALL = 0.125
-"""A first band that is a smaller fraction of the grid than this is swept twice as often: it costs little there."""
+"""Share of the grid below which a first band is swept twice as often: it costs little there."""
 COARSEST = 32
-"""A grid with no more nodes than this along any axis is not coarsened."""
+"""Number of nodes along every axis up to which a grid is not coarsened."""
 FEW = 4
-"""Axes with no more nodes than this are not halved."""
+"""Number of nodes up to which an axis is not halved."""
 ROUNDS = 2
-"""How often each combination of sweep directions is used within a band, by default."""
+"""Default number of rounds of all combinations of sweep directions within a band."""
 BEYOND = 2
-"""Levels that start from values of a finer level are swept so many times as often."""
+"""Factor of the number of rounds on levels that start from values of a finer level."""
 ROUNDS_EVERYWHERE = 12
-"""The same on the coarsest grid, where paths from the source are longer and sweeps are cheap."""
+"""Number of rounds on the coarsest grid, where paths from the source are longer and sweeps are cheap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +59,7 @@ class Level:
     """The diffused vectors on one grid of the hierarchy."""
 
     vectors: NDArray[np.float32] | None  # (l₀, l₁, l₂, n, 4) X within the band; None if skipped
-    # (l₀, l₁, l₂, stretches) where these values are valid; elsewhere those of the coarser level are
-    inside: Bools | None
+    inside: Bools | None  # (l₀, l₁, l₂, stretches) where these values are valid, and not those of the coarser level
     factors: Ints  # (4,) cells of this grid per cell of the next coarser one: see `coarsening`
 
 
@@ -70,8 +72,8 @@ def diffuse_multilevel(
 ) -> list[Level]:
     """Solve ``(1 − tΔ) X = B``, Eq. 12 on a grid, on every level from `finest` (0: the sources' grid) to the coarsest.
 
-    `time` is the diffusion time t on a grid of a given mean spacing. Where a coarser solution suffices, some of the
-    finest levels are skipped. Each combination of sweep directions is used so many rounds within a band.
+    `time` is the diffusion time t on a grid of a given mean spacing. Where a coarser solution suffices, the finest
+    levels are skipped. Each combination of sweep directions is used for this many rounds within a band.
     """
     levels: list[Level] = []
     guess = None
@@ -94,10 +96,10 @@ def diffuse_multilevel(
 
 
 def coarsening(shape: tuple[int, ...], steps: Floats) -> Ints:
-    """(4,) cells of a grid per cell of the next coarser one: 2 along its finest axes, 1 along the others.
+    """Return (4,) cells of a grid per cell of the next coarser one: 2 along its finest axes, 1 along the others.
 
-    An axis with few nodes whose whole length is below the spacing along the others is reduced to one node; its factor
-    is then the number of its nodes or more.
+    An axis with few nodes that is shorter than the spacing along the others is reduced to one node; its factor is then
+    larger than the number of its nodes.
 
     Examples
     --------
@@ -116,7 +118,7 @@ def coarsening(shape: tuple[int, ...], steps: Floats) -> Ints:
 
 
 def skip_finest(shape: tuple[int, ...], steps: Floats, finest: int) -> tuple[list[Level], tuple[int, ...], Floats]:
-    """The first `finest` levels of the hierarchy, empty; and shape and spacing of the grid that follows."""
+    """Return the first `finest` levels of the hierarchy, empty; and shape and spacing of the next grid."""
     levels: list[Level] = []
     while len(levels) < finest and ((factors := coarsening(shape, steps)) > 1).any():
         levels.append(Level(None, None, factors))
@@ -127,6 +129,7 @@ def skip_finest(shape: tuple[int, ...], steps: Floats, finest: int) -> tuple[lis
 def _diffuse_level(
     sources: NodeSources, guess: Guess | None, time: Callable[[float], float], factors: Ints, rounds: int, last: bool
 ) -> Level:
+    """Solve on one level, within the band around its sources or known values, or everywhere on the last."""
     t = time(_mean_step(sources.steps))
     real = sources.steps > 0
     ratios = np.where(real, t / np.where(real, sources.steps, 1) ** 2, 0.0)
@@ -151,7 +154,7 @@ def _mean_step(steps: Floats) -> float:
 
 
 def _dilated(mask: Bools, width: Ints) -> Bools:
-    """The mask dilated by a box of this half width, in nodes."""
+    """Dilate a mask by a box of this half width, in nodes."""
     grown = mask.astype(np.uint8)
     for axis, reach in enumerate((*width[:3], -(-int(width[3]) // STRETCH))):
         size = 2 * min(int(reach), mask.shape[axis]) + 1
@@ -160,14 +163,14 @@ def _dilated(mask: Bools, width: Ints) -> Bools:
 
 
 def _coarser(shape: tuple[int, ...], steps: Floats) -> tuple[tuple[int, ...], Floats]:
-    """Shape and spacing of the next coarser grid."""
+    """Return shape and spacing of the next coarser grid."""
     factors, counts = coarsening(shape, steps), np.array(shape)
     coarse = np.where(factors == 2, counts // 2 + 1, np.where(factors == 1, counts, 1))
     return tuple(int(n) for n in coarse), np.where(coarse > 1, steps * factors, 0.0)
 
 
 def _carried(level: Level, shape: tuple[int, ...], power: float) -> Guess | None:
-    """The values of a level, for the next coarser one: in stretches of which all nodes have a value."""
+    """Return the values of a level for the next coarser one, in stretches of which all nodes have a value."""
     assert level.vectors is not None and level.inside is not None
     vectors = untouched_zeros((*shape, 4), np.float32)
     counts = np.zeros((*shape[:3], -(-shape[3] // STRETCH)), dtype=np.int64)
@@ -181,7 +184,7 @@ def _carried(level: Level, shape: tuple[int, ...], power: float) -> Guess | None
 def collapse(
     levels: list[Level], shape: tuple[int, ...], components: int, extract: Callable[..., None]
 ) -> NDArray[np.float32]:
-    """(components, *shape) a function of X at each node, evaluated on the finest level whose values are valid there.
+    """Return (components, *shape) a function of X at each node, on the finest level whose values are valid there.
 
     The kernel ``extract(vectors, inside, out, axis, start, stop)`` fills `out` where `inside` is true.
     """
@@ -273,7 +276,7 @@ def _interpolate(
 def unit_vectors(
     vectors: NDArray[np.float32], inside: Bools, out: NDArray[np.float32], axis: int, start: int, stop: int
 ) -> None:
-    """The vectors scaled to length one; where they have underflowed, `out` keeps the values of a coarser level."""
+    """Scale the vectors to length one; where they have underflowed, `out` keeps the values of a coarser level."""
     dimension, n0, n1, n2, n = out.shape
     stretches = inside.shape[3]
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
@@ -300,7 +303,7 @@ def unit_vectors(
 def quotients(
     vectors: NDArray[np.float32], inside: Bools, out: NDArray[np.float32], axis: int, start: int, stop: int
 ) -> None:
-    """The second component divided by the first; `out` keeps its values where the first has underflowed."""
+    """Divide the second component by the first; `out` keeps its values where the first has underflowed."""
     _, n0, n1, n2, n = out.shape
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
         for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
@@ -315,7 +318,7 @@ def quotients(
 
 
 TINY = np.float32(1e-34)
-"""Values below this are treated as unknown, and taken from a coarser level."""
+"""Size below which values count as unknown, and are taken from a coarser level."""
 
 
 def diffuse_by_sweeps(
@@ -324,8 +327,8 @@ def diffuse_by_sweeps(
     """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j``, Eq. 12, with no flux through the walls.
 
     It is solved in the `active` stretches, (l₀, l₁, l₂, ⌈n / STRETCH⌉), of a grid of (l₀, l₁, l₂, n) nodes, whose
-    `ratios`, (4,), are a = t / h². X, (l₀, l₁, l₂, n, 4), is `given` elsewhere and overwritten; by default it is zero,
-    and its memory there is never touched, so that it costs nothing.
+    `ratios`, (4,), are a = t / h². Elsewhere X, (l₀, l₁, l₂, n, 4), is `given`, and overwritten; by default it is zero
+    there, and its memory never touched, so that it costs nothing.
     """
     shape = sources.shape
     vectors = untouched_zeros((*shape, 4), np.float32) if given is None else given
@@ -346,8 +349,51 @@ def diffuse_by_sweeps(
     return vectors
 
 
+def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int, *arguments: Any) -> None:
+    """Run ``kernel(*arguments, tiles)`` over all lines along the last axis, in every combination of directions.
+
+    A tile is (begin, end, step) for each of the first three axes of `shape`; the tiles of one call run in order. Tiles
+    on one diagonal of a plane of lines do not depend on each other, and each line reads the same values as in
+    sequential order, so results do not depend on the number of threads.
+    """
+    steps = [(1, -1) if n > 1 else (1,) for n in shape[:3]]
+    threads = 1 if np.prod(shape) < FEW_NODES else n_threads()
+    size = [
+        -(-n // parts) for n, parts in zip(shape[1:3], (threads, 4 * threads) if threads > 1 else (1, 1), strict=True)
+    ]
+    with ThreadPoolExecutor(max(1, threads - 1)) as others:
+        for direction in list(product(*steps)) * rounds:
+            for plane in range(shape[0])[:: direction[0]]:
+                for wave in wavefronts(shape[1:3], size, direction[1:]):
+                    tiles = np.array([[plane, plane + direction[0], direction[0], *tile] for tile in wave])
+                    jobs = [others.submit(kernel, *arguments, tiles[k::threads]) for k in range(1, threads)]
+                    kernel(*arguments, tiles[::threads])
+                    for job in jobs:
+                        job.result()
+
+
+def wavefronts(shape: tuple[int, ...], size: list[int], direction: tuple[int, ...]) -> list[list[list[int]]]:
+    """Return tiles of a plane of lines, in groups whose tiles can run at the same time.
+
+    Examples
+    --------
+    >>> wavefronts((4, 2), [2, 2], (1, -1))
+    [[[0, 2, 1, 1, -1, -1]], [[2, 4, 1, 1, -1, -1]]]
+    """
+    starts = [range(0, n, s)[::step] for n, s, step in zip(shape, size, direction, strict=True)]
+    waves: list[list[list[int]]] = [[] for _ in range(len(starts[0]) + len(starts[1]) - 1)]
+    for a, first in enumerate(starts[0]):
+        for b, second in enumerate(starts[1]):
+            tile = []
+            for start, n, s, step in zip((first, second), shape, size, direction, strict=True):
+                stop = min(start + s, n)
+                tile += [start, stop, 1] if step > 0 else [stop - 1, start - 1, -1]
+            waves[a + b].append(tile)
+    return waves
+
+
 def line_pivots(shape: tuple[int, ...], ratios: Floats) -> NDArray[np.float32]:
-    """(8, n) reciprocal pivots of the tridiagonal matrix of a line; row bit k is set for lines at a wall of axis k."""
+    """Return (8, n) reciprocal pivots of lines' tridiagonal matrix; row bit k is set for lines at a wall of axis k."""
     n = shape[3]
     along = np.full(n, 2.0)
     along[0] = along[-1] = 1.0
@@ -372,7 +418,7 @@ def _sweep_tiles(
     pivots: NDArray[np.float32],
     tiles: Ints,
 ) -> None:
-    """Update the lines of tiles in order, four components at once. Slices of lines help the compiler to vectorise."""
+    """Update the lines of tiles in order, four components at once; slices of lines help the compiler to vectorise."""
     n0, n1, n2, n = shape
     ratio0, ratio1, ratio2, along = ratios
     scratch = np.empty(4 * n, dtype=np.float32)
@@ -382,46 +428,50 @@ def _sweep_tiles(
         for i in range(tile[0], tile[1], tile[2]):
             for j in range(tile[3], tile[4], tile[5]):
                 for k in range(tile[6], tile[7], tile[8]):
-                    here = (i * n1 + j) * n2 + k
+                    line_id = (i * n1 + j) * n2 + k
                     walls = (i == 0 or i == n0 - 1) + 2 * (j == 0 or j == n1 - 1) + 4 * (k == 0 or k == n2 - 1)
                     stretch = 0
                     while stretch < stretches:
-                        if not active[here, stretch]:
+                        if not active[line_id, stretch]:
                             stretch += 1
                             continue
                         first = stretch
-                        while stretch < stretches and active[here, stretch]:
+                        while stretch < stretches and active[line_id, stretch]:
                             stretch += 1
                         begin, end = first * STRETCH, min(stretch * STRETCH, n)
                         part = slice(4 * begin, 4 * end)
-                        inflow, out, pivot = scratch[: 4 * (end - begin)], vectors[here, part], pivots[walls, begin:end]
+                        inflow, out, pivot = (
+                            scratch[: 4 * (end - begin)],
+                            vectors[line_id, part],
+                            pivots[walls, begin:end],
+                        )
                         # inflow from neighbouring lines, the source, and fixed values on the line itself
-                        low = vectors[here - n2, part] if j > 0 else none[part]
-                        high = vectors[here + n2, part] if j < n1 - 1 else none[part]
-                        left = vectors[here - 1, part] if k > 0 else none[part]
-                        right = vectors[here + 1, part] if k < n2 - 1 else none[part]
+                        low = vectors[line_id - n2, part] if j > 0 else none[part]
+                        high = vectors[line_id + n2, part] if j < n1 - 1 else none[part]
+                        left = vectors[line_id - 1, part] if k > 0 else none[part]
+                        right = vectors[line_id + 1, part] if k < n2 - 1 else none[part]
                         for m in range(len(inflow)):
                             inflow[m] = ratio1 * (low[m] + high[m]) + ratio2 * (left[m] + right[m])
                         if n0 > 1:
-                            below = vectors[here - n1 * n2, part] if i > 0 else none[part]
-                            above = vectors[here + n1 * n2, part] if i < n0 - 1 else none[part]
+                            below = vectors[line_id - n1 * n2, part] if i > 0 else none[part]
+                            above = vectors[line_id + n1 * n2, part] if i < n0 - 1 else none[part]
                             for m in range(len(inflow)):
                                 inflow[m] += ratio0 * (below[m] + above[m])
                         for s in range(first, stretch):
-                            row = places[here, s]
+                            row = places[line_id, s]
                             if row >= 0:
                                 into = inflow[4 * STRETCH * (s - first) :]
                                 for m in range(min(len(into), 4 * STRETCH)):
                                     into[m] += sums[row, m]
                         x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
                         if begin > 0:  # the previous node has been eliminated: its value is x + q · (value here)
-                            before = vectors[here, 4 * begin - 4 : 4 * begin]
+                            before = vectors[line_id, 4 * begin - 4 : 4 * begin]
                             q = along * pivots[walls, begin - 1]
                             x, y = before[0] - q * out[0], before[1] - q * out[1]
                             z, w = before[2] - q * out[2], before[3] - q * out[3]
                         if end < n:
                             for c in range(4):
-                                inflow[4 * (end - begin) - 4 + c] += along * vectors[here, 4 * end + c]
+                                inflow[4 * (end - begin) - 4 + c] += along * vectors[line_id, 4 * end + c]
                         # forward elimination and back substitution
                         for m in range(end - begin):
                             p = pivot[m]

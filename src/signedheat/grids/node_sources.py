@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
+from ..compiled import compiled
+from ..memory import untouched_zeros
 from .stencil import interpolation_stencil
 
 STRETCH = 8
@@ -21,8 +23,8 @@ STRETCH = 8
 class NodeSources:
     """Vectors at the nodes of a grid."""
 
-    # (l₀, l₁, l₂, ⌈n / STRETCH⌉) row of `sums` for each stretch of the lines along the last axis; −1 where all vectors
-    # are zero. The grid is padded to four axes in front.
+    # (l₀, l₁, l₂, ⌈n / STRETCH⌉) row of `sums` for each stretch of the lines along the last axis of the grid, padded to
+    # four axes in front; −1 where all vectors are zero
     places: NDArray[np.int32]
     sums: NDArray[np.float32]  # (k, STRETCH, 4) the vectors, padded to four components
     shape: tuple[int, ...]  # nodes along each axis
@@ -30,7 +32,7 @@ class NodeSources:
 
     @classmethod
     def empty(cls, shape: tuple[int, ...], steps: Floats) -> NodeSources:
-        """Zero everywhere."""
+        """Make sources that are zero everywhere."""
         places = np.full((*shape[:3], -(-shape[3] // STRETCH)), -1, dtype=np.int32)
         return cls(places, np.zeros((0, STRETCH, 4), dtype=np.float32), shape, steps)
 
@@ -38,33 +40,223 @@ class NodeSources:
     def scattered(
         cls, shape: tuple[int, ...], steps: Floats, nodes: Ints, weights: Floats, values: NDArray[np.floating]
     ) -> NodeSources:
-        """Values (s, c ≤ 4) added to the `nodes` (s, k) of a grid with `weights` (s, k)."""
+        """Add values (s, c ≤ 4) to the `nodes` (s, k) of a grid with `weights` (s, k)."""
         used = weights > 0
-        lines, at = np.divmod(nodes[used], shape[3])
-        result = cls.empty(shape, steps)
-        flat = result.places.reshape(-1)
-        stretches = lines * result.places.shape[3] + at // STRETCH
+        lines, offsets = np.divmod(nodes[used], shape[3])
+        empty = cls.empty(shape, steps)
+        flat = empty.places.reshape(-1)
+        stretches = lines * empty.places.shape[3] + offsets // STRETCH
         flat[stretches] = 0
         taken = np.flatnonzero(flat == 0)
         flat[taken] = np.arange(len(taken))
-        places = flat[stretches] * STRETCH + at % STRETCH
+        places = flat[stretches] * STRETCH + offsets % STRETCH
         owners = np.nonzero(used)[0]
         sums = np.zeros((STRETCH * len(taken), 4), dtype=np.float32)
         for k in range(values.shape[1]):
             sums[:, k] = np.bincount(places, weights[used] * values[owners, k], len(sums))
-        return cls(result.places, sums.reshape(-1, STRETCH, 4), shape, steps)
+        return cls(empty.places, sums.reshape(-1, STRETCH, 4), shape, steps)
 
     def restricted(self, factors: Ints, shape: tuple[int, ...], steps: Floats) -> NodeSources:
-        """The sources on a coarser grid, by the transpose of linear interpolation."""
+        """Restrict the sources to a coarser grid, by the transpose of linear interpolation."""
         nodes, values = self.nonzero()
         coarse = np.where(np.array(shape) > 1, nodes / factors, 0.0)
         return NodeSources.scattered(shape, steps, *interpolation_stencil(coarse, shape), values)
 
     def nonzero(self) -> tuple[Ints, NDArray[np.float32]]:
-        """(k, 4) nodes whose vectors are not zero, and (k, 4) these."""
+        """Return (k, 4) nodes whose vectors are not zero, and (k, 4) these vectors."""
         taken = self.places >= 0
         stretches, vectors = np.argwhere(taken), self.sums[self.places[taken]]
-        rows, at = np.nonzero(vectors.any(axis=2))
+        rows, offsets = np.nonzero(vectors.any(axis=2))
         nodes = stretches[rows]
-        nodes[:, 3] = STRETCH * nodes[:, 3] + at
-        return nodes, vectors[rows, at]
+        nodes[:, 3] = STRETCH * nodes[:, 3] + offsets
+        return nodes, vectors[rows, offsets]
+
+
+def merge_in_cells(
+    corners: Floats,
+    vectors: Floats,
+    weights: Floats,
+    components: Ints,
+    order: Ints,
+    shape: Ints,
+    size: float,
+    sources: NodeSources,
+    scale: float,
+) -> tuple[tuple[Floats, Floats, Floats, Ints], NodeSources]:
+    """Merge simplices `corners` (m, c, d), in cells, to one sample for each cell of a grid and each component.
+
+    Every simplex is bisected at the midpoint of its longest edge until that is at most `size` cells long; parts whose
+    bounding box misses the grid of `shape` nodes are dropped at once. `order` lists the simplices component by
+    component. The vectors of all parts, divided by `scale`, are added to the `sources` at the nodes around them, with
+    the weights of multilinear interpolation. Returns positions, vectors, weights and components of the samples, and the
+    sources.
+    """
+    slots = untouched_zeros((int(np.prod(shape - 1)),), np.int32)
+    dimension = corners.shape[2]
+    sums, labels, nodes = _merge(
+        np.ascontiguousarray(corners),
+        np.ascontiguousarray(vectors),
+        weights,
+        components,
+        order,
+        shape,
+        size,
+        slots,
+        sources.sums,
+        sources.places.reshape(-1, sources.places.shape[3]),
+        scale,
+    )
+    kept = sums[:, -1] > 0
+    sums, labels = sums[kept], labels[kept]
+    weight = sums[:, -1]
+    samples = (sums[:, :dimension] / weight[:, None], sums[:, dimension:-1].copy(), weight.copy(), labels)
+    return samples, NodeSources(sources.places, nodes, sources.shape, sources.steps)
+
+
+@compiled
+def _with_room(sums: NDArray[np.float32], used: int, more: int) -> NDArray[np.float32]:
+    """Return `sums`, or a longer copy with room for `more` rows beyond the `used` ones."""
+    if used + more <= sums.shape[0]:
+        return sums
+    grown = np.zeros((2 * sums.shape[0] + more, STRETCH, 4), dtype=np.float32)
+    for row in range(used):
+        for m in range(STRETCH):
+            for q in range(4):
+                grown[row, m, q] = sums[row, m, q]
+    return grown
+
+
+@compiled
+def _merge(
+    corners: Floats,
+    vectors: Floats,
+    weights: Floats,
+    components: Ints,
+    order: Ints,
+    shape: Ints,
+    size: float,
+    slots: NDArray[np.int32],
+    nodes: NDArray[np.float32],
+    places: NDArray[np.int32],
+    scale: float,
+) -> tuple[Floats, Ints, NDArray[np.float32]]:
+    """Sum weight · position, vector and weight for each component and cell.
+
+    Arrays are copied entry by entry, since assignments to slices compile slowly.
+    """
+    n_corners, dimension = corners.shape[1], corners.shape[2]
+    deepest = 256
+    stack = np.empty((deepest, n_corners, dimension))
+    shares = np.empty(deepest)  # of the whole simplex
+    capacity = 1024
+    sums = np.zeros((capacity, 2 * dimension + 1))
+    labels = np.empty(capacity, dtype=np.int64)
+    count, used = 0, nodes.shape[0]
+    first = 0  # slots of the current component start here
+    current = np.int64(-1)
+    centre = np.empty(dimension)
+    lines = np.zeros(1 << (dimension - 1), dtype=np.int64)  # of nodes, around a piece, and its share of each
+    parts = np.empty(1 << (dimension - 1))
+    n = shape[dimension - 1]
+    limit, part_of_corner = size * size, 1.0 / n_corners
+    for face in order:
+        if weights[face] == 0.0:
+            continue
+        if components[face] != current:
+            current = components[face]
+            first = count
+        for c in range(n_corners):
+            for d in range(dimension):
+                stack[0, c, d] = corners[face, c, d]
+        shares[0] = 1.0
+        top = 1
+        while top > 0:
+            top -= 1
+            missed = False
+            for d in range(dimension):
+                low = high = stack[top, 0, d]
+                for c in range(1, n_corners):
+                    low = min(low, stack[top, c, d])
+                    high = max(high, stack[top, c, d])
+                if high < 0.0 or low > shape[d] - 1:
+                    missed = True
+            if missed:
+                continue
+            longest = -1.0
+            tail, head = 0, 0
+            for c in range(n_corners):
+                for e in range(c):
+                    square = 0.0
+                    for d in range(dimension):
+                        square += (stack[top, c, d] - stack[top, e, d]) ** 2
+                    if square > longest:
+                        longest, tail, head = square, e, c
+            if longest > limit and top + 2 < deepest:
+                half = 0.5 * shares[top]
+                for c in range(n_corners):
+                    for d in range(dimension):
+                        stack[top + 1, c, d] = stack[top, c, d]
+                for d in range(dimension):
+                    middle = 0.5 * (stack[top, tail, d] + stack[top, head, d])
+                    stack[top, tail, d] = middle
+                    stack[top + 1, head, d] = middle
+                shares[top] = shares[top + 1] = half
+                top += 2
+                continue
+            cell = np.int64(0)
+            for d in range(dimension):
+                mean = 0.0
+                for c in range(n_corners):
+                    mean += stack[top, c, d]
+                mean *= part_of_corner
+                centre[d] = mean
+                if mean < 0.0 or mean > shape[d] - 1:
+                    missed = True
+                cell = cell * (shape[d] - 1) + min(max(np.int64(mean), 0), shape[d] - 2)
+            if missed:
+                continue
+            slot = slots[cell] - 1
+            if slot < first:
+                if count == capacity:
+                    capacity *= 2
+                    grown, more = np.zeros((capacity, 2 * dimension + 1)), np.empty(capacity, dtype=np.int64)
+                    for k in range(count):
+                        more[k] = labels[k]
+                        for d in range(2 * dimension + 1):
+                            grown[k, d] = sums[k, d]
+                    sums, labels = grown, more
+                slot = count
+                labels[slot] = current
+                count += 1
+                slots[cell] = count
+            share = shares[top]
+            weight = weights[face] * share
+            if used + (1 << dimension) > nodes.shape[0]:
+                nodes = _with_room(nodes, used, 1 << dimension)
+            lines[0], parts[0] = 0, share / scale
+            for d in range(dimension - 1):
+                below = min(max(np.int64(centre[d]), 0), shape[d] - 2)
+                f = centre[d] - below
+                for k in range(1 << d):
+                    line, part = lines[k] * shape[d] + below, parts[k]
+                    lines[k], parts[k] = line, part * (1.0 - f)
+                    lines[k + (1 << d)], parts[k + (1 << d)] = line + 1, part * f
+            below = min(max(np.int64(centre[dimension - 1]), 0), n - 2)
+            f = centre[dimension - 1] - below
+            for k in range(1 << (dimension - 1)):
+                if parts[k] > 0.0:
+                    for side in range(2):
+                        part = parts[k] * (f if side else 1.0 - f)
+                        if part > 0.0:
+                            m = below + side
+                            row = places[lines[k], m // STRETCH]
+                            if row < 0:
+                                row = places[lines[k], m // STRETCH] = used
+                                used += 1
+                            for d in range(dimension):
+                                nodes[row, m % STRETCH, d] += np.float32(part * vectors[face, d])
+            for d in range(dimension):
+                sums[slot, d] += weight * centre[d]
+                sums[slot, dimension + d] += vectors[face, d] * share
+            sums[slot, 2 * dimension] += weight
+    return sums[:count], labels[:count], nodes[:used]

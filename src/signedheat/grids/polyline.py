@@ -65,7 +65,7 @@ class Polyline(Displayed, Frozen):
 
     @classmethod
     def from_mask(cls, mask: ArrayLike, origin: ArrayLike = (0.0, 0.0), spacing: ArrayLike = 1.0) -> list[Polyline]:
-        """The boundary of the True region of a boolean image, with φ < 0 inside.
+        """Trace the boundary of the True region of a boolean image, with φ < 0 inside.
 
         Lines pass halfway between pixels with different values. An image whose rows run downwards is brought into the
         order [x, y] by ``image[::-1].T``.
@@ -139,7 +139,7 @@ class Polyline(Displayed, Frozen):
         return float(0.5 * (x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum())
 
     def reversed(self) -> Polyline:
-        """The polyline in opposite direction, for which φ has the opposite sign.
+        """Return the polyline in opposite direction, for which φ has the opposite sign.
 
         Returns
         -------

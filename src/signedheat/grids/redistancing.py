@@ -1,16 +1,17 @@
-"""Signed distance to the zero set of any array: of a smooth function, of one with edges, or of nothing but signs.
+"""Signed distance to the zero set of an array, smooth, with edges, or of nothing but signs; sharpening on grids.
 
 The zero set is the contour of values that are linear along the edges of the grid, and distance is that to the contour's
-triangles. A crossing of the contour with an edge is smooth where the next ones lie on the paraboloid that the values
-say touches there: around such crossings distance is that to the touching circle.
+triangles. A crossing of the contour with an edge is smooth where neighbouring crossings lie on the paraboloid that
+touches the zero set there: around smooth crossings distance is that to the touching circle.
 
-Within, arrays have four axes and vectors four components, of which the first ones are unused in fewer dimensions;
+Internally arrays have four axes and vectors four components, of which the first are unused in fewer dimensions;
 positions are in units of length from the grid's origin.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,17 +20,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..errors import GeometryError, OutsideError
+from ..discretization import SourceTerm
+from ..errors import GeometryError, OutsideError, UnsupportedTypeError
+from ..jobs import run_cancellable
 from ..packages import lazy_module
 from ..parallel import in_chunks
+from ..progress import Progress
 from ..search.face_features import FaceFeatures
 from ..search.face_tree import FaceTree
+from ..sharpening_methods import Method, Nearest, distance_to_nearest, nearest, sharpen_field, timed
 from ..validation import array_of, flag, numbers, positive_steps
-from .wavefront import padded_shape
+from .grid import Grid
+from .grid_field import GridField
+from .solid_queries import Scaled
+from .stencil import padded_shape
 
 
 def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | Sequence[bool] = False) -> Floats:
-    """Signed distance of the nodes of a grid to the zero set of an array: of a level set, or of an image of ±1.
+    """Compute the signed distance of the nodes of a grid to the zero set of an array: of a level set, or of ±1.
 
     Where the zero set is smooth, distance is of second order, and exact for planes and spheres; at its edges it is
     that to the contour of values that are linear between nodes. An array of two opposite values has the side of each
@@ -92,16 +100,52 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
     return np.where(given == 0, 0.0, np.copysign(distances, given))
 
 
+@sharpen_field.register
+def _(field: GridField, source: object, method: Method | None, progress: Progress | None) -> GridField:
+    """Measure the distance of every node to the zero set by `redistance`; signs stay as they are.
+
+    A field that holds its solid is that distance already, up to a factor.
+    """
+    if source is not None or method is not None:
+        raise UnsupportedTypeError(
+            "fields on grids are measured to their zero set", remedy="leave out source and method", element="method"
+        )
+    if not np.isfinite(field.values).all():
+        raise GeometryError(
+            "a field with values that are not finite cannot be sharpened",
+            remedy="fill them in, or use it as it is",
+            element="field",
+        )
+    if field.solid is not None:
+        return field / (abs(field.solid.factor) if isinstance(field.solid, Scaled) else 1.0)
+    run = partial(distance_to_nearest, field.grid, field.values, None, None, 0.0, progress)
+    values, diagnostics = timed(run, field.diagnostics, progress)
+    return GridField(field.grid, values, diagnostics)
+
+
+@nearest.register
+def _(
+    grid: Grid,
+    values: Floats,
+    source: SourceTerm | None,
+    given: None,
+    tolerance: float,
+    report: Callable[[], None] | None,
+) -> Nearest:
+    distances = run_cancellable(lambda: redistance(values, grid.spacing), report)
+    return Nearest(np.abs(distances), np.sign(distances).astype(np.int64))
+
+
 def _axes(periodic: bool | Sequence[bool], count: int) -> list[bool]:
-    """Whether each axis is periodic."""
-    each = [periodic] * count if np.ndim(periodic) == 0 else list(periodic)  # type: ignore[arg-type]
-    if len(each) != count:
+    """Return whether each axis is periodic."""
+    flags = [periodic] * count if np.ndim(periodic) == 0 else list(periodic)  # type: ignore[arg-type]
+    if len(flags) != count:
         raise GeometryError(f"periodic must be one or {count} of True and False, not {periodic!r}", element="periodic")
-    return [flag(one, "periodic") for one in each]
+    return [flag(value, "periodic") for value in flags]
 
 
 def _distances(values: Floats, spacing: Floats, pads: Ints) -> Floats:
-    """Distance of each node that is no padding; axes have at least two nodes."""
+    """Return the distance of each node that is not padding; axes have at least two nodes."""
     signs = values.ndim > 1 and bool((np.abs(values) == 1).all())
     if signs:
         values = smoothed_signs(values)
@@ -124,39 +168,38 @@ def _distances(values: Floats, spacing: Floats, pads: Ints) -> Floats:
 measure: Any = lazy_module("skimage.measure", "contours")
 
 SMOOTHING = 1.0
-"""Standard deviation, in cells, of the Gaussian that smooths arrays of signs. Of balls, half spaces and boxes, 24 to 96
-nodes wide, distances come out best with .7 to 1; more rounds the edges of boxes."""
+"""Standard deviation, in cells, of the Gaussian that smooths arrays of signs. Distances of balls, half spaces and boxes
+24 to 96 nodes wide are best with .7 to 1; more rounds the edges of boxes."""
 LEAST, MOST = 0.3, 0.6
-"""Between these a smoothed sign is kept, so that contours cross the middle third of an edge: signs contain no more.
-With the middle three fifths balls and half spaces come out a tenth better, and boxes a tenth worse."""
+"""Bounds of smoothed signs, with which contours cross the middle third of an edge: signs contain no more. With the
+middle three fifths balls and half spaces come out a tenth better, and boxes a tenth worse."""
 UNEVEN = 0.05
-"""Cells by which crossings may lie off the paraboloid of the next where the zero set is smooth. Of balls of four cells'
-radius, distances are .04 cells off at the most, with .1 by .01; of clipped ones .07 and .12."""
+"""Distance, in cells, from the neighbours' paraboloids up to which a crossing is smooth. Distances of balls of four
+cells' radius are wrong by at most .04 cells, with .1 by .01; those of clipped balls by .07 and .12."""
 
 FLAT = 0.25
 """Radius around a crossing, relative to a cell's diagonal, within which the zero set of signs with four axes is flat.
-Of balls and half spaces, 13 to 17 nodes wide, distances come out best with .125 to .25, of boxes with more."""
+Distances of balls and half spaces 13 to 17 nodes wide are best with .125 to .25, those of boxes with more."""
 
 
 class Contour(NamedTuple):
     """The zero set of an array."""
 
-    # (v, 3) and (m, 3): the contour of values that are linear along edges: axes 1 to 3. None in four dimensions.
+    # (v, 3) along axes 1 to 3, and (m, 3): the contour of values that are linear along edges; empty in four dimensions
     vertices: Floats
     faces: Ints
-    numbers: Ints  # (v,) the crossing at each vertex; −1 at such as are on no edge of the array
+    numbers: Ints  # (v,) the crossing at each vertex; −1 at vertices on no edge of the array
     zeros: Floats  # (k, 3) nodes that are zero, without a negative neighbour
-    # (c, 18) crossings, normals and shape operators of the cubic interpolant: see `crossings_at`
-    curved: Floats
+    curved: Floats  # (c, 18) crossings, normals and shape operators of the cubic interpolant: see `crossings_at`
     # (c, 4) the crossings: where smooth on the zero set of the cubic interpolant, else of values linear along edges
     points: Floats
-    smooth: Bools  # (c,) whether the interpolant tells distance around a crossing
+    smooth: Bools  # (c,) whether distance around a crossing is that to the interpolant's zero set
     uneven: float  # how much distance to the interpolant may differ from that to the triangles
     reach: float  # no point of the zero set is farther from its nearest crossing
 
 
 def smoothed_signs(signs: Floats) -> Floats:
-    """Values with the given signs, ±1, whose contour is smoother.
+    """Return values with the given signs, ±1, whose contour is smoother.
 
     Examples
     --------
@@ -168,10 +211,7 @@ def smoothed_signs(signs: Floats) -> Floats:
 
 
 def zero_contour(values: Floats, steps: Floats) -> Contour:
-    """The zero set of an array with one to four axes; zero counts as positive. On four it is smooth, without triangles.
-
-    Steps along unused axes are 1.
-    """
+    """Extract the zero set of an array with one to four axes, on four without triangles; zero counts as positive."""
     unused = 4 - values.ndim
     field = np.ascontiguousarray(values).reshape(padded_shape(values.shape))
     reach = float(np.linalg.norm(steps[unused:]))
@@ -196,7 +236,7 @@ def zero_contour(values: Floats, steps: Floats) -> Contour:
 
 
 def distances_to(contour: Contour, places: Floats) -> Floats:
-    """(n,) distances of (n, 4) places to the zero set, without sign."""
+    """Return (n,) unsigned distances of (n, 4) places to the zero set."""
     if not len(contour.vertices) and len(contour.points):  # four axes
         nearest = scipy.spatial.cKDTree(contour.points).query(places, workers=-1)[1]
         return _around_crossings(contour, nearest, places)
@@ -205,9 +245,9 @@ def distances_to(contour: Contour, places: Floats) -> Floats:
         features = FaceFeatures.of(contour.vertices, contour.faces)
         tree, corners = FaceTree.of(features), contour.numbers[contour.faces[features.ids]]
 
-        def measured(some: Floats) -> tuple[Floats]:
-            faces, squares = tree.nearest(np.ascontiguousarray(some[:, 1:]))
-            return (_around(contour, corners[faces], squares, some),)
+        def measured(chunk: Floats) -> tuple[Floats]:
+            faces, squares = tree.nearest(np.ascontiguousarray(chunk[:, 1:]))
+            return (_around(contour, corners[faces], squares, chunk),)
 
         distances = in_chunks(measured, places)[0]
     if len(contour.zeros):
@@ -218,7 +258,7 @@ def distances_to(contour: Contour, places: Floats) -> Floats:
 
 @compiled
 def _around(contour: Contour, corners: Ints, squares: Floats, places: Floats) -> Floats:
-    """(n,) distances to triangles of (n, 3) corners, given squared; where smooth, those to the interpolant instead."""
+    """Return (n,) distances to triangles of (n, 3) corners, given squared; where smooth, those to the interpolant."""
     result, away, room = np.empty(len(places)), np.empty(4), np.empty(4)
     for i in range(len(places)):
         distance, least, crossing = np.sqrt(squares[i]), np.inf, -1
@@ -241,7 +281,7 @@ def _around(contour: Contour, corners: Ints, squares: Floats, places: Floats) ->
 
 @compiled
 def _around_crossings(contour: Contour, nearest: Ints, places: Floats) -> Floats:
-    """(n,) distances to the interpolant's zero set around the nearest crossings; where not smooth, to a flat piece."""
+    """Return (n,) distances to the interpolant's zero set at the nearest crossings; if not smooth, to a flat piece."""
     result, away, room = np.empty(len(places)), np.empty(4), np.empty(4)
     for i in range(len(places)):
         height, square = 0.0, 0.0
@@ -258,10 +298,10 @@ def _around_crossings(contour: Contour, nearest: Ints, places: Floats) -> Floats
 
 
 def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Ints]:
-    """Vertices, in cells, and triangles; edges that are crossed, a vertex on each; numbers of edges by vertex, or −1.
+    """Return vertices, in cells, and triangles; crossed edges, and a vertex on each; the edge of each vertex, or −1.
 
-    Marching cubes (Lewiner et al. 2003) decides how crossings are connected, by values that are compressed, so that
-    the edge of every crossing can be read off. Arrays with fewer than three axes are repeated along axes before theirs.
+    Marching cubes (Lewiner et al. 2003) decides how crossings are connected, by values that are compressed, so that the
+    edge of every crossing can be read off. Arrays with fewer than three axes are repeated along axes before theirs.
     """
     unused = 3 - values.ndim
     if not ((values < 0).any() and (values >= 0).any()):
@@ -269,8 +309,8 @@ def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Int
         return np.empty((0, 3)), none.reshape(0, 3), np.empty((0, 5), dtype=np.int32), none, none
     size = np.abs(values)
     compressed = np.where(values < 0, -1.0, 1.0) * (1.0 + size / (size + np.median(size[size > 0])))
-    found = measure.marching_cubes(np.broadcast_to(compressed, (2,) * unused + values.shape), 0.0)
-    vertices, faces = found[0].astype(np.float64), found[1].astype(np.int64)
+    contour = measure.marching_cubes(np.broadcast_to(compressed, (2,) * unused + values.shape), 0.0)
+    vertices, faces = contour[0].astype(np.float64), contour[1].astype(np.int64)
     nodes = np.floor(vertices).astype(np.int64)
     along = vertices - nodes > 0.1  # compressed values cross edges from a third to two thirds
     axes, on_edge = along.argmax(axis=1), along.sum(axis=1) == 1
@@ -291,11 +331,11 @@ def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Int
 
 
 def _between_others(vertices: Floats, faces: Ints, chosen: Bools) -> None:
-    """Move vertices amid those that they share triangles with."""
+    """Move the chosen vertices to the middle of those that they share triangles with."""
     sums, counts = np.zeros_like(vertices), np.zeros(len(vertices))
     for k in range(3):
-        for other in (k - 1, k - 2):
-            tail, head = faces[:, k], faces[:, other]
+        for neighbor in (k - 1, k - 2):
+            tail, head = faces[:, k], faces[:, neighbor]
             joined = chosen[tail] & ~chosen[head]
             np.add.at(sums, tail[joined], vertices[head[joined]])
             np.add.at(counts, tail[joined], 1.0)
@@ -303,34 +343,36 @@ def _between_others(vertices: Floats, faces: Ints, chosen: Bools) -> None:
 
 
 def _lone_zeros(values: Floats) -> Ints:
-    """(k, d) nodes whose value is zero, with no negative one before or behind them."""
+    """Return (k, d) nodes whose value is zero, with no negative one before or behind them."""
     around = scipy.ndimage.generate_binary_structure(values.ndim, 1)
     return np.argwhere((values == 0) & ~scipy.ndimage.binary_dilation(values < 0, around))
 
 
 def _unevenness(curved: Floats, linear: Floats, pairs: Ints) -> Floats:
-    """(e,) how far each crossing moves, and how far those it is joined to lie off its paraboloid, at the most."""
+    """Return (e,) how far each crossing moves, or how far those it is joined to lie off its paraboloid, if farther."""
     uneven: Floats = np.linalg.norm(curved[:, :4] - linear, axis=1)
-    one, other = np.concatenate([pairs, pairs[:, ::-1]]).T
-    away, height, at = curved[other, :4] - curved[one, :4], np.zeros(len(one)), 8
+    crossing, neighbor = np.concatenate([pairs, pairs[:, ::-1]]).T
+    away, height, at = curved[neighbor, :4] - curved[crossing, :4], np.zeros(len(crossing)), 8
     for d in range(4):
-        height += away[:, d] * curved[one, 4 + d]
+        height += away[:, d] * curved[crossing, 4 + d]
         for f in range(d + 1):
-            height += (1.0 if f < d else 0.5) * away[:, d] * away[:, f] * curved[one, at]
+            height += (1.0 if f < d else 0.5) * away[:, d] * away[:, f] * curved[crossing, at]
             at += 1
-    np.maximum.at(uneven, one, np.abs(height))
+    np.maximum.at(uneven, crossing, np.abs(height))
     return uneven
 
 
 def crossed_edges(field: Floats) -> NDArray[np.int32]:
-    """(e, 5) node (4 indices) and axis of each edge whose two ends have different signs; zero counts as positive."""
-    found = [np.argwhere(np.diff(field < 0, axis=axis)) for axis in range(4)]
-    return np.concatenate([np.insert(nodes, 4, axis, axis=1) for axis, nodes in enumerate(found)]).astype(np.int32)
+    """Return (e, 5) node and axis of each edge whose ends have different signs; zero counts as positive."""
+    nodes_by_axis = [np.argwhere(np.diff(field < 0, axis=axis)) for axis in range(4)]
+    return np.concatenate([np.insert(nodes, 4, axis, axis=1) for axis, nodes in enumerate(nodes_by_axis)]).astype(
+        np.int32
+    )
 
 
 @compiled
 def _cubic(field: Floats, place: Floats, weights: Floats, gradient: Floats) -> float:
-    """Value of the cubic convolution interpolant (Keys 1981) at a position in cells; writes its `gradient`."""
+    """Return the cubic convolution interpolant (Keys 1981) at a position in cells; write its gradient."""
     base = np.empty(4, dtype=np.int64)
     for axis in range(4):
         n = field.shape[axis]
@@ -382,7 +424,7 @@ def _cubic(field: Floats, place: Floats, weights: Floats, gradient: Floats) -> f
 
 @compiled
 def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> Floats:
-    """(e, 18) position, unit normal and shape operator (symmetric, ten numbers) of the zero set at crossed edges."""
+    """Return (e, 18) position, unit normal and symmetric shape operator of the zero set at crossed edges."""
     result = np.zeros((len(edges), 18))
     weights = np.empty((2, 4, 4))
     slope, start, place, ahead, behind = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty(4)
@@ -451,10 +493,10 @@ def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> Floa
 
 @compiled
 def circle_distance(crossing: Floats, away: Floats, across: Floats, reach: float) -> float:
-    """Distance to the touching circle in the plane of a point, `away` from a crossing, and the normal there.
+    """Return the distance to the touching circle in the plane of a point, `away` from a crossing, and the normal there.
 
     With s along the normal, r across it and bending k in the direction of r, the distance to the circle of radius 1/k
-    is ``(√((1 + ks)² + k²r²) − 1) / k``, here without the cancellation. `across` is room to work in.
+    is ``(√((1 + ks)² + k²r²) − 1) / k``, computed here without cancellation. `across` is work space.
     """
     s, square = 0.0, 0.0
     for d in range(4):

@@ -1,4 +1,4 @@
-"""Queries of a solid at points: what a field needs of the solid that it is the distance to."""
+"""Queries of a solid at points: what a field needs of the solid whose distance it holds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..arrays import Bools, Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class Closest:
-    """The nearest place of a solid's surface for each of some points, in the shape of these.
+    """The nearest places on a solid's surface for points, in the shape of the points.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class Closest:
     gradients : (..., 3) float
         Gradients of the distance, of length 1; on the surface, its normals.
     confidence : (...) float
-        1 where surface was given; on the completion less, the farther from its rim.
+        1 on the given surface; on the completion less, the farther from its rim.
 
     Examples
     --------
@@ -62,21 +62,21 @@ class SolidQueries(Protocol):
         """(m, 3, 3) corners of all that distance is measured to."""
 
     def distance(self, points: ArrayLike) -> Floats:
-        """(...) signed distances of (..., d) points, negative inside."""
+        """Return (...) signed distances of (..., d) points, negative inside."""
 
     def inside(self, points: ArrayLike) -> Bools:
-        """(...) whether points are inside."""
+        """Return (...) whether points are inside."""
 
     def closest(self, points: ArrayLike) -> Closest:
-        """The nearest place for each of (..., d) points."""
+        """Find the nearest place for each of (..., d) points."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scaled:
-    """The distance to a solid times a number, which is not 0."""
+    """The distance to a solid times a number."""
 
     solid: SolidQueries
-    factor: float  # what its distance is multiplied by; where it is negative inside and outside are exchanged
+    factor: float  # not 0; a negative factor exchanges inside and outside
 
     @property
     def triangles(self) -> Floats:
@@ -84,22 +84,22 @@ class Scaled:
         return self.solid.triangles
 
     def distance(self, points: ArrayLike) -> Floats:
-        """(...) values at (..., d) points."""
+        """Return (...) values at (..., d) points."""
         return self.factor * self.solid.distance(points)
 
     def inside(self, points: ArrayLike) -> Bools:
-        """(...) whether points are where the values are negative."""
-        found = self.solid.inside(points)
-        return found if self.factor > 0 else ~found
+        """Return (...) whether the values are negative at points."""
+        inside = self.solid.inside(points)
+        return inside if self.factor > 0 else ~inside
 
     def closest(self, points: ArrayLike) -> Closest:
-        """The nearest place for each of (..., d) points, with the values and their gradients."""
-        found = self.solid.closest(points)
-        return replace(found, distances=self.factor * found.distances, gradients=self.factor * found.gradients)
+        """Find the nearest place for each of (..., d) points, with the values and their gradients."""
+        closest = self.solid.closest(points)
+        return replace(closest, distances=self.factor * closest.distances, gradients=self.factor * closest.gradients)
 
 
 def scaled(solid: SolidQueries, factor: float) -> SolidQueries:
-    """The distance to a solid times a number; the solid itself, where that is 1."""
+    """Multiply the distance to a solid by a number; return the solid itself if that is 1."""
     if isinstance(solid, Scaled):
         return scaled(solid.solid, solid.factor * factor)
     return solid if factor == 1 else Scaled(solid, factor)

@@ -15,14 +15,20 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..parallel import n_threads
-from .wavefront import SMALL, padded_shape
 
+FEW_NODES = 100_000
+"""Number of nodes below which a grid is worked on by one thread."""
 SLAB = 4
-"""Rows of grid lines in one job of a thread: with 16 what jobs hold adds a tenth to the memory of 128³ nodes."""
+"""Rows of grid lines in one job of a thread; with 16, jobs add a tenth to the memory of 128³ nodes."""
+
+
+def padded_shape(shape: tuple[int, ...]) -> tuple[int, int, int, int]:
+    """Return the shape, preceded by axes of one node to make four."""
+    return (1,) * (4 - len(shape)) + tuple(shape)  # type: ignore[return-value]
 
 
 def divergence(directions: NDArray[np.floating], spacing: Floats) -> Floats:
-    """(*shape) −∇·Y, b of Eq. 13. The flux between two nodes is the mean of theirs, that through walls zero."""
+    """Return −∇·Y, b of Eq. 13: the flux between two nodes is the mean of theirs, that through walls zero."""
     shape = directions.shape[:-1]
     components = np.moveaxis(directions, -1, 0).reshape(-1, *padded_shape(shape))
     out = np.empty(padded_shape(shape))
@@ -31,7 +37,7 @@ def divergence(directions: NDArray[np.floating], spacing: Floats) -> Floats:
 
 
 def laplacian(values: Floats, spacing: Floats) -> Floats:
-    """C φ, Eq. 10 on a grid: the positive semidefinite Laplacian of 2d + 1 points, with no flux through the walls."""
+    """Return C φ, Eq. 10 on a grid: the positive semidefinite Laplacian of 2d + 1 points, no flux through walls."""
     result = np.zeros_like(values)
     for axis, h in enumerate(spacing):
         rise = np.diff(values, axis=axis) / h**2
@@ -43,7 +49,7 @@ def laplacian(values: Floats, spacing: Floats) -> Floats:
 
 
 def solve_poisson(right_hand_side: Floats, spacing: Floats, overwrite: bool = False) -> Floats:
-    """φ of mean zero with ``C φ = b`` (Eq. 13), by the cosine transform that diagonalises C."""
+    """Return φ of mean zero with ``C φ = b`` (Eq. 13), by the cosine transform that diagonalises C."""
     workers = n_threads()
     transformed = scipy.fft.dctn(right_hand_side, type=2, overwrite_x=overwrite, workers=workers)
     eigenvalues = [
@@ -57,7 +63,7 @@ def solve_poisson(right_hand_side: Floats, spacing: Floats, overwrite: bool = Fa
 
 
 def interpolation_stencil(positions: Floats, shape: tuple[int, ...]) -> tuple[Ints, Floats]:
-    """(s, 2^k) nodes and weights of multilinear interpolation at positions in cells; k axes have more than one node."""
+    """Return (s, 2^k) nodes and weights of multilinear interpolation at positions in cells; k axes have many nodes."""
     positions = np.clip(positions, 0, np.array(shape) - 1)  # rounding may put one outside
     cell = np.minimum(positions.astype(np.int64), np.array(shape) - 2)
     part = positions - cell
@@ -77,7 +83,7 @@ def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: An
     """Call ``kernel(*arguments, axis, start, stop)`` for slabs of the first long axis, each on a thread."""
     axis = 0 if shape[0] > 1 else 1
     n = shape[axis]
-    if np.prod(shape) < SMALL:
+    if np.prod(shape) < FEW_NODES:
         kernel(*arguments, axis, 0, n)
         return
     with ThreadPoolExecutor(n_threads()) as pool:
@@ -87,7 +93,7 @@ def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: An
 
 
 def slab(axis: int, start: int, stop: int) -> tuple[slice, ...]:
-    """The index of a slab in arrays of four axes."""
+    """Return the index of a slab in arrays of four axes."""
     return tuple(slice(start, stop) if axis == k else slice(None) for k in range(4))
 
 
@@ -104,6 +110,7 @@ def _divide(eigenvalues: list[Floats], transformed: Floats, axis: int, start: in
 def _divergence(
     components: NDArray[np.floating], scales: Floats, out: Floats, axis: int, start: int, stop: int
 ) -> None:
+    """Write the divergence of a slab."""
     low, high = max(start - 1, 0), min(stop + 1, out.shape[axis])
     around = np.moveaxis(np.moveaxis(components, axis + 1, 0)[low:high], 0, axis + 1)
     sums = np.zeros(around.shape[1:])

@@ -14,7 +14,7 @@ from ..discretization import discretize
 from ..errors import OutsideError
 from ..grids import grid_discretization  # noqa: F401  registers grids
 from ..grids.grid import Grid
-from ..grids.grid_source import GridSource
+from ..grids.grid_discretization import GridSource
 from ..grids.grid_winding import winding_numbers
 from ..grids.marching import closed_surface
 from ..method import diffuse, integrate, normalize

@@ -200,12 +200,12 @@ class TetField(Displayed, Combinable, Frozen):
         return self.contour(distance)
 
     def with_values(self, values: Floats) -> TetField:
-        """Other values on the same mesh, without what belongs to these.
+        """Return other values on the same mesh, without what belongs to the present ones.
 
         Parameters
         ----------
         values : (n,) float
-            Of the shape of `values`.
+            In the shape of `values`.
 
         Returns
         -------
