@@ -48,7 +48,6 @@ FEATURES: dict[str, tuple[str, ...]] = {
     "exact geodesic distance": (
         "geodesics.exact_distance",
         "geodesics.geodesic_sources",
-        "geodesics.geodesic_windows",
         "geodesics.heap_kernels",
         "geodesics.shortest_paths",
     ),

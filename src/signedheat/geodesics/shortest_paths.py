@@ -26,7 +26,7 @@ from ..mesh.surface_points import (
     points_at_vertices,
     shared_faces,
 )
-from .geodesic_windows import Faces
+from .exact_distance import Faces
 from .heap_kernels import Queue, pop, push
 
 

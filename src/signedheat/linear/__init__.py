@@ -84,12 +84,6 @@ def factorize(
 
     For a matrix with entries at the same places as that of the factor `like`, PARDISO takes half the time or less. Then
     only the factor that solved last is in memory; the other is computed anew when it is to solve.
-
-    Examples
-    --------
-    >>> from scipy import sparse
-    >>> factorize(sparse.csr_matrix([[2.0, 1.0], [1.0, 2.0]])).solve(np.array([3.0, 3.0])).round(12)
-    array([1., 1.])
     """
     name = chosen_backend(backend)
     upper = upper_triangle(matrix)

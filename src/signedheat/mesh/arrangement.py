@@ -91,13 +91,6 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None) -> Arrangem
 
     By default all faces that meet are divided. Points nearer than rounding become one, points this near to an edge or
     face lie on it, thinner triangles are left out, and all other faces stay as they are.
-
-    Examples
-    --------
-    >>> points = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [1, -1, -1], [1, 3, -1], [1, 1, 3]])
-    >>> pieces = arranged(points, np.array([[0, 1, 2], [3, 4, 5]]))
-    >>> np.bincount(pieces.origins).tolist(), pieces.points[6:].tolist()
-    ([3, 5], [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
     """
     slack = TOUCHING * float(np.ptp(points, axis=0).max())
     pairs = meeting_faces(points, faces) if pairs is None else pairs

@@ -42,14 +42,7 @@ class BoxTree(NamedTuple):
 
     @classmethod
     def of(cls, lower: Floats, upper: Floats) -> BoxTree:
-        """Build the tree over boxes given by (n, 3) lower and (n, 3) upper corners, in O(n log n) time.
-
-        Examples
-        --------
-        >>> corners = np.arange(6.0).reshape(2, 3)
-        >>> BoxTree.of(corners, corners + 1).bounds[1]
-        array([0., 1., 2., 4., 5., 6.])
-        """
+        """Build the tree over boxes given by (n, 3) lower and (n, 3) upper corners, in O(n log n) time."""
         return cls.in_order(lower, upper, np.argsort(morton_codes((lower + upper) / 2), kind="stable"))
 
     @classmethod
@@ -94,13 +87,6 @@ class BoxTree(NamedTuple):
 
         A triangle may meet a node if its box, its plane and the prism over it do, with some slack along each axis,
         unless all of the node belongs to the triangle's own group.
-
-        Examples
-        --------
-        >>> corners = np.arange(9.0).reshape(3, 3)
-        >>> tree = BoxTree.of(corners, corners)
-        >>> tree.meeting(np.array([[[2.0, 2, 2], [5, 3, 3], [5, 5, 5]], [[9, 9, 9], [9, 9, 9], [9, 9, 9]]]))
-        (array([0, 3, 3]), array([0, 1, 2]))
         """
         corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(3, slack)
         own = np.full(len(corners), -1) if groups is None else np.ascontiguousarray(groups, dtype=np.int64)

@@ -80,16 +80,6 @@ def dual_cells(crossings: Crossings, shape: tuple[int, ...], inside: Callable[[F
     """Find the pieces of a level set in the cells of a grid of this shape.
 
     `inside` tells whether (n, 3) places, in cells, are inside; it is asked about the middles of faces.
-
-    Examples
-    --------
-    A node that alone is inside has a cube around it.
-
-    >>> nodes = np.array([[2, 2, 2]] * 3 + [[1, 2, 2], [2, 1, 2], [2, 2, 1]])
-    >>> crossings = Crossings(nodes, np.array([0, 1, 2, 0, 1, 2]), np.array([True] * 3 + [False] * 3), np.full(6, 0.5))
-    >>> cells = dual_cells(crossings, (5, 5, 5), lambda places: np.zeros(len(places), dtype=bool))
-    >>> len(cells.owners), cells.quads.shape
-    (8, (6, 4))
     """
     places, edges, rows, sides = cells_around(crossings, shape)
     ways = np.zeros((len(places), 6), dtype=np.bool_)

@@ -28,16 +28,6 @@ def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = No
     """Return (m, 3) faces on the same vertices, with edges flipped wherever that makes the surface bend less.
 
     No edge may have more than two faces, and these agree. Nothing is flipped around vertices that are `held`, (n,).
-
-    Examples
-    --------
-    A roof whose ridge the edge between its triangles crosses; the faces around hold its eaves:
-
-    >>> roof, corners = [[0, -1, 0], [1, 0, 1], [0, 1, 0], [-1, 0, 1]], [[2, -2, 0], [2, 2, 0], [-2, 2, 0], [-2, -2, 0]]
-    >>> vertices = np.array(roof + corners, dtype=float)
-    >>> around = [[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]]
-    >>> flipped_along_creases(vertices, np.array([[0, 1, 2], [0, 2, 3], *around]))[:2].tolist()
-    [[2, 3, 1], [3, 0, 1]]
     """
     if not 0 < len(faces) <= MOST:
         return faces

@@ -388,15 +388,6 @@ def flip_all(gluing: Gluing) -> Gluing:
     The surface stays the same, with its vertices, angle sums and area. Boundary, nonmanifold and fixed edges keep their
     ids; faces are turned over where neighbours have opposite orientations. Afterwards two edges may join the same two
     vertices, or an edge a vertex with itself. Returns the gluing, with arrays long enough for its history.
-
-    Examples
-    --------
-    A rhombus cut along its long diagonal; the Delaunay edge is the short one.
-
-    >>> sides = np.array([[1.9, 1.0, 1.0], [1.9, 1.0, 1.0]])
-    >>> rhombus = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [1, 0, 3]]), sides, 4)
-    >>> lay_out(flip_all(glue(rhombus))).edges.vertices.tolist()
-    [[3, 2], [1, 2], [2, 0], [0, 3], [3, 1]]
     """
     n_edges = int(gluing.counts[1])
     gluing.counts[4] = n_edges

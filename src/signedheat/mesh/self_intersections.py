@@ -30,12 +30,6 @@ def self_intersections(vertices: Floats, faces: Ints) -> Ints:
     """Return (k, 2) pairs of faces that pass through each other, or cover each other in one plane.
 
     Faces without a common vertex must not touch, either; vertices at one place are one.
-
-    Examples
-    --------
-    >>> points = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0.5, 0.5, -1], [0.6, 0.5, 1], [0.5, 0.6, 1]])
-    >>> self_intersections(points, np.array([[0, 1, 2], [3, 4, 5]])).tolist()
-    [[0, 1]]
     """
     slack = TOUCHING * float(np.ptp(vertices, axis=0).max(initial=0.0))
     return overlapping_faces(vertices, same_positions(vertices)[faces], slack, -slack)

@@ -53,11 +53,6 @@ def signs_of(links: Links, n_nodes: int) -> Floats:
     Groups with the strongest links merge first, and their links to third groups add up (greedy additive contraction,
     Keuper et al. 2015, for signs instead of cuts), until no link is left. Then groups are taken apart in reverse, and
     each part turns if that agrees better with the rest.
-
-    Examples
-    --------
-    >>> signs_of(Links(np.array([0, 1, 0]), np.array([1, 2, 2]), np.array([-3.0, 2.0, 1.0])), 3)
-    array([ 1., -1., -1.])
     """
     levels = _contractions(_weights(links, n_nodes))
     result = np.ones(int(levels[-1][1].max()) + 1 if levels else n_nodes)
@@ -72,11 +67,6 @@ def best_signs(weights: Floats, first: Floats) -> Floats:
 
     From several starts (`first`, the result of `signs_of`, and the first two eigenvectors), groups of nodes on all
     levels of merging are turned as long as that gains; the best result is returned. The diagonal of W does not matter.
-
-    Examples
-    --------
-    >>> best_signs(np.array([[0.0, -3, 1], [-3, 0, 2], [1, 2, 0]]), np.ones(3)).tolist()
-    [-1.0, 1.0, 1.0]
     """
     n = len(weights)
     weights = np.where(np.eye(n, dtype=bool), 0.0, weights)

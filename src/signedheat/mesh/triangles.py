@@ -119,12 +119,6 @@ def cut_into_ears(polygon: Floats, normal: Floats, allowed: Callable[[int, int],
 
     The polygon is counter-clockwise as seen from the normal. `allowed` tells whether a diagonal may join two corners;
     by default all may. The time is cubic in the number of corners.
-
-    Examples
-    --------
-    >>> arrow = np.array([[0.0, 0, 0], [2, -1, 0], [1, 0, 0], [2, 1, 0]])
-    >>> cut_into_ears(arrow, np.array([0.0, 0, 1])).tolist()
-    [[0, 1, 2], [0, 2, 3]]
     """
     upright = np.eye(3)[np.abs(normal).argmin()]
     first = np.cross(upright, normal)

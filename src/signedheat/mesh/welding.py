@@ -26,17 +26,6 @@ def welded_vertices(points: Floats, tails: Ints, heads: Ints) -> Ints:
     Tails and heads (h,) are those of halfedges. Vertices at different places become one if both are on open edges, with
     an odd number of faces, and if rounding explains the difference: a few units in the last place of the largest
     coordinate, along axes whose coordinates make use of that last place.
-
-    Examples
-    --------
-    Two triangles whose common side is torn by the last bit; whole numbers are no result of rounding.
-
-    >>> torn = np.array([[0, 0, 0.1], [1, 0, 0], [0, 1.1, 0], [1, 0, 0], [1, 1, 0.3], [0, np.nextafter(1.1, 2), 0]])
-    >>> tails, heads = np.array([0, 1, 2, 3, 4, 5]), np.array([1, 2, 0, 4, 5, 3])
-    >>> welded_vertices(torn, tails, heads).tolist()
-    [0, 1, 2, 1, 4, 2]
-    >>> welded_vertices(np.round(torn) + 1e7, tails, heads).tolist()
-    [0, 1, 2, 1, 4, 2]
     """
     same = same_positions(points)
     single = _is_single(points)

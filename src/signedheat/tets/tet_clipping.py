@@ -75,15 +75,7 @@ class Planes(NamedTuple):
 
 
 def clip_triangles(mesh: TetShapes, planes: Planes, triangles: Floats) -> ClippedPolygons:
-    """Clip (k, 3, 3) triangles against the tets that they cross; parts outside the mesh are dropped.
-
-    Examples
-    --------
-    >>> mesh = TetShapes(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]))
-    >>> across = np.array([[[0.0, 0.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]]])
-    >>> clip_triangles(mesh, Planes.of(mesh), across).area_vectors
-    array([[0.   , 0.   , 0.125]])
-    """
+    """Clip (k, 3, 3) triangles against the tets that they cross; parts outside the mesh are dropped."""
     parts = []
     for begin in range(0, max(len(triangles), 1), CHUNK):  # most tets near a triangle contain no part of it
         chunk = triangles[begin : begin + CHUNK]
@@ -97,14 +89,7 @@ def clip_triangles(mesh: TetShapes, planes: Planes, triangles: Floats) -> Clippe
 
 
 def containing_tets(mesh: TetShapes, planes: Planes, points: Floats) -> Ints:
-    """Return (k,) a tet that contains each point, −1 outside the mesh.
-
-    Examples
-    --------
-    >>> mesh = TetShapes(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]))
-    >>> containing_tets(mesh, Planes.of(mesh), np.array([[0.1, 0.1, 0.1], [1.0, 1.0, 1.0]]))
-    array([ 0, -1])
-    """
+    """Return (k,) a tet that contains each point, −1 outside the mesh."""
 
     def located(chunk: Floats) -> tuple[Ints]:
         near = mesh.search_tree.meeting(np.repeat(chunk[:, None], 3, axis=1), slack)
