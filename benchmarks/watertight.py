@@ -33,8 +33,7 @@ from signedheat import samples
 from signedheat.mesh.components import element_components
 from signedheat.mesh.edges import edge_table
 from signedheat.mesh.self_intersections import self_intersections
-from signedheat.search.face_features import FaceFeatures
-from signedheat.search.face_tree import FaceTree
+from signedheat.search.face_tree import FaceFeatures, FaceTree
 
 Mesh = sh.TriangleMesh
 N_POINTS = 20_000

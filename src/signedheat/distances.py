@@ -19,7 +19,7 @@ from .grids.grid import Dimension, Grid, room_around
 from .grids.grid_field import GridField
 from .grids.polyline import Polyline
 from .kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
-from .mesh.outlines import FillRule
+from .mesh.polylines import FillRule
 from .progress import Progress
 from .solids.completion import Completing, Lids
 from .solids.facing import orient

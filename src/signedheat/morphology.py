@@ -36,8 +36,7 @@ from .joining import concatenated
 from .kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
 from .mesh.triangles import part_volumes
 from .progress import Progress
-from .search.face_features import FaceFeatures
-from .search.face_tree import FaceTree
+from .search.face_tree import FaceFeatures, FaceTree
 from .search.nearest_triangles import weights_in
 from .sharpening import sharpen
 from .solids.completion import complete

@@ -16,7 +16,7 @@ from signedheat.curves.jumps import JumpProblem, minimize
 from signedheat.diagnostics import Jumps
 from signedheat.discretization import discretize
 from signedheat.mesh.intrinsic_mesh import IntrinsicMesh, face_pairs
-from signedheat.mesh.segment_chains import assemble_polylines
+from signedheat.mesh.polylines import assemble_polylines
 from signedheat.samples import sphere, torus
 
 

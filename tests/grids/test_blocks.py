@@ -3,8 +3,7 @@ import numpy as np
 from shapes.grid_cases import sphere
 from signedheat.grids.blocks import NODES, SIDE, Blocks, BlockValues
 from signedheat.grids.marching import block_contour, closed_surface
-from signedheat.search.face_features import FaceFeatures
-from signedheat.search.face_tree import FaceTree
+from signedheat.search.face_tree import FaceFeatures, FaceTree
 
 
 def scattered(shape, share, seed=0):

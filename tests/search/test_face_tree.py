@@ -4,8 +4,7 @@ import pytest
 import signedheat as sh
 from shapes.grid_cases import sphere
 from signedheat.samples import torus
-from signedheat.search.face_features import FaceFeatures
-from signedheat.search.face_tree import FaceTree
+from signedheat.search.face_tree import FaceFeatures, FaceTree
 from signedheat.search.nearest_triangles import foot_on_triangle
 
 

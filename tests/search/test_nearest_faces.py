@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from signedheat import samples
-from signedheat.search.face_features import FaceFeatures
-from signedheat.search.face_tree import search_from
+from signedheat.search.face_tree import FaceFeatures, search_from
 from signedheat.search.nearest_triangles import (
     TriangleTree,
     away_from_triangle,

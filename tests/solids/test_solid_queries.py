@@ -9,7 +9,7 @@ from refusals import refused
 from shapes.bodies import box, sheet
 from signedheat import samples
 from signedheat.io.solid_arrays import _key
-from signedheat.search.face_features import FaceFeatures
+from signedheat.search.face_tree import FaceFeatures
 from signedheat.solids.completion import complete
 from signedheat.solids.winding import Windings, open_edges_of
 

@@ -11,7 +11,7 @@ from scipy import sparse
 from ..linear import factorize
 from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, split_corners
-from ..mesh.segment_chains import assemble_polylines
+from ..mesh.polylines import assemble_polylines
 from ..surfaces.cotan import cotan_matrix, divergence
 from .piecewise_field import PiecewiseField
 

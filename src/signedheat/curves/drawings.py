@@ -23,7 +23,7 @@ from ..grids.polyline import Polyline
 from ..grids.solid_queries import Closest
 from ..kinds import Sources
 from ..mesh.components import sums_of
-from ..mesh.outlines import LEAST_SHARE, FillRule, filled_outlines, without_seams
+from ..mesh.polylines import LEAST_SHARE, FillRule, filled_outlines, without_seams
 from ..mesh.unit_vectors import unit
 from ..progress import Progress, within
 from ..search.face_tree import FaceTree

@@ -17,7 +17,7 @@ from ..exchange import Displayed
 from ..field_arithmetic import Arithmetic
 from ..frozen import Frozen
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs, split_corners
-from ..mesh.segment_chains import assemble_polylines
+from ..mesh.polylines import assemble_polylines
 from ..mesh.surface_points import barycentric_in, locate_points
 from ..mesh.triangles import gradients_along
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation

@@ -26,8 +26,7 @@ from ..jobs import run_cancellable
 from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..progress import Progress
-from ..search.face_features import FaceFeatures
-from ..search.face_tree import FaceTree
+from ..search.face_tree import FaceFeatures, FaceTree
 from ..sharpening_methods import Method, Nearest, distance_to_nearest, nearest, sharpen_field, timed
 from ..validation import array_of, flag, numbers, positive_steps
 from .grid import Grid

@@ -14,7 +14,7 @@ from ..foreign import ForeignShape, converted
 from ..geodesics.shortest_paths import gaps
 from ..kinds import EmbeddedSurface
 from ..mesh.intrinsic_mesh import IntrinsicMesh
-from ..mesh.segment_chains import assemble_polylines
+from ..mesh.polylines import assemble_polylines
 from ..mesh.surface_points import locate_points
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.point_cloud import PointCloud

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileFormatError
 from ..grids.polyline import Polyline
-from ..mesh.outlines import filled_outlines
+from ..mesh.polylines import filled_outlines
 from .files import PathLike, contents, damaged
 
 CURVE_PIECES = 64

@@ -14,7 +14,7 @@ from ..arrays import Bools, Complexes, Floats, Ints
 from ..errors import SourceError
 from .components import connected_components
 from .intrinsic_mesh import IntrinsicMesh, face_pairs
-from .segment_chains import assemble_polylines
+from .polylines import assemble_polylines
 from .signed_graph import Links, signs_of
 from .surface_points import (
     EDGE,

@@ -21,8 +21,7 @@ from ..mesh.triangles import face_areas
 from ..mesh.welding import welded_vertices
 from ..packages import lazy_module
 from ..progress import Progress
-from ..search.face_features import FaceFeatures
-from ..search.face_tree import FaceTree, NearestFaces
+from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh

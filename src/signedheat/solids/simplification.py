@@ -12,8 +12,7 @@ from ..compiled import compiled
 from ..errors import GeometryError, InexactWarning, warn_user
 from ..mesh.self_intersections import self_intersections
 from ..packages import lazy_module
-from ..search.face_features import FaceFeatures
-from ..search.face_tree import FaceTree
+from ..search.face_tree import FaceFeatures, FaceTree
 from ..search.nearest_triangles import foot_on_triangle
 from ..surfaces.triangle_mesh import TriangleMesh
 

@@ -26,8 +26,7 @@ from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..progress import Progress
 from ..reprs import short
-from ..search.face_features import FaceFeatures
-from ..search.face_tree import FaceTree, NearestFaces
+from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
 from ..search.nearest_triangles import weights_in
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import transformed

@@ -17,7 +17,7 @@ from ..mesh.conforming_refinement import cut_along
 from ..mesh.curve_segments import CurveSegments
 from ..mesh.edges import EdgeTable
 from ..mesh.intrinsic_mesh import FLATTEST, IntrinsicMesh
-from ..mesh.segment_chains import assemble_polylines
+from ..mesh.polylines import assemble_polylines
 from ..mesh.surface_points import (
     SNAP,
     LocatedPoints,

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..mesh.segment_chains import assemble_polylines, leaving
+from ..mesh.polylines import assemble_polylines, leaving
 from ..mesh.surface_points import SNAP, barycentric_on_edges, crossed_sides
 from ..mesh.triangles import Triangles, area_vectors
 from .surface_curves import Curve

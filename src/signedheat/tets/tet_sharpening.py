@@ -28,8 +28,7 @@ from ..kinds import Shapes
 from ..linear_elements import LinearElements
 from ..mesh.components import grouped
 from ..progress import Progress
-from ..search.face_features import FaceFeatures
-from ..search.face_tree import FaceTree
+from ..search.face_tree import FaceFeatures, FaceTree
 from ..search.nearest_triangles import TriangleTree, foot_on_triangle
 from ..sharpening_methods import Method, Nearest, nearest, sharpen_field, sharpened
 from ..surfaces.point_cloud import PointCloud
