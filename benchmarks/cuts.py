@@ -1,6 +1,6 @@
 """Curves that bound nothing: lines and forks of the cut, its length, error of slopes, objective and time.
 
-Two rows a shape: Eq. 16 in the triangles of the mesh, and the default, which smooths jumps off the cut and refines bad
+Two rows a shape: Eq. 16 in the triangles of the mesh, and the default, which is continuous off the cut and refines bad
 triangles intrinsically. Run with ``python -m benchmarks.cuts``.
 """
 
@@ -90,7 +90,7 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|---|")
     for name, build in cases():
         mesh, curves = build()
-        print(f"| {name} | Eq. 16 | {row(mesh, curves, smoothing=None, intrinsic=False)} |", flush=True)
+        print(f"| {name} | Eq. 16 | {row(mesh, curves, smooth=False, intrinsic=False)} |", flush=True)
         print(f"| | default | {row(mesh, curves)} |", flush=True)
 
 

@@ -1,4 +1,4 @@
-"""Lines on which a function jumps, found among jumps everywhere, and the function smoothed between them (Fig. 12)."""
+"""Lines on which a function jumps, found among jumps everywhere, and the function that jumps on these alone."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ FAR = 3.0
 TWIG = 5.0
 """A branch of a cut whose jump is nowhere this many times that side is none, unless the cut itself is as low."""
 
-WIDEST = 10.0
-"""Greatest width, over the root of the area of a part: that is step 3 all but alone. By more M is rounded away."""
+WIDTH = 10.0
+"""Width of `smoothed`, over the root of the area of a part: step 3 to a thousandth. By more M is rounded away."""
 
 
 def typical_size(triangles: IntrinsicMesh) -> float:
@@ -117,13 +117,10 @@ def smoothed(
     directions: NDArray[np.complex128],
     rough: NDArray[np.float64],
     cut: NDArray[np.bool_],
-    width: float,
 ) -> NDArray[np.float64]:
-    """(m, 3) values continuous off the cut: ``(M + w² C) φ = M φ₀ + w² b``.
+    """(m, 3) values continuous off the cut, with slopes nearest to Y: ``(M + w² C) φ = M φ₀ + w² b``.
 
-    The heat flow of Fig. 12 on what φ₀ differs by from a function of slopes Y, so that it does not flatten those. It
-    minimises ``∫ (φ − φ₀)² + w² ∫ |∇φ − Y|²`` on the surface cut open: within the width w it is step 3 (Eq. 13), which
-    alone would spread over all of the surface what the cut does not take up.
+    It minimises ``∫ (φ − φ₀)² + w² ∫ |∇φ − Y|²`` on the surface cut open: step 3 (Eq. 13), with the constants of φ₀.
 
     Parameters
     ----------
@@ -135,8 +132,6 @@ def smoothed(
         φ₀ at the corners of the triangles.
     cut : (p,) bool
         The pairs of faces that the cut separates.
-    width : float
-        w; more than `WIDEST` is that.
     """
     opened = cut_open(triangles, pairs, cut)
     owner = opened.corner_vertices.ravel()
@@ -144,7 +139,7 @@ def smoothed(
     mass = opened.vertex_areas
     stiffness = cotan_matrix(opened)
     part = sparse.csgraph.connected_components(stiffness, directed=False)[1]
-    squared = np.minimum(width**2, WIDEST**2 * np.bincount(part, mass))[part]
+    squared = WIDTH**2 * np.bincount(part, mass)[part]
     matrix = sparse.csr_matrix(sparse.diags_array(squared) @ stiffness + sparse.diags_array(mass))
     pulled = np.bincount(owner, share * rough.ravel()) + squared * divergence(opened, directions)
     return factorize(matrix).solve(pulled)[opened.corner_vertices]

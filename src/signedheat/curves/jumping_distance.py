@@ -2,7 +2,7 @@
 
 In Eq. 16 φ is linear in every face with gradient exactly Y, so it is known up to one constant per face. Where Y is
 integrable, the constants make φ continuous across edges; elsewhere φ jumps, and the weighted L1 norm concentrates the
-jumps on a cut that is short and runs where Y is not integrable. Jumps elsewhere are then smoothed (`cut_lines`).
+jumps on a cut that is short and runs where Y is not integrable. On the surface cut open there, step 3 integrates Y.
 """
 
 from __future__ import annotations
@@ -32,14 +32,10 @@ from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.surface_curves import CurveOrPoints, CurvesAndPoints
 from ..surfaces.surface_discretization import SurfaceDiscretization, lowered_mesh, lowered_polygons
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import positive_number
+from ..validation import flag, positive_number
 from .cut_lines import high_jumps, integration_error, is_continuous, smoothed
 from .jumps import JumpProblem, JumpSolution, minimize
 from .piecewise_field import IntrinsicPiecewiseField, PiecewiseField
-
-SMOOTHING = 10.0
-"""Width of the smoothing in mean edge lengths. More spreads over the surface what
-the cut does not take up: .43 % against 1.3 % of error without any bound, on halves of a curve on a bumpy sphere."""
 
 ROUGH = 1.0
 """Integration error, as large as slopes themselves, from which there is a warning."""
@@ -57,7 +53,7 @@ def piecewise_distance(
     *,
     diffusion: float = 1.0,
     intrinsic: bool | Literal["auto"] = "auto",
-    smoothing: float | None = SMOOTHING,
+    smooth: bool = True,
     progress: Progress | None = None,
 ) -> PiecewiseField:
     """Signed distance to curves that need not bound a region, with jumps where no continuous distance exists.
@@ -65,8 +61,8 @@ def piecewise_distance(
     Minimises ``Σ_e |e| exp(−κ_e) (|jump at one end| + |jump at the other|)`` over functions whose gradient in every
     triangle is the diffused, normalised source normal Y; κ_e is the difference between the components of Y along e in
     the two faces at e (Eq. 15, Eq. 16). Edges at the source have 100 times the weight, so that the cut avoids the
-    source wherever possible. Then jumps that are not on lines are smoothed (Fig. 12): φ is discontinuous on lines only,
-    and its slopes are near Y. For curves that bound a region the field has no cut, and differs from that of
+    source wherever possible. Large jumps lie on few lines: on the surface cut open there, step 3 (Eq. 13) makes φ
+    continuous, with slopes near Y. For curves that bound a region the field has no cut, and differs from that of
     `SignedHeatSolver.distance` by at most ``integration_error / √λ`` in the root mean square, λ the least positive
     eigenvalue of the Laplacian. Surfaces may have any topology, orientable or not; curves whose parts have opposite
     orientations get a cut that joins the points at which the orientation changes.
@@ -83,9 +79,9 @@ def piecewise_distance(
     intrinsic : "auto", True or False
         As for `SignedHeatSolver`: "auto" refines a triangle mesh intrinsically where large angles or needles would
         spoil directions. The domain of the field is then the refinement.
-    smoothing : float, optional
-        Width, in mean edge lengths, of the smoothing of jumps that are not part of the cut: a heat flow that keeps
-        slopes near Y, not near zero. None leaves all jumps as Eq. 16 does, and the gradient is Y in every triangle.
+    smooth : bool
+        Whether φ is made continuous off its cut: step 3 (Eq. 13) on the surface cut open there. False leaves all jumps
+        as Eq. 16 does, and the gradient is Y in every triangle: better where halves of a curve face each other.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
 
@@ -107,7 +103,7 @@ def piecewise_distance(
     MemoryLimitError
         If the field does not fit into memory; nothing has been allocated then.
     ValueError
-        If `diffusion` or `smoothing` is not positive and finite.
+        If `diffusion` is not positive and finite.
 
     Examples
     --------
@@ -127,8 +123,7 @@ def piecewise_distance(
             f"{type(domain).__name__}",
             element="domain",
         )
-    if smoothing is not None:
-        smoothing = positive_number(smoothing, "smoothing")
+    smooth = flag(smooth, "smooth")
     listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(sources)
     stopwatch = Stopwatch(progress, steps=5)
     with stopwatch("prepare"):
@@ -149,9 +144,8 @@ def piecewise_distance(
         values = slopes + solution.constants[:, None]
     with stopwatch("cut"):
         cut = high_jumps(triangles, pairs, values)
-        if smoothing is not None:
-            width = smoothing * 2 * discretization.spacing
-            values = smoothed(triangles, pairs, directions, values, cut, width)
+        if smooth:
+            values = smoothed(triangles, pairs, directions, values, cut)
     with stopwatch("finish"):
         phi = _field(domain, triangles, centered(triangles, values, parts), cut)
         error = integration_error(phi, directions)
