@@ -186,8 +186,7 @@ def test_intrinsic_triangulation_equals_the_mesh():
     ]
     assert best[0] == pytest.approx(best[1], rel=1e-9)  # several fields may reach it
     plain, intrinsic = (
-        sh.piecewise_distance(domain, curve, diffusion=tau)
-        for domain, tau in zip(domains, diffusion, strict=True)
+        sh.piecewise_distance(domain, curve, diffusion=tau) for domain, tau in zip(domains, diffusion, strict=True)
     )
     middle = sh.SurfacePoints(np.arange(mesh.n_faces), np.full((mesh.n_faces, 3), 1 / 3))
     assert np.abs(plain(middle) - intrinsic(middle)).max() < 1e-6

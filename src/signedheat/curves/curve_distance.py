@@ -14,7 +14,7 @@ from ..diagnostics import Note
 from ..errors import ConstraintError, InexactWarning, warn_user
 from ..foreign import as_list
 from ..kinds import AnySurface, SurfaceDomain
-from ..mesh.components import connected_components
+from ..mesh.components import connected_components, grouped
 from ..progress import Progress
 from ..sharpening import sharpen
 from ..solver import SignedHeatSolver, distance_unwarned
@@ -75,20 +75,25 @@ def distance_to_pieces(
     """Distance to curves that may be pieces of broken ones, and the curves that it was measured to.
 
     The pieces are turned until they bound something together (`curve_orientation`), and those are left out that do not,
-    unless most of them do not. On parts of a surface where faces cannot agree, as those with one side, and across edges
-    of more than two faces, pieces are taken as they are: left of a curve is another side from face to face.
+    unless most of them do not. Where faces cannot agree which side of a curve is left, pieces are taken as they are.
 
-    There is a warning if most of them bound nothing, if they bound something else as well, if loops were turned that
-    might as well be right, if the inside hangs on a piece for which wide gaps are closed, if heat completes the curves
-    otherwise than by what is shortest, and if what was left out goes round.
+    There is a warning then, and if most of them bound nothing, if they bound something else as well, if loops were
+    turned that might as well be right, if the inside hangs on a piece for which wide gaps are closed, if heat completes
+    the curves otherwise than by what is shortest, and if what was left out goes round.
     """
     listed = flattened(curves)
     surface_of(solver).segments(listed)  # refuses curves that do not fit
-    if isinstance(solver.domain, TriangleMesh) and meets_bad_edges(solver.domain, listed):
-        return distance_unwarned(solver, listed, constraint), listed
     once = triangulated_once(solver, listed)
     pieces = Pieces.of(surface_of(once), listed)
     if pieces is None:
+        return distance_unwarned(solver, listed, constraint), listed
+    if isinstance(solver.domain, TriangleMesh) and not has_sides(solver.domain, listed):
+        warn_user(
+            "curves run where faces cannot agree which side of them is left, on a surface with one side or across "
+            "edges of more than two faces: pieces were taken as they are, and which side is which away from them is a "
+            "guess. Leave out faces, or close the curves",
+            InexactWarning,
+        )
         return distance_unwarned(solver, listed, constraint), listed
     decision = decide(pieces)
     turn = decision.turned(len(listed))
@@ -115,20 +120,35 @@ def distance_to_pieces(
     return field, taken
 
 
-def meets_bad_edges(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool:
-    """Whether curves run on parts of a mesh whose faces do not agree, or across edges of more than two faces.
-
-    Faces are of one part that hang together across edges of two: a fin on an edge that a curve crosses is none of it.
-    """
-    edges = mesh.edges
+def has_sides(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool:
+    """Whether the faces that each curve runs on hang together, and can agree which side of the curve is left."""
+    if (mesh.edges.face_counts == 2 - (mesh.edges.balance != 0)).all():
+        return True
+    crossed = [segments_of(curve, mesh.intrinsic, mesh.vertices).faces for curve in curves]
+    sheet = in_sheet(mesh, np.concatenate(crossed))
+    edges = TriangleMesh(mesh.vertices, mesh.faces[sheet]).edges
+    label = np.full(mesh.n_faces, -1)
+    label[sheet] = connected_components(int(sheet.sum()), *(edges.pairs // 3).T)
     disagrees = ((edges.face_counts == 2) & (edges.balance != 0))[edges.face_edges].any(axis=1)
-    crowded: NDArray[np.bool_] = np.asarray((edges.face_counts > 2)[edges.face_edges].any(axis=1))
-    if not (disagrees.any() or crowded.any()):
-        return False
-    label = connected_components(mesh.n_faces, *(edges.pairs // 3).T)
-    bad = np.isin(label, label[disagrees])
-    parts = [segments_of(curve, mesh.intrinsic, mesh.vertices).faces for curve in curves]
-    return any(bool(bad[part].any() or (crowded[part].any() and np.ptp(label[part]) > 0)) for part in parts)
+    bad = np.isin(label, [-1, *label[sheet][disagrees]])
+    return not any(bool(bad[faces].any() or np.ptp(label[faces]) > 0) for faces in crossed if len(faces))
+
+
+def in_sheet(mesh: TriangleMesh, crossed: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(m,) faces without fins and tents: at most two share an edge, those that curves cross first, then large parts."""
+    edges = mesh.edges
+    part = connected_components(mesh.n_faces, *(edges.pairs // 3).T)
+    areas = np.bincount(part, mesh.face_areas)
+    is_crossed = np.bincount(part[crossed], minlength=len(areas)) > 0
+    count, kept = np.zeros(len(edges.vertices), dtype=np.int64), np.zeros(len(areas), dtype=bool)
+    crowded = edges.face_counts[edges.face_edges] > 2
+    starts, members = grouped(part, len(areas))
+    for each in np.lexsort([-areas, ~is_crossed]):
+        faces = members[starts[each] : starts[each + 1]]
+        at, number = np.unique(edges.face_edges[faces][crowded[faces]], return_counts=True)
+        kept[each] = ((count[at] == 0) | (count[at] + number <= 2)).all()
+        count[at] += kept[each] * number
+    return np.asarray(kept[part])
 
 
 def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> str:
