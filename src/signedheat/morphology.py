@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from .area_elements import area_elements, bounds_around
+from .area_elements import bounds_around
 from .arrays import Floats
 from .distances import signed_distance
 from .errors import (
@@ -29,7 +29,6 @@ from .field_arithmetic import smooth_difference, smooth_intersection, smooth_uni
 from .field_kinds import Field
 from .foreign import as_list, as_shape
 from .grids.grid import RESOLUTION, Grid, room_around
-from .grids.grid_discretization import refuse_large_grid
 from .grids.grid_field import GridField
 from .grids.polyline import Polyline
 from .joining import concatenated
@@ -41,7 +40,9 @@ from .search.nearest_triangles import weights_in
 from .sharpening import sharpen
 from .solids.completion import complete
 from .solids.contouring import sharp_surface
+from .solids.implicit_surfaces import contour
 from .solids.offsets import Offset, Reach, checked_reach
+from .solids.sheet_walls import SheetWall
 from .solids.solid import Solid
 from .solver import SignedHeatSolver
 from .surfaces.digital_surface import DigitalSurface
@@ -68,8 +69,6 @@ __all__ = [
 
 ROOM_FOR_OFFSETS = 0.15
 """Padding of a shape in addition to its offsets, relative to its longest side."""
-BYTES_PER_NODE = 31.0
-"""Measured memory per node of the grid on which a sheet is thickened."""
 LIMITS = {"round": 1.0, "mitre": 2.0, "sharp": 10.0}
 """Length of mitres, relative to the distance. With 2, edges and corners of boxes stay whole, and edges between faces
 less than 60° apart are cut off; with 10, those of less than 12°."""
@@ -396,19 +395,27 @@ def thicken(
     below: float | None = None,
     domain: Grid | None = None,
     *,
+    side: Literal["outside", "inside", "both"] = "both",
+    faces: ArrayLike | None = None,
     resolution: int = RESOLUTION,
 ) -> TriangleMesh:
-    """Make a solid around an open surface, rounded at its boundary, without completing the surface.
+    """Make a solid around an open surface, with upright rims and sharp edges, without completing the surface.
 
     Parameters
     ----------
     sheet : TriangleMesh or PolygonMesh
-        A surface with boundary; if `below` equals `above` its orientation does not matter.
-    above, below : float
-        Thickness on the side that the normals point to, and on the other side; `below` is `above` by default.
-        **One side only**: ``thicken(sheet, 0.2, 0.0)`` on that of the normals, ``thicken(sheet, 0.0, 0.2)`` behind.
+        A surface with boundary, or any other; to both sides alike its orientation does not matter.
+    above : float
+        Thickness on each side.
+    below : float, optional
+        Thickness behind the faces, if it differs; `above` is then that on the side of their normals.
     domain : Grid, optional
         By default a grid around the sheet with room for the result.
+    side : {"outside", "inside", "both"}
+        On which side, where `below` is left out: that of the normals, behind them, or both.
+    faces : (k,) int or (m,) bool, optional
+        Thicken these faces only. ``complete(part) | complete(thicken(part, 0.2, side="outside", faces=chosen))`` adds
+        to a part.
     resolution : int
         Number of nodes along the longest side of that default grid. The solid should be at least two cells thick.
 
@@ -427,22 +434,41 @@ def thicken(
     Examples
     --------
     >>> sheet = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    >>> thicken(sheet, 0.1, 0.0, resolution=40).bounds[:, 2].round(1).tolist()
-    [0.0, 0.1]
+    >>> thicken(sheet, 0.1, side="outside", resolution=40).bounds.round(6).tolist()
+    [[0.0, 0.0, 0.0], [1.0, 1.0, 0.1]]
     """
     above = finite_number(above, "the reach above", least=0)
-    below = above if below is None else finite_number(below, "the reach below", least=0)
+    if side not in ("outside", "inside", "both") or (below is not None and side != "both"):
+        raise SignedHeatError(
+            "the side is outside, inside or both, and both where `below` is given", element="side", remedy="name one"
+        )
+    if below is None:
+        above, below = above if side != "inside" else 0.0, above if side != "outside" else 0.0
+    below = finite_number(below, "the reach below", least=0)
     reach = max(above, below)
     if reach == 0:
         raise SignedHeatError("a sheet of thickness 0 has no inside", remedy="give a thickness above 0")
+    if faces is not None:
+        sheet = _chosen(sheet, faces)
     grid = _grid(_room(sheet, reach, resolution) if domain is None else domain)
     _refuse_thin(grid, above + below)
-    refuse_large_grid(grid, BYTES_PER_NODE)
-    depth = _unsigned_distance(sheet, grid) - reach
-    if above != below:
-        phi = _sided(grid, sheet).values
-        depth = np.maximum(depth, np.maximum(phi - above, -below - phi))
-    return GridField(grid, depth).offset(0.0)
+    wall = SheetWall.around(sheet, grid, above, below)
+    return contour(wall.depths, [grid.origin, grid.upper], grid.spacing)
+
+
+def _chosen(sheet: object, faces: ArrayLike) -> TriangleMesh | PolygonMesh:
+    """The mesh of some faces."""
+    if not isinstance(sheet, TriangleMesh | PolygonMesh):
+        raise SourceError("faces are chosen of one mesh", element="faces", remedy="pass it alone")
+    n = sheet.n_faces if isinstance(sheet, TriangleMesh) else sheet.n_polygons
+    named = np.asarray(faces)
+    chosen = np.flatnonzero(named) if named.dtype == bool and named.shape == (n,) else named.ravel()
+    if not len(chosen) or chosen.dtype.kind not in "iu" or chosen.min() < 0 or chosen.max() >= n:
+        raise SourceError(f"faces are some of 0 to {n - 1}, or one truth value for each", element="faces")
+    if isinstance(sheet, TriangleMesh):
+        return TriangleMesh(sheet.vertices, sheet.faces[chosen])
+    polygons = list(sheet.polygons)
+    return PolygonMesh(sheet.vertices, [polygons[k] for k in chosen])
 
 
 def _linear(shape: Shapes, values: Floats) -> Reach:
@@ -585,23 +611,3 @@ def _refuse_thin(grid: Grid[Literal[3]], thickness: float) -> None:
             f"a wall of thickness {thickness:g} is thinner than a cell of {cell:g}",
             remedy=f"raise the resolution to {int(np.ceil(max(grid.shape) * 2 * cell / thickness))}",
         )
-
-
-def _unsigned_distance(sheet: Shapes, grid: Grid[Literal[3]]) -> Floats:
-    """Exact unsigned distance to a surface, at the nodes."""
-    for part in as_list(sheet):
-        if area_elements(part).corners.shape[1:] != (3, grid.dimension):
-            raise SourceError(
-                f"a sheet has faces in the {grid.dimension} dimensions of the grid, and a "
-                f"{type(part).__name__} has none",
-                remedy="reconstruct a mesh first",
-            )
-    corners = np.concatenate([area_elements(part).corners for part in as_list(sheet)]).reshape(-1, 3)
-    features = FaceFeatures.of(corners - grid.origin, np.arange(len(corners)).reshape(-1, 3))
-    if not len(features.rows):
-        raise SourceError("no face of the sheet has any extent", remedy="check its vertices")
-    faces = FaceTree.of(features)
-    x, y, z = (step * np.arange(n) for step, n in zip(grid.spacing, grid.shape, strict=True))
-    plane = np.stack(np.meshgrid(0.0, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
-    distance = [faces.distances(plane + np.array([along, 0.0, 0.0])) for along in x]
-    return np.stack(distance).reshape(grid.shape)

@@ -290,11 +290,8 @@ class Watertight:
             image = read_labels(path)
             solid = complete(image.to_world(image.surface(self.label)))
         else:
-            shape = read(path)
-            if self.units is not None:
-                scale = scale_to(path, self.units)
-                shape = transform(shape, np.diag([scale, scale, scale, 1.0]))  # type: ignore[arg-type]
-            solid = complete(shape)
+            shape, scale = read(path), 1.0 if self.units is None else scale_to(path, self.units)
+            solid = complete(shape if scale == 1 else transform(shape, np.diag([scale, scale, scale, 1.0])))
         names = ("thickness", "contoured", "tolerance", "resolution", "spacing")
         options = {name: getattr(self, name) for name in names}
         with warnings.catch_warnings(record=True) as caught:

@@ -187,6 +187,8 @@ def check_morph(arguments: Namespace) -> None:
         arguments.parser.error("--as-oriented, --keep-overlaps and --plain are for solids, and thicken takes sheets")
     if arguments.operation != "shell" and (arguments.keep_outside or arguments.drain is not None):
         arguments.parser.error("--keep-outside and --drain are for shells")
+    if arguments.operation != "thicken" and (arguments.side != "both" or arguments.faces):
+        arguments.parser.error("--side and --faces are for sheets: morph thicken")
     fewest, most = DISTANCES[arguments.operation]
     if not fewest <= len(arguments.distances) <= most:
         wanted = str(fewest) if fewest == most else f"{fewest} or {most}"
@@ -210,6 +212,11 @@ def check_morph(arguments: Namespace) -> None:
         option("--keep-outside", action="store_true", help="keep the faces given, and make the inner side only (D 0)"),
         option("--drain", type=positive, metavar="DIAMETER", help="a hole straight down (-z) from the largest cavity"),
     ),
+    group(
+        "sheets",
+        option("--side", choices=("outside", "inside", "both"), default="both", help="of the faces, if one D is given"),
+        option("--faces", type=whole_number(0), nargs="+", metavar="F", help="thicken these only, counted from 0"),
+    ),
     option("--preview", metavar="PNG", help="draw the distance to the shape in slices, with the offsets"),
     format_option("stl"),
     check=check_morph,
@@ -224,7 +231,8 @@ def morph(arguments: Namespace) -> Summary:
         fields.append(shapes.compute(part, grid, arguments))
         return fields[-1]
 
-    options: dict[str, Any] = {} if arguments.operation == "thicken" else {"measure": measure}
+    sheets: dict[str, Any] = {"side": arguments.side, "faces": arguments.faces}
+    options: dict[str, Any] = sheets if arguments.operation == "thicken" else {"measure": measure}
     if arguments.operation == "shell":
         options |= {"keep_outside": arguments.keep_outside, "drain": arguments.drain}
     with shapes.prefix_errors(arguments.shape):

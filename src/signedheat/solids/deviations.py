@@ -16,9 +16,7 @@ from ..foreign import SurfaceShape, as_shape
 from ..frozen import Frozen
 from ..joining import joined_shape
 from ..kinds import ShapeLike
-from ..mesh.edges import orient_faces, pair_halfedges
 from ..mesh.triangles import face_areas
-from ..mesh.welding import welded_vertices
 from ..packages import lazy_module
 from ..progress import Progress
 from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
@@ -27,6 +25,7 @@ from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
 from .completion import complete
+from .facing import agreeing_faces
 from .solid import Solid
 
 pictures: Any = lazy_module("signedheat.view.measured_pictures", "pictures")
@@ -335,18 +334,7 @@ def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, Face
         given = solid.faces if solid.source is None else solid.source
     mesh = given.triangulation
     owners = given.refinement.face_polygons if isinstance(given, PolygonMesh) else np.arange(mesh.n_faces)
-    return is_open, FaceFeatures.of(mesh.vertices, _agreeing(mesh)[np.isin(owners, solid.origins[has_sides])])
-
-
-def _agreeing(mesh: TriangleMesh) -> Ints:
-    """(m, 3) faces, turned where most of the area of their component faces the other way."""
-    heads = np.roll(mesh.faces, -1, axis=1).ravel()
-    ids = welded_vertices(mesh.vertices, mesh.faces.ravel(), heads)
-    tails, owners = ids[mesh.faces.ravel()], np.repeat(np.arange(mesh.n_faces), 3)
-    pairs = pair_halfedges(tails, ids[heads], mesh.n_vertices)
-    turned = orient_faces(pairs, tails, owners, face_areas(mesh.vertices[mesh.faces])).turned
-    faces = tails.reshape(-1, 3)
-    return np.where(turned[:, None], faces[:, ::-1], faces)
+    return is_open, FaceFeatures.of(mesh.vertices, agreeing_faces(mesh)[np.isin(owners, solid.origins[has_sides])])
 
 
 def _beyond_rim(surface: FaceFeatures, front: NearestFaces) -> Bools:

@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import cast, overload
 
+import numpy as np
+
+from ..arrays import Ints
 from ..curves.piece_orientation import curve_orientation
 from ..foreign import ForeignShape
 from ..kinds import SurfaceDomain
+from ..mesh.edges import orient_faces, pair_halfedges
+from ..mesh.triangles import face_areas
+from ..mesh.welding import welded_vertices
 from ..surfaces.surface_curves import CurveOrPoints
+from ..surfaces.triangle_mesh import TriangleMesh
 from .mesh_orientation import Mesh, orientation
 
 
@@ -56,3 +63,14 @@ def orient(
     if domain is None:
         return orientation(cast("Mesh | ForeignShape", shape)).shape
     return curve_orientation(cast("Sequence[CurveOrPoints]", shape), domain).curves
+
+
+def agreeing_faces(mesh: TriangleMesh) -> Ints:
+    """(m, 3) faces, turned where most of the area of their component faces the other way."""
+    heads = np.roll(mesh.faces, -1, axis=1).ravel()
+    ids = welded_vertices(mesh.vertices, mesh.faces.ravel(), heads)
+    tails, owners = ids[mesh.faces.ravel()], np.repeat(np.arange(mesh.n_faces), 3)
+    pairs = pair_halfedges(tails, ids[heads], mesh.n_vertices)
+    turned = orient_faces(pairs, tails, owners, face_areas(mesh.vertices[mesh.faces])).turned
+    faces = tails.reshape(-1, 3)
+    return np.where(turned[:, None], faces[:, ::-1], faces)
