@@ -24,6 +24,8 @@ SPREAD = (
     (2, 0x1249249249249249),
 )
 """Shifts and masks that spread the 21 low bits of a number so that each is followed by two zero bits."""
+BLOCK = 1 << 13
+"""Leaves whose slabs are computed at once; a power of two, with all nodes below `FLAT_LEVELS`."""
 FLAT_LEVELS = 8
 """Levels of a tree over triangles, from the leaves up, that are bounded by slabs as well."""
 
@@ -36,7 +38,7 @@ class BoxTree(NamedTuple):
     items: Ints  # (leaves · LEAF,) the boxes in each leaf, −1 where there are none
     groups: Ints  # (2 · leaves,) the group of all boxes below each node; −1 if they are of several
     # (2 · leaves, 10) two directions, the mean normal and the one across long faces, each followed by the least and the
-    # largest extent along it of all below each node
+    # largest extent along it of all below each node; or (0, 10)
     slabs: Floats
     triangles: Floats  # (n, 9) the triangles that the boxes are of, or (0, 9)
 
@@ -73,7 +75,7 @@ class BoxTree(NamedTuple):
                 common[level : 2 * level] = np.where(left == right, left, -1)
             below = bounds[level : 2 * level].reshape(-1, 2, 6) if level > 1 else below
             level //= 2
-        return cls(bounds, items, common, _unbounded(leaves), np.empty((0, 9)))
+        return cls(bounds, items, common, np.empty((0, 10)), np.empty((0, 9)))
 
     @classmethod
     def over(cls, triangles: Floats, order: Ints, groups: Ints | None = None) -> BoxTree:
@@ -147,7 +149,7 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, starts: 
                 apart |= height - reach > ends[k, 1] or height + reach < ends[k, 0]
             if apart:
                 continue
-            for s in range(0, 10, 5):
+            for s in range(0, 10 if len(slabs) else 0, 5):
                 least, most, give = np.inf, -np.inf, 0.0
                 for k in range(0, 9, 3):
                     along = 0.0
@@ -193,31 +195,27 @@ def _is_beyond(triangle: Floats, lower: Floats, upper: Floats, ways: Floats, end
 @np.errstate(all="ignore")
 def _slabs(triangles: Floats, items: Ints) -> Floats:
     """Return (2 · leaves, 10) the slabs around (n, 3, 3) triangles in the lowest nodes of a tree: see `BoxTree`."""
-    first, n = len(items) // LEAF, len(triangles)
-    slabs = _unbounded(first)
-    if not n:
-        return slabs
-    corners = triangles[np.where(items < 0, items[n - 1], items)]
-    sides = np.roll(corners, -1, axis=1) - corners
-    normals = np.cross(sides[:, 0], sides[:, 1])
-    normals[n:] = 0.0
-    lines = sides[np.arange(len(sides)), np.einsum("tcd,tcd->tc", sides, sides).argmax(axis=1)]
-    for _ in range(min(FLAT_LEVELS, first.bit_length())):
-        normals, below = normals.reshape(first, -1, 3).sum(axis=1), len(items) // first
-        ways = np.stack([normals, np.cross(normals, lines[below // 2 :: below])], axis=1)
-        lengths = np.sqrt(np.einsum("nkd,nkd->nk", ways, ways))
-        ways /= np.where(lengths > 0.0, lengths, 1.0)[..., None]
-        heights = ways @ corners.reshape(first, -1, 3).transpose(0, 2, 1)
-        ends = np.stack([heights.min(axis=2), heights.max(axis=2)], axis=2)
-        own = slabs[first : 2 * first].reshape(first, 2, 5)
-        own[lengths > 0.0] = np.concatenate([ways, ends], axis=2)[lengths > 0.0]
-        first //= 2
+    leaves, last = len(items) // LEAF, len(triangles) - 1
+    slabs, size = np.tile([0.0, 0.0, 0.0, -np.inf, np.inf], (2 * leaves, 2)), min(leaves, BLOCK)  # bound nothing
+    for begin in range(0, leaves if last >= 0 else 0, size):
+        some = items[begin * LEAF : (begin + size) * LEAF]
+        corners = triangles[np.where(some < 0, items[last], some)]
+        sides = np.roll(corners, -1, axis=1) - corners
+        normals = np.cross(sides[:, 0], sides[:, 1])
+        normals[some < 0] = 0.0
+        lines = sides[np.arange(len(sides)), np.einsum("tcd,tcd->tc", sides, sides).argmax(axis=1)]
+        for level in range(min(FLAT_LEVELS, leaves.bit_length())):
+            count, below = size >> level, LEAF << level
+            normals = normals.reshape(count, -1, 3).sum(axis=1)
+            ways = np.stack([normals, np.cross(normals, lines[below // 2 :: below])], axis=1)
+            lengths = np.sqrt(np.einsum("nkd,nkd->nk", ways, ways))
+            ways /= np.where(lengths > 0.0, lengths, 1.0)[..., None]
+            heights = ways @ corners.reshape(count, -1, 3).transpose(0, 2, 1)
+            ends = np.stack([heights.min(axis=2), heights.max(axis=2)], axis=2)
+            first = (leaves + begin) >> level
+            own = slabs[first : first + count].reshape(count, 2, 5)
+            own[lengths > 0.0] = np.concatenate([ways, ends], axis=2)[lengths > 0.0]
     return slabs
-
-
-def _unbounded(leaves: int) -> Floats:
-    """Return (2 · leaves, 10) slabs that bound nothing."""
-    return np.tile([0.0, 0.0, 0.0, -np.inf, np.inf], (2 * leaves, 2))
 
 
 def order_in_space(points: Floats) -> Ints:

@@ -24,6 +24,8 @@ DEPTH = 1e-5
 IN_PLANE = 1e-9
 """Volume of the cone to a triangle, relative to the product of its edges at the apex, up to which the apex is in its
 plane."""
+BLOCK = 1 << 15
+"""Triangles that are summed at once."""
 OPENING = 1.25
 """Distance, relative to a node's radius, above which its moments replace its faces."""
 
@@ -64,6 +66,28 @@ class WindingTree:
     @cached_property
     def _moments(self) -> Floats:
         return moments_of(self.triangles, self.tree, OPENING)
+
+
+def winding_sums(triangles: Floats, points: Floats) -> Floats:
+    """Return (n,) winding numbers around few points, triangle by triangle (van Oosterom & Strackee 1983).
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> ball = samples.sphere(2)
+    >>> winding_sums(ball.vertices[ball.faces], np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])).round(9).tolist()
+    [1.0, 0.0]
+    """
+    numbers = np.zeros(len(points))
+    for begin in range(0, len(triangles), BLOCK):
+        block = triangles[begin : begin + BLOCK]
+        for k, point in enumerate(points):
+            a, b, c = (block - point).transpose(1, 0, 2)
+            ab, bc, ca = ((u * v).sum(axis=1) for u, v in ((a, b), (b, c), (c, a)))
+            x, y, z = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
+            volumes = (a * np.cross(b, c)).sum(axis=1)
+            numbers[k] += np.arctan2(volumes, x * y * z + ab * z + bc * x + ca * y).sum() / (2 * np.pi)
+    return numbers
 
 
 @compiled

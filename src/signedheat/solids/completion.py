@@ -171,6 +171,9 @@ def completed(
             chain = run(lambda: Chain.of(joined.triangulation))
             decided = bounding(chain, options.nested, options.as_oriented)
             notes = () if options.as_oriented else (oriented_as(joined, chain, decided).note,)
+        if not chain.areas.any():
+            raise SourceError("no face of the shape has an area", element="shape")
+        chain = replace(chain)  # without what deciding needed
         with stopwatch("complete") as run:
             solid = run(partial(_from_mesh, joined.triangulation, chain, decided, options, method))
             owners = owners_of(joined)
@@ -198,8 +201,6 @@ def oriented_points(cloud: PointCloud) -> tuple[PointCloud, tuple[Note, ...]]:
 
 def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
     """The solid of a mesh, from the decision which of its faces bound it; origins are triangles of the mesh."""
-    if not chain.areas.any():
-        raise SourceError("no face of the shape has an area", element="shape")
     vertices = mesh.vertices
     counts = np.abs(decided.counts)
     faces = np.where((decided.counts < 0)[:, None], chain.faces[:, ::-1], chain.faces)
@@ -222,7 +223,8 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
             restored = float(face_areas(vertices[lost]).sum() / face_areas(vertices[faces[bounds]]).sum())
             notes.append(FacesRestored(len(lost), restored / (1 + restored)))
     idle = np.flatnonzero(counts == 0)
-    surfaces.append(Surface(vertices[chain.faces[idle]], chain.faces[idle], chain.firsts[idle], False))
+    if len(idle):
+        surfaces.append(Surface(vertices[chain.faces[idle]], chain.faces[idle], chain.firsts[idle], False))
     return united(surfaces, options.keep_overlaps, notes)
 
 

@@ -7,10 +7,11 @@ assembly overlap, however, and have bodies within them: there the level is highe
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 from scipy import sparse
 
 from ..arrays import Bools, Floats, Ints
@@ -24,9 +25,9 @@ SHEET = 0.146
 Flat and wavy sheets have 0, a seventh of a ball .16, half of one .31, all of it ½."""
 HINT = 0.5
 """Share of the area of a piece that faces one way, less the rest, from which on it was given that way."""
-APART = 0.1
-"""Share of a body's area that lies outside of another one from which on they overlap, and of its rims up to which it
-lies within."""
+APART = 0.05
+"""Share of a body's area outside of another one from which on they overlap, and of its rims up to which it lies within.
+The rims of a bowl's or a vase's inside lie half outside its outside."""
 
 
 class Rims(NamedTuple):
@@ -45,14 +46,14 @@ class Bodies:
     ----------
     numbers : (p,) int
         The body that each piece is of, or −1.
-    facing : (b,) float
-        1 of bodies that face outwards by the signs of their pieces, −1 of others.
+    levels : (b,) float
+        Their levels by the signs of their pieces, negative of those that face inwards.
     as_given : (b,) bool
         Which were clearly given as bodies that face outwards.
     """
 
     numbers: Ints
-    facing: Floats
+    levels: Floats
     as_given: Bools
 
     @classmethod
@@ -65,9 +66,8 @@ class Bodies:
         chosen = np.flatnonzero(np.abs(levels) >= SHEET)
         numbers = np.full(len(names), -1)
         numbers[chosen] = np.arange(len(chosen))
-        facing = np.sign(levels[chosen])
-        net = np.bincount(owners, given)[chosen] * facing
-        return cls(numbers[owners], facing, net >= HINT * np.bincount(owners, pieces.areas)[chosen])
+        net = np.bincount(owners, given)[chosen] * np.sign(levels[chosen])
+        return cls(numbers[owners], levels[chosen], net >= HINT * np.bincount(owners, pieces.areas)[chosen])
 
 
 def bodies_around(
@@ -88,7 +88,7 @@ def bodies_around(
     """
     directed = np.where((signs < 0)[pieces.labels, None, None], pieces.triangles[:, ::-1], pieces.triangles)
     bodies = Bodies.of(pieces, directed, groups, alone, signs * given)
-    count, n = len(bodies.facing), len(system.places)
+    count, n = len(bodies.levels), len(system.places)
     if count < 2 and not (count and len(closed)):
         return np.zeros(n)
     places = np.concatenate([system.places, rims.middles])
@@ -97,39 +97,37 @@ def bodies_around(
     away = np.flatnonzero(~own)
     if len(away):  # what is no body belongs to the nearest one
         homes[away] = homes[own][scipy.spatial.cKDTree(places[own]).query(places[away], workers=-1)[1]]
-    rows, others, there = _windings(places, homes, directed, bodies.numbers[pieces.labels], bodies.facing, closed)
+    rows, others, there = _windings(places, homes, directed, bodies, bodies.numbers[pieces.labels], closed)
     here = homes[rows]
     weights = np.where(own, np.concatenate([system.areas, rims.lengths]), 0.0)
     on_rim = np.arange(len(places)) >= n
 
-    def share(chosen: Bools, level: float, one: Ints, other: Ints) -> Floats:
-        """Of the chosen places of one body, how much has this winding number in the other, for each pair."""
-        shape = (count + 1, count + 1)
-        sums = sparse.coo_array(
-            (weights[rows] * (chosen[rows] & (there >= level)), (here, others)), shape=shape
-        ).tocsr()
+    def mean(chosen: Bools, values: NDArray[Any], one: Ints, other: Ints) -> Floats:
+        """Over the chosen places of one body, 0 where these are not in the box of the other, for each pair."""
+        entries, shape = weights[rows] * chosen[rows] * values, (count + 1, count + 1)
+        sums = sparse.coo_array((entries, (here, others)), shape=shape).tocsr()
         total = np.bincount(homes, weights * chosen, count + 1)
         return np.asarray(sums[one, other]).ravel() / np.maximum(total[one], np.finfo(float).tiny)
 
-    overlap = np.maximum(share(~on_rim, 0.25, here, others), share(~on_rim, 0.25, others, here)) < 1 - APART
-    enclosed = share(on_rim, 0.75, here, others) >= 1 - APART
+    full = 2 * np.abs(np.append(bodies.levels, 0.5))[others]
+    share = np.clip(there / full, 0.0, 1.0)  # 1 as if nothing of the other body was gone
+    within = np.maximum(*(mean(~on_rim, share > 0.25, *pair) for pair in ((here, others), (others, here))))
+    overlap, enclosed = within < 1 - APART, mean(on_rim, share, here, others) >= 1 - APART
     every = np.ones(count, dtype=bool)
     stays = {"given": bodies.as_given, "cavities": ~every, "bodies": every}[nested][here]
-    among_closed = others == count
-    counted = (there > 0.5) & np.where(among_closed, enclosed & ~stays, overlap | (enclosed & stays))
-    amount = np.where(among_closed, -np.round(there), 1.0) * counted
-    return np.bincount(rows, amount, len(places))[:n].astype(np.float64)
+    counted = np.where(others == count, -1.0 * (enclosed & ~stays), overlap | (enclosed & stays))
+    return np.round(np.bincount(rows, there * counted, len(places))[:n])
 
 
 def _windings(
-    places: Floats, homes: Ints, triangles: Floats, bodies: Ints, facing: Floats, closed: Floats
+    places: Floats, homes: Ints, triangles: Floats, bodies: Bodies, numbers: Ints, closed: Floats
 ) -> tuple[Ints, Ints, Floats]:
     """Places, other bodies whose box they lie in, and their winding numbers; what is closed is one more body."""
-    count = len(facing)
-    order = np.argsort(bodies, kind="stable")
-    cuts = np.searchsorted(bodies[order], np.arange(count + 1))
+    count = len(bodies.levels)
+    order = np.argsort(numbers, kind="stable")
+    cuts = np.searchsorted(numbers[order], np.arange(count + 1))
     rows, others, there = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
-    for body in range(count + 1):
+    for body, level in enumerate([*bodies.levels, 0.5]):
         corners = closed if body == count else triangles[order[cuts[body] : cuts[body + 1]]]
         if not len(corners):
             continue
@@ -138,6 +136,5 @@ def _windings(
         if len(near):
             rows.append(near)
             others.append(np.full(len(near), body))
-            sign = 1.0 if body == count else facing[body]
-            there.append(sign * WindingTree.of(corners).numbers(places[near]))
+            there.append(np.sign(level) * WindingTree.of(corners).numbers(places[near]))
     return np.concatenate(rows), np.concatenate(others), np.concatenate(there)

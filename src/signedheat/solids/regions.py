@@ -69,17 +69,16 @@ def _windings(points: Floats, faces: Ints, normals: Floats, times: Ints, winding
     """(m, 2) winding numbers behind each face and in front of it; faces of different corners, each there so often."""
     n = len(faces)
     one, other = _around_edges(points, faces, normals, times)
-    steps = np.concatenate([times, np.zeros(len(one), dtype=np.int64)])
-    one, other = np.concatenate([2 * np.arange(n), one]), np.concatenate([2 * np.arange(n) + 1, other])
-    levels, labels = (values.reshape(-1, 2) for values in _levels(2 * n, one, other, steps))
+    levels, labels = (values.reshape(-1, 2) for values in _levels(times, one, other))
     labels = labels[:, 0]
-    triangles = points[faces]
     # the widest faces of each part
-    order = np.lexsort((-_widths(triangles), labels))
+    order = np.lexsort((-_widths(points, faces), labels))
     starts = np.searchsorted(labels[order], np.arange(int(labels.max(initial=-1)) + 1))
     chosen = order[np.arange(n) - starts[labels[order]] < SAMPLES]
-    some = triangles[chosen]
-    away = np.minimum(np.maximum(DEPTH * np.sqrt(face_areas(some)), _slack(points)), 0.1 * _widths(some))
+    some = points[faces[chosen]]
+    away = np.minimum(
+        np.maximum(DEPTH * np.sqrt(face_areas(some)), _slack(points)), 0.1 * _widths(points, faces[chosen])
+    )
     away, centres = away[:, None] * normals[chosen], some.mean(axis=1)
     there = np.concatenate([windings.numbers(centres - away), windings.numbers(centres + away)])
     offsets, owners = there - levels[chosen].T.ravel(), np.tile(labels[chosen], 2)
@@ -137,14 +136,18 @@ def _facing(table: EdgeTable, turning: Ints, reached: Ints) -> tuple[Ints, Ints]
 
 
 @compiled
-def _levels(n: int, one: Ints, other: Ints, steps: Ints) -> tuple[Ints, Ints]:
-    """Levels of n nodes that fall by a step from the first to the second of each pair; and what hangs together.
+def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints]:
+    """Levels of the sides of faces, alike in pairs of sides that face each other; and what hangs together.
 
-    A pair that contradicts those before it does not count. Trees have their least node as root.
+    In front of a face it is less than behind it by how often the face is there. A pair that contradicts those before
+    it does not count. Trees have their least node as root.
     """
+    n = 2 * len(times)
     parents, rises = np.arange(n), np.zeros(n, dtype=np.int64)  # from the parent of each
+    for face in range(len(times)):
+        parents[2 * face + 1], rises[2 * face + 1] = 2 * face, -times[face]
     for k in range(len(one)):
-        a, b, rise = one[k], other[k], steps[k]
+        a, b, rise = one[k], other[k], 0
         while parents[a] != a:
             rises[a] += rises[parents[a]]
             parents[a] = parents[parents[a]]
@@ -177,15 +180,17 @@ def _slack(points: Floats) -> float:
 
 def widest(pieces: Arrangement) -> Floats:
     """(p, 3) for each piece the middle of the widest one in its cell."""
-    triangles = pieces.points[pieces.faces]
-    order = np.lexsort((-_widths(triangles), pieces.cells))
+    order = np.lexsort((-_widths(pieces.points, pieces.faces), pieces.cells))
     first = order[np.searchsorted(pieces.cells[order], np.arange(int(pieces.cells.max()) + 1))]
-    middles: Floats = triangles[first].mean(axis=1)[pieces.cells]
+    middles: Floats = pieces.points[pieces.faces[first]].mean(axis=1)[pieces.cells]
     return middles
 
 
-def _widths(triangles: Floats) -> Floats:
+def _widths(points: Floats, faces: Ints) -> Floats:
     """(m,) areas of triangles over their longest sides."""
-    longest = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2).max(axis=1)
-    widths: Floats = face_areas(triangles) / np.maximum(longest, 1e-300)
+    a, b, c = (points[corners] for corners in faces.T)
+    b, c, longest = b - a, c - a, np.linalg.norm(c - b, axis=1)
+    for side in (b, c):
+        longest = np.maximum(longest, np.linalg.norm(side, axis=1))
+    widths: Floats = 0.5 * np.linalg.norm(np.cross(b, c), axis=1) / np.maximum(longest, 1e-300)
     return widths

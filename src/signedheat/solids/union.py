@@ -64,10 +64,12 @@ def united(
     """The solid that surfaces close: without what lies inside, where bodies overlap, and without idle completion."""
     whole = joined_surfaces(surfaces)
     closing = np.concatenate([np.full(len(each.triangles), each.closing) for each in surfaces])
-    windings = Windings(whole.triangles[closing])
+    windings = Windings(whole.triangles if closing.all() else whole.triangles[closing])
     pieces = _cut(whole, closing)
     regions = Regions.of(pieces, windings)
-    triangles, behind, ahead = pieces.points[pieces.faces], regions.behind.copy(), regions.ahead.copy()
+    uncut = np.array_equal(pieces.origins, np.arange(len(whole.triangles)))
+    triangles = whole.triangles if uncut else pieces.points[pieces.faces]
+    behind, ahead = regions.behind.copy(), regions.ahead.copy()
     closes = closing[pieces.origins]
     # winding numbers do not step across sheets
     behind[~closes], ahead[~closes] = windings.sides(triangles[~closes])
@@ -82,7 +84,9 @@ def united(
     confidence = _confidence(triangles[kept], given[kept], whole, points)
     diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds, copies)))
     bounding = (bounds & behind)[kept]
-    return Solid(triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics)
+    return Solid(
+        triangles if kept.all() else triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics
+    )
 
 
 def _cut(whole: Surface, closing: Bools) -> Arrangement:
@@ -169,7 +173,7 @@ def joined_surfaces(surfaces: list[Surface]) -> Surface:
         ids.append(own)
     joined = np.concatenate(ids)
     return Surface(
-        np.concatenate([each.triangles for each in surfaces]),
+        surfaces[0].triangles if len(surfaces) == 1 else np.concatenate([each.triangles for each in surfaces]),
         np.unique(joined, return_inverse=True)[1].reshape(joined.shape),
         np.concatenate([each.origins for each in surfaces]),
         True,

@@ -13,10 +13,12 @@ from ..frozen import Frozen
 from ..mesh.edges import edge_table
 from ..mesh.triangles import area_vectors
 from ..mesh.welding import same_positions
-from ..search.winding_tree import WindingTree
+from ..search.winding_tree import WindingTree, winding_sums
 
 INSIDE = 0.5
 """Winding number above which a point is inside; exact winding numbers are integers."""
+FEW = 16
+"""Points for which a sum over all triangles takes less time and memory than a tree."""
 DEPTH = 1e-6
 """Offset of places in front of a face and behind it, relative to its size."""
 
@@ -57,7 +59,9 @@ class Windings(Frozen):
         return WindingTree.of(self.triangles)
 
     def numbers(self, points: Floats) -> Floats:
-        """(n,) winding numbers."""
+        """(n,) winding numbers; around few points without a tree."""
+        if len(points) <= FEW and "tree" not in vars(self):
+            return winding_sums(self.triangles, points)
         return self.tree.numbers(points) if len(self.triangles) else np.zeros(len(points))
 
     def inside(self, points: Floats) -> Bools:
