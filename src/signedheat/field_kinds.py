@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from scipy import sparse
 
-from .arrays import Bools, Floats
+from .arrays import Bools, Floats, mask_of
 from .diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
 from .errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
 from .grids.grid_discretization import GridDiscretization, GridSource
@@ -56,8 +56,7 @@ def _(
         values = values[discretization.restriction]
     if isinstance(discretization.domain, PointCloud) and np.isnan(values).any():  # its triangles may have gaps
         cloud = discretization.domain
-        used = np.zeros(cloud.n_points, dtype=bool)
-        used[cloud.triangulation.faces] = True
+        used = mask_of(cloud.n_points, cloud.triangulation.faces)
         values = spread(cloud.points, values, used)[cloud.representatives]
     unreached = np.flatnonzero(np.isnan(values))
     if len(unreached):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Floats, Ints
+from .arrays import Floats, Ints, mask_of
 from .foreign import Shape
 from .mesh.components import connected_components
 from .mesh.edges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
@@ -154,9 +154,7 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
 
 def _n_marked(n: int, ids: Ints) -> int:
     """Count the distinct ids."""
-    marked = np.zeros(n, dtype=bool)
-    marked[ids] = True
-    return int(marked.sum())
+    return int(mask_of(n, ids).sum())
 
 
 def _n_components(n: int, tails: Ints, heads: Ints) -> int:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Bools, Floats, Ints
+from .arrays import Bools, Floats, Ints, mask_of
 from .errors import GeometryError, SignedHeatError
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -239,7 +239,6 @@ def element_ids(values: object, name: str, corners: int, n_vertices: int) -> Int
 
 def used_bounds(points: Floats, ids: Ints) -> Floats:
     """(2, d) lower and upper corner of the box around the points with some ids; columns one by one, which is fast."""
-    used = np.zeros(len(points), dtype=bool)
-    used[ids.ravel()] = True
+    used = mask_of(len(points), ids.ravel())
     columns = (points if used.all() else points[used]).T
     return np.array([[column.min() for column in columns], [column.max() for column in columns]])

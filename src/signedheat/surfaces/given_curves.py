@@ -35,10 +35,9 @@ def is_element_list(source: object) -> bool:
 
 
 def curve_of_elements(triangles: Triangles, points: Sequence[tuple[int, Sequence[float]]]) -> Curve | SurfacePoints:
-    """The curve through points, each a vertex, an edge and a fraction of it, or a face and two or three coordinates.
+    """Make the curve through points, each a vertex, an edge and a fraction of it, or a face and its coordinates.
 
-    Edges are counted in the order in which faces, and the sides of each, have them first, and run as there. A single
-    point is a source of its own.
+    Edges are numbered and directed as they first occur in the sides of the faces. A single point is a point source.
     """
     starts, halfedges = triangles.edges.halfedges
     first_corner = np.full(triangles.n_vertices, -1)
@@ -61,7 +60,7 @@ def curve_of_elements(triangles: Triangles, points: Sequence[tuple[int, Sequence
 
 
 def given_curves(domain: object, sources: list[Any]) -> tuple[list[Any], WithoutLength | None]:
-    """Sources on a surface, lists of elements as curves; those without length left out, if there are others."""
+    """Make curves of lists of elements, and leave out curves without length if there are other sources."""
     if not isinstance(domain, Surface):
         return sources, None
     if is_element_list(sources):
@@ -82,7 +81,7 @@ def _converted(domain: Surface, source: object) -> object:
 
 
 def _is_point(domain: Surface, curve: Curve) -> bool:
-    """Whether all points of a curve coincide; faces that do not exist are refused by who uses the curve."""
+    """Whether all points of a curve coincide; faces that do not exist are refused later."""
     triangles = domain.triangulation
     if not hasattr(triangles, "vertices") or not ((curve.faces >= 0) & (curve.faces < triangles.n_faces)).all():
         return False

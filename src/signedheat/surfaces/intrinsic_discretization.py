@@ -1,4 +1,4 @@
-"""Intrinsic triangulations, and meshes that get one per set of sources, lowered to intrinsic meshes (Sec. 9.4)."""
+"""Discretisation by intrinsic triangulations, made once for a mesh or anew for each set of sources (Sec. 9.4)."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from .triangle_mesh import TriangleMesh
 SPOILED = 0.0015
 """Fraction of the area in triangles with an angle above `LARGE`, from which a mesh is refined."""
 LARGE = 120.0
-"""Degrees."""
+"""Angle in degrees."""
 NEEDLES = 0.1
 """Fraction of the area in triangles with an angle below `SMALL`, from which a mesh is refined."""
 SMALL = 10.0
-"""Degrees. Needles resolve distance by their length only, even right-angled ones."""
+"""Angle in degrees. Needles resolve distance by their length only, even right-angled ones."""
 ANGLE = 20.0
-"""Smallest angle of "auto", in degrees: vertices that 28 would take are better spent on large triangles."""
+"""Smallest angle of "auto", in degrees: the vertices that 28 would take are better spent on large triangles."""
 COARSEST = 1.41
-"""Largest triangles of "auto", over the mean one: curves on coarser ones are not resolved."""
+"""Circumradius of the largest triangles of "auto", over the mean one: curves on larger ones are not resolved."""
 BYTES_REFINED = 750
-"""What each triangle of a refinement takes itself, besides distance on it."""
+"""Memory of each triangle of a refinement, besides that of distance on it."""
 SHARE_OF_PIECE = 0.5
 """h over the length of the pieces of a curve that is to be completed, where triangles are larger."""
 THICKNESS = 1e-9
@@ -46,29 +46,24 @@ def _(domain: IntrinsicTriangulation) -> SurfaceDiscretization:
 
 @dataclass(frozen=True, eq=False)
 class Retriangulated:
-    """A mesh for which an intrinsic triangulation is made for every set of sources; fields are reported on the mesh.
-
-    Takes the place of the discretisation until `adapt` is called with the sources.
-    """
+    """A mesh of which `adapt` makes an intrinsic triangulation for the sources; fields are reported on the mesh."""
 
     mesh: TriangleMesh
     progress: Progress | None = field(default=None, repr=False)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
-        """Make the intrinsic Delaunay refinement of the mesh that has the sources along its edges."""
+        """Refine the mesh intrinsically, with the sources along edges."""
         return refined(self.mesh, self.progress, sources).adapt(sources)
 
 
 class RetriangulatedForZeroSet(Retriangulated):
-    """The same for those who want the zero set alone: h suits pieces of curves, not triangles far away.
+    """`Retriangulated` for the zero set alone: h suits the pieces of curves, not triangles far away.
 
-    With the t of large triangles, pieces of a curve that is smaller than these are one blot of heat, and
-    how the curve goes on between them is lost. Gaps are about as long as pieces are, or shorter. Of several curves
-    the smallest counts.
+    With the t of large triangles, the pieces of a curve smaller than these would be one blot of heat, without the
+    curve's course between them. Gaps are about as long as pieces, or shorter. Of several curves the smallest counts.
     """
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
-        """Make the refinement."""
         surface, groups = super().adapt(sources)
         scales = CurveGroups.of(self.mesh, sources).scales
         parts = [part for group in groups for part in group if len(part.ends)]
@@ -81,7 +76,7 @@ class RetriangulatedForZeroSet(Retriangulated):
 
 
 def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
-    """The discretisation of a domain; triangle meshes with many large or small angles are refined intrinsically.
+    """Discretise a domain; refine triangle meshes with many large or small angles intrinsically.
 
     Those whose faces are too thin for that stay as they are, with the note `LargeAngles`.
     """
@@ -110,7 +105,7 @@ def refined(
     angle: float = 28.0,
     coarsest: float = np.inf,
 ) -> SurfaceDiscretization:
-    """The intrinsic Delaunay refinement of a mesh; fields are reported on the mesh, and kept on the refinement."""
+    """Discretise a mesh by its intrinsic Delaunay refinement; fields are reported on the mesh, and kept on both."""
     refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", more=BYTES_REFINED * mesh.n_faces)  # which only grow
     domain = intrinsic_delaunay(mesh, keep, refine=True, angle=angle, coarsest=coarsest, progress=progress)
     refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
@@ -119,7 +114,7 @@ def refined(
 
 
 def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDiscretization:
-    """The discretisation of an intrinsic triangulation; triangles that are nearly flat are mollified."""
+    """Discretise an intrinsic triangulation, and mollify triangles that are nearly flat."""
     triangles = triangulation.triangles
     lengths, added = mollify(triangles.edge_lengths, THICKNESS)
     if added:
@@ -136,9 +131,5 @@ def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDis
 
 
 def spacing(triangles: IntrinsicMesh) -> float:
-    """h: half the area-weighted mean edge length.
-
-    The plain mean would be dominated by the many small triangles that refinement may insert in a small region, and
-    ``√t`` would be too short for the others.
-    """
+    """h: half the area-weighted mean edge length, which many small triangles in a small region do not dominate."""
     return 0.5 * float(triangles.face_areas @ triangles.edge_lengths.mean(axis=1) / triangles.face_areas.sum())

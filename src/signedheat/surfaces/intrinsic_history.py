@@ -1,9 +1,9 @@
 """The steps by which an intrinsic triangulation was made, and the transfer of points and lines through them.
 
-Every step (an edge flip, or a split of a face or an edge) exchanges simplices on four points with one affine dependency
-``Σ c_k p_k = 0``. The weights of a point on the old simplex are moved along c until another one vanishes; then they are
-nonnegative on a new simplex. No angle is measured and no line is traced, so the transfer cannot fail, and a point on an
-edge that stays remains on it exactly.
+Every step (an edge flip, or a split of a face or an edge) exchanges triangles on four points that have one affine
+dependency ``Σ c_k p_k = 0``. The weights of a point in an old triangle are moved along c until another one vanishes;
+then they are nonnegative in a new triangle. No angle is measured and no line is traced, so that the transfer cannot
+fail, and a point on an edge that stays remains on it exactly.
 """
 
 from __future__ import annotations
@@ -38,36 +38,32 @@ class Lines(NamedTuple):
 
     owners: Ints  # (r,) which line
     faces: Ints  # (r,) the face crossed
-    # (r, 3) barycentric coordinates of where the line enters and leaves the face
-    starts: Floats
-    ends: Floats
-    # (r, k, 3) vectors transported along the line, as differences of barycentric coordinates
-    vectors: Floats
+    starts: Floats  # (r, 3) barycentric coordinates of where the line enters the face
+    ends: Floats  # (r, 3) and leaves it
+    vectors: Floats  # (r, k, 3) vectors transported along the line, as differences of barycentric coordinates
 
     def chosen(self, rows: Ints) -> Lines:
-        """Some of the rows, in this order."""
-        return Lines(self.owners[rows], self.faces[rows], self.starts[rows], self.ends[rows], self.vectors[rows])
+        """Choose rows, in this order."""
+        return Lines(*(column[rows] for column in self))
 
 
 @dataclass(frozen=True, eq=False)
 class History(Frozen):
     """Two triangulations of one surface and the steps from one to the other."""
 
-    # vertices of `before` keep their ids; new ones follow
     before: IntrinsicMesh
-    after: IntrinsicMesh
-    # (n, 4) as `gluing.record` writes them
-    steps: Ints
+    after: IntrinsicMesh  # its first vertices are those of `before`
+    steps: Ints  # (n, 4) as `gluing.record` writes them, and weights (n, 4)
     weights: Floats
 
     def forward(self, faces: Ints, barycentric: Floats, vectors: Floats | None = None) -> tuple[Ints, Floats, Floats]:
-        """Points of `before`, and vectors (p, k, 3) at them, as points of `after`."""
+        """Transfer points of `before`, and vectors (p, k, 3) at them, to `after`."""
         faces, barycentric, vectors = copied(faces, barycentric, vectors)
         transfer_forward(self.steps, self.weights, *self._successors, faces, barycentric, vectors)
         return faces, barycentric, vectors
 
     def backward(self, faces: Ints, barycentric: Floats, vectors: Floats | None = None) -> tuple[Ints, Floats, Floats]:
-        """Points of `after`, and vectors (p, k, 3) at them, as points of `before`."""
+        """Transfer points of `after`, and vectors (p, k, 3) at them, to `before`."""
         faces, barycentric, vectors = copied(faces, barycentric, vectors)
         n_faces = max(self.before.n_faces, self.after.n_faces)
         transfer_backward(self.steps, self.weights, n_faces, faces, barycentric, vectors)
@@ -88,25 +84,25 @@ class History(Frozen):
 
     @cached_property
     def gluing_before(self) -> Gluing:
-        """How the triangles of `before` are glued, for lines across them."""
+        """The gluing of `before`, to trace lines on."""
         return for_tracing(self.before)
 
     @cached_property
     def gluing_after(self) -> Gluing:
-        """How the triangles of `after` are glued, for lines across them."""
+        """The gluing of `after`, to trace lines on."""
         return for_tracing(self.after)
 
     def edges_before(self) -> Lines:
-        """The edges of `after`, from tail to head, as lines on `before`."""
+        """Trace the edges of `after`, from tail to head, as lines on `before`."""
         return straight_lines(self.gluing_before, *self.backward(*edge_middles(self.after)))
 
     def edges_after(self) -> Lines:
-        """The edges of `before`, from tail to head, as lines on `after`."""
+        """Trace the edges of `before`, from tail to head, as lines on `after`."""
         return straight_lines(self.gluing_after, *self.forward(*edge_middles(self.before)))
 
 
 def copied(faces: Ints, barycentric: Floats, vectors: Floats | None) -> tuple[Ints, Floats, Floats]:
-    """Points and vectors at them, none by default, as kernels may change them."""
+    """Copy points and vectors at them, none by default, for kernels that change them."""
     vectors = np.zeros((len(faces), 0, 3)) if vectors is None else np.array(vectors, dtype=np.float64)
     return np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64), vectors
 
@@ -123,13 +119,13 @@ def edge_middles(triangles: IntrinsicMesh) -> tuple[Ints, Floats, Floats]:
 
 
 def for_tracing(triangles: IntrinsicMesh) -> Gluing:
-    """A gluing to trace lines on, without room for a history."""
+    """Make a gluing to trace lines on, without room for a history."""
     gluing = glue(triangles)
     return gluing._replace(steps=gluing.steps[:0].copy(), weights=gluing.weights[:0].copy())
 
 
 def straight_lines(gluing: Gluing, faces: Ints, barycentric: Floats, vectors: Floats) -> Lines:
-    """Straight lines given by their midpoints and vectors there, of which the first is the whole extent of the line."""
+    """Trace straight lines, given by their midpoints and vectors there: the first one is the whole line."""
     halves = np.ascontiguousarray(vectors, dtype=np.float64).copy()
     halves[:, 0] *= 0.5
     room = 4 * len(faces) + 16
@@ -153,10 +149,7 @@ def straight_lines(gluing: Gluing, faces: Ints, barycentric: Floats, vectors: Fl
 
 
 def misplaced_lines(triangles: IntrinsicMesh, lines: Lines, lengths: Floats) -> Ints:
-    """Ids of lines whose traces are wrong: somewhere not finite, or more than twice as long as they should be.
-
-    Triangles that are as thin as rounding turn lines that are traced through them.
-    """
+    """Ids of lines whose traces are not finite or twice too long: triangles as thin as rounding turn lines."""
     along, corners = lines.vectors[:, 0], triangles.corner_positions[lines.faces]
     with np.errstate(all="ignore"):  # they may have overflowed
         traced, rounding = np.abs((along * corners).sum(axis=1)), 1e-5 * (np.abs(along) * np.abs(corners)).sum(axis=1)
@@ -172,12 +165,12 @@ BEFORE[SPLIT_EDGE, 0], AFTER[SPLIT_EDGE, :2] = [0, 1, 2], [[0, 3, 2], [3, 1, 2]]
 BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
 
 OUTWARD = 1e-6
-"""Sine of the angle up to which a line that leaves the surface is one along its boundary, but for rounding."""
+"""A line that leaves the surface at an angle with less than this sine runs along its boundary."""
 ALONG = 1e-9
 """Barycentric coordinates of a point and of a direction, over the largest, below which a line runs along an edge.
 From face to face lines drift by some 1e-15; results are the same from 1e-12 to 1e-7."""
 ROUNDING = 1e-10
-"""Of squared lengths, in parts of the size of their terms."""
+"""Rounding error of squared lengths, relative to the size of their terms."""
 
 
 @kernel
@@ -208,10 +201,10 @@ def transfer_forward(
     barycentric: Floats,
     vectors: Floats,
 ) -> None:
-    """Transfer points and vectors at them from the first triangulation of a history to the last; in place.
+    """Transfer points and vectors at them from the first triangulation of a history to the last, in place.
 
-    Every point takes the steps that change its face, and no others: the time does not depend on the length of the
-    history. `first` and `later` are as `find_successors` returns them; for the rest see `transfer_backward`.
+    Every point takes only the steps that change its face. `first` and `later` are from `find_successors`; for the rest
+    see `transfer_backward`.
     """
     around, start = np.empty(3, np.int64), np.zeros(3, np.int64)
     for p in range(len(faces)):
@@ -244,11 +237,11 @@ def transfer_forward(
 def transfer_backward(
     steps: Ints, weights: Floats, n_faces: int, faces: Ints, barycentric: Floats, vectors: Floats
 ) -> None:
-    """Transfer points and vectors at them from the last triangulation of a history to the first; in place.
+    """Transfer points and vectors at them from the last triangulation of a history to the first, in place.
 
-    Points have faces (p,) of the `n_faces` last ones, barycentric coordinates (p, 3) and vectors (p, k, 3), which are
-    differences of such. Those without a face (−1) stand for the new vertices, in the order in which they were inserted,
-    at the end of the array; they get the position at which they were inserted.
+    Points have faces (p,) of the last triangulation, barycentric coordinates (p, 3) and vectors (p, k, 3), which are
+    differences of such. Those at the end without a face (−1) are the new vertices, in the order of insertion; they get
+    the position at which they were inserted.
     """
     first = np.full(n_faces, -1)
     later = np.full(len(faces), -1)
@@ -355,7 +348,7 @@ def shift(x: Floats, c: Floats, lead: int, gone: int, amount: float) -> None:
 
 @kernel
 def squared_length(g: Gluing, f: int, v: Floats) -> tuple[float, float]:
-    """Of a vector in a face, and the sum of the sizes of its terms."""
+    """Squared length of a vector in a face, and the sum of the sizes of its terms."""
     square, size = 0.0, 0.0
     for k in range(3):
         term = v[k] * v[(k + 1) % 3] * g.length[g.edge[3 * f + k]] ** 2
@@ -366,7 +359,7 @@ def squared_length(g: Gluing, f: int, v: Floats) -> tuple[float, float]:
 
 @kernel
 def keep_on_edges(w: Floats, v: Floats) -> None:
-    """Let a line that runs along an edge but for rounding run along it: else it may cross to the other side midway."""
+    """Put a line on the edge from which only rounding separates it: else it may cross to the other side midway."""
     largest = max(abs(v[0]), abs(v[1]), abs(v[2]))
     for k in range(3):
         if w[k] < ALONG and abs(v[k]) < ALONG * largest:
@@ -386,10 +379,10 @@ def trace_geodesic(
     out_vectors: Floats,
     n: int,
 ) -> int:
-    """Trace a geodesic from a point along its first vector, or against it, over its length; other vectors are carried.
+    """Trace a geodesic from a point along its first vector, or against it, over its length; carry the other vectors.
 
-    Writes one row per face crossed, from row n on, as far as there is room: the face, where the line enters and leaves
-    it, and the vectors there. Returns the next row. A line ends where faces as thin as rounding have made it longer.
+    Write one row per face crossed, from row n on, as far as there is room: the face, where the line enters and leaves
+    it, and the vectors there. Return the next row. A line ends where faces as thin as rounding have made it longer.
     """
     f, left, slides = face, 1.0, 0
     w, v = barycentric.copy(), vectors.copy()

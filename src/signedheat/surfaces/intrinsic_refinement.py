@@ -1,8 +1,8 @@
 """Intrinsic Delaunay refinement: insert vertices until no triangle is thin, and none large next to the others.
 
-Circumcentres are inserted (Chew 1993; on surfaces Sharp, Soliman & Crane 2019), which lie in the plane of a face into
-which its neighbours are unfolded one after the other. Where one would lie beyond a segment (an edge that must not be
-flipped) or in a segment's diametral circle, the segment is split instead (Ruppert 1995).
+Circumcentres of bad triangles are inserted (Chew 1993; on surfaces Sharp, Soliman & Crane 2019). They are located in
+the plane of the triangle, into which its neighbours are unfolded one after the other. Where one would lie beyond a
+segment (an edge that must not be flipped) or in its diametral circle, the segment is split instead (Ruppert 1995).
 """
 
 from __future__ import annotations
@@ -35,22 +35,17 @@ PER_EDGE = ("start", "length", "fixed", "flips")
 TO_GROW = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow", "group", "extent")
 
 PATIENCE = 5000
-"""New vertices between two progress reports: some hundredths of a second."""
+"""New vertices between two progress reports, made in some hundredths of a second."""
 
 
 def refine_all(
     gluing: Gluing, angle: float, coarsest: float, max_vertices: int, progress: Callable[[float], None] | None = None
 ) -> tuple[Gluing, Ints, Bools, bool]:
-    """Refine a Delaunay triangulation, in place, until no face is thin and then none is large, where that is possible.
+    """Refine a Delaunay triangulation, in place, until no face is thin, and then none large: see `intrinsic_delaunay`.
 
-    Fixed, boundary and nonmanifold edges may be split but are not flipped. Small angles remain where fixed edges meet
-    at less than 60°, at vertices with a total angle of less than 60°, at vertices that nearly coincide, and where the
-    limit on the number of vertices is reached first. `angle` is in radians; `coarsest` is the largest circumradius, in
-    multiples of that of an equilateral triangle of the mean area once no face is thin; `progress` is called now and
-    then with an estimate of the fraction done, and an exception that it raises cancels.
-
-    Returns the refined triangulation; the fixed edge of the input that each edge (e,) is part of, or −1; faces (m,) at
-    vertices that nearly coincide, which may be thin; and whether it ended before the limit on the number of vertices.
+    `angle` is in radians; `progress` is called now and then with the estimated fraction done, and may raise to cancel.
+    Return the triangulation; the fixed edge of the input that each edge (e,) is part of, or −1; which faces (m,) lie at
+    vertices that nearly coincide, and may be thin; and whether it ended before the limit on the number of vertices.
     """
     segments, agenda = agenda_of(gluing)
     goal = Goal(np.tan(angle / 2) ** 2, np.inf, max_vertices)
@@ -69,7 +64,7 @@ def refine_all(
 def refined(
     gluing: Gluing, agenda: Agenda, goal: Goal, progress: Callable[[float], None] | None
 ) -> tuple[Gluing, Agenda, int]:
-    """Refine until the goal is met or no vertex is left; the arrays, longer where they were full, and why it ended."""
+    """Refine until the goal is met or no vertex is left; return the arrays, perhaps longer, and why it ended."""
     list_all(gluing, agenda, goal)
     listed = np.flatnonzero(agenda.bins >= 0)  # by size: the largest come first, so that their list says how far it is
     done = 0.0
@@ -98,12 +93,12 @@ def close_faces(gluing: Gluing, agenda: Agenda) -> Bools:
     lengths = gluing.length[gluing.edge[: 3 * n_faces]].reshape(-1, 3)
     group = agenda.group[gluing.tail[: 3 * n_faces]].reshape(-1, 3)
     side = lengths.argmin(axis=1)
-    one, other = group[faces, side], group[faces, (side + 1) % 3]
-    return (one >= 0) & (one == other) & (lengths[faces, side] <= agenda.extent[one])
+    tails, heads = group[faces, side], group[faces, (side + 1) % 3]
+    return (tails >= 0) & (tails == heads) & (lengths[faces, side] <= agenda.extent[tails])
 
 
 def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
-    """The fixed edges, and the work lists of refinement; boundary and nonmanifold edges become fixed."""
+    """Make the work lists of refinement, and list the fixed edges, which boundary and nonmanifold edges become."""
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     counts = np.bincount(gluing.edge[: 3 * n_faces], minlength=n_edges)
     gluing.fixed[:n_edges] |= counts != 2
@@ -142,31 +137,22 @@ N_BINS = 256
 
 
 class Agenda(NamedTuple):
-    """Work lists of refinement, and what it needs to know of segments.
+    """Work lists of refinement, and properties of segments."""
 
-    `stack` and `stacked` are the edges to be checked for the Delaunay property. `bins` and `next_face` are linked lists
-    of bad faces, by the binary logarithm of their circumradius; `listed` marks the faces that are in one. `segment` is
-    the input segment of each fixed edge, `segment_ends` and `segment_length` describe the segments, and `on_segment` is
-    the segment on which a new vertex was inserted. `narrow` marks input vertices at which two segments meet at less
-    than 60°, or with a smaller total angle. `group` and `extent` describe the vertices that nearly coincide, as
-    returned by `coinciding`. `seen` counts the steps of the history whose faces have been listed, and holds the list
-    that the last face came from; `room` and `halfedges` are work arrays for the search around a new vertex.
-    """
-
-    stack: Ints
-    stacked: Bools
-    bins: Ints
-    next_face: Ints
-    listed: Bools
-    segment: Ints
-    segment_ends: Ints
-    segment_length: Floats
-    on_segment: Ints
-    narrow: Bools
-    group: Ints
+    stack: Ints  # edges to be checked for the Delaunay property
+    stacked: Bools  # (e,) whether an edge is on the stack
+    bins: Ints  # first bad face by the binary logarithm of its circumradius
+    next_face: Ints  # (m,) the next face in the same bin
+    listed: Bools  # (m,) whether a face is in a bin
+    segment: Ints  # (e,) the input segment of each fixed edge
+    segment_ends: Ints  # (s, 2) vertices
+    segment_length: Floats  # (s,)
+    on_segment: Ints  # (n,) the segment on which a new vertex was inserted
+    narrow: Bools  # (n,) input vertices at which two segments meet at less than 60°, or with a smaller total angle
+    group: Ints  # (n,) vertices that nearly coincide, and the size of each group, from `coinciding`
     extent: Floats
-    seen: Ints
-    room: Floats
+    seen: Ints  # number of steps of the history whose faces have been listed, and the bin that the last face came from
+    room: Floats  # work arrays for the search around a new vertex
     halfedges: Ints
 
 
@@ -238,7 +224,7 @@ def list_all(g: Gluing, agenda: Agenda, goal: Goal) -> None:
 
 @kernel
 def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
-    """The bad face of (nearly) the largest circumradius, or −1."""
+    """Return the bad face of (nearly) the largest circumradius, or −1."""
     for place in range(N_BINS - 1, -1, -1):
         while agenda.bins[place] >= 0:
             f: int = agenda.bins[place]
@@ -252,11 +238,10 @@ def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
 
 @kernel
 def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
-    """Insert one vertex to remove a bad face, where possible; returns False if the arrays have no room for it.
+    """Insert one vertex to remove a bad face, where possible; return False if the arrays have no room for it.
 
     A face at vertices that nearly coincide is left as it is, unless an angle above 150° makes its circumcircle large
-    and no segment blocks its circumcentre: grading the faces towards such vertices would take hundreds of new vertices,
-    for no gain in accuracy.
+    and no segment blocks its circumcentre: grading faces towards such vertices would take hundreds of new ones.
     """
     h = is_bad(g, f, goal)[1]
     close = coincide(g, agenda, h)
@@ -280,8 +265,7 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
 def too_near(g: Gluing, h: int, f: int, px: float, py: float) -> bool:
     """Whether p, the circumcentre of the face with shortest side h in the frame of face f, is too near a corner of f.
 
-    In a Delaunay triangulation no vertex is nearer than the circumradius. Where rounding has made one so, the face is
-    left as it is.
+    Only rounding can make it so: in a Delaunay triangulation no vertex is nearer than the circumradius.
     """
     n, d = tangent_at(g, preceding(h))
     radius = 0.25 * g.length[g.edge[h]] * (n + d) / np.sqrt(n * d)
@@ -415,7 +399,7 @@ def insert(g: Gluing, agenda: Agenda, f: int, px: float, py: float) -> None:
 
 @kernel
 def folded_face(g: Gluing, h: int) -> int:
-    """A face that has the edge of h twice, or −1."""
+    """Find a face that has the edge of h twice, or −1."""
     y = h
     while True:
         if g.edge[following(y)] == g.edge[h] or g.edge[preceding(y)] == g.edge[h]:
@@ -427,7 +411,7 @@ def folded_face(g: Gluing, h: int) -> int:
 
 @kernel
 def vertex_near_edge(g: Gluing, h: int) -> tuple[int, float, float]:
-    """A vertex opposite to an edge that nearly lies on it, its height and its fraction along h; −1, 0, ½ if none."""
+    """Find a vertex opposite to an edge that nearly lies on it, its height and fraction along h; −1, ∞, ½ if none."""
     nearby, height, fraction, length, y = -1, np.inf, 0.5, g.length[g.edge[h]], h
     while True:
         along, above = apex_position(g, y)
@@ -455,12 +439,11 @@ def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
 
 @kernel
 def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool:
-    """Split a segment that keeps face f from being removed; returns False if the arrays have no room for it.
+    """Split a segment that keeps face f from being removed; return False if the arrays have no room for it.
 
     The segment is split in the middle, with two exceptions: next to a vertex that nearly lies on it; and, near an end
     where segments meet at a small angle, at a distance from that end that is a power of two, so that the parts of both
-    segments have equal lengths and stop splitting each other (Ruppert 1995). Parts a billionth of their segment are not
-    split.
+    segments have equal lengths and stop splitting each other (Ruppert 1995). Tiny parts are not split.
     """
     e = g.edge[h]
     segment, length, step = agenda.segment[e], g.length[e], g.counts[3]
@@ -526,7 +509,7 @@ def cross(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> f
 def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, float, float]:
     """Walk straight from the barycentre of a face to its circumcentre.
 
-    Returns INSIDE with the face that contains it and its position there (first halfedge along x), BLOCKED with a
+    Return INSIDE with the face that contains it and its position there (first halfedge along x), BLOCKED with a
     halfedge of the segment in between, or LOST where the face is flat.
     """
     x, y = np.zeros(3), np.zeros(3)
@@ -573,7 +556,7 @@ def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, float, float]:
 
 @kernel
 def encroached(g: Gluing, f: int, px: float, py: float, ends: Floats, halfedges: Ints) -> int:
-    """A segment that p encroaches upon: visible from p, which lies in its diametral circle. −1 if there is none.
+    """Find a segment that p encroaches upon: visible from p, which lies in its diametral circle; −1 if there is none.
 
     p is given in the frame of face f. `ends` and `halfedges` are work arrays for the search.
     """
@@ -618,7 +601,7 @@ NEARNESS = 0.01
 
 @kernel
 def root(parent: Ints, a: int) -> int:
-    """Representative of the group that a vertex belongs to (union–find with path halving)."""
+    """Find the representative of the group of a vertex (union–find with path halving)."""
     while parent[a] != a:
         parent[a] = parent[parent[a]]
         a = parent[a]
@@ -627,11 +610,11 @@ def root(parent: Ints, a: int) -> int:
 
 @kernel
 def coinciding(tail: Ints, head: Ints, length: Floats, order: Ints, n_vertices: int) -> tuple[Ints, Floats]:
-    """Group vertices that nearly coincide: the first vertex of the group of each, or −1.
+    """Group vertices that nearly coincide; return the first vertex of the group of each, or −1, and the group's extent.
 
-    Edges join vertices into ever larger groups, in an order from short to long ones (Kruskal). A group is kept if the
-    lengths of the edges that made it sum to less than `NEARNESS` times the length of the next edge that leaves it; of
-    nested groups the largest is kept. This sum, a bound on the diameter, is returned at its first vertex.
+    Edges join vertices into ever larger groups, from short to long ones (Kruskal). A group is kept if its extent, the
+    sum of the lengths of the edges that made it, is less than `NEARNESS` times the length of the next edge that leaves
+    it; of nested groups the largest is kept. The extent is given at the first vertex of the group.
     """
     parent, node = np.arange(n_vertices), np.arange(n_vertices)
     first, second = np.full(2 * n_vertices, -1), np.full(2 * n_vertices, -1)
@@ -641,10 +624,10 @@ def coinciding(tail: Ints, head: Ints, length: Floats, order: Ints, n_vertices: 
         a, b = root(parent, tail[e]), root(parent, head[e])
         if a == b:
             continue
-        one, two = node[a], node[b]
-        first[count], second[count] = one, two
-        extent[count] = extent[one] + extent[two] + length[e]
-        leaving[one] = leaving[two] = length[e]
+        left, right = node[a], node[b]
+        first[count], second[count] = left, right
+        extent[count] = extent[left] + extent[right] + length[e]
+        leaving[left] = leaving[right] = length[e]
         parent[b] = a
         node[a] = count
         count += 1

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Complexes, Floats, Ints
+from ..arrays import Bools, Complexes, Floats, Ints, mask_of
 from ..errors import SourceError
 from ..frozen import Frozen
 from ..geodesics.exact_distance import cleared
@@ -44,8 +44,8 @@ class ConformingRefinement(Frozen):
     def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments], heights: Floats) -> ConformingRefinement:
         """Cut faces along all segments inside them, and put vertices at all points of the sources.
 
-        Faces are put in the order of the heights (n,) of the vertices, so that no later choice hangs on the order that
-        they were given in.
+        Faces are sorted by the heights (n,) of the vertices, so that nothing depends on the order in which they were
+        given.
         """
         finer, parents, corners = triangles, np.arange(triangles.n_faces), np.eye(3)[None]
         marked = np.zeros(finer.n_edges, dtype=bool)
@@ -54,15 +54,14 @@ class ConformingRefinement(Frozen):
             finer, merged, is_new, parents = cut_along(triangles, parts, begin=begin)
             corners, new = np.where(is_new[:, None, None], 0.0, np.eye(3)), np.flatnonzero(is_new)
             corners[new] = barycentric_of(triangles, parents[new], finer.corner_positions[new])
-            marked = np.zeros(finer.n_edges, dtype=bool)
-            marked[merged.edges[merged.edges >= 0]] = True
+            marked = mask_of(finer.n_edges, merged.edges[merged.edges >= 0])
         at_corners = np.einsum("mkl,ml->mk", corners, heights[triangles.corner_vertices[parents]])
         finer, edges, faces, turns = in_order(finer, at_corners)
         corners = np.take_along_axis(np.broadcast_to(corners, (len(faces), 3, 3))[faces], turns[:, :, None], axis=1)
         return cls(finer, marked[edges], parents[faces], corners)
 
     def push_forward(self, faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
-        """Points, and vectors (p, k, 3) at them, of the faces before the cuts, in the faces after."""
+        """Transfer points, and vectors (p, k, 3) at them, from the faces before the cuts to the faces after."""
         which, child = members_of(*grouped(self.parents, int(self.parents.max()) + 1), faces)
         corners = self.corners[child]
         is_flat = np.linalg.det(corners) == 0  # parts without area contain a point only if no other part does
@@ -73,15 +72,14 @@ class ConformingRefinement(Frozen):
         return child[best], weights[best], np.einsum("pvk,pkl->pvl", vectors, to_child[best])
 
     def pull_back(self, faces: Ints, barycentric: Floats) -> tuple[Ints, Floats]:
-        """Points of the faces after the cuts, in the faces before."""
+        """Transfer points from the faces after the cuts to the faces before."""
         return self.parents[faces], np.einsum("pk,pkl->pl", barycentric, self.corners[faces])
 
 
 def in_order(triangles: IntrinsicMesh, heights: Floats) -> tuple[IntrinsicMesh, Ints, Ints, Ints]:
-    """Triangles with faces, their corners and edges in the order of the heights (m, 3) of the corners.
+    """Sort faces, their corners and edges by the heights (m, 3) of the corners; each face begins at its lowest corner.
 
-    Each face begins at its lowest corner. Also the number that each edge (e,) and face (m,) had, and each corner (m,
-    3).
+    Return the triangles, and the number that each edge (e,), face (m,) and corner (m, 3) had.
     """
     faces = np.argsort(heights.sum(axis=1), kind="stable")
     turns = (heights[faces].argmin(axis=1)[:, None] + np.arange(3)) % 3
@@ -107,7 +105,7 @@ def barycentric_of(triangles: IntrinsicMesh, faces: Ints, points: Complexes) -> 
 
 
 def differences_of(triangles: IntrinsicMesh, faces: Ints, vectors: Complexes) -> Floats:
-    """(n, k, 3) vectors in face layouts as differences of barycentric coordinates, k to each face."""
+    """(n, k, 3) differences of barycentric coordinates of vectors in face layouts, k to each face."""
     q = triangles.corner_positions[faces]
     u, v = (q[:, 1] - q[:, 0])[:, None], (q[:, 2] - q[:, 0])[:, None]
     area = (np.conj(u) * v).imag
@@ -178,10 +176,7 @@ def transfer_segments(
 
 
 def _joined(triangles: IntrinsicMesh, points: LocatedPoints, faces: Ints, owners: Ints, nodes: Ints) -> Ints:
-    """(r, 2) the points that pieces of segments run between: each from where the last one ended, or from a node.
-
-    Shapes: `faces`, `owners` (r,), `nodes` (s, 2).
-    """
+    """(r, 2) ends of the pieces (r,) of segments (s, 2): each begins where the last one ended, or at a node."""
     n = len(points) - 2 * len(faces)
     last = np.append(np.diff(owners) > 0, True)
     first = np.append(True, last[:-1])
@@ -195,7 +190,7 @@ def _joined(triangles: IntrinsicMesh, points: LocatedPoints, faces: Ints, owners
 
 
 def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[Ints, Floats, Floats, Complexes]:
-    """Face, start, end (barycentric) and normal in the layout of the face of every segment, along edges or not.
+    """Return the face of every segment, its barycentric start and end, and its normal in the layout of the face.
 
     For a segment along an edge it is the face of the edge with the largest area.
     """
@@ -218,7 +213,7 @@ def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[Ints, Flo
 
 
 def _snapped(faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
-    """Points within rounding error of an edge moved onto it, and vectors within rounding error of its direction too."""
+    """Move points within rounding error of an edge onto it, and turn vectors within rounding error along it."""
     near = barycentric < SNAP
     weights = np.where(near, 0.0, barycentric)
     weights /= weights.sum(axis=1, keepdims=True)
@@ -229,15 +224,14 @@ def _snapped(faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, F
 
 
 LEAST = 1e-12
-"""Values that are smaller, relative to the largest, count as zero."""
+"""Size of values, relative to the largest, below which they count as zero."""
 
 
 def level_lines(history: History, refinement: ConformingRefinement, values: Floats) -> list[tuple[Ints, Floats, bool]]:
-    """The zero set of a function that is linear on the triangles after a history, on those before the refinement.
+    """Trace the zero set of a function that is linear on the triangles after a history, on those before the refinement.
 
-    Every segment is straight on an intrinsic triangle, and is traced across the faces of the mesh below. The triangles
-    must be consistently oriented. Of each polyline: faces and barycentric coordinates of its points, in order, with
-    larger values to its left; and whether it is closed.
+    The triangles must be consistently oriented. Return the faces and barycentric coordinates of the points of each
+    polyline, in order, with larger values to its left, and whether it is closed.
     """
     least = LEAST * max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-300)
     line = zero_line(history.after, cleared(history.after, values, least))
@@ -250,13 +244,12 @@ def level_lines(history: History, refinement: ConformingRefinement, values: Floa
     faces, starts = refinement.pull_back(lines.faces, lines.starts)
     ends = refinement.pull_back(lines.faces, lines.ends)[1]
     first = np.searchsorted(lines.owners, np.arange(len(line.faces) + 1))
-    found = []
+    polylines = []
     for order, _, closed in assemble_polylines(*line.ends.T):
         rows = np.concatenate([np.arange(first[k], first[k + 1]) for k in order])
         if closed:
-            found.append((faces[rows], starts[rows], True))
+            polylines.append((faces[rows], starts[rows], True))
         elif len(rows):
-            found.append(
-                (np.append(faces[rows], faces[rows[-1]]), np.concatenate([starts[rows], ends[rows[-1:]]]), False)
-            )
-    return found
+            points = np.concatenate([starts[rows], ends[rows[-1:]]])
+            polylines.append((np.append(faces[rows], faces[rows[-1]]), points, False))
+    return polylines

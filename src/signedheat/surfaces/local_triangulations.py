@@ -5,10 +5,11 @@ proposes the triangles around itself. A triangle has one vote for each of its co
 accepted in order of votes, then of roundness, unless they overlap an accepted one around one of their corners. The
 result is a mesh with at most two faces at every edge.
 
-The two sides of a thin plate lie in the same tangent planes, and only normals keep them apart. So neighbours count as
-farther the more normals differ, and are unfolded into a plane: as seen along the mean of both normals, so that the two
-faces at a sharp edge lie next to each other. First points triangulate the neighbours on their own side; where that
-leaves a boundary, they are joined to boundary points of the other side, as seen along the directions in which both end.
+The two sides of a thin plate lie in the same tangent planes, and only normals keep them apart. So the distance of
+neighbours increases with the angle between normals, and neighbours are projected along the mean of both normals, so
+that the two faces at a sharp edge lie next to each other. First, points triangulate the neighbours on their own side.
+Where that leaves a boundary, they are joined to boundary points of the other side, as seen along the directions in
+which both sides end.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, mask_of
 from ..compiled import compiled
 from ..mesh.components import connected_components, grouped, members_of
 from ..mesh.edges import edge_table
@@ -34,23 +35,23 @@ from ..search.nearest_triangles import TriangleTree
 from .plane_fits import point_spacing
 
 NORMALS = 2.0
-"""Spacings of points by which a neighbour counts as farther for each unit of length between its normal and the point's:
-those on the other side of a plate are four spacings farther. 72 thin clouds have 2,750 edges at holes, at 1 4,400, at 3
-2,030; but then 6 of 12 balls of 200 random points have a hole, at 2 none."""
+"""Spacings added to the distance of a neighbour for each unit of length between its normal and the point's, so that
+points on the other side of a plate are four spacings farther. 72 thin clouds have 2,750 edges at holes, at 1 4,400, at
+3 2,030; but then 6 of 12 balls of 200 random points have a hole, at 2 none."""
 OPPOSITE = -0.5
 """Cosine between the normals of two points below which they lie on different sides of a plate. At -0.8 and at 0 edges
 at holes are 4 and 8 % more."""
 FLAT = 0.03
-"""Height over a point's tangent plane, in spacings, up to which another one lies in it, on the same side, whatever its
+"""Height over a point's tangent plane, in spacings, up to which another point lies on the same side, whatever its
 normal. At 0.01 edges at holes are 3 % fewer, at 0.1 51 % more."""
 PULL = 0.03
 """Weight of a point's own normal in its tangent plane, relative to that of its neighbours: it decides where these lie
 along a line, as on the narrow side of a plate. At 0.01 edges at holes are 44 % more; at 0.1 6 % fewer, but 3 of 12
 balls of 200 random points have a hole."""
 NEAREST = 7
-"""Neighbours from which spacing is estimated."""
+"""Number of neighbours from which spacing is estimated."""
 GIVEN = 1.0
-"""Weight of a given normal, relative to that of a neighbour in the same plane, of which there are six."""
+"""Weight of a given normal, relative to that of each of the six neighbours in the same plane."""
 _CHUNK = 65536
 
 
@@ -59,19 +60,14 @@ class LocalTriangulations:
     """Triangles on points."""
 
     faces: Ints  # (m, 3) point ids, oriented alike as far as the surface allows
-    # (n, 3) unit normals, on the side from which the faces at each point run counter-clockwise
-    normals: Floats
+    normals: Floats  # (n, 3) unit normals, on the side from which the faces at each point run counter-clockwise
 
 
 def local_triangulations(
     points: Floats, normals: Floats, n_neighbors: int = 30, given: Floats | None = None
 ) -> LocalTriangulations:
-    """Triangulate points sampled from an unknown surface, in O(n log n) time.
+    """Triangulate points (n, 3) with normals, some of them given, in O(n log n) time.
 
-    Shapes: `points` (n, 3), `normals` (n, 3), `given` (n, 3).
-
-    Notes
-    -----
     Where the local triangulations disagree, triangles are split at points that all proposals have left out, and small
     holes are filled.
     """
@@ -90,7 +86,7 @@ def local_triangulations(
 
 
 def joined_triangles(planes: TangentPlanes) -> tuple[Ints, Ints]:
-    """Triangles on the points of each side, joined where both sides end; and all that were proposed."""
+    """Triangulate the points of each side, and join both where they end; return also all triangles proposed."""
     points, everywhere = planes.points, np.arange(len(planes.points))
     beside = ~planes.opposed(everywhere, planes.neighbors)
     proposals = [proposed_triangles(planes, everywhere, planes.neighbors, beside)]
@@ -134,24 +130,22 @@ class TangentPlanes:
 
     @classmethod
     def of(cls, points: Floats, normals: Floats, n_neighbors: int) -> TangentPlanes:
-        """Fit planes to the neighbours on the same side: normals that come with scans often belong to another mesh, and
-        fit worse.
-        """
+        """Fit planes to the neighbours on the same side: the normals of scans often belong to another mesh."""
         k, many = (min(size, len(points) - 1) for size in (n_neighbors, 2 * n_neighbors))
         nearest = min(NEAREST, many)
         tree = scipy.spatial.cKDTree(points)
 
         def fitted(rows: Floats) -> tuple[NDArray[Any], ...]:
-            some, own = rows[:, :3], rows[:, 3:]
-            distances, near = tree.query(some, k=many + 1)
+            centers, own = rows[:, :3], rows[:, 3:]
+            distances, near = tree.query(centers, k=many + 1)
             spacing = point_spacing(distances[:, nearest], nearest)
             flat = FLAT * spacing
-            others, opposed = turned_alike(points[near] - some[:, None], own[:, None], normals[near], flat[:, None])
+            others, opposed = turned_alike(points[near] - centers[:, None], own[:, None], normals[near], flat[:, None])
             apart = np.linalg.norm(others - own[:, None], axis=2)
             distances = np.hypot(distances, NORMALS * spacing[:, None] * apart)
             order = np.argsort(distances, axis=1, kind="stable")[:, : k + 1]
             near, distances, opposed = (np.take_along_axis(a, order, axis=1) for a in (near, distances, opposed))
-            offsets, reach = points[near] - some[:, None], distances[:, -1]
+            offsets, reach = points[near] - centers[:, None], distances[:, -1]
             weights = np.exp(-((2 * distances / reach[:, None]) ** 2)) * ~opposed
             away = -(weights[..., None] * offsets).sum(axis=1)
             return principal_axes(offsets, weights, own, reach), away, near[:, 1:], reach, flat
@@ -174,9 +168,9 @@ class TangentPlanes:
     def unfolded(self, here: Ints, there: Ints) -> Floats:
         """(m, 2) places of points (m,) in the planes of others (m,).
 
-        A point is projected along the mean of both normals, and what is then seen is turned into the plane. On the
-        other side of a plate, the directions in which both sides end have the part of the normals, and distance along
-        them leads away over the edge.
+        A point is projected along the mean of both normals, and its projection is turned into the plane. For points on
+        the other side of a plate the directions in which both sides end take the place of the normals, and distance
+        along them leads away over the edge.
         """
 
         def places(pairs: Ints) -> tuple[Floats]:
@@ -194,10 +188,10 @@ class TangentPlanes:
 
 
 def turned_alike(offsets: Floats, normal: Floats, others: Floats, flat: Floats) -> tuple[Floats, Bools]:
-    """Normals (…, 3) of other points, and whether (…,) they lie on the other side of a plate.
+    """Turn normals (…, 3) of other points on the same side back; return also which points lie on the other side.
 
-    On the same side a normal may be turned by mistake, and is turned back: where the other point lies in the tangent
-    plane, or is below the point and the point above it.
+    A contrary normal is a mistake where the other point lies in the tangent plane, or is below the point and the point
+    above it; otherwise the other point lies on the other side of a plate.
     """
     contrary = dot(normal, others) < OPPOSITE
     over, under = dot(offsets, normal), -dot(offsets, others)
@@ -211,9 +205,7 @@ def dot(a: Floats, b: Floats) -> Floats:
 
 
 def principal_axes(offsets: Floats, weights: Floats, normals: Floats, reach: Floats) -> Floats:
-    """(n, 3, 3) principal axes of each row of (n, k, 3) offsets with (n, k) weights, longest first; the last one is
-    pulled towards normals (n, 3).
-    """
+    """(n, 3, 3) principal axes of (n, k, 3) offsets with (n, k) weights; the last is pulled towards normals (n, 3)."""
     weights = weights[..., None]
     offsets = offsets - (weights * offsets).sum(axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True)
     covariance = (weights * offsets).transpose(0, 2, 1) @ offsets
@@ -224,9 +216,8 @@ def principal_axes(offsets: Floats, weights: Floats, normals: Floats, reach: Flo
 
 
 def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, used: Bools) -> tuple[Ints, Ints]:
-    """(m, 3) triangles that points (c,) propose among their neighbours (c, k) that are used, and (m,) votes for each.
-
-    Each triangle is there once, its corners in increasing order.
+    """(m, 3) distinct triangles, with sorted corners, that points (c,) propose among some of their neighbours (c, k);
+    and (m,) votes for each.
     """
     triangles = [np.empty((0, 3), dtype=np.int64)]
     k = neighbors.shape[1]
@@ -245,9 +236,9 @@ def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, us
         triangles.append(np.stack([chunk[row], near[row, sides[row, at]], near[row, following[row, at]]], axis=1))
     sorted_corners = np.sort(np.concatenate(triangles), axis=1)
     number, first = distinct_rows(sorted_corners)
-    found = sorted_corners[first]
-    order = np.lexsort(found.T[::-1])
-    return found[order], np.bincount(number)[order]
+    distinct = sorted_corners[first]
+    order = np.lexsort(distinct.T[::-1])
+    return distinct[order], np.bincount(number)[order]
 
 
 def accepted_triangles(planes: TangentPlanes, proposals: Sequence[tuple[Ints, Ints]]) -> Ints:
@@ -273,10 +264,7 @@ def well_shaped_triangles(points: Floats, triangles: Ints, reach: Floats) -> tup
 
 
 def nonoverlapping_triangles(planes: TangentPlanes, triangles: Ints) -> Ints:
-    """The triangles, in the given order, that overlap no earlier one around any of their corners.
-
-    Two triangles overlap if the sectors that they occupy in the tangent plane of a common corner do.
-    """
+    """Accept triangles, in order, unless they overlap an earlier one: in the tangent plane of a common corner."""
     starts, widths = np.empty(triangles.shape), np.empty(triangles.shape)
     for k in range(3):
         here, right, left = (triangles[:, (k + shift) % 3] for shift in range(3))
@@ -290,10 +278,10 @@ def nonoverlapping_triangles(planes: TangentPlanes, triangles: Ints) -> Ints:
 
 
 def split_at_points_left(points: Floats, faces: Ints, candidates: Ints) -> Ints:
-    """The triangles, the nearest to each point that has candidates but no triangle split in three there.
+    """Split the triangle nearest to each point that has candidates but no triangle in three.
 
-    Tangent planes around such a point lie so differently that each triangle proposed at it overlaps others. Points
-    without candidates are outliers.
+    Tangent planes around such a point differ so much that each triangle proposed at it overlaps others. Points without
+    candidates are outliers.
     """
     while len(left := np.setdiff1d(candidates, faces)):
         nearest, _ = TriangleTree.of(points[faces]).nearest(points[left])
@@ -322,9 +310,7 @@ def aligned(axes: Floats, faces: Ints, normals: Floats, given: Floats) -> Ints:
 
 
 def facing(planes: TangentPlanes, normals: Floats, faces: Ints) -> Ints:
-    """The faces, turned to be counter-clockwise, unfolded into the planes of their corners, as seen from where normals
-    along those of the planes point.
-    """
+    """Turn faces to be counter-clockwise, in the planes of their corners, as seen from where the normals point."""
     up = np.sign((np.cross(planes.axes[:, 0], planes.axes[:, 1]) * normals).sum(axis=1))
     area = np.zeros(len(faces))
     for k in range(3):
@@ -340,13 +326,11 @@ TOUCHING = 1e-7  # radians by which the sectors of two triangles at a corner may
 
 @compiled
 def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
-    """Delaunay neighbours of the origin among the points of each row, counter-clockwise.
+    """(n, MAX_SIDES) Delaunay neighbours of the origin among places (n, k, 2), counter-clockwise; (n,) their numbers.
 
     The Voronoi cell of the origin starts as a square, to ±1, and is cut by the bisectors of its neighbours, nearest
     first. Two neighbours whose sides of the cell meet span a Delaunay triangle with the origin, and the corner between
     them is its circumcentre: no circumradius exceeds the square's.
-
-    Shapes: `places` (n, k, 2); returned: neighbours (n, MAX_SIDES), counts (n,).
     """
     n, k = places.shape[:2]
     neighbours = np.full((n, MAX_SIDES), -1, dtype=np.int64)
@@ -431,18 +415,16 @@ MOST_SIDES = 12
 
 
 def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
-    """Triangles that fill holes of at most `MOST_SIDES` sides.
+    """Triangles that fill holes of at most `MOST_SIDES` sides, without edges that exist already.
 
-    A boundary loop is a hole if the faces lie outside it: an outer boundary, however short, is left open. An ear that
-    would make an edge that exists already is not cut off. Faces run counter-clockwise as seen from their normals,
-    except across a few edges, and an edge has two of them at most.
+    A boundary loop is a hole if the faces lie outside it. Faces must run counter-clockwise as seen from their normals,
+    except across a few edges, and an edge must have at most two of them.
     """
     edges = edge_table(faces)
     face, side = np.nonzero(edges.face_counts[edges.face_edges] == 1)
     tails, heads = faces[face, side], faces[face, (side + 1) % 3]
     following = next_around_gap(points, normals, tails, heads)
-    at_boundary = np.zeros(len(points), dtype=bool)
-    at_boundary[tails] = True
+    at_boundary = mask_of(len(points), tails)
     existing = {_pair(i, j) for i, j in edges.vertices[at_boundary[edges.vertices].all(axis=1)].tolist()}
     fillings: list[tuple[int, int, int]] = []
     passed = np.zeros(len(tails), dtype=bool)
@@ -455,9 +437,8 @@ def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
 
 
 def next_around_gap(points: Floats, normals: Floats, tails: Ints, heads: Ints) -> Ints:
-    """(b,) boundary edge that follows each one around the gap to its right, or −1.
-
-    Where several leave its head, it is the first one counter-clockwise from the reversed edge: faces lie to the left.
+    """(b,) boundary edge that follows each one around the gap to its right, or −1: the first one counter-clockwise from
+    the reversed edge.
     """
     arriving, onward = members_of(*grouped(tails, len(points)), heads)
     at = heads[arriving]
@@ -472,7 +453,7 @@ def next_around_gap(points: Floats, normals: Floats, tails: Ints, heads: Ints) -
 
 
 def _loop_from(start: int, following: Ints) -> list[int]:
-    """The boundary edges of the loop through one of them; empty if they do not close."""
+    """Follow the boundary edges of a loop; return none if they do not close."""
     loop = [start]
     while len(loop) <= MOST_SIDES:
         onward = int(following[loop[-1]])

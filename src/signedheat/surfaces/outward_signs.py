@@ -1,12 +1,12 @@
-"""Signs of normals that have axes but no direction yet: points on an unknown surface, turned outwards together.
+"""Orientation of the normals of points on an unknown surface, whose axes are known but not which way is out.
 
-The ball around a Delaunay tet touches four points and holds none. Where it touches two of them along their normals, it
-lies on one side of the surface near both: inside or outside, but the same. So tets link the signs of normals, across
-edges, gaps and thin walls alike, without any triangulated surface. Faces of the convex hull link them with the outside.
-(Poles of Voronoi cells: Amenta & Bern 1999; labels from balls that overlap: Kolluri, Shewchuk & O'Brien 2004.)
+The ball around a Delaunay tet touches four points and contains none. Where it touches two of them along their normals,
+it lies on the same side of the surface near both. So tets link the signs of normals, across edges, gaps and thin walls
+alike, without a triangulated surface. Faces of the convex hull link them with the outside. (Poles of Voronoi cells:
+Amenta & Bern 1999; labels from balls that overlap: Kolluri, Shewchuk & O'Brien 2004.)
 
-Gauss's formula (`signedheat.solids.gauss`) asks for an inside, which clouds need not have: on points of open sheets
-(waves, terrains, saddles) it turns half of them round, where these links turn none.
+Gauss's formula (`signedheat.solids.gauss`) needs an inside, which clouds need not have: on points of open sheets
+(waves, terrains, saddles) it turns half of the normals, where these links turn none.
 """
 
 from __future__ import annotations
@@ -25,30 +25,30 @@ from .plane_fits import PlaneFits, fit_planes, noise_scale, noisy_sizes, point_s
 SPREAD = 0.35
 """Distance between the noisy points that are kept, in reaches: larger than the noise that planes leave."""
 MOST = 100_000
-"""Points for which tets are made; the others take the signs of their neighbours."""
+"""Number of points for which tets are made; the others take the signs of their neighbours."""
 GIVEN_WEIGHT = 0.1
 """Weight of given signs, over half the sum of the weights of all links of a point."""
 MOST_WRONG = 3.0
-"""Share of given signs that seem wrong, over that in which points contradict each other, up to which they stay."""
+"""Given signs stay unless the share that seems wrong exceeds this many times the share of contradictions."""
 WORSE = 0.0015
-"""Coherence by which larger neighbourhoods must gain, and which, once lost, no larger ones win back."""
+"""Gain of coherence for which larger neighbourhoods are taken, and loss at which no larger ones are tried."""
 JOGGLE = 1e-4
-"""Part of the distance to neighbours by which points are moved: flat faces and lattices are slow to triangulate."""
+"""Random move of points, over the distance to neighbours: flat faces and lattices are slow to triangulate."""
 STEEPEST = 0.5
 """Cosine between a normal and the direction to a ball's centre below which a ball links no signs."""
 LONE = 4.0
-"""Distance from a point to its neighbours, over that of these to theirs, above which it is an outlier: without evidence
-of its own. Where spacing is even it is up to 1.4, where density halves within three spacings 1.6."""
+"""Distance from a point to its neighbours, over that of these to theirs, above which it is an outlier. Where spacing is
+even it is up to 1.4, where density halves within three spacings 1.6."""
 NEARBY = 8
-"""Neighbours that a point is compared with directly."""
+"""Number of neighbours with which a point is compared directly."""
 DIRECT_WEIGHT = 0.1
-"""Weight of a link between neighbours, over that of a ball's; with noisy points they weigh the same."""
+"""Weight of a link between neighbours, over that of a ball; with noisy points they weigh the same."""
 UPWARD = np.array([0.01, 0.1, 1.0])
-"""Where out is if nothing decides it, as for points in a plane: up; on vertical planes along the second axis. Each
-component halved or doubled, planes have the same sides."""
+"""Direction of out where nothing decides it, as for points in a plane: up, and on vertical planes along the second
+axis. If a component is halved or doubled, planes keep their sides."""
 MUTUAL = 0.98
 """Share of pairs of near points with opposite normals of which each is below the other, less the share of those of
-which each is above it, from which given normals are believed on thin sheets: there it is 1, and .9 if a fifth of the
+which each is above it, above which given normals are kept on thin sheets: there it is 1, and .9 if a fifth of the
 normals are turned."""
 _CHUNK = 4096
 
@@ -63,22 +63,22 @@ class OutwardSigns:
 
 
 def outward_normals(points: Floats, given: Floats | None = None) -> tuple[Floats, PlaneFits, OutwardSigns]:
-    """Normals at (n, 3) distinct points, outwards together: the given ones, some of them turned, or fitted ones."""
+    """Orient normals at (n, 3) distinct points outwards: the given ones, some of which are turned, or fitted ones."""
     if given is None:
-        fits, found = fitted_outward(points)
-        return fits.axes * found.signs[:, None], fits, found
+        fits, outward = fitted_outward(points)
+        return fits.axes * outward.signs[:, None], fits, outward
     fits = fit_planes(points, noise_scale(points, given))
-    found = outward_signs(fits, given, given=True)
-    found = replace(found, signs=kept_on_thin_sheets(points, given, found.signs))
-    return given * found.signs[:, None], fits, found
+    outward = outward_signs(fits, given, given=True)
+    outward = replace(outward, signs=kept_on_thin_sheets(points, given, outward.signs))
+    return given * outward.signs[:, None], fits, outward
 
 
 def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
-    """Signs of given normals (n, 3), which stay on thin sheets as they are given if they fit each other there.
+    """Keep the signs of given normals (n, 3) on thin sheets, if the normals fit each other there.
 
-    Balls between the sides of a sheet thinner than points are apart are flat, and no evidence. Normals fit each other
-    if of two near points with opposite ones each is below the other, all over the cloud; or above it, where normals are
-    inverted, or lie on both sides of a gap: then most of the other points decide.
+    Balls between the sides of a sheet thinner than the spacing are flat, and no evidence. Normals fit each other if of
+    two near points with opposite ones each is below the other, all over the cloud; or above it, where all are inverted,
+    or lie on both sides of a gap: then most of the other points decide.
     """
     k = min(NEARBY, len(points) - 1)
     distances, near = scipy.spatial.cKDTree(points).query(points, k=k + 1)
@@ -94,26 +94,23 @@ def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
 
 
 def fitted_outward(points: Floats) -> tuple[PlaneFits, OutwardSigns]:
-    """Planes near (n, 3) distinct points, and signs that turn their normals outwards.
+    """Fit planes near (n, 3) distinct points, and find signs that turn their normals outwards.
 
-    In noise, neighbourhoods too small fit planes to it, and too large ones to several sheets at once: either way the
-    points contradict each other. The size with which they do so least is taken.
+    Too small neighbourhoods fit planes to noise, and too large ones to several sheets at once: either way the points
+    contradict each other. The size with which they do so least is taken.
     """
     tried: list[tuple[PlaneFits, OutwardSigns]] = []
     for size in noisy_sizes(points) or (None,):
         fits = fit_planes(points, size)
         tried.append((fits, outward_signs(fits, fits.axes)))
-        best = max(found.coherence for _, found in tried)
+        best = max(outward.coherence for _, outward in tried)
         if tried[-1][1].coherence < best - WORSE:
             break
-    return next(one for one in tried if one[1].coherence >= best - WORSE)
+    return next((fits, outward) for fits, outward in tried if outward.coherence >= best - WORSE)
 
 
 def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False, groups: Ints | None = None) -> OutwardSigns:
-    """Signs that turn axes outwards.
-
-    Shapes: `axes` (n, 3), `groups` (n,).
-    """
+    """Find signs that turn axes (n, 3) outwards, the same for all points of a group (n,)."""
     # links between chosen points; node m of the graph is the outside, node m + 1 the signs as given
     n = len(axes)
     chosen = spread_out(fits.places, SPREAD * fits.reaches) if fits.noisy else np.arange(n)
@@ -146,7 +143,7 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False, groups: In
 
 
 def _lone(places: Floats, reaches: Floats) -> Bools:
-    """(n,) points that are far from those next to them, compared with these: outliers."""
+    """(n,) outliers: points farther from their neighbours than these are from theirs."""
     near = scipy.spatial.cKDTree(places).query(places, k=min(NEARBY + 1, len(places)), workers=-1)[1]
     return reaches > LONE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
 
@@ -166,12 +163,9 @@ def _shared(signs: Floats, groups: Ints) -> Floats:
 
 
 def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = False) -> tuple[Links, bool]:
-    """Links between the signs of axes, from balls and from neighbours; and whether there were balls.
+    """Link the signs of axes (n, 3) by balls and by neighbours; return also whether there were balls.
 
-    One node past the points is the outside, whose sign is 1. Points in a plane have no tets: then there are links
-    between neighbours alone, and none with the outside.
-
-    Shapes: `places` (n, 3), `axes` (n, 3), `reaches` (n,).
+    Node n is the outside, whose sign is 1. Points in a plane have no tets, and no links with the outside.
     """
     near = _neighbor_links(places, axes, 1.0 if noisy else DIRECT_WEIGHT)
     moves = np.random.default_rng(0).uniform(-1, 1, places.shape) * (JOGGLE * reaches[:, None])
@@ -214,7 +208,7 @@ def _ball_links(places: Floats, axes: Floats, tets: Ints) -> Links:
 
 
 def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> Links:
-    """Links with the outside, from the faces of the hull: flat tets behind them do not tell the inner side."""
+    """Link faces of the hull with the outside: flat tets behind them do not tell the inner side."""
     tet, opposite = np.nonzero(tets.neighbors < 0)
     faces = tets.simplices[tet[:, None], (opposite[:, None] + [1, 2, 3]) % 4].astype(np.int64)
     a, b, c = places[faces].transpose(1, 0, 2)
@@ -226,7 +220,7 @@ def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> L
 
 
 def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
-    """Neighbours compared as if on a circle: one axis reflected in the plane midway is the other."""
+    """Link neighbours as if on a circle: reflected in the plane midway, one axis is the other."""
     n, k = len(places), min(NEARBY, len(places) - 1)
     neighbors = scipy.spatial.cKDTree(places).query(places, k=k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), neighbors.ravel()

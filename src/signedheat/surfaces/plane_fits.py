@@ -13,14 +13,14 @@ from ..mesh.unit_vectors import axes_across
 from ..parallel import in_chunks
 
 CLEAN_NEIGHBORS = 12
-"""Neighbours that a plane is fitted to where there is no noise to average out."""
+"""Number of neighbours to which a plane is fitted where there is no noise."""
 NOISY_NEIGHBORS = (12, 24, 48, 96, 192)
-"""Sizes of neighbourhood that noise may call for."""
+"""Sizes of neighbourhood for noisy points."""
 CLEAN_DEVIATION = 0.07
 """Deviation from robust planes, in reaches of neighbourhoods, above which points are noisy: curvature stays below .06,
-also on thin sheets and at edges where the points resolve them; noise as wide as the neighbourhood has .09 or more."""
+also on thin sheets and at edges that the points resolve; noise as wide as the neighbourhood has .09 or more."""
 ANGLE_ERROR = 0.13
-"""Radians by which noise may turn planes, as estimated from their deviation, above which they are not used."""
+"""Largest angle, in radians, by which noise may turn planes, as estimated from their deviation."""
 CLEAN_HEIGHTS = (0.25, 0.15, 0.1)
 """Heights over the plane through a point, in reaches, beyond which a neighbour belongs to another sheet, one by one."""
 NOISY_HEIGHTS = (0.5, 0.5, 0.5)
@@ -35,7 +35,7 @@ spacings of noise at most .014 are such; of plates, bowls, lenses and tubes whos
 ONE_SIDE = 0.02
 """Root mean square distance from a quadric, in spacings, up to which neighbours are taken for those of one side."""
 ON_QUADRIC = 24
-"""Neighbours to which a quadric is fitted."""
+"""Number of neighbours to which a quadric is fitted."""
 _TRIAL_HEIGHTS = (0.5, 0.5, 0.5)
 _TRIED = 2000
 
@@ -54,9 +54,8 @@ class PlaneFits:
 def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
     """Fit a plane near each of (n, 3) distinct points.
 
-    Without noise the neighbourhoods are small, and sheets that lie close together, or meet in an edge, stay apart:
-    of several planes that explain the point, the one that explains most neighbours. `n_neighbors` says that there is
-    noise, and how large neighbourhoods must be to average it out.
+    Without noise the neighbourhoods are small, and sheets that lie close together, or meet in an edge, stay apart: the
+    plane that explains most neighbours is taken. Noisy points need neighbourhoods of the size `n_neighbors`.
     """
     tree = scipy.spatial.cKDTree(points)
     noisy = n_neighbors is not None
@@ -70,8 +69,7 @@ def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
 def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
     """Sizes of neighbourhoods in which planes can be fitted in spite of noise, from the least; without noise none.
 
-    Estimated from at most 2,000 of the points. With normals, from neighbours on the same side: the other side of a thin
-    plate is no noise.
+    Estimated from at most 2,000 of the points. If normals are given, the other side of a thin plate is no noise.
     """
     largest = (len(points) - 1) // 4
     if largest < CLEAN_NEIGHBORS:
@@ -90,24 +88,24 @@ def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
 
 
 def noise_scale(points: Floats, normals: Floats | None = None) -> int | None:
-    """Size of neighbourhoods that noise calls for where normals are given; without noise none."""
+    """Size of neighbourhoods for noisy points, whose normals may be given; None without noise."""
     sizes = noisy_sizes(points, normals)
     return sizes[min(2, len(sizes) - 1)] if sizes else None
 
 
 def point_spacing(distances: Floats, k: int) -> Floats:
-    """Distance between points, from that to the k-th neighbour: in a plane, k lie in a circle of k squared spacings."""
+    """Distance between points, from that to the k-th neighbour: the circle around k points has k squared spacings."""
     return distances / np.sqrt(k / np.pi)
 
 
 def share_of_two_sides(points: Floats, normals: Floats) -> float:
-    """Share of points whose neighbours with similar normals are rather those of both sides of a plate that is thinner
-    than they are apart: they lie at two heights over a quadric. Estimated from at most 2,000 points.
+    """Share of points whose neighbours lie at two heights over a quadric, as on both sides of a plate thinner than the
+    spacing. Estimated from at most 2,000 points.
     """
     k = min(ON_QUADRIC, len(points) - 1)
     tree = scipy.spatial.cKDTree(points)
 
-    def found(tried: Ints) -> tuple[Bools]:
+    def two_sided(tried: Ints) -> tuple[Bools]:
         distances, near = tree.query(points[tried], k=k + 1)
         offsets, normal = points[near] - points[tried, None], normals[tried]
         weights = np.exp(-((distances / distances[:, -1:]) ** 2)) * (np.einsum("nkd,nd->nk", normals[near], normal) > 0)
@@ -122,7 +120,7 @@ def share_of_two_sides(points: Floats, normals: Floats) -> float:
         enough = (weights > 0).sum(axis=1) > k / 2
         return ((mean > TWO_SIDES * root) & (root > ONE_SIDE) & enough,)
 
-    return float(in_chunks(found, np.arange(0, len(points), -(-len(points) // _TRIED)))[0].mean())
+    return float(in_chunks(two_sided, np.arange(0, len(points), -(-len(points) // _TRIED)))[0].mean())
 
 
 def planes_near(
@@ -135,10 +133,10 @@ def planes_near(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Axes, centres, reaches and deviations of planes near chosen points."""
 
-    def fit(some: Ints) -> tuple[Floats, Floats, Floats, Floats]:
-        distances, neighbors = tree.query(tree.data[some], k=n_neighbors + 1)
-        neighbors[:, 0] = some
-        axes, centers, deviations = np.zeros((len(some), 3)), points[some], np.zeros(len(some))
+    def fit(ids: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+        distances, neighbors = tree.query(tree.data[ids], k=n_neighbors + 1)
+        neighbors[:, 0] = ids
+        axes, centers, deviations = np.zeros((len(ids), 3)), points[ids], np.zeros(len(ids))
         fitted = axes, centers, deviations
         robust_planes(points, neighbors, distances, np.array(heights), n_starts > 1, n_starts, *fitted)
         return axes, centers, distances[:, -1], deviations
@@ -248,11 +246,10 @@ def robust_planes(
     centers: Floats,
     deviations: Floats,
 ) -> None:
-    """Fit a plane near each point to those of its neighbours that lie within a height of it, from several starts.
+    """Fit a plane near each point, its first neighbour, to those of its neighbours that lie within a height of it.
 
-    The first neighbour is the point itself. Heights are parts of the reach, one after the other: over the plane through
-    the point, if `on_surface`, else through the centre of those found before, the point itself at first. The plane with
-    most neighbours within the last height is kept.
+    Heights are in reaches, one after the other: over the plane through the point, if `on_surface`, else through the
+    centre of the last fit. Of several starts the plane with most neighbours within the last height is kept.
     """
     n, k = neighbors.shape
     offsets, near, weights = np.empty((k, 3)), np.empty(k), np.empty(k)

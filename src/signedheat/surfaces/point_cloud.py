@@ -25,18 +25,16 @@ if TYPE_CHECKING:
     import trimesh  # noqa: F401  named in the base class
 
 CONTRARY = 0.35
-"""Share of the normals given that may contradict the orientation of the points, if not all are inverted: .39 to .49
-where both sides of a plate are taken for one; where .3 of the normals are turned, that."""
-
-
+"""Share of the given normals that may contradict the orientation of the points, unless all are inverted. It is .39 to
+.49 where both sides of a plate are taken for one, and .3 where .3 of the normals are turned."""
 SEAM = 0.35
-"""Edges next to another side across which triangles face opposite ways, over the root of the number of points, above
-which a cloud is announced. On scans, CAD and a box with up to .15 spacings of noise they are at most .07, where parts
-of thin plates face the wrong way mostly .41 to .96."""
+"""Number of edges next to another side across which triangles face opposite ways, over the root of the number of
+points, above which there is a warning. On scans, CAD and a box with up to .15 spacings of noise it is at most .07,
+where parts of thin plates face the wrong way mostly .41 to .96."""
 STEEP = 0.7
-"""Cosine between a normal and the direction to a neighbour above which that lies on another side."""
+"""Cosine between a normal and the direction to a neighbour above which the neighbour lies on another side."""
 _NEARBY = 13
-"""Points near an edge among which those on another side are looked for: its own neighbourhood, about twice."""
+"""Number of points near an edge that may lie on another side: about twice its own neighbourhood."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,8 +202,9 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
 
 def edges_turned(points: Floats, normals: Floats, faces: Ints) -> int:
-    """Number of edges next to another side across which triangles face opposite ways. Surfaces with one side have such
-    edges, too, but no other side is near.
+    """Count edges next to another side across which triangles face opposite ways.
+
+    Surfaces with one side have such edges, too, but no other side is near.
     """
     halfedges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     edges, uses = np.unique(halfedges, axis=0, return_counts=True)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, mask_of
 from ..errors import GeometryError
 from ..exchange import Elements, Exchangeable
 from ..mesh.components import sums_of
@@ -198,8 +198,7 @@ def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> Virtua
     whole = area_vectors(np.stack([vertices[tails], vertices[heads], centers[fan_of]], axis=1))
     total = sums_of(whole, fan_of, len(fans))
     part = (whole * total[fan_of]).sum(axis=1)
-    turned = np.zeros(len(fans), dtype=bool)
-    turned[fan_of[part < _SLIVER * (total * total).sum(axis=1)[fan_of]]] = True
+    turned = mask_of(len(fans), fan_of[part < _SLIVER * (total * total).sum(axis=1)[fan_of]])
     cuts = {k: _cut(vertices[corners[polygons == fans[k]]]) for k in np.flatnonzero(turned)}
     cuts = {k: triangles for k, triangles in cuts.items() if len(triangles)}
     kept = np.ones(len(fans), dtype=bool)

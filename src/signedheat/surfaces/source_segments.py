@@ -23,11 +23,11 @@ Positions: TypeAlias = Floats | None
 def segments_of(
     source: CurveOrPoints | CurveSegments, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0
 ) -> CurveSegments:
-    """Cut a source, whose faces are those of the triangles, into segments; `CurveSegments` are returned as they are.
+    """Cut a source, whose faces are those of the triangles, into segments; return `CurveSegments` as they are.
 
-    Consecutive points of a curve that share no face are joined by a geodesic path. Curves with given normals need
-    `positions`: in space, of vertices or, if every face lies in a plane of its own, of corners. `number` is the index
-    of the source, for messages.
+    Consecutive points of a curve that share no face are joined by a geodesic path. Curves with given normals need the
+    `positions` in space of vertices or, if every face lies in a plane of its own, of corners. `number` is the index of
+    the source, for messages.
     """
     raise SourceError(
         f"source {number} is a {type(source).__name__}: on a surface, distance is measured to a "
@@ -39,7 +39,7 @@ def segments_of(
 def segments_of_each(
     sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]], triangles: IntrinsicMesh, positions: Positions = None
 ) -> list[list[CurveSegments]]:
-    """The segments of several sources; a sequence of curves and points among them counts as one source."""
+    """Cut several sources into segments; a sequence of curves and points among them counts as one source."""
     return [
         [
             segments_of(item, triangles, positions, number)
@@ -97,10 +97,7 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, numb
 
 
 def one_sided(sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]], triangles: IntrinsicMesh) -> list[int]:
-    """Numbers of the sources with a curve that has one side only: faces along it cannot be turned to agree.
-
-    Curves with normals have the sides that these give them.
-    """
+    """List the sources with a curve without normals along which faces cannot be turned to agree: it has one side."""
     if triangles.is_consistently_oriented:
         return []
     numbers = []

@@ -68,7 +68,7 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
 
 
 def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], Ints, LocatedPoints]:
-    """The polygons, the triangle that each lies in, and the points at which edges of the mesh cross intrinsic edges.
+    """Find the polygons, the triangle of each, and the points at which edges of the mesh cross intrinsic edges.
 
     Corners of polygons are vertices of the triangulation, or, from n_vertices on, crossings in order.
     """
@@ -120,12 +120,12 @@ def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
     places = defaultdict(list)
     for k, corner in enumerate(outline):
         places[corner].append(k)
-    found = [(a, b) for a, b in chords if a in places and b in places]
-    found.sort(key=lambda ends: abs(places[ends[0]][0] - places[ends[1]][0]))
+    between = [(a, b) for a, b in chords if a in places and b in places]
+    between.sort(key=lambda ends: abs(places[ends[0]][0] - places[ends[1]][0]))
     following = [*range(1, len(outline)), 0]
     alive = [True] * len(outline)
     parts, left = [], len(outline)
-    for chord in found:
+    for chord in between:
         ends = [next((k for k in places[corner] if alive[k]), -1) for corner in chord]
         first, last = min(ends), max(ends)
         if first < 0 or following[first] == last:
@@ -143,5 +143,5 @@ def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
 
 def positions(triangulation: IntrinsicTriangulation, places: LocatedPoints) -> Floats:
     """(p, 3) positions in space of points of the triangulation."""
-    found = triangulation.history.backward(places.faces, places.barycentric)
-    return triangulation.in_space(*triangulation.refinement.pull_back(*found[:2]))
+    faces, barycentric, _ = triangulation.history.backward(places.faces, places.barycentric)
+    return triangulation.in_space(*triangulation.refinement.pull_back(faces, barycentric))

@@ -97,7 +97,7 @@ class Curve(Frozen):
         return self.n_points if self.closed else self.n_points - 1
 
     def reversed(self) -> Curve:
-        """The curve in opposite direction: left and right are exchanged; given normals stay the same.
+        """Reverse the curve, which exchanges left and right; given normals stay the same.
 
         Returns
         -------
@@ -169,7 +169,7 @@ ElementList: TypeAlias = Sequence[tuple[int, Sequence[float]]]
 
 
 def surface_points(faces: ArrayLike, barycentric: ArrayLike, name: str) -> tuple[Ints, Floats]:
-    """Read-only face ids and barycentric coordinates, checked as far as possible without the surface."""
+    """Check face ids and barycentric coordinates as far as possible without the surface; return them read-only."""
     ids = np.atleast_1d(array_of(faces, f"face ids of a {name}", SourceError))
     if ids.size == 0:
         return frozen(np.empty(0, dtype=np.int64)), frozen(np.empty((0, 3)))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..arrays import Bools, Complexes, Floats, Ints
+from ..arrays import Bools, Complexes, Floats, Ints, mask_of
 from ..cache import LastUsed, fingerprint
 from ..diagnostics import EdgesLengthened, LargeAngles, Note, PointsLeftOut, VerticesAdded
 from ..direct_integration import DirectIntegration, refuse_contradictions
@@ -34,7 +34,7 @@ from .triangle_mesh import TriangleMesh
 from .vector_heat import VectorHeat, extrapolated, nonmanifold_frames
 
 TIMES = 2
-"""Diffusion times whose factors are kept: where curves end another one is used."""
+"""Number of diffusion times whose factors are kept: there is another one where curves end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class SurfaceDiscretization:
         return surface._turned_to(triangles), groups
 
     def segments(self, sources: Sequence[Any]) -> list[list[CurveSegments]]:
-        """The sources, given on the domain, as segments on the triangles."""
+        """Cut the sources, given on the domain, into segments on the triangles."""
         if self.transfer is not None:
             sources = [self.transfer(source) for source in sources]
         positions = self.positions
@@ -97,7 +97,7 @@ class SurfaceDiscretization:
         return segments_of_each(sources, self.triangles, positions)
 
     def _turned_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
-        """The same surface with other first faces at nonmanifold edges; shares all of step 3, which ignores them."""
+        """Choose other first faces at nonmanifold edges, and share all of step 3, which does not depend on them."""
         if triangles is self.triangles:
             return self
 
@@ -109,7 +109,7 @@ class SurfaceDiscretization:
         return self._turned(fingerprint(triangles.first_halfedges), turned)
 
     def _cut_into(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
-        """The same surface with refined triangles, whose first vertices are the present ones."""
+        """Refine the triangles, which keep their vertices as the first ones."""
         added = triangles.n_vertices - self.triangles.n_vertices
         return replace(
             self,
@@ -134,10 +134,7 @@ class SurfaceDiscretization:
         return heat.solve([source.vectors for source in sources], changes=2 if sources[0].extrapolated else 0)
 
     def to_cells(self, stages: list[Complexes]) -> Complexes:
-        """(m,) three times the mean of X over the edges of each face (Sec. 6), in its layout; extrapolated if wanted.
-
-        Each face takes it from the last stage in which all of its edges are known.
-        """
+        """(m,) three times the mean of X over the edges of each face (Sec. 6), from the last stage that has them all."""
         sums = self.triangles.sums_in_faces(stages[0])
         for stage in stages[1:]:
             later = self.triangles.sums_in_faces(stage)
@@ -149,15 +146,13 @@ class SurfaceDiscretization:
         return divergence(self.triangles, directions)
 
     def reached_by(self, vectors: sparse.csr_array) -> Bools:
-        """(n_vertices,) which vertices have a face in a component with a source: vectors diffuse across edges only."""
+        """(n_vertices,) vertices with a face in a component with a source: vectors diffuse across edges only."""
         parts = self.triangles.face_components
         if not parts.any():
             return np.ones(self.triangles.n_vertices, dtype=bool)
-        is_source = np.zeros(self.triangles.n_edges, dtype=bool)
-        is_source[vectors.indices[vectors.data != 0]] = True
+        is_source = mask_of(self.triangles.n_edges, vectors.indices[vectors.data != 0])
         with_source = np.unique(parts[is_source[self.triangles.edges.face_edges].any(axis=1)])
-        reached = np.zeros(self.triangles.n_vertices, dtype=bool)
-        reached[self.triangles.corner_vertices[np.isin(parts, with_source)]] = True
+        reached = mask_of(self.triangles.n_vertices, self.triangles.corner_vertices[np.isin(parts, with_source)])
         return reached
 
 
@@ -168,7 +163,7 @@ def _(domain: TriangleMesh) -> SurfaceDiscretization:
 
 
 def lowered_mesh(domain: TriangleMesh) -> SurfaceDiscretization:
-    """The discretisation of a mesh, of whose memory the caller has made sure."""
+    """Discretise a mesh, whose memory the caller has checked."""
     triangles, added = laid_out(domain, 1e-6)
     share = large_angles(triangles)
     notes = (*([EdgesLengthened(added)] if added else []), *([LargeAngles(share)] if share else []))
@@ -182,20 +177,20 @@ def large_angles(triangles: IntrinsicMesh) -> float:
 
 
 BYTES = {"pardiso": (1200, 40), "cholmod": (1150, 150), "superlu": (800, 200)}
-"""Peak for each triangle, and what every doubling of their number adds, since the fill of factors grows; by back end.
+"""Peak memory of each triangle by back end, and its growth with every doubling of their number, by the fill of factors.
 Measured on 20,000 to 310,000 triangles with one diffusion time; CHOLMOD with three."""
 
 
 def memory_estimate(n_triangles: int) -> float:
-    """Bytes that a first distance on so many triangles takes at the most."""
+    """Estimate the bytes of a first distance on so many triangles."""
     each, per_doubling = BYTES[chosen_backend()]
     return n_triangles * (each + per_doubling * math.log2(max(n_triangles, 2)))
 
 
 def refuse_too_many(triangles: int, count: int, elements: str, more: float = 0.0) -> None:
-    """Raise `MemoryLimitError` if distance on so many triangles, and `more` bytes, do not fit into memory.
+    """Raise `MemoryLimitError` if distance on triangles, and `more` bytes, do not fit into memory.
 
-    They stand for a `count` of elements of the domain: triangles, polygons, points, faces of voxels.
+    The triangles stand for `count` elements of the domain, which the message names.
     """
     each = triangles / max(count, 1)
     refuse_beyond_memory(
@@ -226,9 +221,9 @@ class SurfaceIntegration(SpringIntegration):
         return self._pulled_factor(source.interpolation, DirectIntegration.springs(self, source))
 
     def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, Floats]:
-        """Springs all along segments, so that more points on them change nothing; at vertices, and isolated points.
+        """Put springs at the two Gauss points of each segment, so that more points on it change nothing, and at points.
 
-        What is linear along a segment has the same square there as at its two Gauss points.
+        The integral of the square of a linear function along a segment is exact there.
         """
         assert isinstance(source, SurfaceSource)
         n, springs = len(source.weights), self.springs(source)
@@ -254,7 +249,7 @@ class SurfaceIntegration(SpringIntegration):
 
 
 LIGHTER = 0.87
-"""Memory of a triangle of a polygon, over that of others: few edges meet in virtual vertices. Measured on quads."""
+"""Memory of a triangle of a polygon, over that of others: few edges meet at virtual vertices. Measured on quads."""
 
 
 @discretize.register
@@ -264,13 +259,12 @@ def _(domain: PolygonMesh) -> SurfaceDiscretization:
 
 
 def lowered_polygons(domain: PolygonMesh) -> SurfaceDiscretization:
-    """The discretisation of polygons, of whose memory the caller has made sure.
+    """Discretise polygons, whose memory the caller has checked.
 
-    φ is solved for on all vertices of the triangles, virtual ones included, and reported at those of the polygons.
-
-    With virtual vertices eliminated in step 3 (``PᵀCP``), a curve across polygons could not be a level set of φ: it
-    crosses more edges of triangles than its polygons have corners, and φ would be constant on whole polygons. h is half
-    the mean length of the polygons' own edges, so that virtual vertices do not change t.
+    φ is solved for on all vertices of the triangles, virtual ones included, and reported at those of the polygons. With
+    virtual vertices eliminated in step 3 (``PᵀCP``), a curve across polygons could not be a level set of φ: it crosses
+    more edges of triangles than its polygons have corners, and φ would be constant on whole polygons. h is half the
+    mean length of the polygons' own edges, so that virtual vertices do not change t.
     """
     lowered = lowered_mesh(domain.triangulation)
     own = (domain.triangulation.edges.vertices < domain.n_vertices).all(axis=1)
@@ -279,19 +273,15 @@ def lowered_polygons(domain: PolygonMesh) -> SurfaceDiscretization:
 
 
 NEIGHBORS, BYTES_PER_POINT = 40_000_000, 1300
-"""Bytes of the libraries that find neighbours, and of neighbours, in addition to those of triangles. Measured."""
+"""Measured bytes of the libraries that find neighbours, and of the neighbours, in addition to those of triangles."""
 
 
 @discretize.register
 def _(domain: PointCloud) -> SurfaceDiscretization:
-    """The values of φ are at the points; points that coincide share one unknown.
-
-    h is the mean distance between neighbouring points, the scale below which the samples do not determine the surface.
-    """
+    # h is the mean distance between neighbouring points, the scale below which they do not determine the surface
     refuse_too_many(2 * domain.n_points, domain.n_points, "points", more=NEIGHBORS + BYTES_PER_POINT * domain.n_points)
     mesh = domain.triangulation
-    used = np.zeros(domain.n_points, dtype=bool)
-    used[mesh.faces] = True
+    used = mask_of(domain.n_points, mesh.faces)
     duplicates = int((domain.representatives != np.arange(domain.n_points)).sum())
     notes = (PointsLeftOut(duplicates, np.flatnonzero(~used[domain.representatives]).tolist()),)
     spacing = float(mesh.edge_lengths.mean())
@@ -299,16 +289,14 @@ def _(domain: PointCloud) -> SurfaceDiscretization:
 
 
 BYTES_PER_VOXEL = 20
-"""Blurred copies of the volume, from which normals are estimated."""
+"""Memory of the blurred copies of the volume from which normals are estimated."""
 
 
 @discretize.register
 def _(domain: DigitalSurface) -> SurfaceDiscretization:
-    """Each square becomes four triangles between its corners, moved, and their mean.
-
-    h is the standard deviation of the Gaussian with which normals are estimated, and at least the voxel size. At a
-    smaller scale the shape of the surface is unknown, and diffusion would follow the directions of the lattice.
-    """
+    # Each square becomes four triangles between its moved corners and their mean. h is the standard deviation of the
+    # Gaussian with which normals are estimated, and at least the voxel size: at a smaller scale the shape is unknown,
+    # and diffusion would follow the directions of the lattice.
     faces = count_surfels(domain.volume)
     refuse_too_many(4 * faces, faces, "faces of voxels", more=BYTES_PER_VOXEL * domain.volume.size)
     mesh, corners = domain.triangulation, domain.smooth_vertices

@@ -1,6 +1,6 @@
 """Sharpening on surfaces: exact geodesic distance to curves and points, and to the zero set of φ where curves end.
 
-The sides of curves are found from the curves alone: where they are closed, no heat is needed.
+Closed curves decide the sides of the surface by themselves, without heat.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, mask_of
 from ..diagnostics import GeodesicWindows, SharpenedToCurves
 from ..discretization import SourceTerm, discretize
 from ..errors import GeometryError, InexactWarning, SourceError, UnsupportedTypeError, warn_user
@@ -33,22 +33,17 @@ from .surface_source import SurfaceSource
 from .vertex_field import VertexField
 
 FAR = 1.0
-"""Triangle sizes: what the zero set has farther from any curve completes the curves."""
-
+"""Distance from any curve, in sizes of triangles, beyond which the zero set completes the curves."""
 ROUGHLY = 1e-4
-"""Tolerance of distances that are compared only, of which differences below a thousandth do not count."""
-
+"""Tolerance of distances that are only compared, with differences below a thousandth ignored."""
 INVENTED = 0.05
-"""Share of the zero set, apart from curves without an end, from which there is a warning that these bound nothing."""
-
+"""Share of the zero set that completes curves without ends, above which there is a warning that these bound nothing."""
 UNDECIDED = 0.1
-"""Share of the vertices whose sides curves without an end decide, up to which they bound nothing: where they bound a
-region of meshes, they decide all but those next to them. At that, no level set of 96 on eight meshes is announced."""
-
+"""Share of the vertices whose sides curves without ends decide, up to which these bound nothing: curves that bound a
+region decide all vertices but those next to them. With it, no level set of 96 on eight meshes causes a warning."""
 NEGLIGIBLE = 1e-3
-"""Share of the zero set, apart from curves that bound nothing, up to which they are not announced: a loop round a hole
-through a plate has that share of the hole's circumference in its own."""
-
+"""`INVENTED` for curves that bound nothing: a loop around a hole through a plate has a completion of that share if the
+hole's circumference is that share of its own."""
 FALSE_ZERO_WIDTH = 4.0
 """Distance from an unoriented source, relative to h, within which zeros of φ may be due to that source alone."""
 
@@ -103,7 +98,6 @@ def _(
     tolerance: float,
     report: Callable[[], None] | None,
 ) -> Nearest:
-    """Polyhedral distance."""
     if given is None:
         return nearest_zero(surface, values, source, tolerance, report)
     parts = list(chain.from_iterable(surface.segments(as_list(given))))
@@ -115,7 +109,7 @@ def _(
 def nearest_zero(
     surface: SurfaceDiscretization, values: Floats, source: SourceTerm | None, tolerance: float, report: Report | None
 ) -> Nearest:
-    """The nearest of the zero set of φ, and of the unoriented curves and points that φ was computed from."""
+    """Measure to the nearest of the zero set of φ, and of the unoriented curves and points that φ was computed from."""
     unsided = [part for part in source.parts if not part.oriented] if isinstance(source, SurfaceSource) else []
     sides = np.zeros(len(values), dtype=np.int64)
     if not isinstance(source, SurfaceSource) or not unsided:
@@ -168,13 +162,11 @@ def nearest_curve(
     tolerance: float,
     report: Report | None,
 ) -> Nearest:
-    """The nearest of curves and points, and of the zero set of φ where oriented ones are missing.
+    """Measure to the nearest of curves and points, and of the zero set of φ where oriented curves are missing.
 
-    1. Exact distance to the curves themselves.
-    2. Sides: in regions that curves bound, and at vertices next to a curve, the curve decides; elsewhere φ does.
-    3. The zero set of φ, in regions that no curve bounds, where it is farther from any curve than the triangles there
-       are large, or beyond the free end of one: it completes the curves.
-    4. The smaller of both distances, with the sides of 2.
+    In regions that curves bound, and at vertices next to a curve, the curve decides the side; elsewhere φ does. In
+    regions that no curve bounds, the zero set of φ completes the curves where it is farther from any curve than the
+    triangles there are large, or beyond the free end of one.
     """
     there = CurvesThere.on(triangles, parts, tolerance, report)
     distance, counts = there.distance, [there.windows]
@@ -214,7 +206,7 @@ def missing_parts(
     spacing: float,
     report: Report | None,
 ) -> tuple[PlacedSegments, list[int]]:
-    """The parts of the zero set of φ that complete the curves; and the number of windows of each search."""
+    """Find the parts of the zero set of φ that complete the curves, and the number of windows of each search."""
     size = np.sqrt(2 * triangles.face_areas)
     corners = triangles.corner_vertices
     apart = there.distance[corners].mean(axis=1) > FAR * size
@@ -252,8 +244,7 @@ def without_false_zeros(triangles: IntrinsicMesh, values: Floats, near: Bools, s
     face, side = np.nonzero(through)
     line = connected_components(m + e, face, m + triangles.edges.face_edges[crossed[face], side])[:m]
     corners = triangles.corner_vertices[crossed]
-    is_sided = np.zeros(len(values), dtype=bool)
-    is_sided[sided] = True
+    is_sided = mask_of(len(values), sided)
     own = np.ones(line.max(initial=-1) + 1, dtype=bool)
     own[line[(~near[corners] | is_sided[corners]).any(axis=1)]] = False
     result = values.copy()
@@ -262,7 +253,7 @@ def without_false_zeros(triangles: IntrinsicMesh, values: Floats, near: Bools, s
 
 
 def note_on_searches(triangles: IntrinsicMesh, *counts: int) -> GeodesicWindows:
-    """The note on searches with so many windows, and a warning if one was cut short."""
+    """Note the windows of searches, and warn if one was cut short."""
     note = GeodesicWindows(sum(counts), cut_short=max(counts) >= window_limit(triangles))
     if note.cut_short:
         warn_user(f"exact distance was cut short: {note}", InexactWarning)
@@ -277,14 +268,10 @@ TIE = 1e-9
 class CurveSides:
     """The sides of the vertices of a surface, as far as oriented curves decide them."""
 
-    # (n,) 1 or −1 in regions that the curves bound from one side only, without a free end in it; 0 elsewhere
-    regions: Ints
-    # (n,) the side of the nearest segment among those in the faces at a vertex; 0 where there is none, and near free
-    # ends
-    nearby: Ints
+    regions: Ints  # (n,) 1 or −1 in regions that curves bound from one side only, without free ends; 0 elsewhere
+    nearby: Ints  # (n,) side of the nearest segment in the faces at a vertex; 0 where there is none, and near free ends
     reach: Floats  # (n,) distance to that segment; inf where there is none
-    # (k,) nodes at which curves end, away from the boundary of the surface, or run head to head
-    free_ends: Ints
+    free_ends: Ints  # (k,) nodes at which curves end, away from the boundary of the surface, or run head to head
 
 
 def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
@@ -297,8 +284,7 @@ def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
     nearby, reach = nearest_sides(triangles, placed, ends)
     oriented = placed.sides != 0
     nodes = placed.nodes[np.unique(placed.ends[oriented])]
-    on_curve = np.zeros(triangles.n_vertices, dtype=bool)
-    on_curve[nodes.elements[nodes.kinds == VERTEX]] = True
+    on_curve = mask_of(triangles.n_vertices, nodes.elements[nodes.kinds == VERTEX])
     tail, head = triangles.edges.vertices.T
     is_open = ~(on_curve[tail] | on_curve[head])
     is_open[nodes.elements[nodes.kinds == EDGE]] = False
@@ -313,10 +299,7 @@ def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
 
 
 def free_ends(triangles: IntrinsicMesh, placed: PlacedSegments) -> Ints:
-    """Nodes at which more segments of oriented curves begin than end, or fewer: the boundary of the chain of segments.
-
-    Ends at the boundary of the surface do not count.
-    """
+    """Nodes, not at the boundary of the surface, at which more segments of oriented curves begin than end, or fewer."""
     _, once = np.unique(placed.given, return_index=True)
     sides, ends = placed.sides[once], placed.ends[once]
     n = len(placed.nodes)
@@ -334,7 +317,7 @@ def free_ends(triangles: IntrinsicMesh, placed: PlacedSegments) -> Ints:
 def nearest_sides(triangles: IntrinsicMesh, placed: PlacedSegments, ends: Ints) -> tuple[Ints, Floats]:
     """Side of the nearest oriented segment in the faces at each vertex, and the distance to it.
 
-    Of segments that meet at the nearest point, the one that is seen most from the front decides the side.
+    Of segments that meet at the nearest point, the one seen most from the front decides the side.
     """
     n = triangles.n_vertices
     rows = np.flatnonzero(placed.sides != 0)
@@ -345,8 +328,7 @@ def nearest_sides(triangles: IntrinsicMesh, placed: PlacedSegments, ends: Ints) 
     gap = np.abs(corner - share * step)
     height = (np.conj(step) * corner).imag / np.abs(step)
     height[np.abs(height) <= TIE * np.abs(step)] = 0.0
-    is_end = np.zeros(len(placed.nodes), dtype=bool)
-    is_end[ends] = True
+    is_end = mask_of(len(placed.nodes), ends)
     bare = ((share == 0) & is_end[placed.ends[rows, 0], None]) | ((share == 1) & is_end[placed.ends[rows, 1], None])
     vertex = triangles.corner_vertices[faces]
     reach = np.full(n, np.inf)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array, csr_matrix, vstack
 
-from ..arrays import Bools, Complexes, Floats, Ints
+from ..arrays import Bools, Complexes, Floats, Ints, mask_of
 from ..errors import CancellingNormalsError, SourceError
 from ..frozen import Frozen
 from ..mesh.components import connected_components
@@ -33,21 +33,19 @@ class SurfaceSource(Frozen):
     """Curves and points, lowered to an intrinsic mesh."""
 
     vectors: csr_array  # (1, e) X₀, in the frames of the edges
-    time: float  # t of Eq. 12.
-    # (s, n_vertices) row i interpolates φ at sample i; samples are the distinct points of every source
-    interpolation: csr_matrix
+    time: float  # t of Eq. 12
+    interpolation: csr_matrix  # (s, n_vertices) φ at the samples, which are the distinct points of every source
     weights: Floats  # (s,) length of curve that belongs to each sample; h for isolated points
     components: Ints  # (s,) connected component of the union of all sources, numbered by first appearance
     source_ids: Ints  # (s,) source that each sample belongs to
     oriented: bool  # whether any source is oriented; if none is, φ is an unsigned distance
-    # the triangles that the sources are lowered to; the first vertices are those of the domain's own triangles
-    triangles: IntrinsicMesh
+    triangles: IntrinsicMesh  # whose first vertices are those of the domain's own triangles
     parts: Sequence[CurveSegments]  # the sources on these triangles
     extrapolated: bool = False  # whether directions are to be extrapolated in t
 
     @cached_property
     def ending(self) -> Bools:
-        """(m,) faces of those connected parts of the surface in which an oriented curve ends.
+        """(m,) whether a face lies in a connected part of the surface in which an oriented curve ends.
 
         Ends at the boundary and at nonmanifold edges, where three curves may meet, do not count.
         """
@@ -58,8 +56,7 @@ class SurfaceSource(Frozen):
         nodes, ends = joined(oriented)
         free = nodes[np.flatnonzero(np.bincount(ends.ravel(), minlength=len(nodes)) % 2)]
         rim = triangles.edges.face_counts != 2
-        at_rim = np.zeros(triangles.n_vertices, dtype=bool)
-        at_rim[triangles.edges.vertices[rim]] = True
+        at_rim = mask_of(triangles.n_vertices, triangles.edges.vertices[rim])
         outer = ((free.kinds == VERTEX) & at_rim[free.elements % triangles.n_vertices]) | (
             (free.kinds == EDGE) & rim[free.elements % triangles.n_edges]
         )
@@ -78,8 +75,8 @@ def surface_source(
     """Lower sources to an intrinsic mesh, whose faces they refer to; ``t = diffusion · spacing²``.
 
     A sequence among the sources counts as one. Unoriented curves must run along edges: see `refine_to_conform`. An
-    isolated point has the weight of a curve as long as `spacing`, h, the mean distance between unknowns. Curves with
-    given normals need the `positions`, (n_vertices, 3), in space.
+    isolated point has the weight of a curve of the length `spacing`. Curves with given normals need the `positions`,
+    (n_vertices, 3), in space.
     """
     groups = segments_of_each(sources, triangles, positions)
     parts = [part for group in groups for part in group]
@@ -118,10 +115,10 @@ def surface_source(
 
 
 def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> csr_array:
-    """Eq. 11 without its factor ψ_e(m): i(b − a) for a segment ab, to its edge or in thirds to the edges of its face.
+    """(1, e) Eq. 11 with 1/3 for ψ_e(m): i(b − a) of a segment ab, to its edge or in thirds to the edges of its face.
 
-    One third is the mean of ψ_e over a face; it gives segments along edges and segments inside faces of one curve the
-    same weight. (The published code adds the whole vector to each of the three edges.)
+    One third is the mean of ψ_e over a face; it gives segments along edges and segments inside faces the same weight.
+    (The published code adds the whole vector to each of the three edges.)
     """
     sums = csr_array((1, triangles.n_edges), dtype=np.complex128)
     for part in parts:
@@ -132,7 +129,7 @@ def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -
 
 
 def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments], spacing: float) -> csr_array:
-    """App. A.2, from Eq. 11 and Eq. 19: vectors away from curves along edges, on both sides and at free ends.
+    """(1, e) vectors away from curves along edges, on both sides and at free ends (App. A.2, Eq. 11 and Eq. 19).
 
     A face at edge ij, i before j in its own order, contributes i(p_j − p_i) to its other two edges. On ij itself the
     contributions of the two sides cancel.
@@ -141,9 +138,7 @@ def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments],
     if not curves:
         return csr_array((1, triangles.n_edges), dtype=np.complex128)
     edges = np.unique(np.concatenate([p.edges for p in curves]))
-    marked = np.zeros(triangles.n_edges, dtype=bool)
-    marked[edges] = True
-    faces, sides = np.nonzero(marked[triangles.edges.face_edges])
+    faces, sides = np.nonzero(mask_of(triangles.n_edges, edges)[triangles.edges.face_edges])
     inward = 1j * triangles.edge_vectors[faces, sides]
     on_edges = triangles.in_edge_frames(inward[:, None], faces)
     on_edges[np.arange(len(faces)), sides] = 0
@@ -161,13 +156,11 @@ def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments],
 
 
 def vertex_point_vectors(triangles: IntrinsicMesh, vertices: Ints) -> csr_array:
-    """App. A.1, Eq. 19: the corner of angle α at a vertex contributes i d (1 − e^{iα}) / Θ to the edges of its face.
+    """(1, e) X₀ of points at vertices (Eq. 19): each corner, of angle α, adds i d (1 − e^{iα}) / Θ to its face's edges.
 
     d is the direction of the first edge of the corner, counter-clockwise, and Θ the total angle at the vertex.
     """
-    marked = np.zeros(triangles.n_vertices, dtype=bool)
-    marked[vertices] = True
-    faces, corners = np.nonzero(marked[triangles.corner_vertices])
+    faces, corners = np.nonzero(mask_of(triangles.n_vertices, vertices)[triangles.corner_vertices])
     leaving = triangles.edge_vectors[faces, corners]
     arriving = -triangles.edge_vectors[faces, (corners + 2) % 3]
     angles = np.angle(arriving * np.conj(leaving))
@@ -178,12 +171,12 @@ def vertex_point_vectors(triangles: IntrinsicMesh, vertices: Ints) -> csr_array:
 
 
 def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_array:
-    """Points on edges and inside faces: −∇δ_p against the Crouzeix–Raviart functions, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
+    """(1, e) X₀ of points on edges and inside faces: −∇δ_p against the functions ψ_e, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
 
     Its diffusion is minus the gradient of the heat kernel, which points away from p with equal strength in all
     directions, whatever the shape of the faces: on each, ``Σ_e ∇ψ_e = 0`` and ``Σ_e ∇ψ_e x_eᵀ`` is the identity. ∇ψ_e,
     constant on faces, is averaged over the faces around each vertex and interpolated at p. At a vertex of equilateral
-    triangles it is Eq. 19 divided by √3 h, which the caller makes up for.
+    triangles it is Eq. 19 divided by √3 h, for which the caller corrects.
     """
     corner = np.argwhere(located.barycentric > 0)
     vertices = triangles.corner_vertices[located.faces[corner[:, 0]], corner[:, 1]]
@@ -215,7 +208,7 @@ def line_elements(part: CurveSegments, spacing: float) -> Floats:
 
 
 def joined(parts: Sequence[CurveSegments]) -> tuple[LocatedPoints, Ints]:
-    """The distinct points of all sources, and the two at the ends of every segment."""
+    """Join the points of all sources; return the distinct ones, and the two at the ends of every segment."""
     nodes = concatenated([p.nodes for p in parts])
     first, who = unique_points(nodes)
     return nodes[first], ends_among(parts, who)
@@ -235,20 +228,15 @@ def connected(parts: Sequence[CurveSegments]) -> Ints:
 
 
 def free_end_arcs(triangles: IntrinsicMesh, edges: Ints, vertices: Ints, least: float) -> tuple[Ints, Complexes]:
-    """Vectors that point away from the free ends of curves, integrated over the half disk of directions behind each.
+    """Faces (j,), and vectors (j,) that point away from the free ends of curves, summed over the half disk behind each.
 
-    Directions are given by their angle from the curve, measured the shortest way around the vertex. Behind the end are
-    those at a quarter of the total angle or more; at boundary and nonmanifold vertices, at a right angle or more.
-
-    Curves end with an edge at a vertex. The weight of an end is the length of that edge, but at least `least`:
-    subdividing a curve into short edges must not make its ends vanish. (The published code has no least weight.)
-
-    Returned: faces (j,), vectors (j,).
+    Directions are measured by their angle from the curve, the shortest way around the vertex. Behind the end are those
+    at a quarter of the total angle or more; at boundary and nonmanifold vertices, at a right angle or more. The weight
+    of an end is the length of its edge, but at least `least`: subdividing a curve into short edges must not make its
+    ends vanish. (The published code has no least weight.)
     """
     faces, vectors = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.complex128)]
-    marked = np.zeros(triangles.n_vertices, dtype=bool)
-    marked[vertices] = True
-    all_faces, all_corners = np.nonzero(marked[triangles.corner_vertices])
+    all_faces, all_corners = np.nonzero(mask_of(triangles.n_vertices, vertices)[triangles.corner_vertices])
     owner = triangles.corner_vertices[all_faces, all_corners]
     order = np.argsort(owner, kind="stable")
     all_faces, all_corners, owner = all_faces[order], all_corners[order], owner[order]

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csr_array
 
-from ..arrays import Bools, Complexes, Floats, Ints
+from ..arrays import Bools, Complexes, Floats, Ints, mask_of
 from ..geodesics.exact_distance import distances_along_edges
 from ..linear import Factor, factorize
 from ..linear.restarts import Stage, restart, scaled
@@ -25,7 +25,7 @@ from ..mesh.unit_vectors import unit
 from .cotan import assemble
 
 EXPONENTS = (-1.0, 0.5)
-"""Powers of t in the error of Y: cells that do not resolve exp(−r/√t) give h²/t, smoothing gives √t."""
+"""Powers of t in the error of Y: h²/t from cells that do not resolve exp(−r/√t), and √t from smoothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +68,10 @@ class VectorHeat:
         return restart(solve, self._border_forces, start, Stage(values, 0.0), float(self.mass.min()))
 
     def _border_forces(self, columns: Complexes, faint: Bools) -> tuple[Bools, Complexes]:
-        """What `_solve` undoes, applied to columns, at the edges of faces that are faint in part."""
+        """Apply the inverse of `_solve` to columns, at the edges of faces that are faint in part."""
         edges = self.triangles.edges.face_edges
         of_face = faint[edges]
-        border = np.zeros(len(faint), dtype=bool)
-        border[edges[of_face.any(axis=1) & ~of_face.all(axis=1)]] = True
+        border = mask_of(len(faint), edges[of_face.any(axis=1) & ~of_face.all(axis=1)])
         around = np.flatnonzero(border[edges].any(axis=1))
         forces = [vector_heat_forces(self.triangles, self.time, column, around) for column in columns.T]
         for k in range(1, len(forces)):
@@ -96,7 +95,7 @@ class VectorHeat:
 
 
 def extrapolated(columns: Complexes) -> Complexes:
-    """(m,) directions without the errors of Y that go like the `EXPONENTS` of t, from (m, 3) columns X, R X and R² X.
+    """(m,) directions Y without errors like the `EXPONENTS` of t, from (m, 3) columns X, R X and R² X.
 
     With ``D = t d/dt``, Richardson's extrapolation in the limit of equal times is ``Π (1 − D/e) Y`` over the exponents
     e: it keeps what does not depend on t, and takes ``t^e`` to zero. For ``R = (M + tL)⁻¹ M``, since ``tL = (M + tL) −
@@ -106,8 +105,8 @@ def extrapolated(columns: Complexes) -> Complexes:
     with np.errstate(all="ignore"):
         first, second = once / x - 1.0, 1.0 - 3.0 * (once / x) + 2.0 * (twice / x)
         turn, bend = first.imag, (second - first**2).imag
-        one, two = -sum(1.0 / e for e in EXPONENTS), 1.0 / float(np.prod(EXPONENTS))
-        factor = 1.0 + 1j * one * turn + two * (1j * bend - turn**2)
+        linear, quadratic = -sum(1.0 / e for e in EXPONENTS), 1.0 / float(np.prod(EXPONENTS))
+        factor = 1.0 + 1j * linear * turn + quadratic * (1j * bend - turn**2)
     return unit(x.copy()) * np.where(np.isfinite(factor), factor, 1.0)
 
 
@@ -130,7 +129,7 @@ def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matr
 
 
 def vector_heat_forces(triangles: IntrinsicMesh, time: float, vectors: Complexes, faces: Ints) -> Complexes:
-    """``(M + t L) X`` of Eq. 12, summed over some faces only: complete at edges all of whose faces are among them."""
+    """``(M + t L) X`` of Eq. 12, summed over some faces: complete at edges all of whose faces are among them."""
     diagonal, factor = _local_entries(triangles, time, faces)
     x = triangles.in_face_frames(vectors, faces)
     forces = diagonal * x + factor * np.roll(x, -1, axis=1) + np.roll(factor * x, 1, axis=1)
@@ -147,7 +146,7 @@ def _local_entries(triangles: IntrinsicMesh, time: float, faces: Ints | slice) -
 
 
 def _real_form(triangles: IntrinsicMesh, diagonal: np.ndarray, factor: np.ndarray) -> sparse.csr_matrix:
-    """The real matrix of blocks ``B_feᵀ B_fg``; the columns of B_fe are the axes of the edge's frame in the face."""
+    """Assemble the real matrix of blocks ``B_feᵀ B_fg``; the columns of B_fe are the axes of the edge in the face."""
     edge, z = triangles.edges.face_edges, triangles.edge_directions
     rows, columns = edge.ravel(), np.roll(edge, -1, axis=1).ravel()
     second = np.where(triangles.reflected, -1j, 1j) * z
@@ -172,12 +171,11 @@ def _components(vectors: np.ndarray) -> np.ndarray:
 def nonmanifold_frames(
     triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
 ) -> tuple[IntrinsicMesh, Sequence[Sequence[CurveSegments]]]:
-    """Make the face that is nearest to the sources the first face of every edge with more than two faces.
+    """Make the face nearest to the sources the first face of every edge with more than two faces.
 
     Heat that leaves one face through such an edge enters all the others. The frame of the edge distinguishes its first
-    face from the others, so the first must be the face that heat comes from: vectors that pass between two of the
-    others would be reflected. Edges whose ends are nearer than every opposite corner, which heat passes or runs along,
-    keep their first face. Where none changes, the same triangles are returned.
+    face from the others, so that heat must come from the first: vectors that pass between two of the others would be
+    reflected. Edges whose ends are nearer than every opposite corner keep their first face.
     """
     table = triangles.edges
     if table.face_counts.max(initial=0) <= 2:
@@ -186,8 +184,7 @@ def nonmanifold_frames(
     if not parts:
         return triangles, groups
     distance = _distances(triangles, parts)
-    holds = np.zeros(triangles.n_faces, dtype=bool)
-    holds[np.concatenate([part.faces[part.edges < 0] for part in parts])] = True
+    holds = mask_of(triangles.n_faces, np.concatenate([part.faces[part.edges < 0] for part in parts]))
     side = np.flatnonzero(table.face_counts[table.face_edges].ravel() > 2)
     edge = table.face_edges.ravel()[side]
     opposite = np.roll(triangles.corner_vertices, -2, axis=1).ravel()[side]
@@ -200,17 +197,16 @@ def nonmanifold_frames(
     nearest = nearest[(away[nearest] < ends[nearest]) & (side[nearest] != first[edge[nearest]])]
     if not len(nearest):
         return triangles, groups
-    changed = np.zeros(triangles.n_edges, dtype=bool)
-    changed[edge[nearest]] = True
+    changed = mask_of(triangles.n_edges, edge[nearest])
     first[edge[nearest]] = side[nearest]
     turned = replace(triangles, leading_sides=first[first >= 0])
     return turned, [[mirrored(part, changed) for part in group] for group in groups]
 
 
 def mirrored(part: CurveSegments, changed: Bools) -> CurveSegments:
-    """The segments, with the vectors on edges whose frames have changed reflected."""
-    here = (part.edges >= 0) & changed[part.edges]
-    return replace(part, vectors=np.where(here, np.conj(part.vectors), part.vectors)) if here.any() else part
+    """Reflect the vectors of segments on edges whose frames have changed."""
+    on_changed = (part.edges >= 0) & changed[part.edges]
+    return replace(part, vectors=np.where(on_changed, np.conj(part.vectors), part.vectors))
 
 
 def _distances(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> Floats:
