@@ -27,7 +27,7 @@ FLOORS = [
         "#d3e8ea",
     ),
     (
-        "constraints direct_integration discretization linear_elements method spring_integration",
+        "constraints direct_integration discretization linear_elements method",
         "the paper: diffuse → normalize → integrate, once, on discretisations",
         "#fff6c9",
     ),
@@ -35,7 +35,7 @@ FLOORS = [
     ("search   linear   exchange", "nearest faces, winding numbers; sparse solvers; other packages", "#c9dcee"),
     ("mesh", "arrays in, arrays out: edges, welding, components, cutting, intrinsic meshes", "#bccfe8"),
     (
-        ("arrays cache compiled diagnostics errors frozen jobs memory packages parallel progress reprs validation"),
+        ("arrays cache compiled diagnostics errors frozen jobs memory packages parallel progress validation"),
         "used by all",
         "#d9d9e3",
     ),

@@ -29,13 +29,12 @@ FLOORS = [
         "parallel",
         "processes",
         "progress",
-        "reprs",
         "validation",
     },
     {"mesh"},
     {"search", "linear", "exchange"},
     {"geodesics"},
-    {"constraints", "direct_integration", "discretization", "linear_elements", "method", "spring_integration"},
+    {"constraints", "direct_integration", "discretization", "linear_elements", "method"},
     {"surfaces", "grids", "tets"}
     | {
         "area_elements",

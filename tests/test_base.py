@@ -14,7 +14,7 @@ from signedheat.batches.pool import duration
 from signedheat.cache import LastUsed, fingerprint
 from signedheat.errors import MissingPackageError, SignedHeatError
 from signedheat.foreign import is_pair, package_of, what_to_pass
-from signedheat.frozen import Frozen
+from signedheat.frozen import Frozen, ShortRepr, short
 from signedheat.inspection import inspect
 from signedheat.jobs import command_for, run_cancellable, run_limited
 from signedheat.joining import concatenated, placed
@@ -23,7 +23,6 @@ from signedheat.memory import fitting_count, untouched_zeros
 from signedheat.packages import ensure_installed, missing_package, require
 from signedheat.parallel import connected, in_chunks
 from signedheat.progress import within
-from signedheat.reprs import ShortRepr, short
 from signedheat.surfaces.triangle_mesh import TriangleMesh
 from signedheat.validation import coordinates, finite_number, numbers, shaped, used_bounds
 

@@ -11,7 +11,7 @@ import numpy as np
 from .arrays import Floats
 from .discretization import Integration, Levels, SourceTerm
 from .errors import ConstraintError
-from .reprs import ShortRepr
+from .frozen import ShortRepr
 from .validation import LARGEST, numbers, positive_number
 
 

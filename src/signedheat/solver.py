@@ -21,10 +21,9 @@ from .kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .progress import Progress, Stopwatch
 from .surfaces.extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
-from .surfaces.given_curves import given_curves
 from .surfaces.intrinsic_discretization import Retriangulated, lowered_by_angles
 from .surfaces.intrinsic_triangulation import triangle_mesh
-from .surfaces.source_segments import one_sided
+from .surfaces.source_segments import given_curves, one_sided
 from .surfaces.surface_curves import CurvesAndPoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .surfaces.vertex_field import VertexField

@@ -9,7 +9,7 @@ import signedheat as sh
 from refusals import refused
 from signedheat.diagnostics import WithoutLength
 from signedheat.samples import sphere
-from signedheat.surfaces.given_curves import curve_of_elements
+from signedheat.surfaces.source_segments import curve_of_elements
 
 BALL = sphere(3)
 RING = BALL.level_set(BALL.vertices[:, 2], 0.1)[0]

@@ -23,7 +23,7 @@ import numpy as np
 import signedheat as sh
 from signedheat.search.winding_tree import WindingTree
 from signedheat.solids.completion import complete
-from signedheat.surfaces.given_curves import curve_of_elements
+from signedheat.surfaces.source_segments import curve_of_elements
 
 Pairs = list[tuple[Any, Any]]
 """What ours and theirs return."""

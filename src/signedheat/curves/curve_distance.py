@@ -18,8 +18,7 @@ from ..mesh.components import connected_components, grouped
 from ..progress import Progress
 from ..sharpening import sharpen
 from ..solver import SignedHeatSolver, distance_unwarned
-from ..surfaces.given_curves import given_curves
-from ..surfaces.source_segments import segments_of
+from ..surfaces.source_segments import given_curves, segments_of
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField

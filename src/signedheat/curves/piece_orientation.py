@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from ..errors import UnsupportedTypeError
 from ..foreign import ForeignShape, converted
-from ..frozen import Frozen
+from ..frozen import Frozen, ShortRepr
 from ..kinds import SurfaceDomain
-from ..reprs import ShortRepr
 from ..solver import SignedHeatSolver
 from ..surfaces.surface_curves import Curve, CurveOrPoints
 from .resolution import on_resolving_triangles, surface_of, triangulated_once

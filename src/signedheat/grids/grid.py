@@ -15,9 +15,8 @@ from ..arrays import Bools, Floats
 from ..errors import GeometryError, MemoryLimitError
 from ..exchange import Displayed
 from ..foreign import ForeignShape, Shape, as_shapes
-from ..frozen import Frozen
+from ..frozen import Frozen, short
 from ..packages import lazy_module
-from ..reprs import short
 from ..validation import (
     coordinates,
     finite_number,

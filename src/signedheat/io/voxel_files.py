@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from ..errors import FileFormatError, GeometryError
 from ..exchange import NAME
 from ..foreign import Represented
-from ..frozen import Frozen
+from ..frozen import Frozen, short
 from ..grids.grid import Grid
 from ..grids.grid_field import GridField
 from ..packages import require
-from ..reprs import short
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh

@@ -12,8 +12,7 @@ from ..arrays import Bools, Ints
 from ..diagnostics import ShapeOriented
 from ..errors import GeometryError
 from ..foreign import ForeignShape, converted
-from ..frozen import Frozen
-from ..reprs import ShortRepr
+from ..frozen import Frozen, ShortRepr
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from .bounding import Bounding, bounding

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import GeometryError
-from ..reprs import ShortRepr
+from ..frozen import ShortRepr
 from ..surfaces.outward_signs import outward_normals
 from ..surfaces.point_cloud import PointCloud
 

@@ -16,7 +16,7 @@ from ..diagnostics import Diagnostics
 from ..errors import InexactWarning, SignedHeatError, SourceError, warn_user
 from ..exchange import Displayed
 from ..foreign import Represented
-from ..frozen import Frozen
+from ..frozen import Frozen, short
 from ..grids.grid import Grid
 from ..grids.grid_field import GridField
 from ..grids.solid_queries import Closest
@@ -25,7 +25,6 @@ from ..mesh.triangles import area_vectors, face_areas
 from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..progress import Progress
-from ..reprs import short
 from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
 from ..search.nearest_triangles import weights_in
 from ..surfaces.triangle_mesh import TriangleMesh

@@ -44,7 +44,7 @@ class Lines(NamedTuple):
 
     def chosen(self, rows: Ints) -> Lines:
         """Choose rows, in this order."""
-        return Lines(*(column[rows] for column in self))
+        return Lines(self.owners[rows], self.faces[rows], self.starts[rows], self.ends[rows], self.vectors[rows])
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from scipy import sparse
 from ..arrays import Bools, Complexes, Floats, Ints, mask_of
 from ..cache import LastUsed, fingerprint
 from ..diagnostics import EdgesLengthened, LargeAngles, Note, PointsLeftOut, VerticesAdded
-from ..direct_integration import DirectIntegration, refuse_contradictions
+from ..direct_integration import DirectIntegration, SpringIntegration, refuse_contradictions
 from ..discretization import Levels, SourceTerm, discretize
 from ..errors import GeometryError
 from ..linear import Factor, chosen_backend, elimination_order, factorize
@@ -22,7 +22,6 @@ from ..memory import refuse_beyond_memory
 from ..mesh.conforming_refinement import refine_to_conform
 from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import IntrinsicMesh, laid_out, mollify
-from ..spring_integration import SpringIntegration
 from .cotan import cotan_matrix, divergence
 from .digital_surface import DigitalSurface, count_surfels, separated_edges
 from .intrinsic_triangulation import IntrinsicTriangulation
@@ -134,7 +133,7 @@ class SurfaceDiscretization:
         return heat.solve([source.vectors for source in sources], changes=2 if sources[0].extrapolated else 0)
 
     def to_cells(self, stages: list[Complexes]) -> Complexes:
-        """(m,) three times the mean of X over the edges of each face (Sec. 6), from the last stage that has them all."""
+        """(m,) three times the mean of X over the edges of each face (Sec. 6), of the last stage that has them all."""
         sums = self.triangles.sums_in_faces(stages[0])
         for stage in stages[1:]:
             later = self.triangles.sums_in_faces(stage)

@@ -13,14 +13,13 @@ from scipy import sparse
 
 from ..arrays import Bools, Floats, Ints
 from ..cache import LastUsed
-from ..direct_integration import STIFFEST
+from ..direct_integration import STIFFEST, SpringIntegration
 from ..discretization import DiffusesEach, Levels, SourceTerm, discretize
 from ..linear import Factor, factorize, upper_triangle
 from ..linear.incomplete_cholesky import IncompleteCholesky, from_first, outward_order
 from ..linear.restarts import Stage, matrix_forces, solve_with_restarts
 from ..memory import refuse_beyond_memory
 from ..mesh.unit_vectors import unit
-from ..spring_integration import SpringIntegration
 from .tet_clipping import GRAZING, Planes, visible
 from .tet_mesh import TetMesh
 from .tet_source import TetSource, tet_source
