@@ -1,4 +1,4 @@
-"""Levels of a field: refuse those that leave its domain, and move points onto exact levels."""
+"""Levels of a field: refuse those that leave its domain, and move points onto exact ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .grids.grid import Grid
 from .grids.marching import CLEARANCE
 
 CLOSE = 1e-3
-"""Distance from a level, in cells, below which a point is not moved."""
+"""Distance from a level, in cells, at which a point is close enough."""
 ROUNDS = 10
 """Upper bound of the number of iterations; few points need more than 4."""
 

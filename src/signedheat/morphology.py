@@ -70,8 +70,8 @@ __all__ = [
 ROOM_FOR_OFFSETS = 0.15
 """Padding of a shape in addition to its offsets, relative to its longest side."""
 LIMITS = {"round": 1.0, "mitre": 2.0, "sharp": 10.0}
-"""Length of mitres, relative to the distance. With 2, edges and corners of boxes stay whole, and edges between faces
-less than 60° apart are cut off; with 10, those of less than 12°."""
+"""Largest length of mitres, relative to the distance. With 2, edges and corners of boxes stay whole, and edges between
+faces less than 60° apart are cut off; with 10, those of less than 12°."""
 SIDES = 64
 """Number of sides of a drain hole."""
 

@@ -49,7 +49,7 @@ def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None
 
 
 def named_path(name: str | os.PathLike[str]) -> Path:
-    """The path with a name; an empty name, such as of an unset variable, is refused."""
+    """Make a path of a name; refuse an empty name, such as of an unset variable."""
     if not os.fspath(name) or "\0" in str(name):
         cause = "holds a null character" if os.fspath(name) else "is empty"
         raise FileFormatError(f"the name {cause}", remedy="name a file or a folder, or . for this one", path=name)
@@ -57,7 +57,7 @@ def named_path(name: str | os.PathLike[str]) -> Path:
 
 
 def _files(path: Path, results: Path | None) -> tuple[list[Path], Path]:
-    """Files of an input, and the folder that their names are relative to."""
+    """List the files of an input, and return the folder to which their names are relative."""
     if path.is_dir():
         avoided = None if results is None else os.path.realpath(results)
         if avoided is not None and Path(os.path.realpath(path)).is_relative_to(avoided):
@@ -101,7 +101,7 @@ def _is_file_or_broken_link(path: Path) -> bool:
 
 
 def _names(below: dict[str, str]) -> list[str]:
-    """Unique names for files: without extension, with it, or with more of their folders."""
+    """Give files unique names: without extension, with it, or with more of their folders."""
     alike: dict[str, list[str]] = {}
     for place in below:
         alike.setdefault(os.path.basename(place).lower(), []).append(os.path.dirname(place))
@@ -117,6 +117,6 @@ def _names(below: dict[str, str]) -> list[str]:
 
 
 def _without_extension(name: str) -> str:
-    """A name without its extension, unless only dots would be left, as of ``..stl``."""
+    """Remove the extension of a name, unless only dots would be left, as of ``..stl``."""
     short = name.removesuffix(Path(name).suffix)
     return name if os.path.basename(short) in ("", ".", "..") else short

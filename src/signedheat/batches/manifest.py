@@ -71,7 +71,7 @@ class Manifest:
         self.outcomes = _read(self.path)
 
     def still_holds(self, name: str, path: Path, job: str) -> Outcome | None:
-        """The earlier outcome of a shape, if the file and the job are the same and all results still exist."""
+        """Return the earlier outcome of a shape, if file and job are the same and all results still exist."""
         outcome = self.outcomes.get(name)
         if outcome is None or not outcome.is_done or outcome.job != job or outcome.source != source_of(path):
             return None
@@ -99,13 +99,13 @@ def source_of(path: Path) -> tuple[int, int]:
 
 
 def _line(outcome: Outcome) -> str:
-    """A readable line; escaped where names of files hold separators of lines or bytes that are not text."""
+    """Write a line, escaped where names of files hold separators of lines or bytes that are not text."""
     line = json.dumps(asdict(outcome), ensure_ascii=False)
     return (line if line.isprintable() else json.dumps(asdict(outcome))) + "\n"
 
 
 def _read(path: Path) -> dict[str, Outcome]:
-    """The last outcome of each name; damaged and truncated lines are skipped."""
+    """Read the last outcome of each name; skip damaged and truncated lines."""
     outcomes: dict[str, Outcome] = {}
     if not os.path.lexists(path) or (path.is_file() and not path.stat().st_size):
         return outcomes
@@ -117,7 +117,7 @@ def _read(path: Path) -> dict[str, Outcome]:
 
 
 def _outcome(entries: dict[str, Any]) -> Outcome:
-    """An outcome from its entries; ValueError, TypeError or KeyError if they are not those of an outcome."""
+    """Make an outcome of its entries; raise ValueError, TypeError or KeyError if they are no outcome."""
     outcome = Outcome(**{**entries, "outputs": tuple(entries["outputs"]), "source": tuple(entries["source"])})
     texts = (outcome.name, outcome.input, outcome.state, outcome.message, outcome.job, *outcome.outputs)
     if not all(isinstance(text, str) and "\0" not in text for text in texts):

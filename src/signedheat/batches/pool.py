@@ -181,7 +181,7 @@ def run(
 
 
 def _described(job: Function) -> str:
-    """A text that identifies a job and the version of the package; shapes with another one are done again."""
+    """Describe a job and the version of the package; shapes with another description are done again."""
     text = repr(job) if is_dataclass(job) else f"{getattr(job, '__module__', '')}.{getattr(job, '__qualname__', job)}"
     package = __name__.partition(".")[0]
     return f"{text} by {package} {import_module(package).__version__}"

@@ -1,8 +1,8 @@
 """Worker processes that run one task after another under a time limit, and are replaced when they die.
 
-`concurrent.futures`, loky and Dask cannot stop a running task, and fail other tasks when a process dies, so this module
-has its own worker. It uses `subprocess`, because `multiprocessing` would run the user's script in each process. A
-process serves many tasks, because starting one takes two seconds.
+`concurrent.futures`, loky and Dask cannot stop a running task, and fail other tasks when a process dies. The workers
+use `subprocess`, because `multiprocessing` would run the user's script in each process. A process serves many tasks,
+because starting one takes two seconds.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class Task:
         outputs: tuple[str, ...] = (),
         figures: Mapping[str, object] | None = None,
     ) -> Outcome:
-        """The outcome of this task in the manifest."""
+        """Make the outcome of this task for the manifest."""
         path = self.shape.path
         return Outcome(
             name=self.shape.name,
@@ -152,10 +152,9 @@ class Worker:
         return (task.outcome("failed", 0.0, done), False) if isinstance(done, str) else done
 
     def _ready(self, tries: int = 2) -> subprocess.Popen[bytes]:
-        """The process, once it waits for a task.
+        """Return the process once it waits for a task; replace it once if it dies before.
 
-        A process may die before it gets a task, for example while the package is being updated. Since that says nothing
-        about the shape, it is replaced once.
+        That happens, for example, while the package is being updated, and has nothing to do with the shape.
         """
         process = self._process = self._process or self._started()
         try:

@@ -67,7 +67,7 @@ def save_row(path: PathLike, *panels: tuple[Any, ...]) -> None:
 
 
 def html_of(thing: object) -> str:
-    """A line of text and, if Matplotlib is installed, a picture as HTML."""
+    """Write a line of text and, if Matplotlib is installed, a picture as HTML."""
     text = f"<code>{html.escape(repr(thing))}</code>".replace("\n", "<br>")
     try:
         figure = new_figure(SIDE * 1.25, SIDE)
@@ -81,7 +81,7 @@ def html_of(thing: object) -> str:
 
 
 def _small_png(figure: Any) -> bytes:
-    """The picture with few colours, since notebooks store it with every output."""
+    """Write the picture with few colours, since notebooks store it with every output."""
     whole, small = io.BytesIO(), io.BytesIO()
     figure.savefig(whole, dpi=DPI, format="png")
     pillow.open(whole).convert("RGB").quantize(N_COLORS).save(small, format="png", optimize=True)
@@ -150,7 +150,7 @@ def _(field: PiecewiseField, axes: Any, **options: Any) -> bool:
 
 
 def _best_axis(field: GridField) -> int:
-    """The axis across which a slice shows most of the inside; y, then z, if equal."""
+    """Choose the axis across which a slice shows most of the inside; y, then z, if equal."""
     field = field.whole
     inside = field.values < 0
     counts = [int(inside.take(clearest_layer(field, axis), axis).sum()) for axis in range(3)]

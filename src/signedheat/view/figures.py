@@ -41,7 +41,7 @@ def ensure_picture_writable(path: PathLike) -> None:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure; width and height in inches."""
+    """Make an empty figure of a width and a height in inches."""
     figure: Figure = mpl_figure.Figure(figsize=(width, height), layout="constrained", facecolor="white")
     backend_agg.FigureCanvasAgg(figure)
     return figure
@@ -58,22 +58,20 @@ def picture(path: PathLike, width: float, height: float, dpi: int = 130) -> Iter
 
 
 def distance_colors(low: float, high: float) -> ScalarMappable:
-    """A colour scale for distances between two values, light at zero.
+    """Make a colour scale for distances between two values, light at zero and equally saturated inside and outside.
 
-    Equal distances inside and outside have equally saturated colours. The scale is in the square root of distance, so
-    that a thin inside is visible next to a wide outside.
+    The scale is in the square root of distance, so that a thin inside is visible next to a wide outside.
     """
     reach = max(abs(low), abs(high), 1e-300)
-    return scale_of(mpl_colors.FuncNorm((signed_root, signed_square), -reach, reach))
+    return _scale_of(mpl_colors.FuncNorm((signed_root, lambda x: x * np.abs(x)), -reach, reach))
 
 
 def even_colors(reach: float) -> ScalarMappable:
-    """The same colours, linear from −reach to reach, and constant beyond."""
-    return scale_of(mpl_colors.Normalize(-reach, reach))
+    """Make a scale of the same colours, linear from −reach to reach, and constant beyond."""
+    return _scale_of(mpl_colors.Normalize(-reach, reach))
 
 
-def scale_of(norm: Any) -> ScalarMappable:
-    """Colours from inside to outside, over a norm of values."""
+def _scale_of(norm: Any) -> ScalarMappable:
     colors = mpl_colors.LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
     return mpl_cm.ScalarMappable(norm, colors)
 
@@ -83,13 +81,8 @@ def signed_root(values: Any) -> Any:
     return np.sign(values) * np.sqrt(np.abs(values))
 
 
-def signed_square(values: Any) -> Any:
-    """x², with the sign of x."""
-    return np.sign(values) * np.square(values)
-
-
 def isolines_between(low: float, high: float, most: int = 16) -> tuple[Floats, float]:
-    """Levels between two values, without zero, about `most` of them; and the step between them, a round number."""
+    """Return about `most` levels between two values, without zero, and the step between them, a round number."""
     step = round_step((high - low) / max(most, 1))
     levels = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
     return levels[np.abs(levels) > 0.5 * step], step
@@ -119,7 +112,7 @@ def legible(ticks: Floats, low: float, high: float) -> list[float]:
 def add_color_bar(
     figure: Figure | SubFigure, axes: Sequence[Axes], colors: ScalarMappable, isolines: Floats, step: float
 ) -> None:
-    """A colour bar that spans the isolines, with round numbers on both sides of zero."""
+    """Add a colour bar that spans the isolines, with round numbers on both sides of zero."""
     bar = figure.colorbar(colors, ax=list(axes), shrink=0.85, pad=0.015)
     bar.set_label(f"signed distance, a line every {step:g}")
     if len(isolines):

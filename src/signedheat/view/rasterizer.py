@@ -1,7 +1,7 @@
 """A small software rasteriser for triangles: depth, face and value at each pixel.
 
-Matplotlib sorts whole faces by depth, which is wrong where they pass through each other, as those of broken shapes do;
-VTK has half a gigabyte, and needs a display or a library for drawing without one, which servers do not have.
+Matplotlib sorts whole faces by depth, which is wrong where they pass through each other, as those of broken shapes do.
+VTK takes half a gigabyte, and needs a display, or a library to draw without one, which servers do not have.
 """
 
 from __future__ import annotations

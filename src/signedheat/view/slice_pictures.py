@@ -23,7 +23,7 @@ from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_field import TetField
 from .figures import add_color_bar, distance_colors, isolines_between, picture
-from .surface_pictures import outside_of, triangulated
+from .surface_pictures import outside_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,9 +103,9 @@ def draw_slices(
 
 
 def clearest_layer(field: GridField, axis: int) -> int:
-    """The layer of nodes across an axis with most inside nodes; if there are none, with most nodes near the zero set.
+    """Choose the layer across an axis with most nodes inside or, if there are none, near the zero set.
 
-    Among equal layers, the one closest to the middle.
+    Of equal layers, it is the one closest to the middle.
     """
     inside = field.values < 0
     if not inside.any():
@@ -117,7 +117,7 @@ def clearest_layer(field: GridField, axis: int) -> int:
 
 
 def rounded(position: float, spacing: float) -> str:
-    """A position as text, rounded to the resolution of the grid."""
+    """Write a position as text, rounded to the resolution of the grid."""
     digits = max(0, 1 - int(np.floor(np.log10(spacing))))
     return f"{round(position, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{position:.0f}"
 
@@ -143,7 +143,7 @@ def draw_line(line: Polyline, axes: Axes) -> None:
 
 
 def _look(field: GridField) -> tuple[ScalarMappable, Floats, float]:
-    """Colours, isolines and the step between them, shared by all panels of a picture."""
+    """Choose colours, isolines and the step between them, shared by all panels of a picture."""
     low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
     return distance_colors(low, high), *isolines_between(low, high)
 
@@ -199,13 +199,7 @@ def level_pieces(
 
 
 def cross_section(mesh: TriangleMesh, axis: int, position: float) -> Floats:
-    """Intersection of a mesh with a plane across an axis.
-
-    Returns
-    -------
-    (s, 2, 2) float
-        Ends of the segments, in the other two coordinates.
-    """
+    """(s, 2, 2) ends, in the other two coordinates, of the segments in which a plane across an axis cuts a mesh."""
     corners = mesh.vertices[mesh.faces]
     height = corners[:, :, axis] - position
     above = height >= 0
@@ -228,5 +222,5 @@ def _draw_section(panel: Axes, given: Any, axis: int, position: float, spacing: 
         x, y = np.delete(near, axis, axis=1).T
         panel.scatter(x, y, s=3, c="#d4145a", linewidths=0, zorder=3)
     elif shape is not None:
-        segments = cross_section(triangulated(shape), axis, position)
+        segments = cross_section(shape.triangulation, axis, position)
         panel.add_collection(mpl_collections.LineCollection(list(segments), colors="#d4145a", linewidths=1.1, zorder=3))

@@ -60,7 +60,7 @@ def draw_shape(
     if isinstance(shape, PointCloud):
         draw_points(shape.points, axes, direction, up)
         return
-    mesh = triangulated(shape)
+    mesh = shape.triangulation
     camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
     corners = camera.pixels(mesh.vertices)[mesh.faces]
     _, face, _ = rasterize(corners, np.zeros((mesh.n_faces, 3)), camera.width, camera.height)
@@ -72,33 +72,24 @@ def draw_shape(
 
 def draw_points(points: Floats, axes: Axes, direction: Floats, up: int = 2, colors: Floats | None = None) -> None:
     """Draw points into axes from far to near, in (n, 4) colours or in a blue that darkens with nearness."""
-    some = slice(None, None, max(1, len(points) // MOST_POINTS))
-    pixels = Camera.around(points[some], direction, up).pixels(points[some])
+    drawn = slice(None, None, max(1, len(points) // MOST_POINTS))
+    pixels = Camera.around(points[drawn], direction, up).pixels(points[drawn])
     order = np.argsort(pixels[:, 2])
     x, y, depth = pixels[order].T
     if colors is None:
         axes.scatter(x, y, s=4, c=depth, cmap="Blues", vmin=depth[0] - np.ptp(depth), linewidths=0)
     else:
-        axes.scatter(x, y, s=4, c=colors[some][order], linewidths=0)
+        axes.scatter(x, y, s=4, c=colors[drawn][order], linewidths=0)
     axes.set_axis_off()
     axes.set_aspect("equal")
 
 
 def outside_of(shape: Shape | ForeignShape) -> TriangleMesh | PolygonMesh | PointCloud:
-    """The visible surface of a shape, which is the boundary of voxels and tets."""
+    """Return the visible surface of a shape: of voxels and tets their boundary."""
     own = as_shape(shape)
     if isinstance(own, DigitalSurface):
         return own.squares
     return own.boundary if isinstance(own, TetMesh) else own
-
-
-def triangulated(mesh: Any) -> TriangleMesh:
-    """Polygons as fans around their centroids, for drawing."""
-    if isinstance(mesh, TriangleMesh):
-        return mesh
-    center = mesh.n_vertices + mesh.corner_polygons
-    faces = np.stack([mesh.corners, mesh.next_corners, center], axis=1)
-    return TriangleMesh(np.concatenate([mesh.vertices, mesh.polygon_centroids]), faces)
 
 
 def save_surface(
@@ -183,7 +174,7 @@ def draw_surface(
 
 
 def _own_and_painted(field: VertexField | PiecewiseField) -> tuple[TriangleMesh, Any, Floats]:
-    """The triangles to which sources refer, and those on which φ is linear with the values at their vertices."""
+    """Return the triangles to which sources refer, and those on which φ is linear with the values at their vertices."""
     domain = field.domain
     own = domain.mesh if isinstance(domain, IntrinsicTriangulation) else domain.triangulation
     painted = field.split() if isinstance(field, PiecewiseField) else field.subdivided()
@@ -220,7 +211,7 @@ def draw_source(axes: Axes, item: Any, mesh: Any, camera: Camera, depth: Floats)
 
 
 def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> Floats:
-    """A direction from which most of the sources are visible; for flat surfaces, along their normals."""
+    """Choose a direction from which most of the sources are visible; for flat surfaces, along their normals."""
     normals = [mesh.face_area_vectors[s.faces] for s in sources]
     mean = np.zeros(3)
     if normals:

@@ -28,7 +28,7 @@ LINE = "#1a1a1a"
 
 
 def plotter_of(thing: object) -> Any:
-    """A `pyvista.Plotter` in which a shape or a field is drawn."""
+    """Draw a shape or a field into a new `pyvista.Plotter`."""
     plotter = pyvista.Plotter()
     add(thing, plotter)
     plotter.add_axes()
@@ -119,7 +119,7 @@ def _add_zero_set(plotter: Any, field: Any) -> None:
 
 
 def _add_section(plotter: Any, mesh: Any, look: dict[str, Any]) -> None:
-    """The section across y through the middle of the box."""
+    """Add the section across y through the middle of the box."""
     plotter.add_mesh(mesh.outline(), color=LINE)
     section = mesh.slice(normal="y")
     _add_colors(plotter, section, look, lighting=False)
