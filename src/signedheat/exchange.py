@@ -57,6 +57,32 @@ def with_values(thing: Any, values: NDArray[np.floating]) -> Any:
 class Displayed:
     """A shape or a field that can be looked at."""
 
+    def to_pyvista(self) -> pyvista.DataSet:
+        """Convert to PyVista.
+
+        Returns
+        -------
+        pyvista.DataSet
+            `pyvista.PolyData` of triangles, polygons, lines or points, `pyvista.ImageData` of grids, and
+            `pyvista.UnstructuredGrid` of tets. Values of a field are point data ``signed_distance``, normals of points
+            ``Normals``. Of voxels these are the faces, and of an intrinsic triangulation its mesh.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> ball = sh.samples.sphere(1)
+        >>> ball.to_pyvista().n_cells
+        80
+        >>> sh.SignedHeatSolver(ball).distance(ball.points_at(0)).to_pyvista().array_names
+        ['signed_distance']
+        """
+        raise NotImplementedError
+
     def plotter(self) -> pyvista.Plotter:
         """Draw this into a `pyvista.Plotter`, to add more to it, or to make a file of it.
 
@@ -279,19 +305,6 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         return cls._of(from_pyvista(thing))
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """Convert to PyVista.
-
-        Returns
-        -------
-        pyvista.PolyData
-            The normals of points are point data ``Normals``.
-
-        Examples
-        --------
-        >>> import signedheat as sh
-        >>> sh.samples.sphere(1).to_pyvista().n_cells
-        80
-        """
         return to_pyvista(self._elements)
 
     @classmethod

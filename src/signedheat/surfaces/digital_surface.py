@@ -169,23 +169,6 @@ class DigitalSurface(Displayed, Surface):
         return self.squares._triangle_mask(face_mask)
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """Convert the faces of the voxels to PyVista.
-
-        Returns
-        -------
-        pyvista.PolyData
-            Squares.
-
-        Raises
-        ------
-        MissingPackageError
-            If PyVista is not installed.
-
-        Examples
-        --------
-        >>> DigitalSurface(np.ones((1, 1, 1), dtype=bool)).to_pyvista().n_cells
-        6
-        """
         return self.squares.to_pyvista()
 
     def __repr__(self) -> str:

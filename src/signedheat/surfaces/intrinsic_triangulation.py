@@ -379,24 +379,6 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return transfer_segments(seen, self.refinement, self.history, self.base)
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """Convert the mesh to PyVista.
-
-        Returns
-        -------
-        pyvista.PolyData
-            The triangles of the mesh, not those of the triangulation.
-
-        Raises
-        ------
-        MissingPackageError
-            If PyVista is not installed.
-
-        Examples
-        --------
-        >>> from signedheat import samples
-        >>> intrinsic_delaunay(samples.sphere(1)).to_pyvista().n_points
-        42
-        """
         return self.mesh.to_pyvista()
 
     def __repr__(self) -> str:

@@ -238,26 +238,6 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return values
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """Convert to PyVista.
-
-        Returns
-        -------
-        pyvista.PolyData
-            Triangles, polygons or points with point data ``signed_distance``.
-
-        Raises
-        ------
-        MissingPackageError
-            If PyVista is not installed.
-
-        Examples
-        --------
-        >>> import signedheat as sh
-        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-        >>> phi = VertexField(mesh, np.array([0.0, 1.0, 2.0]))
-        >>> phi.to_pyvista().array_names
-        ['signed_distance']
-        """
         simple = on_simple_surface(self)
         return with_values(simple.domain.to_pyvista(), simple.values)
 
