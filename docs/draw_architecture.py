@@ -27,7 +27,7 @@ FLOORS = [
         "#d3e8ea",
     ),
     (
-        "constraints direct_integration discretization linear_elements method",
+        "constraints direct_integration discretization method",
         "the paper: diffuse → normalize → integrate, once, on discretisations",
         "#fff6c9",
     ),

@@ -34,7 +34,7 @@ FLOORS = [
     {"mesh"},
     {"search", "linear", "exchange"},
     {"geodesics"},
-    {"constraints", "direct_integration", "discretization", "linear_elements", "method"},
+    {"constraints", "direct_integration", "discretization", "method"},
     {"surfaces", "grids", "tets"}
     | {
         "area_elements",

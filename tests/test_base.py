@@ -18,11 +18,11 @@ from signedheat.frozen import Frozen, ShortRepr, short
 from signedheat.inspection import inspect
 from signedheat.jobs import command_for, run_cancellable, run_limited
 from signedheat.joining import concatenated, placed
-from signedheat.linear_elements import LinearElements
 from signedheat.memory import fitting_count, untouched_zeros
 from signedheat.packages import ensure_installed, missing_package, require
 from signedheat.parallel import connected, in_chunks
 from signedheat.progress import within
+from signedheat.sharpening_methods import LinearElements
 from signedheat.surfaces.triangle_mesh import TriangleMesh
 from signedheat.validation import coordinates, finite_number, numbers, shaped, used_bounds
 

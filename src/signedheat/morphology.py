@@ -55,17 +55,9 @@ from .tets.tet_mesh import TetMesh
 from .validation import finite_number, positive_number
 
 __all__ = [
-    "closing",
-    "dilate",
-    "erode",
-    "offset",
-    "opening",
-    "shell",
-    "smooth_difference",
-    "smooth_intersection",
-    "smooth_union",
-    "thicken",
-]
+    "closing", "dilate", "erode", "offset", "opening", "shell", "smooth_difference", "smooth_intersection",
+    "smooth_union", "thicken",
+]  # fmt: skip
 
 ROOM_FOR_OFFSETS = 0.15
 """Padding of a shape in addition to its offsets, relative to its longest side."""

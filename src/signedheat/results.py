@@ -10,13 +10,6 @@ from .solids.sample_set import Samples
 from .solids.thickness import Thickness
 
 __all__ = [
-    "Closest",
-    "CurveOrientation",
-    "Deviation",
-    "Diagnostics",
-    "FilledMesh",
-    "FilledPolygonMesh",
-    "Orientation",
-    "Samples",
-    "Thickness",
-]
+    "Closest", "CurveOrientation", "Deviation", "Diagnostics", "FilledMesh", "FilledPolygonMesh", "Orientation",
+    "Samples", "Thickness",
+]  # fmt: skip

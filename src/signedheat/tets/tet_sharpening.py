@@ -25,12 +25,11 @@ from ..geodesics.heap_kernels import Queue, pop, push
 from ..jobs import run_cancellable
 from ..joining import joined_triangles
 from ..kinds import Shapes
-from ..linear_elements import LinearElements
 from ..mesh.components import grouped
 from ..progress import Progress
 from ..search.face_tree import FaceFeatures, FaceTree
 from ..search.nearest_triangles import TriangleTree, foot_on_triangle
-from ..sharpening_methods import Method, Nearest, nearest, sharpen_field, sharpened
+from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_field, sharpened
 from ..surfaces.point_cloud import PointCloud
 from .marching_tets import level_triangles
 from .tet_clipping import GRAZING, Planes, barycentric, beyond, stays_inside
