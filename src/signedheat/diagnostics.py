@@ -191,27 +191,13 @@ class OrientedPoints(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LeftOut(Note):
-    """What a union leaves out of a shape.
+    """Faces that a union leaves out of a shape."""
 
-    Attributes
-    ----------
-    covered_faces : int
-        Faces, or points, that lie inside other bodies, wholly or in part.
-    covered_area : float
-        Their fraction of the area, as far as they do.
-    cut_faces : int
-        Those that lie inside in part, and were cut.
-    merged_faces : int
-        Duplicates, and small loose pieces that lie along a body, nearer than they are large.
-    doubled_walls : int
-        Faces that are there twice, once facing each way; they stay, unless they lie inside a body.
-    """
-
-    covered_faces: int = 0
-    covered_area: float = 0.0
-    cut_faces: int = 0
-    merged_faces: int = 0
-    doubled_walls: int = 0
+    covered_faces: int = 0  # faces, or points, that lie inside other bodies, wholly or in part
+    covered_area: float = 0.0  # fraction of the area that does
+    cut_faces: int = 0  # faces that lie inside in part, and were cut
+    merged_faces: int = 0  # duplicates, and small loose pieces that lie along a body, nearer than they are large
+    doubled_walls: int = 0  # faces given twice, once facing each way; they stay, unless they lie inside a body
     text: ClassVar[str] = (
         "left out: {0.covered_faces} faces, {0.covered_area:.1%} of the area, that lie inside other bodies "
         "({0.cut_faces} of them in part), and {0.merged_faces} duplicates"
@@ -245,21 +231,11 @@ class SharpenedToShape(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CompletedArea(Note):
-    """How much of the surface of a solid is its completion, not a face that was given.
+    """How much of the surface of a solid is its completion, not a face that was given."""
 
-    Attributes
-    ----------
-    completed_area : float
-        Area of the completion, in squared units of length.
-    completed_share : float
-        The same, over the area of the whole surface.
-    where : (k, 2, d) float
-        Lower and upper corners of boxes around it.
-    """
-
-    completed_area: float
-    completed_share: float
-    where: list[list[list[float]]]
+    completed_area: float  # in squared units of length
+    completed_share: float  # over the area of the whole surface
+    where: list[list[list[float]]]  # (k, 2, d) lower and upper corners of boxes around it
 
     @property
     def important(self) -> bool:
@@ -356,19 +332,12 @@ class PointsLeftOut(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SlopeErrors(Note):
-    """Root mean square of ``|∇φ| − 1`` over the domain, before and after sharpening.
-
-    Attributes
-    ----------
-    slope_error_before, slope_error_after : float
-        The two.
-    worse : bool
-        Whether the slopes of most of the domain became worse, so that the field before is the better distance. Cells
-        without height and the kinks that every distance has do not count: they may raise the root mean square.
-    """
+    """Root mean square of ``|∇φ| − 1`` over the domain, before and after sharpening."""
 
     slope_error_before: float
     slope_error_after: float
+    # whether the slopes of most of the domain became worse, so that the field before is the better distance; cells
+    # without height and the kinks of a distance, which may raise the root mean square, do not count
     worse: bool = False
 
     def __str__(self) -> str:
@@ -378,21 +347,11 @@ class SlopeErrors(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SharpenedToCurves(Note):
-    """What distance of a field sharpened to curves is measured to, and what decided its sign.
+    """To what distance of a field sharpened to curves is measured, and what decided its sign."""
 
-    Attributes
-    ----------
-    completed_length : float
-        Fraction of what distance is measured to that is zero set of φ, where curve is missing.
-    free_ends : int
-        Ends of oriented curves, but for those at the boundary of the surface, and points where curves run head to head.
-    sides_by_curves : float
-        Fraction of the vertices whose sign the curves decide by themselves; φ decides that of the others.
-    """
-
-    completed_length: float
-    free_ends: int
-    sides_by_curves: float
+    completed_length: float  # fraction of the length, given or completed, that is zero set of φ, where curve is missing
+    free_ends: int  # ends of oriented curves inside the surface, and points where curves run head to head
+    sides_by_curves: float  # fraction of the vertices whose sign the curves decide; φ decides that of the others
     text: ClassVar[str] = (
         "{0.completed_length:.1%} of the curve completed between {0.free_ends} free ends; curves decide the sign of "
         "{0.sides_by_curves:.1%} of the vertices"
@@ -401,18 +360,10 @@ class SharpenedToCurves(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GeodesicWindows(Note):
-    """Number of windows in the exact polyhedral distance.
-
-    Attributes
-    ----------
-    windows : int
-        Their number, a measure of the work.
-    cut_short : bool
-        Whether there were so many that some distances are lengths of paths along edges instead of shortest ones.
-    """
+    """Number of windows in the exact polyhedral distance, a measure of the work."""
 
     windows: int
-    cut_short: bool = False
+    cut_short: bool = False  # whether some distances are lengths of paths along edges instead of shortest ones
 
     def __str__(self) -> str:
         return f"windows: {self.windows}" + ("; some distances are along edges, too long" if self.cut_short else "")
@@ -437,32 +388,16 @@ class ConvexRounds(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Jumps(Note):
-    """Objective of a piecewise distance with its lower bound, and the size of its jumps.
+    """Objective of a piecewise distance with its lower bound, and the size of its jumps."""
 
-    Attributes
-    ----------
-    objective : float
-        The objective of Eq. 16, before what jumps off the cut was smoothed.
-    bound, gap : float
-        A lower bound of the objective, and the relative difference of the objective and it.
-    rounds : int
-        Number of iterations.
-    continuous : bool
-        Whether there is no cut.
-    largest_jump, cut_length : float
-        The largest jump, and the total length of all cuts.
-    integration_error : float
-        Root mean square of ∇φ̄ − Y, φ̄ being φ averaged at the vertices of `PiecewiseField.split`.
-    """
-
-    objective: float
-    bound: float
-    gap: float
+    objective: float  # of Eq. 16, before jumps away from the cut were smoothed
+    bound: float  # a lower bound of the objective
+    gap: float  # relative difference of the objective and its bound
     rounds: int
-    continuous: bool
+    continuous: bool  # whether there is no cut
     largest_jump: float
-    cut_length: float
-    integration_error: float
+    cut_length: float  # total length of all cuts
+    integration_error: float  # root mean square of ∇φ̄ − Y, φ̄ being φ averaged at the vertices of `PiecewiseField.split`
 
     def __str__(self) -> str:
         cut = "continuous" if self.continuous else f"cuts of length {self.cut_length:.3g}"

@@ -21,31 +21,21 @@ NUMBERS = (int, float, np.number)
 
 
 class HasValues(Protocol):
-    """What arithmetic with numbers needs of a field."""
+    """A field with values, as arithmetic with numbers needs it."""
 
     @property
-    def values(self) -> NDArray[Any]:
-        """φ at the unknowns."""
-
-    def _mapped(self: AnyField, change: Change) -> AnyField:
-        """Change the values."""
-
-    def _scaled(self: AnyField, factor: float) -> AnyField:
-        """Multiply the field by a number."""
+    def values(self) -> NDArray[Any]: ...
+    def _mapped(self: AnyField, change: Change) -> AnyField: ...
+    def _scaled(self: AnyField, factor: float) -> AnyField: ...
 
 
 class SolidField(HasValues, Protocol):
-    """What a field has to be for its solid to be combined with others: a `GridField`, `TetField` or `VertexField`."""
+    """A field whose solid can be combined with others: a `GridField`, `TetField` or `VertexField`."""
 
     @property
-    def domain(self) -> object:
-        """Where the unknowns are."""
-
-    def with_values(self: Solid, values: Floats) -> Solid:
-        """Put other values on the same domain."""
-
-    def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
-        """Combine the values of two fields by a rule, wherever both have one."""
+    def domain(self) -> object: ...
+    def with_values(self: Solid, values: Floats) -> Solid: ...
+    def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid: ...
 
 
 @runtime_checkable

@@ -69,8 +69,8 @@ SIDES = 64
 
 Boundary: TypeAlias = TriangleMesh | list[Polyline] | list[Curve]
 """The boundary of a result, of the same kind as the shape."""
-Measure: TypeAlias = Callable[[Sources, Domain], Field]
-"""Called as ``measure(shape, domain)`` for the distance whose level sets are the offsets."""
+Measure: TypeAlias = Callable[[Sources, Domain], Field] | None
+"""Called as ``measure(shape, domain)`` for the distance whose level sets are the offsets; None for the default."""
 
 
 class _Morphology(Protocol):
@@ -81,20 +81,20 @@ class _Morphology(Protocol):
         self,
         shape: Shapes,
         distance: float,
-        domain: Grid | TetMesh | None = None,
+        domain: Grid | TetMesh | None = ...,
         *,
         resolution: int = ...,
-        measure: Measure | None = ...,
+        measure: Measure = ...,
     ) -> TriangleMesh: ...
     @overload
     def __call__(
         self,
         shape: Polylines,
         distance: float,
-        domain: Grid | None = None,
+        domain: Grid | None = ...,
         *,
         resolution: int = ...,
-        measure: Measure | None = ...,
+        measure: Measure = ...,
     ) -> list[Polyline]: ...
     @overload
     def __call__(
@@ -104,7 +104,7 @@ class _Morphology(Protocol):
         domain: SurfaceDomain,
         *,
         resolution: int = ...,
-        measure: Measure | None = ...,
+        measure: Measure = ...,
     ) -> list[Curve]: ...
 
 
@@ -119,7 +119,7 @@ def dilate(
     domain: Domain | None = None,
     *,
     resolution: int = RESOLUTION,
-    measure: Measure | None = None,
+    measure: Measure = None,
 ) -> Boundary:
     """Dilate a shape: offset it outward by a distance.
 
@@ -168,7 +168,7 @@ def erode(
     domain: Domain | None = None,
     *,
     resolution: int = RESOLUTION,
-    measure: Measure | None = None,
+    measure: Measure = None,
 ) -> Boundary:
     """Erode a shape: offset it inward by a distance. Parameters, result and errors are those of `dilate`.
 
@@ -189,7 +189,7 @@ def opening(
     domain: Domain | None = None,
     *,
     resolution: int = RESOLUTION,
-    measure: Measure | None = None,
+    measure: Measure = None,
 ) -> Boundary:
     """Erode, then dilate: removes parts thinner than twice the distance, rounds convex corners. See `dilate`.
 
@@ -210,7 +210,7 @@ def closing(
     domain: Domain | None = None,
     *,
     resolution: int = RESOLUTION,
-    measure: Measure | None = None,
+    measure: Measure = None,
 ) -> Boundary:
     """Dilate, then erode: fills gaps narrower than twice the distance, rounds concave corners. See `dilate`.
 
@@ -297,7 +297,7 @@ def shell(
     domain: Grid | None = None,
     *,
     resolution: int = RESOLUTION,
-    measure: Measure | None = None,
+    measure: Measure = None,
     keep_outside: bool = False,
     drain: float | None = None,
 ) -> TriangleMesh:
@@ -556,12 +556,7 @@ def _sided(domain: Domain, shape: Sources) -> Field:
 
 
 def _offsets(
-    shape: Sources,
-    distance: float,
-    signs: tuple[int, ...],
-    domain: Domain | None,
-    resolution: int,
-    measure: Measure | None,
+    shape: Sources, distance: float, signs: tuple[int, ...], domain: Domain | None, resolution: int, measure: Measure
 ) -> Boundary:
     """Offset successively, outward for a sign of 1 and inward for −1, and compute the distance anew each time."""
     distance = finite_number(distance, "the distance", least=0)

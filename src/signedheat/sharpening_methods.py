@@ -29,6 +29,7 @@ from .errors import (
     warn_user,
 )
 from .field_kinds import Field
+from .geodesics.exact_distance import Report
 from .linear.splitting import split_rounds
 from .mesh.intrinsic_mesh import IntrinsicMesh
 from .mesh.tet_shapes import Tetrahedra
@@ -113,12 +114,7 @@ class Nearest:
 
 @singledispatch
 def nearest(
-    domain: Any,
-    values: Floats,
-    source: SourceTerm | None,
-    given: Any,
-    tolerance: float,
-    report: Callable[[], None] | None,
+    domain: Any, values: Floats, source: SourceTerm | None, given: Any, tolerance: float, report: Report | None
 ) -> Nearest:
     """Measure to the nearest of a source and the zero set of φ; every kind of domain registers a function of its own.
 
