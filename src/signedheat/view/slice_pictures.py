@@ -23,7 +23,7 @@ from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_field import TetField
 from .figures import add_color_bar, distance_colors, isolines_between, picture
-from .surface_pictures import outside_of
+from .surface_pictures import outside_of, triangulated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -222,5 +222,5 @@ def _draw_section(panel: Axes, given: Any, axis: int, position: float, spacing: 
         x, y = np.delete(near, axis, axis=1).T
         panel.scatter(x, y, s=3, c="#d4145a", linewidths=0, zorder=3)
     elif shape is not None:
-        segments = cross_section(shape.triangulation, axis, position)
+        segments = cross_section(triangulated(shape), axis, position)
         panel.add_collection(mpl_collections.LineCollection(list(segments), colors="#d4145a", linewidths=1.1, zorder=3))

@@ -60,7 +60,7 @@ def draw_shape(
     if isinstance(shape, PointCloud):
         draw_points(shape.points, axes, direction, up)
         return
-    mesh = shape.triangulation
+    mesh = triangulated(shape)
     camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
     corners = camera.pixels(mesh.vertices)[mesh.faces]
     _, face, _ = rasterize(corners, np.zeros((mesh.n_faces, 3)), camera.width, camera.height)
@@ -90,6 +90,15 @@ def outside_of(shape: Shape | ForeignShape) -> TriangleMesh | PolygonMesh | Poin
     if isinstance(own, DigitalSurface):
         return own.squares
     return own.boundary if isinstance(own, TetMesh) else own
+
+
+def triangulated(mesh: TriangleMesh | PolygonMesh) -> TriangleMesh:
+    """Split polygons into fans around their centroids, which is fast and good enough to draw."""
+    if isinstance(mesh, TriangleMesh):
+        return mesh
+    center = mesh.n_vertices + mesh.corner_polygons
+    faces = np.stack([mesh.corners, mesh.next_corners, center], axis=1)
+    return TriangleMesh(np.concatenate([mesh.vertices, mesh.polygon_centroids]), faces)
 
 
 def save_surface(
