@@ -65,7 +65,8 @@ class Displayed:
         pyvista.DataSet
             `pyvista.PolyData` of triangles, polygons, lines or points, `pyvista.ImageData` of grids, and
             `pyvista.UnstructuredGrid` of tets. Values of a field are point data ``signed_distance``, normals of points
-            ``Normals``. Of voxels these are the faces, and of an intrinsic triangulation its mesh.
+            ``Normals``. Lines and grids in the plane have z = 0. A solid gives its boundary, voxels their faces, an
+            intrinsic triangulation its mesh, and a `PiecewiseField` what `split` returns, so that the jumps show.
 
         Raises
         ------

@@ -234,26 +234,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         return self.split().contour(level)
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """Convert `split` to PyVista, so that the jumps show.
-
-        Returns
-        -------
-        pyvista.PolyData
-            With point data ``signed_distance``.
-
-        Raises
-        ------
-        MissingPackageError
-            If PyVista is not installed.
-
-        Examples
-        --------
-        >>> import signedheat as sh
-        >>> ball = sh.samples.sphere(2)
-        >>> phi = sh.piecewise_distance(ball, ball.level_set(ball.vertices[:, 2]))
-        >>> phi.to_pyvista().array_names
-        ['signed_distance']
-        """
+        # cut open, so that the jumps show
         return self.split().to_pyvista()
 
     def save(self, path: str | PathLike[str]) -> None:

@@ -154,23 +154,6 @@ class Polyline(Displayed, Frozen):
         return Polyline(self.points[::-1], self.closed)
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """Convert to a line of PyVista.
-
-        Returns
-        -------
-        pyvista.PolyData
-            A line with z = 0.
-
-        Raises
-        ------
-        MissingPackageError
-            If PyVista is not installed.
-
-        Examples
-        --------
-        >>> Polyline([[0, 0], [1, 0], [1, 1]]).to_pyvista().n_points
-        3
-        """
         points = np.column_stack([self.points, np.zeros(self.n_points)])
         return pyvista.lines_from_points(points, close=self.closed)
 

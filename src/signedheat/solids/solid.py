@@ -541,24 +541,6 @@ class Solid(Displayed, Represented, Frozen):
         return self.field(grid=field.grid, band=None if field.blocks is None else field.width)
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """Convert `boundary` to PyVista.
-
-        Returns
-        -------
-        pyvista.PolyData
-            Triangles.
-
-        Raises
-        ------
-        MissingPackageError
-            If PyVista is not installed.
-
-        Examples
-        --------
-        >>> from signedheat import complete, samples
-        >>> complete(samples.sphere(1)).to_pyvista().n_cells
-        80
-        """
         return self.boundary.to_pyvista()
 
     def __repr__(self) -> str:

@@ -221,24 +221,6 @@ class TetField(Displayed, Combinable, Frozen):
         return TetField(self.mesh, values)
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
-        """Convert to PyVista.
-
-        Returns
-        -------
-        pyvista.UnstructuredGrid
-            With point data ``signed_distance``.
-
-        Raises
-        ------
-        MissingPackageError
-            If PyVista is not installed.
-
-        Examples
-        --------
-        >>> phi = TetField(TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]), [0.0, 1.0, 2.0, 3.0])
-        >>> phi.to_pyvista().array_names
-        ['signed_distance']
-        """
         return with_values(self.mesh.to_pyvista(), self.values)
 
     def save(self, path: str | PathLike[str]) -> None:

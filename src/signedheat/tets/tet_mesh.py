@@ -231,23 +231,6 @@ class TetMesh(Displayed, Frozen):
         return cls(grid.points, tets_of_pyvista(grid))
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
-        """Convert to PyVista.
-
-        Returns
-        -------
-        pyvista.UnstructuredGrid
-            Of tets.
-
-        Raises
-        ------
-        MissingPackageError
-            If PyVista is not installed.
-
-        Examples
-        --------
-        >>> TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]).to_pyvista().n_cells
-        1
-        """
         return pyvista.UnstructuredGrid({10: np.array(self.tets)}, np.array(self.vertices))
 
     def __repr__(self) -> str:
