@@ -86,18 +86,9 @@ class Task:
         figures: Mapping[str, object] | None = None,
     ) -> Outcome:
         """Make the outcome of this task for the manifest."""
-        path = self.shape.path
-        return Outcome(
-            name=self.shape.name,
-            input=str(path),
-            state=state,
-            seconds=round(seconds, 3),
-            message=message,
-            outputs=outputs,
-            figures=figures or {},
-            job=self.description,
-            source=source_of(path),
-        )
+        name, path, seconds = self.shape.name, self.shape.path, round(seconds, 3)
+        ended = name, str(path), state, seconds, message, outputs, figures or {}
+        return Outcome(*ended, job=self.description, source=source_of(path))
 
     def _move_to(self, folder: Path) -> list[str]:
         """Move all results to the folder, or none unless the disk fails, and return their names."""

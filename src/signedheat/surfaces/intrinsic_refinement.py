@@ -341,16 +341,8 @@ def narrow_vertices(g: Gluing) -> Bools:
 @kernel
 def has_room(g: Gluing, agenda: Agenda, ring: int) -> bool:
     """Whether splitting an edge with so many faces fits into the arrays (splitting a face needs less)."""
-    faces: int = g.counts[0]
-    edges: int = g.counts[1]
-    vertices: int = g.counts[2]
-    steps: int = g.counts[3]
-    return (
-        3 * (faces + ring + 2) <= len(g.tail)
-        and edges + ring + 4 <= len(g.length)
-        and vertices + 1 <= len(agenda.on_segment)
-        and steps + ring + 2 <= len(g.steps)
-    )
+    fits: bool = 3 * (g.counts[0] + ring + 2) <= len(g.tail) and g.counts[1] + ring + 4 <= len(g.length)
+    return fits and g.counts[2] + 1 <= len(agenda.on_segment) and g.counts[3] + ring + 2 <= len(g.steps)
 
 
 @kernel

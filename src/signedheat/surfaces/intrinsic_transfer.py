@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Complexes, Floats, Ints, mask_of
+from ..arrays import Bools, Complexes, Floats, Ints
 from ..errors import SourceError
 from ..frozen import Frozen
 from ..geodesics.exact_distance import cleared
@@ -48,17 +48,17 @@ class ConformingRefinement(Frozen):
         given.
         """
         finer, parents, corners = triangles, np.arange(triangles.n_faces), np.eye(3)[None]
-        marked = np.zeros(finer.n_edges, dtype=bool)
+        along = np.empty(0, dtype=np.int64)
         if parts:
             begin = heights[triangles.corner_vertices].argmin(axis=1)
             finer, merged, is_new, parents = cut_along(triangles, parts, begin=begin)
             corners, new = np.where(is_new[:, None, None], 0.0, np.eye(3)), np.flatnonzero(is_new)
             corners[new] = barycentric_of(triangles, parents[new], finer.corner_positions[new])
-            marked = mask_of(finer.n_edges, merged.edges[merged.edges >= 0])
+            along = merged.edges[merged.edges >= 0]
         at_corners = np.einsum("mkl,ml->mk", corners, heights[triangles.corner_vertices[parents]])
         finer, edges, faces, turns = in_order(finer, at_corners)
         corners = np.take_along_axis(np.broadcast_to(corners, (len(faces), 3, 3))[faces], turns[:, :, None], axis=1)
-        return cls(finer, marked[edges], parents[faces], corners)
+        return cls(finer, np.isin(edges, along), parents[faces], corners)
 
     def push_forward(self, faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
         """Transfer points, and vectors (p, k, 3) at them, from the faces before the cuts to the faces after."""

@@ -92,18 +92,6 @@ def gradient_directions(mesh: Triangles, values: Floats, faces: Ints) -> Floats:
     return np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
 
 
-def region_boundary(mesh: Triangles, mask: Bools) -> list[Curve]:
-    """Curves along the edges between the faces of a region and all others, with the region to the left."""
-    inside = np.bincount(mesh.edges.face_edges.ravel(), np.repeat(mask, 3), len(mesh.edges.vertices))
-    between = (inside > 0) & (inside < mesh.edges.face_counts)
-    return along_sides(mesh, between[mesh.edges.face_edges] & mask[:, None])
-
-
-def boundary_curves(mesh: Triangles) -> list[Curve]:
-    """Curves along the edges with a single face, with the surface to the left."""
-    return along_sides(mesh, (mesh.edges.face_counts == 1)[mesh.edges.face_edges])
-
-
 def along_sides(mesh: Triangles, chosen: Bools) -> list[Curve]:
     """Curves along chosen sides of faces, in the direction in which the face is to the left."""
     faces, sides = np.nonzero(chosen)

@@ -16,7 +16,7 @@ from ..mesh.surface_points import corners_at, locate_points
 from ..mesh.triangles import Triangles
 from ..search.nearest_triangles import TriangleTree
 from ..validation import array_of, coordinates, finite_number, flag, numbers
-from .level_sets import boundary_curves, level_set, region_boundary
+from .level_sets import along_sides, level_set
 from .surface_curves import Curve, SurfacePoints
 
 
@@ -245,7 +245,11 @@ class Surface(Frozen):
         >>> mesh.region_boundary([True, False])
         [Curve(2 points, open, oriented)]
         """
-        return region_boundary(self.triangulation, self._triangle_mask(array_of(face_mask, "face_mask", SourceError)))
+        mask = self._triangle_mask(array_of(face_mask, "face_mask", SourceError))
+        edges = self.triangulation.edges
+        inside = np.bincount(edges.face_edges.ravel(), np.repeat(mask, 3), len(edges.vertices))
+        between = (inside > 0) & (inside < edges.face_counts)
+        return along_sides(self.triangulation, between[edges.face_edges] & mask[:, None])
 
     def boundary_curves(self) -> list[Curve]:
         """Find the boundary of the surface, with the surface to its left.
@@ -261,7 +265,8 @@ class Surface(Frozen):
         >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).boundary_curves()
         [Curve(3 points, closed, oriented)]
         """
-        return boundary_curves(self.triangulation)
+        edges = self.triangulation.edges
+        return along_sides(self.triangulation, (edges.face_counts == 1)[edges.face_edges])
 
     def _at_vertices(self, vertices: ArrayLike, name: str) -> tuple[Ints, Floats]:
         ids = self._triangulation_vertices(np.atleast_1d(array_of(vertices, f"vertex ids of a {name}", SourceError)))

@@ -28,7 +28,7 @@ from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharp
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .surface_curves import CurvesAndPoints
 from .surface_discretization import SurfaceDiscretization
-from .surface_source import SurfaceSource
+from .surface_source import SurfaceSource, lie_along
 from .vertex_field import VertexField
 
 FAR = 1.0
@@ -303,14 +303,7 @@ def free_ends(triangles: IntrinsicMesh, placed: PlacedSegments) -> Ints:
     sides, ends = placed.sides[once], placed.ends[once]
     n = len(placed.nodes)
     surplus = np.bincount(ends[:, 1], sides, n) - np.bincount(ends[:, 0], sides, n)
-    at_boundary = np.zeros(triangles.n_vertices, dtype=bool)
-    rim = triangles.edges.face_counts == 1
-    at_boundary[triangles.edges.vertices[rim]] = True
-    kinds, elements = placed.nodes.kinds, placed.nodes.elements
-    outer = np.zeros(n, dtype=bool)
-    outer[kinds == VERTEX] = at_boundary[elements[kinds == VERTEX]]
-    outer[kinds == EDGE] = rim[elements[kinds == EDGE]]
-    return np.flatnonzero((surplus != 0) & ~outer)
+    return np.flatnonzero((surplus != 0) & ~lie_along(triangles, placed.nodes, triangles.edges.face_counts == 1))
 
 
 def nearest_sides(triangles: IntrinsicMesh, placed: PlacedSegments, ends: Ints) -> tuple[Ints, Floats]:

@@ -55,11 +55,7 @@ class SurfaceSource(Frozen):
             return np.zeros(triangles.n_faces, dtype=bool)
         nodes, ends = joined(oriented)
         free = nodes[np.flatnonzero(np.bincount(ends.ravel(), minlength=len(nodes)) % 2)]
-        rim = triangles.edges.face_counts != 2
-        at_rim = mask_of(triangles.n_vertices, triangles.edges.vertices[rim])
-        outer = ((free.kinds == VERTEX) & at_rim[free.elements % triangles.n_vertices]) | (
-            (free.kinds == EDGE) & rim[free.elements % triangles.n_edges]
-        )
+        outer = lie_along(triangles, free, triangles.edges.face_counts != 2)
         parts = triangles.face_components
         return np.isin(parts, parts[incident_faces(triangles, free[~outer])[1]])
 
@@ -67,6 +63,14 @@ class SurfaceSource(Frozen):
     def ends_everywhere(self) -> bool:
         """Whether there is no connected part of the surface in which all curves are closed."""
         return all(self.ending[part.nodes.faces].all() for part in self.parts)
+
+
+def lie_along(triangles: IntrinsicMesh, points: LocatedPoints, edges: Bools) -> Bools:
+    """(p,) points on some of the edges (e,), or at vertices of them."""
+    vertices = mask_of(triangles.n_vertices, triangles.edges.vertices[edges])
+    return ((points.kinds == VERTEX) & vertices[points.elements % triangles.n_vertices]) | (
+        (points.kinds == EDGE) & edges[points.elements % triangles.n_edges]
+    )
 
 
 def surface_source(
