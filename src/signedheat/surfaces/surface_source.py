@@ -57,7 +57,7 @@ class SurfaceSource(Frozen):
         free = nodes[np.flatnonzero(np.bincount(ends.ravel(), minlength=len(nodes)) % 2)]
         outer = lie_along(triangles, free, triangles.edges.face_counts != 2)
         parts = triangles.face_components
-        return np.isin(parts, parts[incident_faces(triangles, free[~outer])[1]])
+        return np.isin(parts, parts[incident_faces(triangles, free[np.flatnonzero(~outer)])[1]])
 
     @property
     def ends_everywhere(self) -> bool:
