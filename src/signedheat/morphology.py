@@ -449,7 +449,7 @@ def thicken(
 
 
 def _chosen(sheet: object, faces: ArrayLike) -> TriangleMesh | PolygonMesh:
-    """The mesh of some faces."""
+    """Return the mesh of some faces."""
     if not isinstance(sheet, TriangleMesh | PolygonMesh):
         raise SourceError("faces are chosen of one mesh", element="faces", remedy="pass it alone")
     n = sheet.n_faces if isinstance(sheet, TriangleMesh) else sheet.n_polygons

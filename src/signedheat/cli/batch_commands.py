@@ -257,7 +257,7 @@ def made_of_each(
 
 
 def listed(inputs: list[str]) -> list[str]:
-    """The inputs, with ``-`` replaced by the lines of standard input."""
+    """Return the inputs, with ``-`` replaced by the lines of standard input."""
     if "-" not in inputs:
         return inputs
     lines = [line.rstrip("\r\n") for line in (sys.stdin or ()) if line.strip()]
@@ -268,7 +268,7 @@ def listed(inputs: list[str]) -> list[str]:
 
 
 def job_of(arguments: Namespace) -> sh.batches.Job:
-    """The job that the options describe."""
+    """Return the job that the options describe."""
     sampling = None
     if arguments.sample is not None:
         named = {name: getattr(arguments, name) for name in ("near", "seed", "normalize", "layout")}

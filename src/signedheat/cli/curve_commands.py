@@ -30,7 +30,7 @@ from .terminal import ProgressBar
 
 
 def about_curves(written: str) -> tuple[Option, ...]:
-    """The arguments of a distance to curves on a surface, and of what is written."""
+    """Return the arguments of a distance to curves on a surface, and of what is written."""
     return (
         option(
             "mesh",
@@ -178,7 +178,7 @@ def close(arguments: Namespace) -> Summary:
 
 
 def surface_and_curves(arguments: Namespace) -> tuple[Any, list[Any]]:
-    """The surface, and the curves on it."""
+    """Return the surface, and the curves on it."""
     domain: Any = sh.as_shape(sh.read(arguments.mesh))
     kind = type(domain).__name__
     if not hasattr(domain, "triangulation"):
@@ -196,7 +196,7 @@ def surface_and_curves(arguments: Namespace) -> tuple[Any, list[Any]]:
 
 
 def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -> sh.VertexField:
-    """The distance to the curves."""
+    """Return the distance to the curves."""
     constraint = shapes.constraint_of(arguments.constraint)
     intrinsic: Literal[True, "auto"] = True if arguments.intrinsic else "auto"
     field: sh.VertexField

@@ -50,7 +50,7 @@ def solids() -> None:
 
 
 def reports() -> None:
-    """What `info` and pictures take."""
+    """Return what `info` and pictures take."""
     ball = samples.sphere(2)
     inspect(ball)
     widths(orientation(ball).shape)

@@ -75,7 +75,7 @@ def prefix_errors(path: Any) -> Iterator[None]:
 
 
 def read_source(arguments: Namespace, path: str | None = None) -> Any:
-    """The source, of another file or that of the command: a shape in space, placed, or polylines in the plane."""
+    """Read the source, of another file or that of the command: a placed shape in space, or polylines in the plane."""
     path = arguments.shape if path is None else path
     if is_planar(path):
         if arguments.transform is not None:
@@ -91,7 +91,7 @@ def read_source(arguments: Namespace, path: str | None = None) -> Any:
 
 
 def unit_in_use(arguments: Namespace, *paths: str) -> str | None:
-    """The unit of the lengths that a command prints and writes: of ``--units``, or of its files; None if nobody says.
+    """Find the unit of the lengths that a command prints and writes, of ``--units`` or its files; None if nobody says.
 
     Where only some files state one, or they state different ones, the first counts for all.
     """
@@ -104,17 +104,17 @@ def unit_in_use(arguments: Namespace, *paths: str) -> str | None:
 
 
 def named(unit: str | None, power: str = "") -> str:
-    """A unit after a length, or ``power="³"`` after a volume; nothing if it is unknown."""
+    """Return a unit after a length, or ``power="³"`` after a volume; nothing if it is unknown."""
     return "" if unit is None else f" {unit}{power}"
 
 
 def place(coordinates: Iterable[float]) -> str:
-    """A place, in a line."""
+    """Return a place, in a line."""
     return f"({', '.join(f'{x:.4g}' for x in coordinates)})"
 
 
 def solid_of(arguments: Namespace, path: str) -> Any:
-    """The shape in a file, completed as the options say; what matters about it goes to standard error."""
+    """Return the shape in a file, completed as the options say; what matters about it goes to standard error."""
     repair = {name: getattr(arguments, name) for name in ("as_oriented", "keep_overlaps", "lids", "nested")}
     with prefix_errors(path), ProgressBar(is_quiet(arguments)) as progress:
         solid = complete(read_source(arguments, path), **repair, progress=progress)
@@ -123,7 +123,7 @@ def solid_of(arguments: Namespace, path: str) -> Any:
 
 
 def placement(arguments: Namespace, path: str) -> Floats | None:
-    """The map of ``--units`` and ``--transform``, units first; None if neither is given."""
+    """Return the map of ``--units`` and ``--transform``, units first; None if neither is given."""
     if arguments.units is None and arguments.transform is None:
         return None
     matrix = np.eye(4)
@@ -135,7 +135,7 @@ def placement(arguments: Namespace, path: str) -> Floats | None:
 
 
 def unit_scale(arguments: Namespace, path: str) -> float:
-    """What ``--units`` multiplies lengths by: 1 where neither it nor the file names the units that the file is in."""
+    """Return the factor of ``--units``: 1 where neither it nor the file names the units that the file is in."""
     assumed, _, wanted = arguments.units.rpartition(":")
     if not assumed and unit_of(path) is None and not is_quiet(arguments):
         cause = f"{printable(path)} does not say its units"
@@ -161,7 +161,7 @@ def matrix_of(words: list[str]) -> Floats:
 
 
 def grid_for(shape: Any, arguments: Namespace, reach: float | None = None, image: LabelImage | None = None) -> Grid:
-    """The grid of the options; by default that of the image, or one around the shape with room for offsets."""
+    """Return the grid of the options; by default that of the image, or one around the shape with room for offsets."""
     spacing = arguments.spacing
     if spacing is not None and len(spacing) == 1:
         spacing = spacing[0]
@@ -175,7 +175,7 @@ def grid_for(shape: Any, arguments: Namespace, reach: float | None = None, image
 
 
 def constraint_of(word: str) -> Constraint:
-    """A constraint from its name on the command line.
+    """Return a constraint from its name on the command line.
 
     Examples
     --------
@@ -199,7 +199,7 @@ def constraint_of(word: str) -> Constraint:
 def measured(
     arguments: Namespace, image: LabelImage | None = None, reach: float | None = None
 ) -> tuple[Any, GridField]:
-    """The shape of a command, from its file or an image, and the distance to it, with room for offsets."""
+    """Return the shape of a command, from its file or an image, and the distance to it, with room for offsets."""
     with prefix_errors(arguments.shape):
         shape = read_source(arguments) if image is None else image.surface(arguments.label)
         return shape, compute(shape, grid_for(shape, arguments, reach, image), arguments)
@@ -251,7 +251,7 @@ def in_band(solid: Any, grid: Grid, arguments: Namespace, progress: Progress | N
 
 
 def hint(field: GridField) -> str:
-    """A further line of output about sources that may have been given twice, or nothing."""
+    """Return a further line of output about sources that may have been given twice, or nothing."""
     note = field.diagnostics.note(SampledSource)
     cancelled = note.area_cancelled if note else 0.0
     if cancelled < CANCELLED:
@@ -263,12 +263,12 @@ def hint(field: GridField) -> str:
 
 
 def range_in_words(summary: dict[str, Any], unit: str | None) -> str:
-    """The least and the greatest value of a field that `describe` described."""
+    """Return the least and the greatest value of a field that `describe` described."""
     return f"φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}{named(unit)}"
 
 
 def on_tets(arguments: Namespace) -> tuple[Any, TetField]:
-    """The shape of a command, and the distance to it on tets: of a file, or around the shape."""
+    """Return the shape of a command, and the distance to it on tets: of a file, or around the shape."""
     shape, mesh = read_source(arguments), read(arguments.tets) if arguments.tets else None
     if mesh is not None and not isinstance(mesh, TetMesh):
         raise GeometryError(
@@ -290,7 +290,7 @@ def on_tets(arguments: Namespace) -> tuple[Any, TetField]:
 
 
 def field_or_image(path: str) -> Any:
-    """The field in a file; the image in it, if its axes are not x, y, z; None if the file holds neither."""
+    """Return the field in a file; the image in it, if its axes are not x, y, z; None if the file holds neither."""
     if extension(path) in NIFTI:
         return read_labels(path)
     if extension(path) == ".npz" and holds_solid(path):
@@ -311,7 +311,7 @@ def field_or_image(path: str) -> Any:
 
 
 def image_of(arguments: Namespace) -> LabelImage | None:
-    """The image of labels that the command is about, if it is about one."""
+    """Return the image of labels that the command is about, if it is about one."""
     if extension(arguments.shape) not in IMAGES:
         return None
     image = read_labels(arguments.shape)
@@ -321,7 +321,7 @@ def image_of(arguments: Namespace) -> LabelImage | None:
 
 
 def labels_of(image: LabelImage) -> list[int] | None:
-    """The labels, if these are few whole numbers; otherwise the image holds a field."""
+    """Return the labels, if these are few whole numbers; otherwise the image holds a field."""
     values = image.labels.astype(np.int8) if image.labels.dtype == bool else image.labels
     found = np.unique(values[np.isfinite(values)])
     if len(found) > LISTED or (found != np.round(found)).any():
@@ -330,12 +330,12 @@ def labels_of(image: LabelImage) -> list[int] | None:
 
 
 def field_of(image: LabelImage) -> GridField:
-    """The values of an image as a field along its own axes."""
+    """Return the values of an image as a field along its own axes."""
     return GridField(image.grid, image.labels.astype(np.float64))
 
 
 def thing_of(image: LabelImage) -> GridField | PolygonMesh:
-    """What an image shows, along its own axes: a field, or the boundary of all voxels with a label."""
+    """Return what an image shows, along its own axes: a field, or the boundary of all voxels with a label."""
     if labels_of(image) is None:
         return field_of(image)
     return DigitalSurface(image.labels != 0, image.spacing).squares
@@ -379,7 +379,7 @@ def counts(what: Any) -> dict[str, Any]:
 
 
 def output_names(output: str, distances: list[float]) -> list[str]:
-    """The given name for one distance; a name with the distance in it for each of several."""
+    """Return the given name for one distance; a name with the distance in it for each of several."""
     path = Path(output)
     if len(distances) == 1 or not path.name:  # a name that is none is refused as it is
         return [output]

@@ -137,7 +137,7 @@ def command(
 
 
 def parser_of(commands: Iterable[Command]) -> Parser:
-    """The parser of the whole command line."""
+    """Return the parser of the whole command line."""
     parser = Parser(
         prog="signedheat",
         description="Generalized signed distance to broken geometry: negative inside, positive outside, "
@@ -185,18 +185,18 @@ def refuse_output_over_input(arguments: Namespace) -> None:
 
 
 def _names(value: Any) -> list[str]:
-    """The valid names of files in the value of an argument."""
+    """Return the valid names of files in the value of an argument."""
     values = value if isinstance(value, list) else [value]
     return [name for name in values if isinstance(name, str) and "\0" not in name]
 
 
 def output(help: str, metavar: str = "OUT") -> Option:
-    """The option that names the output."""
+    """Return the option that names the output."""
     return option("-o", "--output", required=True, metavar=metavar, help=help)
 
 
 def format_option(standard: str) -> Option:
-    """The option for the format of standard output, with its default."""
+    """Return the option for the format of standard output, with its default."""
     return option("--format", default=standard, metavar="EXT", help=f"of standard output, with -o - ({standard})")
 
 
@@ -206,7 +206,7 @@ def is_quiet(arguments: Namespace) -> bool:
 
 
 def finite(word: str) -> float:
-    """A finite number."""
+    """Return a finite number."""
     try:
         value = float(word)
     except ValueError:
@@ -217,14 +217,14 @@ def finite(word: str) -> float:
 
 
 def ending(word: str) -> str:
-    """The extension of a file, without its first dot."""
+    """Return the extension of a file, without its first dot."""
     if not re.fullmatch(r"\.?\w+(\.gz)?", word):
         raise argparse.ArgumentTypeError(f"{word!r} is not an extension of a file")
     return word.removeprefix(".")
 
 
 def positive(word: str) -> float:
-    """A positive number."""
+    """Return a positive number."""
     value = finite(word)
     if value <= 0:
         raise argparse.ArgumentTypeError(f"{word} is not positive")
@@ -232,7 +232,7 @@ def positive(word: str) -> float:
 
 
 def not_negative(word: str) -> float:
-    """A nonnegative number."""
+    """Return a nonnegative number."""
     value = finite(word)
     if value < 0:
         raise argparse.ArgumentTypeError(f"{word} is negative")
@@ -240,7 +240,7 @@ def not_negative(word: str) -> float:
 
 
 def fraction(word: str) -> float:
-    """A number from 0 to 1."""
+    """Return a number from 0 to 1."""
     value = not_negative(word)
     if value > 1:
         raise argparse.ArgumentTypeError(f"{word} is more than 1")
@@ -248,7 +248,7 @@ def fraction(word: str) -> float:
 
 
 def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
-    """A parser of whole numbers from `least` to `most`."""
+    """Return a parser of whole numbers from `least` to `most`."""
     upper = "on" if most is None else f"to {most}"
 
     def parse(word: str) -> int:
@@ -290,7 +290,7 @@ def surface_constraint(word: str) -> str:
 
 
 def shape_option(planar: str = "") -> Option:
-    """The argument for the shape of a command; `planar` lists formats of drawings in the plane."""
+    """Return the argument for the shape of a command; `planar` lists formats of drawings in the plane."""
     return option(
         "shape", metavar="SHAPE", help=f"surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc{planar}"
     )
@@ -383,7 +383,7 @@ SCHEDULER = option("--scheduler", metavar="ADDRESS", help="a running Dask cluste
 
 
 def workers(help: str) -> Option:
-    """The number of processes or threads."""
+    """Return the number of processes or threads."""
     return option("--workers", type=whole_number(1, MOST_WORKERS), metavar="N", help=help)
 
 

@@ -111,7 +111,7 @@ def lines_report(file: str) -> Summary:
 
 
 def image_report(file: str, image: LabelImage) -> dict[str, Any]:
-    """The image: where it is, and its labels or the range of its values."""
+    """Return the image: where it is, and its labels or the range of its values."""
     values, labels = image.labels, labels_of(image)
     found: dict[str, Any] = {
         "file": file,
@@ -129,7 +129,7 @@ def image_report(file: str, image: LabelImage) -> dict[str, Any]:
 
 
 def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation | None) -> str:
-    """What to expect of a shape, in a line: whether it is whole, and if not, what is mended on the way.
+    """Return what to expect of a shape, in a line: whether it is whole, and if not, what is mended on the way.
 
     Examples
     --------
@@ -167,7 +167,7 @@ def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation 
 
 
 def verdict_of_solid(solid: Solid) -> str:
-    """What a solid is, in a line: it is complete, and nothing of it is mended on the way.
+    """Return what a solid is, in a line: it is complete, and nothing of it is mended on the way.
 
     Examples
     --------
@@ -225,7 +225,7 @@ def curve_reports(surface: Any, sources: Sequence[Any]) -> list[dict[str, Any]]:
 
 
 def curve_report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str, Any]:
-    """The row of one source."""
+    """Return the row of one source."""
     places = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
     kinds = np.bincount(places.kinds, minlength=3)
     row: dict[str, Any] = {
@@ -260,7 +260,7 @@ def curve_report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str
 
 
 def curves_text(rows: Sequence[dict[str, Any]]) -> str:
-    """The rows as text, one line each."""
+    """Return the rows as text, one line each."""
     lines = []
     for number, row in enumerate(rows):
         points = f"{row['at_vertices']} at vertices, {row['on_edges']} on edges, {row['in_faces']} in faces"
@@ -279,7 +279,7 @@ def curves_text(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def _shortened(items: Sequence[Any], most: int = 6) -> str:
-    """The first few items of a list, as text."""
+    """Return the first few items of a list, as text."""
     return ", ".join(map(str, items[:most])) + (", …" if len(items) > most else "")
 
 

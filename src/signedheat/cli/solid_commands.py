@@ -108,7 +108,7 @@ def volume(arguments: Namespace) -> Summary:
 
 
 def _on_tets(arguments: Namespace) -> Summary:
-    """The same on tets instead of a grid."""
+    """Return the same on tets instead of a grid."""
     sh.io.ensure_writable(arguments.output, sh.io.TET_FIELD_FORMATS, "a field on tets")
     require("meshio", "fields on tets")
     shape, field = shapes.on_tets(arguments)
@@ -310,7 +310,7 @@ def combined(combine: Callable[[sh.Solid, sh.Solid], sh.Solid], arguments: Names
 
 
 def combining(name: str) -> Command:
-    """The command of this name."""
+    """Return the command of this name."""
     combine, help = COMBINED[name]
     return command(
         name,

@@ -32,7 +32,7 @@ class StandardFiles:
     names: Mapping[str, str] = field(default_factory=dict)
 
     def named(self, text: str) -> str:
-        """A text with the paths of temporary files replaced."""
+        """Return a text with the paths of temporary files replaced."""
         for path, name in self.names.items():
             text = text.replace(path, name)
         return text

@@ -93,7 +93,7 @@ def info(arguments: Namespace) -> Summary:
 
 
 def _without_folders(names: list[str]) -> Iterator[str]:
-    """The names of files, with each folder replaced by its shapes."""
+    """Return the names of files, with each folder replaced by its shapes."""
     for name in names:
         if os.path.isdir(name):
             yield from (str(shape.path) for shape in inputs.expand([name]))
@@ -177,7 +177,7 @@ def shape_or_field(path: str) -> Any:
 
 
 def outputs(help: str) -> Option:
-    """The option that names any number of outputs."""
+    """Return the option that names any number of outputs."""
     return option("-o", "--output", metavar="OUT", nargs="+", action="extend", default=[], help=help)
 
 

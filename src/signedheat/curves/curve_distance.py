@@ -193,7 +193,7 @@ def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[Curv
 
 
 def named(numbers: NDArray[np.int64]) -> str:
-    """The numbers of some curves in words."""
+    """Return the numbers of some curves in words."""
     some = ", ".join(map(str, numbers[:8].tolist())) + (", …" if len(numbers) > 8 else "")
     return f"curves number {some}" if len(numbers) > 1 else f"curve number {some}"
 

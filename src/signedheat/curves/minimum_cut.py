@@ -37,7 +37,7 @@ class CutGraph:
 
     @classmethod
     def of(cls, edges: NDArray[np.int64], n: int) -> CutGraph:
-        """The graph of n nodes and these (e, 2) edges, each of which is two arcs: number k and, backwards, k + e."""
+        """Make the graph of n nodes and (e, 2) edges, each of which is two arcs: number k and, backwards, k + e."""
         tails, heads = np.concatenate([edges, edges[:, ::-1]]).T
         starts, order = grouped(tails, n)
         place = np.empty(len(order), dtype=np.int64)

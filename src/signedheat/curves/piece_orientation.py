@@ -46,7 +46,7 @@ class CurveOrientation(Frozen, ShortRepr):
     agreement: NDArray[np.float64]
 
     def agreeing(self, least: float) -> list[CurveOrPoints]:
-        """The curves that agree with the others at least that well.
+        """Return the curves that agree with the others at least that well.
 
         Parameters
         ----------
@@ -127,7 +127,7 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | F
 
 
 def with_turned(curves: Sequence[CurveOrPoints], turned: NDArray[np.bool_]) -> list[CurveOrPoints]:
-    """The curves, some with their positive side negative."""
+    """Return the curves, some with their positive side negative."""
     return [_turned(curve) if turn else curve for curve, turn in zip(curves, turned, strict=True)]
 
 

@@ -106,7 +106,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
 
     def _mapped(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> PiecewiseField:
-        """The field with changed values, without the diagnostics of this one."""
+        """Return the field with changed values, without the diagnostics of this one."""
         return PiecewiseField(self.domain, self.surface, change(self.values), self.triangles, self.is_cut)
 
     def gradient(self, points: SurfacePoints) -> NDArray[np.float64]:
@@ -180,7 +180,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         return sorted(lines, key=lambda line: -line.length)
 
     def split(self) -> VertexField[TriangleMesh | PolygonMesh]:
-        """The same field on a mesh whose vertices are doubled along the cut, for viewers and for contours.
+        """Return the same field on a mesh whose vertices are doubled along the cut, for viewers and for contours.
 
         Away from the cut, the values of all corners at a vertex are averaged. Faces keep their ids.
 
@@ -295,7 +295,7 @@ class IntrinsicPiecewiseField(PiecewiseField):
         return (self.values[faces] * weights).sum(axis=1)
 
     def split(self) -> VertexField[TriangleMesh | PolygonMesh]:
-        """The same field on the common subdivision of mesh and triangulation, with vertices doubled along the cut."""
+        """Move the field to the common subdivision of mesh and triangulation, with vertices doubled along the cut."""
         triangles, n = self.triangles, self.domain.n_vertices
         polygons, owners, where = subdivided(self.domain)
         sizes = [len(polygon) for polygon in polygons]

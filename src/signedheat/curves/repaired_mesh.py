@@ -88,7 +88,7 @@ class RepairedMesh:
         return cls(given, repaired, vertices, targets, to, MeshRepaired(joined, int(turned.sum()), copies))
 
     def on_it(self, source: Any) -> Any:
-        """A curve, points, or a sequence of them, on the repaired mesh; what does not fit the given one stays so."""
+        """Move a curve, points, or a sequence of them to the repaired mesh; what does not fit the given one stays."""
         if isinstance(source, Sequence):
             return [self.on_it(part) for part in source]
         if not isinstance(source, Curve | SurfacePoints):
@@ -103,7 +103,7 @@ class RepairedMesh:
         return Curve(self.faces[faces], weights, source.closed, source.oriented, source.normals)
 
     def on_given(self, field: VertexField[Any]) -> VertexField[Any]:
-        """A field on the repaired mesh, at the vertices of the given one."""
+        """Return a field on the repaired mesh, at the vertices of the given one."""
         values = field.values[self.vertices]
         diagnostics = replace(field.diagnostics, unreached=np.flatnonzero(np.isnan(values))).noting(self.note)
         return VertexField(self.given, values, diagnostics)

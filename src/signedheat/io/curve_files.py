@@ -156,7 +156,7 @@ def surface_in_space(domain: EmbeddedSurface | ForeignShape) -> EmbeddedSurface:
 
 
 def placed(group: Group, domain: EmbeddedSurface) -> CurveOrPoints:
-    """The curve or the points of a group."""
+    """Return the curve or the points of a group."""
     faces, weights = on_faces(group.nodes, domain)
     if group.kind == POINTS:
         return SurfacePoints(faces, weights)

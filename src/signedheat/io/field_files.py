@@ -164,7 +164,7 @@ def _made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
 
 
 def load_vertex_field(path: PathLike) -> VertexField:
-    """A surface with φ at its vertices: what `VertexField.save` wrote, except as ``.obj``."""
+    """Return a surface with φ at its vertices: what `VertexField.save` wrote, except as ``.obj``."""
     with reading(path):
         if extension(path) in _VALUES:
             found = _VALUES[extension(path)](path, (NAME,))
@@ -228,7 +228,7 @@ def _write_npz(field: GridField, path: Path) -> None:
 
 
 def _held_solid(path: PathLike) -> SolidQueries | None:
-    """The solid that a field in an archive is the distance to, if it holds one."""
+    """Return the solid that a field in an archive is the distance to, if it holds one."""
     if "solid_factor" not in names_in_npz(path):
         return None
     found = read_npz(path, [PREFIX + name for name in SOURCE], ["solid_factor", *(PREFIX + name for name in NEEDED)])

@@ -35,7 +35,7 @@ READING_MODULES = f"{__package__}.", f"{PACKAGE}packages"
 
 
 def extension(path: PathLike) -> str:
-    """The extension of a file name in lower case, such as ``".stl"`` or ``".nii.gz"``."""
+    """Return the extension of a file name in lower case, such as ``".stl"`` or ``".nii.gz"``."""
     suffixes = [suffix.lower() for suffix in Path(path).suffixes[-2:]]
     return "".join(suffixes if suffixes[-1:] == [".gz"] else suffixes[-1:])
 
@@ -65,12 +65,12 @@ def distinct_names(numbers: Sequence[float]) -> list[str]:
 
 
 def damaged(cause: str, element: str | None = None) -> FileFormatError:
-    """The error for a truncated or damaged file; `reading` adds the name of the file."""
+    """Return the error for a truncated or damaged file; `reading` adds the name of the file."""
     return FileFormatError(cause, remedy="write or download it again", element=element)
 
 
 def refuse_kind(kind: str, path: PathLike, holds: str, instead: str) -> FileFormatError:
-    """The error for a format that does not support a kind of shape."""
+    """Return the error for a format that does not support a kind of shape."""
     cause = f"{extension(path)} files hold {holds}, not a {kind}"
     return FileFormatError(cause, remedy=f"save it as {instead}", path=path)
 
@@ -106,7 +106,7 @@ def _is_ours(error: BaseException) -> bool:
 
 
 def contents(path: PathLike) -> bytes:
-    """The bytes of a file."""
+    """Return the bytes of a file."""
     with _opened(path) as (file, size):
         ensure_fits(TAKEN.get(extension(path), 1) * size, path)
         data = file.read()
@@ -146,7 +146,7 @@ def _opened(path: PathLike) -> Iterator[tuple[BinaryIO, int]]:
 
 
 def companion_contents(path: PathLike, name: str) -> bytes:
-    """The bytes of a file that another file names, which must lie in the same folder or below it."""
+    """Return the bytes of a file that another file names, which must lie in the same folder or below it."""
     folder = os.path.realpath(Path(path).parent)
     named = os.path.realpath(os.path.join(folder, name))
     if os.path.isabs(name) or os.path.commonpath([folder, named]) != folder:

@@ -109,7 +109,7 @@ def read_image(path: PathLike, formats: Collection[str], purpose: str) -> Image:
 
 
 def _aligned(values: NDArray[Any], origin: Any, spacing: Any, **others: Any) -> Image:
-    """An image along x, y, z."""
+    """Return an image along x, y, z."""
     steps = np.asarray(spacing, dtype=np.float64)
     steps = np.full(values.ndim, steps) if steps.ndim == 0 else steps
     return Image(values, np.diag(steps), np.asarray(origin, dtype=np.float64), **others)
@@ -137,7 +137,7 @@ def _read_vti(path: PathLike) -> Image:
 
 
 def _read_nrrd(path: PathLike) -> Image:
-    """A file that the header names must lie in the same folder or below it."""
+    """Return a file that the header names must lie in the same folder or below it."""
     header, rest = _nrrd_header(contents(path))
     companion = header.get("data file")
     if companion is not None:
@@ -185,7 +185,7 @@ def _nrrd_vectors(text: str) -> NDArray[np.float64]:
 
 
 def _nrrd_values(data: bytes, header: dict[str, str], count: int, dtype: np.dtype[Any], path: PathLike) -> NDArray[Any]:
-    """The values in a row; they are `count`."""
+    """Return the values in a row; they are `count`."""
     encoding, size = header["encoding"].lower(), count * dtype.itemsize
     skip = int(header.get("byte skip", 0))
     if encoding in ("ascii", "text", "txt"):

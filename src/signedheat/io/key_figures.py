@@ -45,7 +45,7 @@ def describe(field: Any) -> dict[str, Any]:
 
 
 def snake(name: str) -> str:
-    """A class name as a key of JSON.
+    """Return a class name as a key of JSON.
 
     Examples
     --------
@@ -56,7 +56,7 @@ def snake(name: str) -> str:
 
 
 def shape_figures(shape: Shape) -> dict[str, object]:
-    """Counts and defects of a shape; for meshes also their orientation, walls and gaps."""
+    """Return counts and defects of a shape; for meshes also their orientation, walls and gaps."""
     counted = shape.squares if isinstance(shape, DigitalSurface) else shape
     figures: dict[str, object] = {"kind": type(shape).__name__, **asdict(inspect(counted))}
     if isinstance(shape, TriangleMesh | PolygonMesh):

@@ -257,7 +257,7 @@ def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> 
 
 
 def _corner_count(word: str) -> int:
-    """Number of corners of a face; 0 if it is not a number, which is refused later."""
+    """Count the corners of a face; 0 if it is not a number, which is refused later."""
     return int(word) if word.isdecimal() and len(word) < 19 else 0
 
 

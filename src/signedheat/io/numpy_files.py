@@ -19,7 +19,7 @@ _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0
 
 
 def read_npy(path: PathLike) -> NDArray[Any]:
-    """The array of a ``.npy`` file."""
+    """Return the array of a ``.npy`` file."""
     data = contents(path)
     with reading(path):
         return _array(io.BytesIO(data), len(data), path)
@@ -55,7 +55,7 @@ def names_in_npz(path: PathLike) -> set[str]:
 
 
 def _array(file: IO[bytes], size: int, path: PathLike) -> NDArray[Any]:
-    """An array of numbers, from a file of `size` bytes."""
+    """Return an array of numbers, from a file of `size` bytes."""
     version = npy.read_magic(file)
     if version not in _HEADERS:
         raise FileFormatError(f"its version {version} of NumPy's format is unknown")

@@ -53,7 +53,7 @@ class _Element:
 
 
 def read_ply(path: PathLike, names: Sequence[str] = ()) -> Elements:
-    """The faces of a PLY file, including triangle strips; or its points, with ``nx ny nz`` and ``area`` if present.
+    """Read the faces of a PLY file, including triangle strips; or its points, with ``nx ny nz`` and ``area`` if there.
 
     `names` are further properties of the vertices that are wanted, where there are such.
     """
@@ -105,7 +105,7 @@ def _header_of(
     count_type: str = "int",
     comment: str | None = None,
 ) -> bytes:
-    """The header of binary PLY with doubles and colours at the vertices, and faces if there are some."""
+    """Return the header of binary PLY with doubles and colours at the vertices, and faces if there are some."""
     lines = ["ply", "format binary_little_endian 1.0", *([] if comment is None else [f"comment {comment}"])]
     lines += [f"element vertex {n_vertices}", *(f"property double {name}" for name in names)]
     lines += [f"property uchar {channel}" for channel in channels]
@@ -144,7 +144,7 @@ def write_parts(parts: Iterator[tuple[NDArray[np.float64], NDArray[np.int64]]], 
 
 
 def _tables(path: PathLike) -> dict[str, dict[str, Any]]:
-    """The columns of each element."""
+    """Return the columns of each element."""
     form, elements, body = _header(contents(path).removeprefix(codecs.BOM_UTF8))
     read_element = _text_reader(body) if form == "ascii" else _BinaryReader(body, form).read
     return {element.name: read_element(element) for element in elements}
@@ -155,7 +155,7 @@ def _columns(table: dict[str, Any], names: Any) -> NDArray[np.float64]:
 
 
 def _unrolled(strip: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The triangles of strips separated by −1; every second one has the opposite orientation."""
+    """Return the triangles of strips separated by −1; every second one has the opposite orientation."""
     windows = np.stack([strip[:-2], strip[1:-1], strip[2:]], axis=1)
     index = np.arange(len(strip))
     begin = np.maximum.accumulate(np.where(np.concatenate([[True], strip[:-1] < 0]), index, 0))
@@ -192,7 +192,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
 
 
 def _count(word: str) -> int:
-    """The number of rows of an element."""
+    """Return the number of rows of an element."""
     if not word.isdecimal() or len(word) > 18:
         raise ValueError(word)
     return int(word)
@@ -229,7 +229,7 @@ class _BinaryReader:
         return self._row_by_row(element) if table is None else table
 
     def _all_alike(self, element: _Element, lists: dict[str, tuple[str, str]]) -> dict[str, Any] | None:
-        """The table if all lists have the length of the first, which is quick; otherwise nothing."""
+        """Return the table if all lists have the length of the first, which is quick; otherwise nothing."""
         lengths = self._first_lengths(element)
         entries: list[Any] = []
         for number, (name, kind) in enumerate(element.properties.items()):
@@ -288,7 +288,7 @@ class _BinaryReader:
         }
 
     def _one(self, code: str, length: int, element: _Element) -> NDArray[Any]:
-        """The next numbers."""
+        """Return the next numbers."""
         size = length * int(code[1])
         if length < 0 or self.at + size > len(self.body):
             raise _truncated(element)

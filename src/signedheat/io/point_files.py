@@ -88,7 +88,7 @@ def read_point_lists(path: PathLike, dimension: int) -> list[tuple[NDArray[np.fl
 
 
 def write_point_lists(lists: Sequence[tuple[NDArray[np.float64], bool]]) -> str:
-    """The text that `read_point_lists` reads."""
+    """Return the text that `read_point_lists` reads."""
     blocks = []
     for points, closed in lists:
         rows = [*points.tolist(), *([points[0].tolist()] if closed else [])]
@@ -197,7 +197,7 @@ def read_e57(path: PathLike) -> PointCloud:
 
 
 def _e57_description(data: bytes) -> bytes:
-    """The XML of an E57 file, whose pages each end with a checksum."""
+    """Return the XML of an E57 file, whose pages each end with a checksum."""
     if data[:8] != b"ASTM-E57" or len(data) < 48:
         raise damaged("it does not begin as E57 files do")
     offset, length, page = struct.unpack_from("<QQQ", data, 24)
@@ -240,7 +240,7 @@ def _cloud(points: NDArray[np.float64], path: PathLike) -> PointCloud:
 
 
 def _unpacked(body: bytes, size: int) -> bytes:
-    """What LZF has packed, behind two numbers of four bytes: how long it is packed, and unpacked.
+    """Return what LZF has packed, behind two numbers of four bytes: how long it is packed, and unpacked.
 
     A byte below 32 is followed by one more byte than it says. Others have the length of a part that comes again, less
     two, in three bits (seven: the next byte is added), and in the other five and a byte how far back it is, less one.

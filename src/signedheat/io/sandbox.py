@@ -145,7 +145,7 @@ def _answer(stream: BinaryIO, path: PathLike) -> dict[str, Any] | None:
 
 
 def _died(package: str, status: int, said: str, seconds: int) -> SignedHeatError:
-    """The error for a parser that ended without an answer."""
+    """Return the error for a parser that ended without an answer."""
     number = -status if status < 0 else 0
     name = Signals(number).name if number else f"status {status}"
     if name == "SIGKILL":
@@ -159,7 +159,7 @@ def _died(package: str, status: int, said: str, seconds: int) -> SignedHeatError
 
 
 def _failed(package: str, purpose: str, found: dict[str, Any], memory: int) -> SignedHeatError:
-    """The error for a parser that raised an exception."""
+    """Return the error for a parser that raised an exception."""
     kind, message = found["error"], " ".join(str(found["message"]).split())
     if kind == "MemoryError":
         cause = f"{package} needs more than {memory / 1e9:.2g} GB for it"

@@ -96,7 +96,7 @@ def read_3mf(path: PathLike) -> TriangleMesh:
 
 
 def unit_of(path: PathLike) -> str | None:
-    """The unit of length of a file: what a 3MF file says, metres in glTF; None where formats do not say.
+    """Return the unit of length of a file: what a 3MF file says, metres in glTF; None where formats do not say.
 
     Of STEP millimetres, since it is read so whatever it says.
     """
@@ -113,7 +113,7 @@ def unit_of(path: PathLike) -> str | None:
 
 
 def scale_to(path: PathLike, units: str) -> float:
-    """What multiplies the lengths of a file, so that they are in TO of the units ``TO`` or ``FROM:TO``.
+    """Return what multiplies the lengths of a file, so that they are in TO of the units ``TO`` or ``FROM:TO``.
 
     Files that do not state their unit are in FROM, or in TO already.
     """
@@ -141,13 +141,13 @@ class _Package:
         return ROOT
 
     def model(self, part: str) -> ElementTree.Element:
-        """The root element of a part."""
+        """Return the root element of a part."""
         if part not in self._models:
             self._models[part] = ElementTree.fromstring(self._bytes(part))
         return self._models[part]
 
     def object(self, key: Key) -> _Object:
-        """An object, by part and id."""
+        """Return an object, by part and id."""
         if key not in self._objects:
             part, wanted = key
             for element in _all(self.model(part), "object"):
@@ -157,7 +157,7 @@ class _Package:
         return self._objects[key]
 
     def count(self, key: Key, depth: int = 0) -> tuple[int, int]:
-        """Number of triangles of an object with all its components, and how deep these lie, without placing them."""
+        """Count the triangles of an object with all its components, and how deep these lie, without placing them."""
         if key not in self._counts:
             if depth > DEPTH:
                 raise damaged("its components contain themselves, or too many others")
@@ -180,7 +180,7 @@ class _Package:
             yield from self.placed(part, np.vstack([own[:3] @ matrix[:3], own[3] @ matrix[:3] + matrix[3]]))
 
     def _bytes(self, part: str) -> bytes:
-        """A part, of which no more is unpacked than it announces."""
+        """Return a part, of which no more is unpacked than it announces."""
         entry = self._zip.getinfo(part)
         ensure_fits(10 * entry.file_size, self._path)  # its tree of elements is several times larger
         with self._zip.open(entry) as file:
@@ -200,7 +200,7 @@ def _part(target: str) -> str:
 
 
 def _key(element: ElementTree.Element, part: str, name: str = "objectid") -> Key:
-    """The object that an element names; with the production extension it may lie in another part."""
+    """Return the object that an element names; with the production extension it may lie in another part."""
     other = element.get(PATH)
     return part if other is None else _part(other), element.get(name, "")
 
@@ -213,7 +213,7 @@ def _matrix(element: ElementTree.Element) -> NDArray[np.float64]:
 
 
 def _object(element: ElementTree.Element, part: str) -> _Object:
-    """The object that an element of a part describes."""
+    """Return the object that an element of a part describes."""
     vertices = [[float(v.get(axis, "nan")) for axis in "xyz"] for v in _all(element, "vertex")]
     faces = [[int(t.get(corner, "-1")) for corner in ("v1", "v2", "v3")] for t in _all(element, "triangle")]
     parts = [(_key(each, part), _matrix(each)) for each in _all(element, "component")]
@@ -270,5 +270,5 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
 
 
 def step_mesh(path: PathLike) -> TriangleMesh:
-    """The triangles alone."""
+    """Return the triangles alone."""
     return read_step(path)[0]

@@ -28,7 +28,7 @@ from .vtk_xml import read_vtp, write_vtp
 
 
 def read_archive(path: PathLike) -> Solid | TriangleMesh:
-    """The solid in a NumPy archive, or that of a field in space; of one without a solid the surface at 0."""
+    """Return the solid in a NumPy archive, or that of a field in space; of one without a solid the surface at 0."""
     if holds_solid(path):
         return load(path)
     field = load_field(path)

@@ -25,7 +25,7 @@ VERSION = 2
 
 
 def arrays_of(solid: Solid) -> dict[str, NDArray[Any]]:
-    """What a solid is made of, with a key that tells whether it has been changed."""
+    """Return what a solid is made of, with a key that tells whether it has been changed."""
     arrays: dict[str, NDArray[Any]] = {
         "triangles": solid.triangles,
         "origins": solid.origins,
@@ -39,7 +39,7 @@ def arrays_of(solid: Solid) -> dict[str, NDArray[Any]]:
 
 
 def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
-    """The solid that `arrays_of` gave these of; without notes.
+    """Return the solid that `arrays_of` gave these of; without notes.
 
     Raises
     ------

@@ -96,7 +96,7 @@ class _Drawing:
             yield [(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in parts]
 
     def _path(self, element: ElementTree.Element, kind: str) -> str:
-        """The path data of an element; circles and ellipses run clockwise in the drawing."""
+        """Return the path data of an element; circles and ellipses run clockwise in the drawing."""
         if kind == "path":
             return element.get("d", "")
         if kind == "line":
@@ -123,13 +123,13 @@ class _Drawing:
         return ""
 
     def _length(self, element: ElementTree.Element, name: str) -> float:
-        """An attribute in user units, including percentages of the width, height or diagonal."""
+        """Return an attribute in user units, including percentages of the width, height or diagonal."""
         whole = self.size[AXES[name]] if name in AXES else math.hypot(*self.size) / math.sqrt(2)
         return length(element.get(name, "0"), whole, name)
 
 
 def length(word: str, whole: float = math.nan, name: str = "length") -> float:
-    """A length in user units, 96 of which are an inch.
+    """Return a length in user units, 96 of which are an inch.
 
     Examples
     --------
@@ -242,7 +242,7 @@ def _subpaths(data: str) -> Iterator[tuple[NDArray[np.float64], bool]]:
 
 
 def _whole(parts: list[NDArray[np.complex128]], closed: bool) -> Iterator[tuple[NDArray[np.float64], bool]]:
-    """A subpath, if it has a length; it is closed if it ends where it begins, too."""
+    """Return a subpath, if it has a length; it is closed if it ends where it begins, too."""
     points = np.concatenate([np.zeros(0, dtype=np.complex128), *parts])
     if len(points) == 0 or (points == points[0]).all():
         return
@@ -291,7 +291,7 @@ def _arc(
 
 
 def svg(lines: Sequence[Polyline]) -> str:
-    """An SVG drawing of polylines, with the y axis pointing down."""
+    """Return an SVG drawing of polylines, with the y axis pointing down."""
     points = np.concatenate([line.points for line in lines])
     lower, upper = points.min(axis=0), points.max(axis=0)
     margin = 0.05 * float((upper - lower).max())

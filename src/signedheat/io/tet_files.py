@@ -106,7 +106,7 @@ def store_cells(mesh: Any, path: PathLike) -> None:
 
 
 def _files(path: PathLike) -> list[Path]:
-    """The named file, preceded by the other file of a pair."""
+    """Return the named file, preceded by the other file of a pair."""
     named = Path(path)
     return [*(named.with_suffix(end) for end in TETGEN if extension(path) in TETGEN and end != extension(path)), named]
 

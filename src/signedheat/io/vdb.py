@@ -105,7 +105,7 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
 
 
 def _band(field: GridField) -> _Tree:
-    """The blocks of a band; elsewhere, the value is plus or minus the background, as in the coarse field."""
+    """Return the blocks of a band; elsewhere, the value is plus or minus the background, as in the coarse field."""
     assert field.blocks is not None
     grid, background = field.grid, np.float32(field.width)
     finite = ~np.isnan(field.values)
@@ -145,7 +145,7 @@ def _whole(field: GridField) -> _Tree:
 def _in_order(
     blocks: Blocks, values: NDArray[np.floating], active: NDArray[np.bool_], background: np.float32, outside: Outside
 ) -> _Tree:
-    """The tree with its blocks in the order of the file: by top node, by cube, by place."""
+    """Return the tree with its blocks in the order of the file: by top node, by cube, by place."""
     places = SIDE * blocks.places.astype(np.int64)
     top, cube = SIDES[0] * SIZES[0], SIZES[0]
     order = np.lexsort(np.concatenate([places // top, places // cube, places], axis=1).T[::-1])
@@ -196,7 +196,7 @@ def _write_topology(file: BinaryIO, tree: _Tree, kind: np.dtype) -> None:
 
 
 def _node(place: NDArray[np.int64], level: int, children: NDArray[np.int64], outside: Outside, kind: np.dtype) -> bytes:
-    """A node: a mask of places with children, of active ones (none), and values of all places, 0 at children."""
+    """Return a node: a mask of places with children, of active ones (none), and values of all places, 0 at children."""
     side, size = SIDES[level], SIZES[level]
     inner = place + size * np.stack(np.unravel_index(np.arange(side**3), (side,) * 3), axis=1)
     has_child = np.zeros(side**3, dtype=bool)
@@ -206,7 +206,7 @@ def _node(place: NDArray[np.int64], level: int, children: NDArray[np.int64], out
 
 
 def _transform(origin: NDArray[np.float64], step: NDArray[np.float64]) -> bytes:
-    """Translation, scale, voxel size, and what the library keeps of the scale's inverse."""
+    """Return translation, scale, voxel size, and what the library keeps of the scale's inverse."""
     uniform = "Uniform" if bool((step == step[0]).all()) else ""
     rows = np.concatenate([origin, step, step, 1 / step, 1 / step**2, 0.5 / step])
     return _text(f"{uniform}ScaleTranslateMap") + rows.astype("<f8").tobytes()
@@ -223,7 +223,7 @@ def _metadata(metadata: dict[str, str | bool]) -> bytes:
 
 
 def _text(given: str) -> bytes:
-    """A string after its length."""
+    """Return a string after its length."""
     return struct.pack("<I", len(given.encode())) + given.encode()
 
 

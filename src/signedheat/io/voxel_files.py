@@ -94,7 +94,7 @@ class LabelImage(Represented, Frozen):
         return self.to_world(self.surface())
 
     def surface(self, label: float | None = None) -> TriangleMesh:
-        """The smooth surface around the voxels with a label, along the axes of the image: closed and manifold.
+        """Return the smooth surface around the voxels with a label, along the axes of the image: closed and manifold.
 
         Parameters
         ----------

@@ -228,7 +228,7 @@ class _Writer:
         self._offset = 0
 
     def array(self, name: str, values: NDArray[Any]) -> str:
-        """The XML element of an array, whose data are appended to the file."""
+        """Return the XML element of an array, whose data are appended to the file."""
         values = np.ascontiguousarray(values)
         code = values.dtype.str[1:]
         data = values.astype("<" + code, copy=False).tobytes()
@@ -241,7 +241,7 @@ class _Writer:
         return element
 
     def file(self, kind: str, body: str) -> bytes:
-        """The whole file."""
+        """Return the whole file."""
         about = f'type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64"'
         head = f'<?xml version="1.0"?>\n<VTKFile {about}>\n'
         appended = '\n<AppendedData encoding="raw">_'
@@ -260,14 +260,14 @@ class _Arrays:
     appended: bytes
 
     def count(self, piece: ElementTree.Element, name: str) -> int:
-        """A count that a piece announces, 0 by default."""
+        """Return a count that a piece announces, 0 by default."""
         word = piece.get(name, "0").strip()
         if not word.isdecimal() or len(word) > 18:
             raise damaged(f"{name} is {word!r}: it is damaged", element=name)
         return int(word)
 
     def of(self, element: ElementTree.Element | None, count: int) -> NDArray[Any]:
-        """The `count` numbers of a DataArray element; no more are unpacked."""
+        """Return the `count` numbers of a DataArray element; no more are unpacked."""
         if element is None:
             return self._counted(np.empty(0), count)
         code = _TYPES.get(element.get("type", ""))
@@ -297,7 +297,7 @@ class _Arrays:
         return values
 
     def _block(self, data: bytes | memoryview, is_base64: bool, size: int) -> bytes | memoryview:
-        """The bytes of one array, `size` or too few: sizes, then data; in base 64 each of the two by itself."""
+        """Return the bytes of one array, `size` or too few: sizes, then data; in base 64 each of the two by itself."""
         width = self.header.itemsize
 
         def take(start: int, length: int) -> tuple[bytes | memoryview, int]:

@@ -63,7 +63,7 @@ def smooth_patches(triangles: Floats, ids: Ints) -> Ints:
 
 
 def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spatial.cKDTree, reach: float) -> Samples:
-    """Samples of triangles in a tree within reach of a rim, at most reach / `SAMPLES` apart, unless too many are."""
+    """Sample triangles in a tree within reach of a rim, at most reach / `SAMPLES` apart, unless too many are."""
     size = reach / SAMPLES
     some = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
     triangles, patches = triangles[some], patches[some]
@@ -92,7 +92,7 @@ def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spa
 
 
 def continuation(lid: Lid, samples: Samples, patches: Ints, width: float) -> tuple[Floats, Floats, Floats]:
-    """Normals and curvatures with which the surface would continue over its rim, and how much that counts.
+    """Return normals and curvatures with which the surface would continue over its rim, and how much that counts.
 
     Across an opening of width W a surface that meets the flat lid at angle β must turn by 2 sin β, the chord of a
     circle; if its curvature towards the rim is k, it would turn by k W. On a ball both are the same, on a box k is 0.

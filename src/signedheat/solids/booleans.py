@@ -25,17 +25,17 @@ BOX = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6
 
 
 def union(a: Solid, b: Solid) -> Solid:
-    """The union of two solids."""
+    """Return the union of two solids."""
     return _combination(a, b, turned=False)
 
 
 def difference(a: Solid, b: Solid) -> Solid:
-    """The part of the first solid outside the second."""
+    """Return the part of the first solid outside the second."""
     return _combination(a, b, turned=True)
 
 
 def intersection(a: Solid, b: Solid) -> Solid:
-    """The intersection of two solids."""
+    """Return the intersection of two solids."""
     bounds = np.stack([np.minimum(a.bounds[0], b.bounds[0]), np.maximum(a.bounds[1], b.bounds[1])])
     room = float(np.ptp(bounds, axis=0).max())
     lower, upper = bounds[0] - room, bounds[1] + room
@@ -45,7 +45,7 @@ def intersection(a: Solid, b: Solid) -> Solid:
 
 
 def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None) -> Solid:
-    """The solid whose winding number is the sum of those of `a`, of `b`, turned or not, and of triangles `around`."""
+    """Make the solid whose winding number is the sum of those of `a`, `b`, turned or not, and triangles `around`."""
     (first, of_first), (second, of_second) = ((x.triangles[x.bounding], np.flatnonzero(x.bounding)) for x in (a, b))
     triangles = np.concatenate([first, second[:, ::-1] if turned else second])
     if not len(triangles):

@@ -49,7 +49,7 @@ class Chain(Frozen):
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Chain:
-        """That of a mesh."""
+        """Return that of a mesh."""
         tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
         ids = welded_vertices(mesh.vertices, tails, heads)[mesh.faces]
         first, backwards = coincident_faces(ids.ravel(), np.arange(0, 3 * len(ids) + 1, 3))

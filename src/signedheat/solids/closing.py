@@ -221,7 +221,7 @@ def _rims(surface: _Surface) -> list[walls.Rim]:
 
 
 def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
-    """The lid of a loop: the points that it adds to the loop's, and triangles."""
+    """Return the lid of a loop: the points that it adds to the loop's, and triangles."""
     corners = surface.vertices[loop]
     if len(loop) == 3:
         return np.empty((0, 3)), np.array([[0, 1, 2]])
@@ -234,7 +234,7 @@ def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
 
 
 def _spanned(surface: _Surface, loop: Ints, frame: Frame | None, bent: bool) -> tuple[Floats, Ints] | None:
-    """The lid of a loop, triangulated in a plane or without one in a disc; None if it crosses itself in that plane."""
+    """Close a loop by a lid, triangulated in a plane or without one in a disc; None if it crosses itself there."""
     corners, behind = surface.vertices[loop], surface.behind(loop)[0]
     rim = lids.SmoothRim.of(corners)
     smooth = lids.pattern(rim, frame)

@@ -54,12 +54,12 @@ def is_flat(points: Floats) -> bool:
 
 
 def flat_lid(loop: Floats) -> tuple[Floats, Ints] | None:
-    """The lid of a planar loop, as added points and triangles; None if it crosses itself."""
+    """Return the lid of a planar loop, as added points and triangles; None if it crosses itself."""
     return _filled(loop, len(loop), [np.arange(len(loop))])
 
 
 def creased(loop: Floats, normals: Floats) -> tuple[Floats, Ints] | None:
-    """The lid of flat faces that closes a rim, as added points and triangles; None if there is none.
+    """Return the lid of flat faces that closes a rim, as added points and triangles; None if there is none.
 
     Consecutive sides in a plane are closed in that plane by a straight crease, if the sides before and after them lie
     in a plane with their ends; three such runs, by creases to the point where their planes meet. This restores edges
@@ -98,7 +98,7 @@ def _sides(loop: Floats, normals: Floats) -> list[_Side]:
 
 
 def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
-    """The longest runs of two or more sides in a plane, the largest first; none if there are too many.
+    """Return the longest runs of two or more sides in a plane, the largest first; none if there are too many.
 
     Those whose lid would be folded back over the surface are left out.
     """
@@ -124,7 +124,7 @@ def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
 
 
 def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple[_Run, _Run, _Run]] | None:
-    """The point near a loop of three runs where their planes meet, and the runs."""
+    """Return the point near a loop of three runs where their planes meet, and the runs."""
     following = {run.first: run for run in runs}
     for one in runs:
         two = following.get((one.first + one.count) % n_sides)
@@ -144,7 +144,7 @@ def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple
 
 
 def _closed_by_a_crease(points: Floats, sides: list[_Side], runs: list[_Run]) -> _Run | None:
-    """The first run whose ends lie in a plane with the sides before and after it."""
+    """Return the first run whose ends lie in a plane with the sides before and after it."""
     n = len(sides)
     for run in runs:
         if n - run.count < 2:

@@ -88,7 +88,7 @@ class Pieces(Frozen):
 
 
 def system_of(pieces: Pieces) -> Matrix | Dipoles:
-    """The system of some pieces: many loose triangles are dipoles, all else has exact solid angles."""
+    """Return the system of some pieces: many loose triangles are dipoles, all else has exact solid angles."""
     sizes, areas = np.bincount(pieces.labels), pieces.areas
     many = areas.sum() ** 2 > MANY * (areas**2).sum() and areas[sizes == 1].sum() > 0.5 * areas.sum()
     return Dipoles.of_triangles(pieces) if many or len(areas) > DENSE else Matrix.of(pieces)
@@ -139,7 +139,7 @@ class Matrix:
         return cls(matrix, places, normals, owners, pieces.areas[owners] / counts[owners], np.zeros(len(owners)))
 
     def chosen(self, kept: Bools) -> Matrix:
-        """The system of some of the pieces, numbered anew."""
+        """Return the system of some of the pieces, numbered anew."""
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
         matrix = self.matrix[rows][:, kept]
@@ -169,7 +169,7 @@ class Matrix:
 
 
 def without_slender(pieces: Pieces) -> Pieces:
-    """The pieces with slender triangles halved."""
+    """Return the pieces with slender triangles halved."""
     triangles, labels = pieces.triangles, pieces.labels
     for _ in range(HALVINGS):
         lengths = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
@@ -291,7 +291,7 @@ class Dipoles:
         return np.where(np.isfinite(balls), balls, 0.0)
 
     def chosen(self, kept: Bools) -> Dipoles:
-        """The system of some of the pieces, numbered anew."""
+        """Return the system of some of the pieces, numbered anew."""
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
         values = (self.places, self.normals, self.areas, self.softening, self.within)
@@ -401,7 +401,7 @@ def spacing(places: Floats) -> Floats:
 def _potentials(
     places: Floats, softening: Floats, vectors: Floats, items: Ints, balls: Floats, nodes: Floats, at: Ints
 ) -> Floats:
-    """Sums at some places of ``v · d / (|d|² + ε²)^(3/2)`` over all others, d the way there."""
+    """Sum ``v · d / (|d|² + ε²)^(3/2)`` at some places over all others, d the way there."""
     leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.zeros(len(at))
     for row in range(len(at)):
         p = at[row]
@@ -435,7 +435,7 @@ def _potentials(
 def _fields(
     places: Floats, softening: Floats, charges: Floats, items: Ints, balls: Floats, nodes: Floats, at: Ints
 ) -> Floats:
-    """Sums at places of ``c d / (|d|² + ε²)^(3/2)`` over all others, d the way from there; ε is the place's own."""
+    """Sum ``c d / (|d|² + ε²)^(3/2)`` at places over all others, d the way from there; ε is the place's own."""
     leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.zeros((len(at), 3))
     for row in range(len(at)):
         p = at[row]

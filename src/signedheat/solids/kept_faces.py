@@ -176,7 +176,7 @@ def _exchanged(whole: Joined, windings: Windings, surface: TriangleMesh, boxes: 
 
 
 def _without_crumbs(mesh: TriangleMesh, boxes: Boxes) -> TriangleMesh:
-    """A mesh without bodies and cavities smaller than a cell that lie in boxes or next to them."""
+    """Return a mesh without bodies and cavities smaller than a cell that lie in boxes or next to them."""
     parts, volumes = part_volumes(mesh.vertices, mesh.faces)
     small = np.abs(volumes) < boxes.cell**3
     beyond = ~boxes.grown.have(mesh.vertices)[mesh.faces].all(axis=1)
@@ -205,7 +205,7 @@ class Boxes:
 
     @classmethod
     def around(cls, points: Floats, cell: float, shift: Floats) -> Boxes:
-        """The cells that points are in, and all that touch them."""
+        """Return the cells that points are in, and all that touch them."""
         return cls(np.unique(np.floor(points / cell - shift).astype(np.int64), axis=0), cell, shift).grown
 
     @cached_property

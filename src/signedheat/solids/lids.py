@@ -89,14 +89,14 @@ class SmoothRim:
 
     @classmethod
     def of(cls, corners: Floats) -> SmoothRim:
-        """That of a loop."""
+        """Return that of a loop."""
         sides = np.roll(corners, -1, axis=0) - corners
         starts, length = spanning.shares_of(corners)
         steps = np.diff(starts)[:, None]
         sums = np.concatenate([np.zeros((1, 3)), np.cumsum(steps * (corners + 0.5 * sides), axis=0)])
 
         def integral(shares: Floats) -> Floats:
-            """That of positions along the loop, from its first corner."""
+            """Return that of positions along the loop, from its first corner."""
             turns, rest = np.divmod(shares, 1.0)
             k = np.minimum(np.searchsorted(starts, rest, side="right") - 1, len(starts) - 2)
             onward = (rest - starts[k])[:, None]
@@ -129,7 +129,7 @@ def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
 
 
 def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:
-    """A film before it is solved for; None if the loop's shadow in the plane crosses itself.
+    """Return a film before it is solved for; None if the loop's shadow in the plane crosses itself.
 
     It is flat inside its rim, or without a plane triangulated in a disc.
     """
@@ -156,7 +156,7 @@ def _around_disc(shares: Floats) -> Floats:
 
 
 def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tuple[Floats, Ints] | None:
-    """A lid that spans a loop and follows another: the points that it adds to the loop's, and triangles.
+    """Return a lid that spans a loop and follows another: the points that it adds to the loop's, and triangles.
 
     It is triangulated in the same plane, or the same disc, around which the vertices of the loop come after these
     shares of its length. None if the loop's shadow in the plane crosses itself.
@@ -184,7 +184,7 @@ def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tup
 
 
 def film(pattern: Film) -> Film:
-    """The lid of least area, near enough.
+    """Return the lid of least area, near enough.
 
     The first shape is harmonic in the plane, and the lengths of each shape give the next (Pinkall & Polthier 1993). No
     weight is negative, so that the lid stays within the hull of its rim.
@@ -219,7 +219,7 @@ def _membrane(vertices: Floats, n: int, ends: Ints, weights: Floats) -> Floats:
 
 
 def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: float) -> Film | None:
-    """A lid bent as a thin plate whose shape at rest is as curved as the surface behind its rim (Helfrich 1973).
+    """Return a lid bent as a thin plate whose shape at rest is as curved as the surface behind its rim (Helfrich 1973).
 
     ``min Σ |(L x)_v − m_v κ_v n_v − Σ_e ½ |e| g_e|² / (m_v + s_v)``. L is the cotangent Laplacian, m the areas of
     vertices, κ twice the mean curvature at the rim and harmonic inside, and g_e = e × n / |e × n| the direction across

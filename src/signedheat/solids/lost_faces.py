@@ -131,7 +131,7 @@ def _normal(a: Floats, b: Floats, c: Floats, normal: Floats) -> None:
 
 @compiled
 def _angle(a: Floats, b: Floats) -> float:
-    """The angle between two unit vectors; 0 where one of them is 0."""
+    """Return the angle between two unit vectors; 0 where one of them is 0."""
     if (a[0] == 0 and a[1] == 0 and a[2] == 0) or (b[0] == 0 and b[1] == 0 and b[2] == 0):
         return 0.0
     return float(np.arccos(min(max(a[0] * b[0] + a[1] * b[1] + a[2] * b[2], -1.0), 1.0)))

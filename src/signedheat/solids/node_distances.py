@@ -35,7 +35,7 @@ ALONG_A_CURVE = np.stack(
 def distances_in(
     tree: FaceTree, windings: Windings, grid: Grid, first: Ints, places: Ints
 ) -> tuple[Floats, NDArray[np.float32]]:
-    """(a, b, c) signed distances at the nodes of blocks of a grid, NaN between these; and confidence.
+    """Compute (a, b, c) signed distances at the nodes of blocks of a grid, NaN between these; and confidence.
 
     `first` is the first node of the box around them; `places` are the first nodes of the blocks, divided by `SIDE`.
     """
@@ -179,7 +179,7 @@ def _fill(
 def _nearest(
     rows: Floats, faces: NDArray[np.int32], count: int, places: Floats, away: Floats, best: Floats, which: Ints
 ) -> None:
-    """The nearest of some faces to each place: writes the ways to all faces, the least squares, and their faces."""
+    """Find the nearest of some faces to each place: write the ways to all faces, the least squares, and their faces."""
     for e in range(len(best)):
         best[e], which[e] = np.inf, 0
     for c in range(count):
@@ -201,7 +201,7 @@ def _divide(
     out: NDArray[np.int32],
     counts: Ints,
 ) -> None:
-    """The faces that can be nearest to a node of each of eight boxes, by a bound on squared distance.
+    """Return the faces that can be nearest to a node of each of eight boxes, by a bound on squared distance.
 
     Squared distance is convex, so it lies above its tangent plane at the centre, whose slope is twice the way from the
     foot.

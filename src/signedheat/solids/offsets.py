@@ -130,7 +130,7 @@ class Offset:
 
 
 def checked_reach(reach: Reach) -> Reach:
-    """The function, refused where it does not give a finite number for each place."""
+    """Return the function, refused where it does not give a finite number for each place."""
 
     def called(places: Floats) -> Floats:
         values = np.asarray(reach(places), dtype=np.float64)

@@ -36,7 +36,7 @@ class Quadrics:
 
     @classmethod
     def of(cls, owners: Ints, places: Floats, normals: Floats, count: int) -> Quadrics:
-        """Sums of planes, each through a place, relative to the centre of its owner, with a normal of length 1."""
+        """Sum planes, each through a place, relative to the centre of its owner, with a normal of length 1."""
         along = (normals * places).sum(axis=1)[:, None]
         products = sums_of(normals[:, :, None] * normals[:, None, :], owners, count)
         return cls(products, sums_of(normals * along, owners, count))
@@ -49,7 +49,7 @@ class Quadrics:
 
 
 def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats, Ints, Floats]:
-    """The points of least error of n quadrics within boxes, whose (n, 3) corners are relative to the centres.
+    """Return the points of least error of n quadrics within boxes, whose (n, 3) corners are relative to the centres.
 
     A minimum outside of its box moves along the direction in which the error grows the least, that of a crease, until
     it is in the box; or else it is looked for again on the wall that it is beyond the farthest, up to three times.
@@ -94,7 +94,7 @@ def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats
 
 
 def _way_into(points: Floats, along: Floats, lower: Floats, upper: Floats) -> Floats:
-    """The shortest moves along directions into boxes; 0 where a line misses its box."""
+    """Return the shortest moves along directions into boxes; 0 where a line misses its box."""
     slow = np.where(np.abs(along) > 1e-12, along, 1e-12)
     first, second = (lower - points) / slow, (upper - points) / slow
     enter, leave = np.minimum(first, second).max(axis=1), np.maximum(first, second).min(axis=1)

@@ -74,7 +74,7 @@ def boundary(faces: Ints) -> Ints:
 
 
 def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
-    """Closed loops around the gaps of faces, along all of their boundary edges; none passes a vertex twice.
+    """Return closed loops around the gaps of faces, along all of their boundary edges; none passes a vertex twice.
 
     Where several loops meet at a vertex, each edge that arrives there goes on along the edge at the other side of the
     gap beside it. Where gaps hang together at vertices, loops come apart there, beginning far from the middle of all.
@@ -120,7 +120,7 @@ def _normals(vertices: Floats, faces: Ints) -> Floats:
 
 @compiled
 def _across_gaps(starts: Ints, names: Ints) -> Ints:
-    """The edge that follows each one, by the edges that leave each vertex and, as −1 − e, arrive, counterclockwise.
+    """Find the edge that follows each one, by the edges that leave each vertex and, as −1 − e, arrive, in order.
 
     Gaps are nested as parentheses are: each begins at an edge that leaves, and ends at one that arrives.
     """

@@ -47,7 +47,7 @@ class SheetWall:
 
     @classmethod
     def around(cls, sheet: Shapes, grid: Grid[Literal[3]], above: float, below: float) -> SheetWall:
-        """The wall around meshes of triangles or polygons."""
+        """Return the wall around meshes of triangles or polygons."""
         for part in as_list(sheet):
             if area_elements(part).corners.shape[1:] != (3, grid.dimension):
                 raise SourceError(

@@ -67,7 +67,7 @@ class Spanned:
 
 
 def frame_of(rim: Floats) -> Frame | None:
-    """The plane of a loop's area, in which it runs counterclockwise; None if it has none."""
+    """Return the plane of a loop's area, in which it runs counterclockwise; None if it has none."""
     normal = area_vector(rim)
     length = np.linalg.norm(normal)
     if not length > 1e-6 * np.linalg.norm(np.ptp(rim, axis=0)) ** 2:
@@ -82,7 +82,7 @@ def frame_of(rim: Floats) -> Frame | None:
 
 
 def farthest(loop: Floats, away: Floats) -> int:
-    """The point of a closed loop that is farthest away; of several, that from which on the loop stays away longest.
+    """Find the point of a closed loop that is farthest away; of several, where the loop then stays away longest.
 
     So loops that are symmetric begin at the same point, or at its image, whichever point comes first.
     """

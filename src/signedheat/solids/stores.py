@@ -147,7 +147,7 @@ def _reserve(path: Path, dtype: type, shape: tuple[int, ...]) -> None:
 
 
 def blocks_held(folder: Path) -> int:
-    """Number of blocks for which a folder has allocated space."""
+    """Count the blocks for which a folder has allocated space."""
     if not (folder / "key.txt").exists():
         return 0
     return int(np.load(folder / "values.npy", mmap_mode="r").shape[0])
@@ -155,7 +155,7 @@ def blocks_held(folder: Path) -> int:
 
 @lru_cache(maxsize=1)
 def _plan(folder: str, key: str) -> tuple[FaceTree, Windings, Grid, dict[str, Ints]]:
-    """The input of the tiles of a folder, read once per process."""
+    """Return the input of the tiles of a folder, read once per process."""
     with np.load(Path(folder) / "plan.npz", allow_pickle=False) as file:
         plan = dict(file)
     tree = FaceTree.of_triangles(plan["corners"], plan["trusted"])

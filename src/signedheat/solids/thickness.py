@@ -344,7 +344,7 @@ def _normals_at(triangles: Floats, faces: Ints, places: Floats) -> Floats:
 
 
 def _quantile(widths: Floats, share: float) -> float | None:
-    """A quantile of what is known; None if nothing is."""
+    """Return a quantile of what is known; None if nothing is."""
     known = np.sort(widths[~np.isnan(widths)])
     return float(known[int(share * len(known))]) if len(known) else None
 

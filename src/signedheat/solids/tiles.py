@@ -165,7 +165,7 @@ def tiles_of(blocks: Blocks) -> list[Ints]:
 
 
 def coarser(grid: Grid, factor: int) -> Grid:
-    """A grid with nodes farther apart by a factor."""
+    """Return a grid with nodes farther apart by a factor."""
     return Grid(grid.origin, factor * grid.spacing, [max(2, 1 - (-(n - 1) // factor)) for n in grid.shape])
 
 
@@ -195,7 +195,7 @@ def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: floa
 
 
 def blocks_that_fit(store: str | PathLike[str] | None) -> int:
-    """Number of blocks that fit in memory, or on the disk of a store."""
+    """Count the blocks that fit in memory, or on the disk of a store."""
     if store is not None:
         folder = Path(store).absolute()
         there = next(place for place in (folder, *folder.parents) if place.exists())

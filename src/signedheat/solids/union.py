@@ -50,7 +50,7 @@ class Surface:
         return cls(triangles, ids, np.full(len(triangles), -1), closing)
 
     def select(self, chosen: Bools | Ints, closing: bool) -> Surface:
-        """Some of its triangles."""
+        """Return some of its triangles."""
         return Surface(self.triangles[chosen], self.ids[chosen], self.origins[chosen], closing)
 
 
@@ -61,7 +61,7 @@ def united(
     points: Floats | None = None,
     copies: int = 0,
 ) -> Solid:
-    """The solid that surfaces close: without what lies inside, where bodies overlap, and without idle completion."""
+    """Make the solid that surfaces close: without what lies inside, where bodies overlap, and idle completion."""
     whole = joined_surfaces(surfaces)
     closing = np.concatenate([np.full(len(each.triangles), each.closing) for each in surfaces])
     windings = Windings(whole.triangles if closing.all() else whole.triangles[closing])
@@ -120,7 +120,7 @@ def _cut(whole: Surface, closing: Bools) -> Arrangement:
 
 
 def _arranged(points: Floats, faces: Ints, chosen: Ints, pairs: Ints) -> Arrangement:
-    """Some faces, divided where pairs of them meet."""
+    """Return some faces, divided where pairs of them meet."""
     if not len(pairs):
         return Arrangement(points, faces[chosen], chosen, np.arange(len(chosen)))
     pieces = arranged(points, faces[chosen], pairs)

@@ -52,7 +52,7 @@ class Rim:
 
     @classmethod
     def of(cls, ids: Ints, corners: Floats, behind: Floats, parts: Ints) -> Rim:
-        """The rim around a loop of vertices; behind each edge, the face's third corner lies."""
+        """Return the rim around a loop of vertices; behind each edge, the face's third corner lies."""
         along = np.roll(corners, -1, axis=0) - corners
         away = corners - behind
         away -= ((away * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-300))[:, None] * along

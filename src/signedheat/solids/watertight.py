@@ -31,7 +31,7 @@ def closed_surface(
     resolution: int = 256,
     spacing: float | None = None,
 ) -> tuple[TriangleMesh, str]:
-    """A closed surface of a solid, and how it was made; the options are those of `signedheat.batches.Watertight`.
+    """Make a closed surface of a solid, and say how; the options are those of `signedheat.batches.Watertight`.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def closed_surface(
 
 
 def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[str, object]:
-    """Counts and sizes of a closed surface, and its distances from the faces of a solid and back.
+    """Return counts and sizes of a closed surface, and its distances from the faces of a solid and back.
 
     `bad_edges` are those that not exactly two faces share.
     `to_faces` is the largest distance from the surface, but where it lies on the completion, to its level around the
@@ -100,7 +100,7 @@ def _places(triangles: Floats) -> Floats:
 
 
 def _openings(completion: Floats) -> int:
-    """Connected parts of what completes."""
+    """Return connected parts of what completes."""
     if not len(completion):
         return 0
     _, faces = np.unique(completion.reshape(-1, 3), axis=0, return_inverse=True)
