@@ -603,18 +603,9 @@ class Faces(NamedTuple):
         """Collect the arrays of an intrinsic mesh."""
         table, (first_halfedge, halfedges) = triangles.edges, triangles.edges.halfedges
         first_corner, corners = grouped(triangles.corner_vertices.ravel(), triangles.n_vertices)
-        return cls(
-            triangles.corner_vertices,
-            triangles.corner_positions,
-            table.face_edges,
-            table.forward,
-            table.vertices,
-            triangles.lengths_of_edges,
-            halfedges,
-            first_halfedge,
-            corners,
-            first_corner,
-        )
+        corners_and_edges = triangles.corner_vertices, triangles.corner_positions, table.face_edges, table.forward
+        lists = halfedges, first_halfedge, corners, first_corner
+        return cls(*corners_and_edges, table.vertices, triangles.lengths_of_edges, *lists)
 
 
 class Search(NamedTuple):

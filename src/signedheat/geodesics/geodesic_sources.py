@@ -154,12 +154,8 @@ class PlacedSegments:
         away = np.concatenate([steps, -steps])
         at_edge = np.flatnonzero(kinds[node] == EDGE)
         faces, edges = self.faces[seg[at_edge]], nodes.elements[node[at_edge]]
-        places = on_sides(
-            triangles,
-            np.repeat(faces, 3),
-            np.tile(np.arange(3), len(faces)),
-            np.repeat(nodes.along[node[at_edge]], 3)[:, None],
-        )
+        along = np.repeat(nodes.along[node[at_edge]], 3)[:, None]
+        places = on_sides(triangles, np.repeat(faces, 3), np.tile(np.arange(3), len(faces)), along)
         gap = np.abs(places.reshape(-1, 3) - self.positions.T.ravel()[at_edge][:, None])
         k = np.where(triangles.edges.face_edges[faces] == edges[:, None], gap, np.inf).argmin(axis=1)
         away[at_edge] = triangles.in_edge_frames(away[at_edge], faces, k)

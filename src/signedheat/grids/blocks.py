@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ CUBE = 16
 """Blocks along each edge of a cube."""
 NODES = SIDE**3
 """Nodes in a block."""
+Tables: TypeAlias = tuple[NDArray[np.int32], NDArray[np.int32]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +47,7 @@ class Blocks:
         return len(self.places)
 
     @cached_property
-    def tables(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    def tables(self) -> Tables:
         """Number of each cube, −1 where it holds nothing; and (cubes, 16, 16, 16) the block at each place in a cube."""
         cubes = np.full(tuple(-(-n // (SIDE * CUBE)) for n in self.shape), -1, dtype=np.int32)
         if not len(self):
@@ -98,34 +99,27 @@ class BlockValues:
 
     def interpolated(self, points: Floats) -> Floats:
         """Interpolate linearly at (k, 3) points in cells; NaN where one of the nodes around has no value."""
-        result = np.empty(len(points))
         limit = np.array(self.shape, dtype=np.float64) - 1
-        _interpolate(*self.blocks.tables, self.values, np.ascontiguousarray(points, dtype=np.float64), limit, result)
-        return result
+        return _interpolate(self.blocks.tables, self.values, np.ascontiguousarray(points, dtype=np.float64), limit)
 
     def window(self, first: NDArray[np.integer], shape: tuple[int, int, int]) -> NDArray[np.float32]:
         """Return values in a box of nodes from `first` on; NaN where there are none."""
         result = np.full(shape, np.nan, dtype=np.float32)
-        _gather(*self.blocks.tables, self.values, np.asarray(first, dtype=np.int64), np.array(self.shape), result)
+        _gather(self.blocks.tables, self.values, np.asarray(first, dtype=np.int64), np.array(self.shape), result)
         return result
 
 
 @compiled
-def row_of_node(cubes: NDArray[np.int32], rows: NDArray[np.int32], i: int, j: int, k: int) -> np.int32:
+def row_of_node(tables: Tables, i: int, j: int, k: int) -> np.int32:
     """Return the block that holds a node of the grid; −1 if there is none."""
+    cubes, rows = tables
     cube = cubes[i // 128, j // 128, k // 128]
     return rows[cube, i // 8 % 16, j // 8 % 16, k // 8 % 16] if cube >= 0 else np.int32(-1)
 
 
 @compiled
-def _interpolate(
-    cubes: NDArray[np.int32],
-    rows: NDArray[np.int32],
-    values: NDArray[np.float32],
-    points: Floats,
-    limit: Floats,
-    out: Floats,
-) -> None:
+def _interpolate(tables: Tables, values: NDArray[np.float32], points: Floats, limit: Floats) -> Floats:
+    out = np.empty(len(points))
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         out[p] = np.nan
@@ -140,23 +134,17 @@ def _interpolate(
             a, b, c = corner >> 2 & 1, corner >> 1 & 1, corner & 1
             part = (f if a else 1.0 - f) * (g if b else 1.0 - g) * (h if c else 1.0 - h)
             if part > 0.0:
-                row = row_of_node(cubes, rows, i + a, j + b, k + c)
+                row = row_of_node(tables, i + a, j + b, k + c)
                 if row < 0:
                     total = np.nan
                     break
                 total += part * values[row, (i + a) % 8, (j + b) % 8, (k + c) % 8]
         out[p] = total
+    return out
 
 
 @compiled
-def _gather(
-    cubes: NDArray[np.int32],
-    rows: NDArray[np.int32],
-    values: NDArray[np.float32],
-    first: Ints,
-    limit: Ints,
-    out: NDArray[np.float32],
-) -> None:
+def _gather(tables: Tables, values: NDArray[np.float32], first: Ints, limit: Ints, out: NDArray[np.float32]) -> None:
     for a in range(out.shape[0]):
         for b in range(out.shape[1]):
             i, j = first[0] + a, first[1] + b
@@ -167,6 +155,6 @@ def _gather(
                 k = first[2] + c
                 if 0 <= k < limit[2]:
                     if k // 8 != held:
-                        row, held = row_of_node(cubes, rows, i, j, k), k // 8
+                        row, held = row_of_node(tables, i, j, k), k // 8
                     if row >= 0:
                         out[a, b, c] = values[row, i % 8, j % 8, k % 8]

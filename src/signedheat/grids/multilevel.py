@@ -334,18 +334,10 @@ def diffuse_by_sweeps(
     vectors = untouched_zeros((*shape, 4), np.float32) if given is None else given
     ratios = np.minimum(ratios, 1e30)
     lines = shape[0] * shape[1] * shape[2]
-    sweep_lines(
-        _sweep_tiles,
-        shape,
-        rounds,
-        vectors.reshape(lines, 4 * shape[3]),
-        sources.sums.reshape(-1, 4 * STRETCH),
-        sources.places.reshape(lines, -1),
-        active.reshape(lines, -1),
-        np.array(shape),
-        ratios.astype(np.float32),
-        line_pivots(shape, ratios),
-    )
+    by_line = vectors.reshape(lines, 4 * shape[3]), sources.sums.reshape(-1, 4 * STRETCH)
+    stretches = sources.places.reshape(lines, -1), active.reshape(lines, -1)
+    grid = np.array(shape), ratios.astype(np.float32), line_pivots(shape, ratios)
+    sweep_lines(_sweep_tiles, shape, rounds, *by_line, *stretches, *grid)
     return vectors
 
 
@@ -440,11 +432,8 @@ def _sweep_tiles(
                             stretch += 1
                         begin, end = first * STRETCH, min(stretch * STRETCH, n)
                         part = slice(4 * begin, 4 * end)
-                        inflow, out, pivot = (
-                            scratch[: 4 * (end - begin)],
-                            vectors[line_id, part],
-                            pivots[walls, begin:end],
-                        )
+                        inflow, out = scratch[: 4 * (end - begin)], vectors[line_id, part]
+                        pivot = pivots[walls, begin:end]
                         # inflow from neighbouring lines, the source, and fixed values on the line itself
                         low = vectors[line_id - n2, part] if j > 0 else none[part]
                         high = vectors[line_id + n2, part] if j < n1 - 1 else none[part]

@@ -5,7 +5,7 @@ Sweeps run along lines, on grids of one to four dimensions; `Blocks` are for nod
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,7 @@ STRETCH = 8
 """Number of consecutive nodes of a line that are stored, swept, or skipped together."""
 
 
-@dataclass(frozen=True, eq=False)
-class NodeSources:
+class NodeSources(NamedTuple):
     """Vectors at the nodes of a grid."""
 
     # (l₀, l₁, l₂, ⌈n / STRETCH⌉) row of `sums` for each stretch of the lines along the last axis of the grid, padded to
@@ -72,45 +71,33 @@ class NodeSources:
         return nodes, vectors[rows, offsets]
 
 
+class Simplices(NamedTuple):
+    """Area elements on a grid."""
+
+    corners: Floats  # (m, c, d) positions, in cells
+    vectors: Floats  # (m, d)
+    weights: Floats  # (m,)
+    components: Ints  # (m,)
+
+
 def merge_in_cells(
-    corners: Floats,
-    vectors: Floats,
-    weights: Floats,
-    components: Ints,
-    order: Ints,
-    shape: Ints,
-    size: float,
-    sources: NodeSources,
-    scale: float,
+    simplices: Simplices, order: Ints, shape: Ints, size: float, sources: NodeSources, scale: float
 ) -> tuple[tuple[Floats, Floats, Floats, Ints], NodeSources]:
-    """Merge simplices `corners` (m, c, d), in cells, to one sample for each cell of a grid and each component.
+    """Merge simplices to one sample for each cell of a grid of `shape` nodes and each component.
 
     Every simplex is bisected at the midpoint of its longest edge until that is at most `size` cells long; parts whose
-    bounding box misses the grid of `shape` nodes are dropped at once. `order` lists the simplices component by
-    component. The vectors of all parts, divided by `scale`, are added to the `sources` at the nodes around them, with
-    the weights of multilinear interpolation. Returns positions, vectors, weights and components of the samples, and the
-    sources.
+    bounding box misses the grid are dropped at once. `order` lists the simplices component by component. The vectors of
+    all parts, divided by `scale`, are added to the `sources` at the nodes around them, with the weights of multilinear
+    interpolation. Returns positions, vectors, weights and components of the samples, and the sources.
     """
     slots = untouched_zeros((int(np.prod(shape - 1)),), np.int32)
-    dimension = corners.shape[2]
-    sums, labels, nodes = _merge(
-        np.ascontiguousarray(corners),
-        np.ascontiguousarray(vectors),
-        weights,
-        components,
-        order,
-        shape,
-        size,
-        slots,
-        sources.sums,
-        sources.places.reshape(-1, sources.places.shape[3]),
-        scale,
-    )
+    dimension = simplices.corners.shape[2]
+    sums, labels, nodes = _merge(simplices, order, shape, size, slots, sources, scale)
     kept = sums[:, -1] > 0
     sums, labels = sums[kept], labels[kept]
     weight = sums[:, -1]
     samples = (sums[:, :dimension] / weight[:, None], sums[:, dimension:-1].copy(), weight.copy(), labels)
-    return samples, NodeSources(sources.places, nodes, sources.shape, sources.steps)
+    return samples, sources._replace(sums=nodes)
 
 
 @compiled
@@ -128,22 +115,20 @@ def _with_room(sums: NDArray[np.float32], used: int, more: int) -> NDArray[np.fl
 
 @compiled
 def _merge(
-    corners: Floats,
-    vectors: Floats,
-    weights: Floats,
-    components: Ints,
+    simplices: Simplices,
     order: Ints,
     shape: Ints,
     size: float,
     slots: NDArray[np.int32],
-    nodes: NDArray[np.float32],
-    places: NDArray[np.int32],
+    sources: NodeSources,
     scale: float,
 ) -> tuple[Floats, Ints, NDArray[np.float32]]:
     """Sum weight · position, vector and weight for each component and cell.
 
     Arrays are copied entry by entry, since assignments to slices compile slowly.
     """
+    corners, vectors, weights, components = simplices
+    nodes, places = sources.sums, sources.places.reshape(-1, sources.places.shape[3])
     n_corners, dimension = corners.shape[1], corners.shape[2]
     deepest = 256
     stack = np.empty((deepest, n_corners, dimension))

@@ -18,16 +18,7 @@ from .ordering import elimination_order, upper_triangle, whole
 from .pardiso import PardisoFactor
 from .superlu import SuperLUFactor
 
-__all__ = [
-    "Factor",
-    "PardisoFactor",
-    "available_backends",
-    "chosen_backend",
-    "elimination_order",
-    "factorize",
-    "upper_triangle",
-    "whole",
-]
+__all__ = ["PardisoFactor", "elimination_order", "upper_triangle", "whole"]
 
 
 LARGE = 40_000
@@ -51,11 +42,7 @@ class Factor(Protocol):
 
 def available_backends() -> list[str]:
     """Return the names of the back ends available on this machine, fastest first."""
-    return [
-        *(["pardiso"] if pardiso.is_available() else []),
-        *(["cholmod"] if cholmod.is_available() else []),
-        "superlu",
-    ]
+    return ["pardiso"] * pardiso.is_available() + ["cholmod"] * cholmod.is_available() + ["superlu"]
 
 
 def chosen_backend(backend: str | None = None) -> str:

@@ -197,17 +197,9 @@ def _with_segments(
 ) -> tuple[Lines, Records]:
     """Add the segments along which pairs of faces meet, from the points that they have in common."""
     members = _members(faces, table, lines, np.unique(pairs))
-    rows, sides = _segments(
-        points,
-        members.starts(len(faces)),
-        members.points,
-        table.face_edges,
-        lines.ends,
-        lines.on.starts(len(lines.ends)),
-        lines.on.points,
-        pairs,
-        STRAIGHT * slack,
-    )
+    chains = Chains(lines.ends, lines.on.starts(len(lines.ends)), lines.on.points)
+    starts = members.starts(len(faces))
+    rows, sides = _segments(points, starts, members.points, table.face_edges, chains, pairs, STRAIGHT * slack)
     own = rows[:, 1] >= len(lines.ends)
     ends = np.zeros((len(sides), 2), dtype=np.int64)
     ends[rows[own, 1] - len(lines.ends)] = rows[own, 2:]
@@ -495,46 +487,47 @@ def _meet(points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Int
     return np.array(meetings)[1:], np.array(places)[1:]
 
 
+class Chains(NamedTuple):
+    """Lines with the points on them."""
+
+    ends: Ints  # (l, 2)
+    # (l + 1,) where the points of each line begin in the second, and these points, in order of their numbers
+    starts: Ints
+    points: Ints
+
+
 @compiled
-def _shared_edge(face_edges: Ints, ends: Ints, starts: Ints, on: Ints, f: int, a: int, b: int) -> int:
+def _shared_edge(face_edges: Ints, chains: Chains, f: int, a: int, b: int) -> int:
     """Return the edge of a face that two points lie on, or −1."""
     for k in range(3):
         e = face_edges[f, k]
-        if _is_along(ends, starts, on, e, a) and _is_along(ends, starts, on, e, b):
+        if _is_along(chains, e, a) and _is_along(chains, e, b):
             return e
     return -1
 
 
 @compiled
-def _is_along(ends: Ints, starts: Ints, on: Ints, line: int, p: int) -> bool:
-    """Return whether a point is an end of a line or one of the points on it, which are in order."""
-    if p == ends[line, 0] or p == ends[line, 1]:
+def _is_along(chains: Chains, line: int, p: int) -> bool:
+    """Return whether a point is an end of a line or lies on it."""
+    if p == chains.ends[line, 0] or p == chains.ends[line, 1]:
         return True
-    begin, end = starts[line], starts[line + 1]
+    begin, end = chains.starts[line], chains.starts[line + 1]
     while begin < end:
         middle = (begin + end) // 2
-        if on[middle] < p:
+        if chains.points[middle] < p:
             begin = middle + 1
         else:
             end = middle
-    return begin < starts[line + 1] and on[begin] == p
+    return begin < chains.starts[line + 1] and chains.points[begin] == p
 
 
 @compiled
 def _segments(
-    points: Floats,
-    starts: Ints,
-    members: Ints,
-    face_edges: Ints,
-    ends: Ints,
-    line_starts: Ints,
-    on: Ints,
-    pairs: Ints,
-    straight: float,
+    points: Floats, starts: Ints, members: Ints, face_edges: Ints, chains: Chains, pairs: Ints, straight: float
 ) -> tuple[Ints, Ints]:
     """Return parts of lines in faces, as rows of face, line and two ends; and the two faces of each new line."""
     records, sides = [(0, 0, 0, 0)], [(0, 0)]
-    n_lines = len(ends)
+    ends = chains.ends
     for r in range(len(pairs)):
         f, g = pairs[r, 0], pairs[r, 1]
         common = [np.int64(0)]
@@ -571,10 +564,10 @@ def _segments(
             order = np.argsort(shares)
             for c in range(len(order) - 1):
                 a, b = common[order[c]], common[order[c + 1]]
-                e = _shared_edge(face_edges, ends, line_starts, on, f, a, b)
-                h = _shared_edge(face_edges, ends, line_starts, on, g, a, b)
+                e = _shared_edge(face_edges, chains, f, a, b)
+                h = _shared_edge(face_edges, chains, g, a, b)
                 if e < 0 and h < 0:
-                    line = n_lines + len(sides) - 1
+                    line = len(ends) + len(sides) - 1
                     sides.append((f, g))
                     records.append((f, line, a, b))
                     records.append((g, line, a, b))
@@ -589,7 +582,7 @@ def _segments(
                 e = face_edges[inner, k]
                 first, last = np.int64(-1), np.int64(-1)
                 for c in common:
-                    if _is_along(ends, line_starts, on, e, c):
+                    if _is_along(chains, e, c):
                         if first < 0:
                             first = last = c
                             continue
@@ -599,7 +592,7 @@ def _segments(
                             first = c
                         elif ((points[c] - points[last]) * way).sum() > 0.0:
                             last = c
-                if first == last or _shared_edge(face_edges, ends, line_starts, on, outer, first, last) >= 0:
+                if first == last or _shared_edge(face_edges, chains, outer, first, last) >= 0:
                     continue
                 records.append((outer, e, first, last))
     return np.array(records)[1:], np.array(sides)[1:]

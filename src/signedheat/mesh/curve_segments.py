@@ -98,11 +98,14 @@ class MergedSources:
         for (begin, end), samples, has_sides in zip(pairwise(bounds), self.samples, oriented, strict=True):
             own = order[begin:end]
             nodes = np.concatenate([samples, np.setdiff1d(self.ends[own], samples)]).astype(np.int64)
-            distinct, first = np.unique(nodes, return_index=True)
-            ends = first[np.searchsorted(distinct, self.ends[own])]
-            columns = self.faces[own], self.edges[own], self.vectors[own]
-            parts.append(CurveSegments(self.nodes[nodes], ends, *columns, has_sides))
+            parts.append(self.part(own, nodes, has_sides))
         return parts
+
+    def part(self, own: Ints, nodes: Ints, oriented: bool) -> CurveSegments:
+        """Return the source with some of the segments and nodes."""
+        distinct, first = np.unique(nodes, return_index=True)
+        ends = first[np.searchsorted(distinct, self.ends[own])]
+        return CurveSegments(self.nodes[nodes], ends, self.faces[own], self.edges[own], self.vectors[own], oriented)
 
 
 def without_copies(parts: Sequence[CurveSegments], by_points: Bools) -> tuple[Ints, Ints]:
@@ -146,16 +149,7 @@ def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple
             continue
         own = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in line])
         nodes = np.unique(np.concatenate([merged.samples[k] for k in line]))
-        joined.append(
-            CurveSegments(
-                merged.nodes[nodes],
-                np.searchsorted(nodes, merged.ends[own]),
-                merged.faces[own],
-                merged.edges[own],
-                merged.vectors[own],
-                parts[line[0]].oriented,
-            )
-        )
+        joined.append(merged.part(own, nodes, parts[line[0]].oriented))
     return joined, which
 
 

@@ -103,14 +103,11 @@ def corners_at(faces: Ints, vertices: Ints, n_vertices: int, name: str = "point"
 
 def contain(triangles: IntrinsicMesh, faces: Ints, located: LocatedPoints) -> Bools:
     """Return (n,) whether face k contains point k."""
-    return np.choose(
-        located.kinds,
-        [
-            (triangles.corner_vertices[faces] == located.elements[:, None]).any(axis=1),
-            (triangles.edges.face_edges[faces] == located.elements[:, None]).any(axis=1),
-            faces == located.elements,
-        ],
+    of_vertices, of_edges = (
+        (table[faces] == located.elements[:, None]).any(axis=1)
+        for table in (triangles.corner_vertices, triangles.edges.face_edges)
     )
+    return np.choose(located.kinds, [of_vertices, of_edges, faces == located.elements])
 
 
 def barycentric_in(triangles: IntrinsicMesh, faces: Ints, located: LocatedPoints) -> Floats:

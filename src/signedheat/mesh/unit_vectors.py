@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..parallel import n_threads
+
+BLOCK = 1 << 16
+"""Number of vectors scaled at a time, which fit into the processor's cache."""
 
 
 def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
@@ -31,19 +35,19 @@ def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
         return vectors / np.where(length > 0, length, 1)
     result = vectors if overwrite else np.empty_like(vectors)
 
-    def scale(block: Any) -> None:
-        part = vectors[block]
+    def scale(rows: slice) -> None:
+        part = vectors[rows]
         largest = np.abs(part).max(axis=-1, keepdims=True)
         scaled = part / np.where(largest > 0, largest, 1)
         length = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., None]
-        np.divide(scaled, np.where(length > 0, length, 1), out=result[block])
+        np.divide(scaled, np.where(length > 0, length, 1), out=result[rows])
 
-    blocks = _blocks(vectors.shape)
-    if len(blocks) == 1:
-        scale(blocks[0])
+    count = max(1, BLOCK // max(1, math.prod(vectors.shape[1:-1])))
+    if vectors.ndim == 1 or len(vectors) <= count:
+        scale(slice(None))
     else:
         with ThreadPoolExecutor(n_threads()) as pool:
-            list(pool.map(scale, blocks))
+            list(pool.map(scale, (slice(begin, begin + count) for begin in range(0, len(vectors), count))))
     return result
 
 
@@ -51,14 +55,3 @@ def axes_across(vectors: Floats) -> tuple[Floats, Floats]:
     """Return two (n, 3) unit vectors perpendicular to each vector and to each other, right-handed in this order."""
     first = unit(np.cross(vectors, np.eye(3)[np.abs(vectors).argmin(axis=1)]))
     return first, unit(np.cross(vectors, first))
-
-
-def _blocks(shape: tuple[int, ...], size: int = 2**16) -> list[Any]:
-    """Return slices of the first axes that make blocks of about `size` vectors, which fit the processor's cache."""
-    if len(shape) == 1 or np.prod(shape[:-1]) <= size:
-        return [...]
-    inner = int(np.prod(shape[1:-1], dtype=np.int64))
-    if inner <= size:
-        rows = max(1, size // inner)
-        return [(slice(start, start + rows),) for start in range(0, shape[0], rows)]
-    return [(slice(i, i + 1), *(() if b is ... else b)) for i in range(shape[0]) for b in _blocks(shape[1:], size)]

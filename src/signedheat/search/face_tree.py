@@ -102,24 +102,12 @@ class FaceFeatures(NamedTuple):
 
         edge_regular, vertex_regular, mates = _regular(faces, table, edge_normals, len(vertices))
         across = np.where(mates < 0, -1, mates // 3).reshape(-1, 3).astype(np.int32)
-        return cls(
-            corners,
-            triangle_rows(corners),
-            vertices,
-            faces.astype(np.int32),
-            table.face_edges.astype(np.int32),
-            face_normals,
-            edge_normals,
-            vertex_normals,
-            edge_regular,
-            vertex_regular,
-            across,
-            np.where(across < 0, -1, faces[across].sum(axis=2) - faces - np.roll(faces, -1, axis=1)).astype(np.int32),
-            starts,
-            around.astype(np.int32),
-            trusted,
-            ids,
-        )
+        apexes = np.where(across < 0, -1, faces[across].sum(axis=2) - faces - np.roll(faces, -1, axis=1))
+        positions = corners, triangle_rows(corners), vertices
+        ids_of_faces = faces.astype(np.int32), table.face_edges.astype(np.int32)
+        normals = face_normals, edge_normals, vertex_normals
+        around_faces = edge_regular, vertex_regular, across, apexes.astype(np.int32)
+        return cls(*positions, *ids_of_faces, *normals, *around_faces, starts, around.astype(np.int32), trusted, ids)
 
 
 def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: int) -> tuple[Bools, Bools, Ints]:
