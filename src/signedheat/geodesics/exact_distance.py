@@ -155,7 +155,7 @@ class PausedSearch:
         reached = np.flatnonzero(np.isfinite(distance))
         # merged windows may miss zero by their tolerance, and Dijkstra needs it
         along = distances_along_edges(self.triangles, reached, np.maximum(distance[reached], 0.0))
-        # where it has ended: on other parts, or past edges so short that windows on them are lost in rounding
+        # a search that has ended misses other parts, and what is past edges as short as rounding
         return np.where(np.isinf(distance), along, distance) if self.has_ended else along
 
 
@@ -238,7 +238,7 @@ def _collect(
     while row >= 0:
         before += 1
         row = following[row]
-    counts[MADE] += count * (count + before) // MANY**2  # each is compared with every other one
+    counts[MADE] += count * (count + before) // MANY**2  # each is compared with all others
     chosen = np.empty((count, 6))
     count, row = 0, queued[halfedge]
     while row >= 0:

@@ -163,7 +163,7 @@ class PlacedSegments:
         away[at_edge[branching]] = 0
         away, node = away[away != 0], node[away != 0]
         starts, order = grouped(node, len(nodes))
-        has = np.flatnonzero(np.diff(starts))  # of a segment along an edge both copies have the same direction
+        has = np.flatnonzero(np.diff(starts))  # both copies of a segment along an edge have the same direction
         directions = np.zeros((2, len(nodes)), dtype=np.complex128)
         directions[0, has], directions[1, has] = away[order[starts[has]]], away[order[starts[has + 1] - 1]]
         return directions[0], directions[1]

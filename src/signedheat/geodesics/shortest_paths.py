@@ -266,7 +266,7 @@ def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tupl
     bends, ends = [0], [0]
     bends.pop()
     ends.pop()
-    rims, at = np.full(2, start), np.full(2, -1)  # of the funnel, right and left, and the portals they come from
+    rims, at = np.full(2, start), np.full(2, -1)  # the right and left rim of the funnel, and the portals they come from
     apex, total, i = start, 0.0, 0
     while i <= len(portals):
         for side in range(2):

@@ -137,8 +137,8 @@ class _Call:
         others = _library().MKL_Set_Num_Threads_Local(self._threads)
         self._function(
             _address(self._handle),
-            ctypes.byref(integer(1)),  # factors in memory
-            ctypes.byref(integer(1)),  # which of them
+            ctypes.byref(integer(1)),  # number of factors in memory
+            ctypes.byref(integer(1)),  # the factor to use
             ctypes.byref(integer(self._kind)),
             ctypes.byref(integer(phase)),
             ctypes.byref(integer(self._n)),
@@ -189,7 +189,7 @@ def _makes_factors_anew() -> bool:
     """Return whether the library can: before 2026.2 two-level factors silently stay those of the first matrix."""
     one, two = (sparse.csr_matrix(np.array([[diagonal]])) for diagonal in (1.0, 2.0))
     half = PardisoFactor(one)._again(two).solve(np.ones(1))[0]
-    return bool(abs(half - 0.5) < 0.25)  # some processors round it
+    return bool(abs(half - 0.5) < 0.25)  # the result is rounded on some processors
 
 
 def is_available() -> bool:

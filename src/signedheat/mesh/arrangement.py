@@ -37,10 +37,10 @@ ON_EDGE, IN_FACE, EDGES, EDGE_AND_FACE = range(4)
 class Arrangement(NamedTuple):
     """Pieces of faces that meet in whole edges."""
 
-    points: Floats  # (n, 3) those that were given, and where faces meet
+    points: Floats  # (n, 3) the given points, followed by those where faces meet
     faces: Ints  # (p, 3) pieces, in order of the faces
-    origins: Ints  # (p,) face that each is a piece of, ascending
-    cells: Ints  # (p,) pieces of a face that hang together without a line between them have the same
+    origins: Ints  # (p,) the face that each is a piece of, ascending
+    cells: Ints  # (p,) number of a cell: pieces of a face that are connected without a line between have the same
 
 
 class Incidence(NamedTuple):
@@ -220,7 +220,7 @@ def _with_crossings(
     first, second = records.lines[crossing].T
     n_edges = len(lines.ends) - len(lines.sides)
     names = np.stack([np.minimum(first, second), np.maximum(first, second), np.full(len(first), -1)], axis=1)
-    three = names[:, 0] >= n_edges  # two segments: the face that they are in, and one more of each
+    three = names[:, 0] >= n_edges  # two segments: the face they lie in, and the other face of each
     of_faces = np.sort(lines.sides[names[three][:, :2] - n_edges].reshape(-1, 4), axis=1)
     twice = np.append(of_faces[:, 1:] == of_faces[:, :-1], np.zeros((len(of_faces), 1), dtype=bool), axis=1)
     single = twice.sum(axis=1) == 1
@@ -239,7 +239,7 @@ def _divided(
     n_lines = len(lines.ends)
     on = Incidence.of(lines.on).along(points, lines.ends)
     counts = np.bincount(on.owners, minlength=n_lines)
-    starts = np.append(0, np.cumsum(counts + 2))  # of all points of each line, with its ends
+    starts = np.append(0, np.cumsum(counts + 2))  # of the points of each line, including its ends
     whole = np.empty(starts[-1], dtype=np.int64)
     whole[starts[:-1]], whole[starts[1:] - 1] = lines.ends.T
     rest = np.ones(len(whole), dtype=bool)
@@ -247,7 +247,7 @@ def _divided(
     whole[rest] = on.points
     line_of = np.repeat(np.arange(n_lines), counts + 2)
 
-    # parts of lines in faces, from point to point
+    # split parts of lines in faces at every point
     n = len(points)
     keys = line_of * n + whole
     order = np.argsort(keys, kind="stable")
@@ -265,7 +265,7 @@ def _divided(
     chosen = np.flatnonzero(busy)
     if not len(chosen):
         return Arrangement(points, faces, origins, np.arange(len(faces)))
-    # points on rims, in order
+    # the points on rims, in order
     edges, forward = table.face_edges[chosen].ravel(), table.forward[chosen].ravel()
     side, place = members_of(starts, np.arange(starts[-1]), edges)
     backwards = ~forward[side]
@@ -578,7 +578,7 @@ def _segments(
             continue
         for s in range(2):
             inner, outer = (f, g) if s == 0 else (g, f)
-            for k in range(3):  # edges of the one that lie in the other
+            for k in range(3):  # edges of one face that lie in the other
                 e = face_edges[inner, k]
                 first, last = np.int64(-1), np.int64(-1)
                 for c in common:

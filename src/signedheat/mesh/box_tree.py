@@ -114,7 +114,7 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, starts: 
             lower[d], upper[d] = min(a, b, c) - slacks[d], max(a, b, c) + slacks[d]
             ways[3, d] = (corners[t, 3 + p] - corners[t, p]) * (corners[t, 6 + q] - corners[t, q])
             ways[3, d] -= (corners[t, 3 + q] - corners[t, q]) * (corners[t, 6 + p] - corners[t, p])
-        for k in range(3):  # at right angles to each side, in the plane
+        for k in range(3):  # perpendicular to each side, in the plane
             i, j = 3 * k, (3 * k + 3) % 9
             for d in range(3):
                 p, q = (d + 1) % 3, (d + 2) % 3

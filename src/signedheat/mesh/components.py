@@ -50,7 +50,7 @@ def _labels(n: int, one: Ints, other: Ints) -> Ints:
             b = parents[b]
         parents[max(a, b)] = min(a, b)
     count = 0
-    for node in range(n):  # those above it have their numbers already
+    for node in range(n):  # its ancestors already have numbers
         if parents[node] == node:
             parents[node] = -1 - count
             count += 1

@@ -53,7 +53,7 @@ class Triangulation:
     # the corner opposite each directed edge, in the triangle that runs along it
     apex: dict[Edge, int] = field(default_factory=dict)
     leaving: dict[int, int] = field(default_factory=dict)  # the end of one of the directed edges that leave each point
-    # the points along edges that are part of a segment, after the first: more than one where others cross them
+    # the points after the first along edges that are part of a segment: several where other segments cross them
     parts: dict[Edge, list[int]] = field(default_factory=dict)
 
     @classmethod
@@ -191,7 +191,7 @@ class Triangulation:
         moved = goal >= 0
         while moved and (a, goal) not in apex and (goal, a) not in apex:
             moved, left = False, []
-            for u, v in reversed(waiting):  # met and back: flips at one end make room for the next
+            for u, v in reversed(waiting):  # back and forth: flips at one end make room for the next
                 w, x = apex[u, v], apex[v, u]
                 if min(turn(points[x], points[v], points[w]), turn(points[w], points[u], points[x])) <= FLAT:
                     left.append((u, v))

@@ -136,7 +136,7 @@ def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple
     arriving = np.zeros(len(merged.nodes), dtype=np.int64)
     arriving[heads] = np.arange(len(parts))
     turns_back = np.isin(tails, heads) & (last[arriving[tails]] == second)
-    apart = len(merged.nodes) * (1 + np.arange(len(parts)))  # nodes of its own for each
+    apart = len(merged.nodes) * (1 + np.arange(len(parts)))  # distinct nodes for each curve
     tails = tails + np.where(may_go_on & ~turns_back, 0, apart)
     lines = assemble_polylines(tails, heads + np.where(may_go_on, 0, apart))
     members = sorted((line for line, _, _ in lines), key=min)
@@ -170,7 +170,9 @@ def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegmen
     bent &= merged.edges[before] < 0
     straight = np.bincount(run[before], bent, len(first))[run[before]] == 0
     ends_at = np.bincount(np.concatenate([merged.ends.ravel(), *merged.samples]), minlength=len(merged.nodes))
-    passes = np.bincount(node[straight], minlength=len(merged.nodes))  # of each, two segments and one sample
+    passes = np.bincount(
+        node[straight], minlength=len(merged.nodes)
+    )  # each passing line has two segment ends and one sample there
     straight &= (3 * passes == ends_at)[node]
     node, before, after = node[straight], before[straight], after[straight]
 
@@ -200,7 +202,9 @@ def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
     for elements in (merged.edges, np.where(merged.edges < 0, merged.faces, -1)):
         alike &= elements[before] == elements[after]
     places_between, before, after = places_between[alike], before[alike], after[alike]
-    run = connected_components(k, before, after)  # loops that go straight on, as such without area do, begin somewhere
+    run = connected_components(
+        k, before, after
+    )  # loops that go straight on, as loops without area do, must begin somewhere
     of_runs, link = np.unique(run[before], return_index=True)
     begins = link[np.bincount(run[before], minlength=k)[of_runs] == np.bincount(run)[of_runs]]
     places_between, before, after = (np.delete(column, begins) for column in (places_between, before, after))
@@ -230,7 +234,7 @@ def given_directions(
     edge.
     """
     largest = np.abs(normals).max(axis=1, initial=0.0)
-    extreme = (largest > 1e100) | ((largest > 0) & (largest < 1e-100))  # whose squares cannot be computed
+    extreme = (largest > 1e100) | ((largest > 0) & (largest < 1e-100))  # their squares overflow or underflow
     normals = normals / np.where(extreme, largest, 1.0)[:, None]
     inside = np.flatnonzero(edges < 0)
     directions = np.zeros(len(faces), dtype=np.complex128)

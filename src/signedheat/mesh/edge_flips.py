@@ -63,7 +63,7 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
     (first, second), (i, j) = (creases // 3).T, (creases % 3).T
     a, b = faces[first, i], faces[first, (i + 1) % 3]
     c, d = faces[first, (i + 2) % 3], faces[second, (j + 2) % 3]
-    rim = (  # from, to, the side, the face it belongs to, and which of the new ones it will
+    rim = (  # tail, head, side, its face, and the new face that it will belong to
         (b, c, (i + 1) % 3, first, 1),
         (c, a, (i + 2) % 3, first, 0),
         (a, d, (j + 1) % 3, second, 0),
@@ -94,7 +94,7 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
     for face in faces_around:
         np.maximum.at(best, face, rank)
     won = np.flatnonzero((rank > 0) & np.all([best[face] == rank for face in faces_around], axis=0))
-    won = won[np.unique(keys[won], return_index=True)[1]]  # two of them may want the same edge
+    won = won[np.unique(keys[won], return_index=True)[1]]  # two flips may make the same edge
     return first[won], second[won], new[0][won], new[1][won]
 
 

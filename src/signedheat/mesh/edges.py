@@ -35,11 +35,11 @@ class FaceOrientation:
     """Parts of faces that are connected across edges of two faces, and how the faces of each agree."""
 
     parts: Ints  # (n_faces,) part of each face; parts are numbered by first appearance
-    turned: Bools  # (n_faces,) which faces must turn; of parts that cannot be oriented, none
+    turned: Bools  # (n_faces,) whether each face must be turned; False in parts that cannot be oriented
     # (n_parts,) whether all neighbours of the part can agree; whether each of its edges has two faces
     orientable: Bools
     closed: Bools
-    disagreeing: int  # edges whose two faces run along them the same way
+    disagreeing: int  # number of edges whose two faces run along them the same way
 
 
 def following_corners(offsets: Ints) -> NDArray[np.int32]:

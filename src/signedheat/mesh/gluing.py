@@ -207,7 +207,7 @@ def flip(g: Gluing, h: int) -> bool:
     g.tail[t], g.tail[t1], g.tail[t2] = a, b, j
     g.length[g.edge[h]] = length
     g.forward[h], g.forward[t] = True, False
-    g.front[h], g.front[t] = True, False  # it is another edge now
+    g.front[h], g.front[t] = True, False  # it is a different edge now
     return True
 
 
@@ -362,7 +362,7 @@ def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
     start[edge[first]], front[first] = first, True
     sums = np.bincount(edge, weights=triangles.edge_lengths.ravel(), minlength=n_edges)
     lengths = sums / np.maximum(edges.face_counts, 1)
-    unit = float(lengths.mean()) or 1.0  # what is compared with powers of two does not depend on scale
+    unit = float(lengths.mean()) or 1.0  # comparisons with powers of two do not depend on scale
     fixed = np.zeros(n_edges, dtype=bool) if fixed_edges is None else np.array(fixed_edges, dtype=bool)
     return Gluing(
         tail=triangles.corner_vertices.ravel().copy(),

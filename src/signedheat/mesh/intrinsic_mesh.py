@@ -125,7 +125,7 @@ class IntrinsicMesh(Frozen):
 
         Two edges e, g of a face differ by the rotation ``conj(z_fe) z_fg``, which is r of Eq. 8.
         """
-        lengths = np.where(self.edge_lengths > 0, self.edge_lengths, 1.0)  # what has no length has no direction
+        lengths = np.where(self.edge_lengths > 0, self.edge_lengths, 1.0)  # edges without length have no direction
         return np.where(self.edges.forward, 1.0, -1.0) * self.edge_vectors / lengths
 
     @cached_property

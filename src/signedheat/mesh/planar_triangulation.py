@@ -24,7 +24,7 @@ class Planar(NamedTuple):
     x: Floats  # (n, 2) positions
     tri: Ints  # (t, 3) vertices of triangles, counter-clockwise
     adj: Ints  # (t, 3) triangle across each edge, or −1
-    fixed: Bools  # (t, 3) whether it is part of a segment
+    fixed: Bools  # (t, 3) whether each edge is part of a segment
     at: Ints  # (n,) a triangle at each vertex
     flat: float  # height below which a triangle is flat
 
@@ -193,7 +193,7 @@ def _insert(mesh: Planar, count: int, i: int) -> int:
     t, k, depth = _locate(mesh, count, i)
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
     s = adj[t, k]
-    if s >= 0 and depth <= flat * _length(x, a, b):  # on an edge: four
+    if s >= 0 and depth <= flat * _length(x, a, b):  # on an edge: four triangles
         j = _place(tri, s, b)
         _split(mesh, t, k, i, count)
         _split(mesh, s, j, i, count + 1)
@@ -230,7 +230,7 @@ def _legalize(mesh: Planar, i: int) -> None:
         k = _place(tri, t, i)
         edge = (k + 1) % 3
         if adj[t, edge] >= 0 and not fixed[t, edge] and _bad(mesh, t, edge):
-            _flip(mesh, t, edge)  # t is (i, a, d): looked at again
+            _flip(mesh, t, edge)  # t is (i, a, d), which is checked again
             first = t
             continue
         t = adj[t, (k + 2) % 3]  # across the edge back to i, counter-clockwise

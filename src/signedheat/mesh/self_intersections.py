@@ -153,7 +153,7 @@ def overlap(p: Floats, q: Floats, slack: float, depth: float, ways: Floats) -> b
             ways[6 + t, d] = ways[3 * t + 2, e] * ways[3 * t, f] - ways[3 * t + 2, f] * ways[3 * t, e]
             ways[8 + t, d] = 0.0
     for a in range(17):
-        # normals of both; sides turned in their planes, which part most of those that touch; products of their sides
+        # normals; sides turned in their planes, which separate most triangles that touch; cross products of sides
         if a < 2:
             i, j = 3 * a, 3 * a + 2
         elif a < 8:
@@ -169,7 +169,7 @@ def overlap(p: Floats, q: Floats, slack: float, depth: float, ways: Floats) -> b
         x, y, z = x / length, y / length, z / length
         if a < 2:
             ways[8 + a, 0], ways[8 + a, 1], ways[8 + a, 2] = x, y, z
-        elif a >= 8:  # along a normal both are flat, and touch
+        elif a >= 8:  # along a normal both are flat and touch
             upright = False
             for t in range(2):
                 cosine = ways[8 + t, 0] * x + ways[8 + t, 1] * y + ways[8 + t, 2] * z

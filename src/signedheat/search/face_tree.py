@@ -48,8 +48,8 @@ class FaceFeatures(NamedTuple):
     """
 
     corners: Floats  # (m, 9) corners of the faces, each face once, in the order of a space-filling curve
-    rows: Floats  # (m, 16) the same as `foot_on_triangle` wants it
-    vertices: Floats  # (n, 3) their positions
+    rows: Floats  # (m, 16) the same for `foot_on_triangle`: see `triangle_rows`
+    vertices: Floats  # (n, 3) positions
     faces: NDArray[np.int32]  # (m, 3) vertices; equal positions have equal ids
     edges: NDArray[np.int32]  # (m, 3) edges, from corner k to corner k + 1
     face_normals: Floats  # (m, 3) unit normals
@@ -77,7 +77,7 @@ class FaceFeatures(NamedTuple):
         proper = (a != b) & (b != c) & (c != a)
         if not proper.all():
             faces, trusted, ids = faces[proper], trusted[proper], ids[proper]
-        if len(faces):  # what is near in space had better be near in memory
+        if len(faces):  # faces near each other in space should be so in memory
             order = np.argsort(morton_codes(vertices[faces].mean(axis=1)), kind="stable")
             trusted, ids = trusted[order], ids[order]
             numbers, used = by_first_use(faces[order].ravel(), len(vertices))
@@ -120,7 +120,7 @@ def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: in
     corners, fan = faces.ravel(), np.empty(n_vertices, dtype=np.int64)
     fan[corners] = fans
     vertices = np.ones(n_vertices, dtype=bool)
-    vertices[corners[fans != fan[corners]]] = False  # cones that touch are several
+    vertices[corners[fans != fan[corners]]] = False  # at which several cones touch
     vertices[table.vertices[~edges]] = False
     return edges, vertices, mates
 
@@ -140,7 +140,7 @@ class FaceTree:
     """Faces, and a tree of boxes around them."""
 
     features: FaceFeatures
-    tree: BoxTree  # over their boxes
+    tree: BoxTree  # the tree of their boxes
 
     @classmethod
     def of(cls, features: FaceFeatures) -> FaceTree:
@@ -236,7 +236,7 @@ def _discs(corners: Floats, tree: BoxTree) -> Floats:
                     square = max(square, ax * ax + ay * ay + az * az - along * along)
         radius, thickness, middle = np.sqrt(square), 0.5 * (high - low), 0.5 * (high + low)
         if thickness < FLAT * radius:
-            slack = 1.0 + 1e-9  # lest rounding makes a disc too small
+            slack = 1.0 + 1e-9  # against rounding
             discs[node, 0], discs[node, 1], discs[node, 2] = x + middle * nx, y + middle * ny, z + middle * nz
             discs[node, 3], discs[node, 4], discs[node, 5] = nx, ny, nz
             discs[node, 6], discs[node, 7] = radius * slack, thickness * slack + 1e-12 * radius
@@ -312,7 +312,9 @@ def _nearest_of_candidates(
                 vx, vy, vz = places[vertex, 0], places[vertex, 1], places[vertex, 2]
                 dx, dy, dz = x - vx, y - vy, z - vz
                 steepest = 0.0
-                turns = 1 if vertex_regular[vertex] else 2  # around a whole vertex every side is the first of a corner
+                turns = (
+                    1 if vertex_regular[vertex] else 2
+                )  # around a regular vertex every side is the first of a corner
                 for k in range(starts[vertex], starts[vertex + 1]):
                     near = np.int64(around[k]) // 3
                     corner = np.int64(around[k]) - 3 * near

@@ -44,8 +44,10 @@ def _rows(corners: Floats) -> Floats:
     across = _dot(v, u)
     w = v - across * u
     flat = ~(np.sqrt(_dot(w, w)) > HEIGHT * np.abs(across))
-    w = np.where(flat, np.arange(3)[:, None] == np.abs(u).argmin(axis=0), w)  # flat ones in any plane through the side
-    for _ in range(2):  # again for slivers, whose height is of few digits
+    w = np.where(
+        flat, np.arange(3)[:, None] == np.abs(u).argmin(axis=0), w
+    )  # the plane of flat ones is any through the side
+    for _ in range(2):  # twice, since the height of slivers has few accurate digits
         w = w - _dot(w, u) * u
         w /= np.sqrt(_dot(w, w))
     up = np.where(flat, 0.0, _dot(v, w))
@@ -194,7 +196,7 @@ class TriangleTree:
     """Triangles in a tree of boxes, for finding the triangle nearest to a point."""
 
     rows: Floats  # (m, 16) the triangles, as `triangle_rows` gives them
-    tree: BoxTree  # of their bounding boxes
+    tree: BoxTree  # the tree of their bounding boxes
 
     @classmethod
     def of(cls, triangles: Floats) -> TriangleTree:
@@ -245,7 +247,7 @@ def _descend(
             best[k], which[k], gaps[0, k] = np.inf, last, 0.0
         stack[0], depth, begun = 1, 1, begin % run == 0
         while depth > 0:
-            node, first, end = np.int64(0), np.int64(0), np.int64(0)  # of faces to be looked at
+            node, first, end = np.int64(0), np.int64(0), np.int64(0)  # the range of faces to be measured
             if begun:
                 depth -= 1
                 node, some = stack[depth], 0
@@ -291,7 +293,7 @@ def _descend(
                             some += 1 if square < best[k] else 0
                     kept += 1 + side if some > 0 else 0
                 node = 2 * node + 1 if kept == 2 else 2 * node if kept > 0 else np.int64(0)
-                if kept == 3:  # that which is nearer to one of the points first
+                if kept == 3:  # first the one that is nearer to one of the points
                     if gaps[depth, middle] <= gaps[depth + 1, middle]:
                         for k in range(together):
                             gaps[depth, k] = gaps[depth + 1, k]

@@ -35,7 +35,7 @@ class WindingTree:
     """Triangles in a tree, of which each node can replace its triangles for points far away."""
 
     triangles: Floats  # (m, 3, 3) their corners, counterclockwise from outside
-    tree: BoxTree  # over their boxes
+    tree: BoxTree  # the tree of their boxes
 
     @classmethod
     def of(cls, triangles: Floats) -> WindingTree:
@@ -48,7 +48,7 @@ class WindingTree:
         On a face the number is that of one of its sides: use `behind`.
         """
         corners = np.ascontiguousarray(self.triangles).reshape(-1, 9)
-        points = np.ascontiguousarray(points)  # one kind of array, for which the kernel is compiled
+        points = np.ascontiguousarray(points)  # the kernel is compiled for one kind of array
         (numbers,) = in_chunks(lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk),), points)
         return numbers
 
@@ -128,7 +128,9 @@ def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> F
                 for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
                     if items[k] >= 0:
                         rest, volume = solid_angle(corners, items[k], x, y, z)
-                        if rest > abs(volume):  # less than an eighth of a turn each: their product has their sum
+                        if rest > abs(
+                            volume
+                        ):  # angles below an eighth of a turn are added by multiplying complex numbers
                             share = volume / rest
                             real, imaginary = real - imaginary * share, imaginary + real * share
                         elif volume != 0.0:
@@ -194,7 +196,7 @@ def moments_of(triangles: Floats, tree: BoxTree, opening: float) -> Floats:
     while True:
         rows = slice(level, 2 * level)
         low, high = tree.bounds[rows, :3].T, tree.bounds[rows, 3:].T
-        with np.errstate(invalid="ignore"):  # of nothing
+        with np.errstate(invalid="ignore"):  # of empty nodes
             box = np.linalg.norm(np.maximum(centres - low, high - centres), axis=0)
         radii = np.where(weights > 0, np.minimum(radii, box), 0.0)
         moments[rows, :3], moments[rows, 3:6], moments[rows, 6] = vectors.T, centres.T, (opening * radii) ** 2
