@@ -69,8 +69,8 @@ def distance_to_segments(
     search = PausedSearch.start(triangles, placed, tolerance).until(many, report)
     better = None if search.has_ended else in_delaunay_triangles(triangles, placed)
     if better is not None:
-        other = PausedSearch.start(*better, tolerance).until(limit, report)
-        search = other if other.has_ended else search
+        anew = PausedSearch.start(*better, tolerance).until(limit, report)
+        search = anew if anew.has_ended else search
     search = search.until(limit, report)
     windows = min(search.windows, limit - 1) if search.has_ended else limit
     return search.distance()[: triangles.n_vertices], windows
@@ -306,15 +306,6 @@ def _settle(search: Search, halfedge: int, chosen: Floats, count: int) -> None:
 
 
 @compiled
-def start_search(faces: Faces, sources: GeodesicSources, search: Search, slack: float) -> None:
-    """Set distances at the sources, and make the first windows, as far as there is room."""
-    initial_windows(faces, sources, search, slack)
-    for v in range(len(search.distance)):
-        if search.pseudosources[v] and search.distance[v] < np.inf:
-            push(search.queue, len(search.queued) + v, search.distance[v])
-
-
-@compiled
 def _most_windows(faces: Faces, queued: Ints, following: Ints, item: int) -> int:
     """Return the largest number of windows that one item of the queue can make."""
     most, n_halfedges = 0, len(queued)
@@ -539,10 +530,10 @@ def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
         merged[P], merged[Q] = s0 + away * ax, away * ay
         merged[KIND] = POINT if away < 0.0 else FOCUS
         merged[SIGMA] = begin + away
-    error, other = arrival(merged, between, 0.0) - middle, arrival(merged, s1, 0.0) - end
-    if max(abs(error), abs(other)) > tolerance * length:
+    error, end_error = arrival(merged, between, 0.0) - middle, arrival(merged, s1, 0.0) - end
+    if max(abs(error), abs(end_error)) > tolerance * length:
         return False
-    merged[SIGMA] -= 0.5 * (max(error, other, 0.0) + min(error, other, 0.0))
+    merged[SIGMA] -= 0.5 * (max(error, end_error, 0.0) + min(error, end_error, 0.0))
     for i in range(6):
         a[i] = merged[i]
     return True
@@ -785,8 +776,8 @@ def _first_fan(
 
 
 @compiled
-def initial_windows(faces: Faces, sources: GeodesicSources, search: Search, slack: float) -> None:
-    """Set distances at the corners of faces with sources, then make the initial windows."""
+def start_search(faces: Faces, sources: GeodesicSources, search: Search, slack: float) -> None:
+    """Set distances at the corners of faces with sources, and make the first windows, as far as there is room."""
     for v in sources.vertices:
         search.distance[v] = 0.0
     for i in range(len(sources.beam_faces)):
@@ -798,3 +789,6 @@ def initial_windows(faces: Faces, sources: GeodesicSources, search: Search, slac
     for i in range(len(sources.fan_faces)):
         point, first, second = sources.fan_points[i], sources.fan_firsts[i], sources.fan_seconds[i]
         _first_fan(faces, search, sources.fan_faces[i], point, first, second, slack)
+    for v in range(len(search.distance)):
+        if search.pseudosources[v] and search.distance[v] < np.inf:
+            push(search.queue, len(search.queued) + v, search.distance[v])

@@ -100,15 +100,17 @@ class PlacedSegments:
             shares = np.abs(vectors[i]) / triangles.lengths_of_edges[edges[i]]
             along[i, k] = np.where(np.abs(along[i, 1 - k] - shares) < np.abs(1 - along[i, 1 - k] - shares), 0.0, 1.0)
         which, halfedges = halfedges_of(triangles, edges)
-        faces, at = halfedges // 3, halfedges % 3
-        forward = triangles.edges.forward[faces, at]
+        faces, local_sides = halfedges // 3, halfedges % 3
+        forward = triangles.edges.forward[faces, local_sides]
         along, ends = along[which], ends[which]
         swapped = (along[:, 1] < along[:, 0]) == forward
         along[swapped], ends[swapped] = along[swapped, ::-1], ends[swapped, ::-1]
-        positions = on_sides(triangles, faces, at, along)
+        positions = on_sides(triangles, faces, local_sides, along)
         seen = vectors[which]
-        seen = triangles.edge_directions[faces, at] * np.where(triangles.reflected[faces, at], np.conj(seen), seen)
-        sides = np.sign((np.conj(1j * triangles.edge_vectors[faces, at]) * seen).real).astype(np.int64)
+        seen = triangles.edge_directions[faces, local_sides] * np.where(
+            triangles.reflected[faces, local_sides], np.conj(seen), seen
+        )
+        sides = np.sign((np.conj(1j * triangles.edge_vectors[faces, local_sides]) * seen).real).astype(np.int64)
         return ends, faces, positions, np.ones(len(faces), dtype=bool), sides * oriented[rows][which], rows[which]
 
     @cached_property

@@ -195,18 +195,18 @@ def _find_sleeve(faces: Faces, routes: Routes, starts: Places, ends: Places, pai
             h = faces.halfedges[k]
             if h == leave[e]:
                 continue
-            here = middle(faces, h)
+            entry = middle(faces, h)
             for s in range(ends.first[pair], ends.first[pair + 1]):
-                if ends.faces[s] == h // 3 and d + abs(here - ends.points[s]) < best:
-                    best, last = d + abs(here - ends.points[s]), h
+                if ends.faces[s] == h // 3 and d + abs(entry - ends.points[s]) < best:
+                    best, last = d + abs(entry - ends.points[s]), h
             for turn in range(1, 3):
                 out = h - h % 3 + (h + turn) % 3
                 to = edge_of[out]
-                there = d + abs(middle(faces, out) - here) * toll(to)
-                if there < cost[to]:
-                    cost[to], leave[to], enter[to] = there, out, h
+                longer = d + abs(middle(faces, out) - entry) * toll(to)
+                if longer < cost[to]:
+                    cost[to], leave[to], enter[to] = longer, out, h
                     touched.append(to)
-                    push(queue, to, there)
+                    push(queue, to, longer)
     n, h = 0, last
     while h >= 0:
         n, h = n + 1, enter[edge_of[h]]
@@ -266,24 +266,27 @@ def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tupl
     bends, ends = [0], [0]
     bends.pop()
     ends.pop()
-    rims, at = np.full(2, start), np.full(2, -1)  # the right and left rim of the funnel, and the portals they come from
+    rims, rim_portals = (
+        np.full(2, start),
+        np.full(2, -1),
+    )  # the right and left rim of the funnel, and the portals they come from
     apex, total, i = start, 0.0, 0
     while i <= len(portals):
         for side in range(2):
-            other, sign = 1 - side, 1.0 - 2.0 * side
+            opposite, sign = 1 - side, 1.0 - 2.0 * side
             place = portals[i, side ^ over[i]] if i < len(portals) else end
             if sign * turns(rims[side] - apex, place - apex) < 0:
                 continue
-            if apex == rims[side] or sign * turns(rims[other] - apex, place - apex) < 0:
+            if apex == rims[side] or sign * turns(rims[opposite] - apex, place - apex) < 0:
                 if i < len(portals):
-                    rims[side], at[side] = place, i
+                    rims[side], rim_portals[side] = place, i
                 continue
-            i = at[other]
+            i = rim_portals[opposite]
             bends.append(i)
-            ends.append(other ^ over[i])
-            total += abs(rims[other] - apex)
-            apex = rims[side] = rims[other]
-            at[side] = i
+            ends.append(opposite ^ over[i])
+            total += abs(rims[opposite] - apex)
+            apex = rims[side] = rims[opposite]
+            rim_portals[side] = i
             break
         i += 1
     return bends, ends, total + abs(end - apex)
@@ -356,8 +359,8 @@ def _path_in(
     last = entered[-1] // 3
     begin, end = _point_in(starts, pair, left[0] // 3), _point_in(ends, pair, last)
     end = on_base(faces.positions[last], 0, over[-1], end, placed[0], placed[1])
-    bends, at, length = funnel(portals, over, begin, end)
-    return portals, begin, end, bends, at, length
+    bends, bend_ends, length = funnel(portals, over, begin, end)
+    return portals, begin, end, bends, bend_ends, length
 
 
 @compiled
@@ -368,10 +371,10 @@ def _straighten(
 
     Returns the halfedges crossed and the fraction along each.
     """
-    portals, begin, end, bends, at, length = _path_in(faces, left, entered, starts, ends, pair)
+    portals, begin, end, bends, bend_ends, length = _path_in(faces, left, entered, starts, ends, pair)
     k = 0
     while k < len(bends):
-        point = portals[bends[k], at[k]]
+        point = portals[bends[k], bend_ends[k]]
         try_left, try_entered = other_way(faces, left, entered, portals, bends[k], point)
         k += 1
         if len(try_left) == 0:
@@ -379,16 +382,16 @@ def _straighten(
         path = _path_in(faces, try_left, try_entered, starts, ends, pair)
         if path[5] < length * (1 - 1e-12):
             left, entered, k = try_left, try_entered, 0
-            portals, begin, end, bends, at, length = path
+            portals, begin, end, bends, bend_ends, length = path
     fractions = np.empty(len(left))
-    here, k = begin, 0
+    place, k = begin, 0
     for i in range(len(left)):
         if k < len(bends) and bends[k] == i:
-            fractions[i], here = at[k], portals[i, at[k]]
+            fractions[i], place = bend_ends[k], portals[i, bend_ends[k]]
             k += 1
             continue
-        there = portals[bends[k], at[k]] if k < len(bends) else end
-        along, span, away = there - here, portals[i, 1] - portals[i, 0], here - portals[i, 0]
+        next_place = portals[bends[k], bend_ends[k]] if k < len(bends) else end
+        along, span, away = next_place - place, portals[i, 1] - portals[i, 0], place - portals[i, 0]
         across = turns(along, span)
         share = (
             turns(along, away) / across if across != 0 else (np.conj(span) * away).real / max(abs(span) ** 2, 1e-300)

@@ -87,7 +87,12 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
         raise GeometryError(f"values must have one to four axes, and two nodes, not {given.shape}", element="values")
     if read.dtype == np.bool_:
         raise GeometryError("booleans have no sign", remedy="pass numpy.where(inside, -1.0, 1.0)", element="values")
-    steps, again = positive_steps(spacing, given.ndim), _axes(periodic, given.ndim)
+    flags = [periodic] * given.ndim if np.ndim(periodic) == 0 else list(periodic)  # type: ignore[arg-type]
+    if len(flags) != given.ndim:
+        raise GeometryError(
+            f"periodic must be one or {given.ndim} of True and False, not {periodic!r}", element="periodic"
+        )
+    steps, again = positive_steps(spacing, given.ndim), [flag(value, "periodic") for value in flags]
     if not np.isfinite(given).all():
         raise GeometryError("values must be finite", remedy="fill in those that are not", element="values")
     largest = float(np.abs(given).max())
@@ -133,14 +138,6 @@ def _(
 ) -> Nearest:
     distances = run_cancellable(lambda: redistance(values, grid.spacing), report)
     return Nearest(np.abs(distances), np.sign(distances).astype(np.int64))
-
-
-def _axes(periodic: bool | Sequence[bool], count: int) -> list[bool]:
-    """Return whether each axis is periodic."""
-    flags = [periodic] * count if np.ndim(periodic) == 0 else list(periodic)  # type: ignore[arg-type]
-    if len(flags) != count:
-        raise GeometryError(f"periodic must be one or {count} of True and False, not {periodic!r}", element="periodic")
-    return [flag(value, "periodic") for value in flags]
 
 
 def _distances(values: Floats, spacing: Floats, pads: Ints) -> Floats:
@@ -230,7 +227,9 @@ def zero_contour(values: Floats, steps: Floats) -> Contour:
     least = UNEVEN * float(steps[unused:].min())
     smooth = uneven <= least
     points = np.where(smooth[:, None], curved[:, :4], linear)
-    zeros = np.pad(_lone_zeros(values), ((0, 0), (3 - values.ndim, 0))) * steps[1:]
+    around = scipy.ndimage.generate_binary_structure(values.ndim, 1)
+    lone = np.argwhere((values == 0) & ~scipy.ndimage.binary_dilation(values < 0, around))
+    zeros = np.pad(lone, ((0, 0), (3 - values.ndim, 0))) * steps[1:]
     return Contour(vertices, faces, numbers, zeros, curved, points, smooth, least, reach)
 
 
@@ -315,10 +314,10 @@ def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Int
     axes, on_edge = along.argmax(axis=1), along.sum(axis=1) == 1
     ends = nodes.copy()
     ends[np.arange(len(ends)), axes] += 1
-    here, there = (size[tuple(at[on_edge, unused:].T)] for at in (nodes, ends))
-    largest = np.maximum(here, there)
+    tail_sizes, head_sizes = (size[tuple(at[on_edge, unused:].T)] for at in (nodes, ends))
+    largest = np.maximum(tail_sizes, head_sizes)
     vertices[on_edge] = nodes[on_edge]
-    vertices[on_edge, axes[on_edge]] += here / largest / (here / largest + there / largest)
+    vertices[on_edge, axes[on_edge]] += tail_sizes / largest / (tail_sizes / largest + head_sizes / largest)
     if not on_edge.all():
         _between_others(vertices, faces, ~on_edge)
     edges = np.column_stack([np.zeros(len(nodes)), nodes, axes + 1])[on_edge].astype(np.int32)
@@ -339,12 +338,6 @@ def _between_others(vertices: Floats, faces: Ints, chosen: Bools) -> None:
             np.add.at(sums, tail[joined], vertices[head[joined]])
             np.add.at(counts, tail[joined], 1.0)
     vertices[counts > 0] = sums[counts > 0] / counts[counts > 0, None]
-
-
-def _lone_zeros(values: Floats) -> Ints:
-    """Return (k, d) nodes whose value is zero, with no negative one before or behind them."""
-    around = scipy.ndimage.generate_binary_structure(values.ndim, 1)
-    return np.argwhere((values == 0) & ~scipy.ndimage.binary_dilation(values < 0, around))
 
 
 def _unevenness(curved: Floats, linear: Floats, pairs: Ints) -> Floats:
@@ -410,9 +403,9 @@ def _cubic(field: Floats, place: Floats, weights: Floats, gradient: Floats) -> f
                 line, slope = 0.0, 0.0
                 for m in range(4):
                     if weights[0, 3, m] != 0.0 or weights[1, 3, m] != 0.0:
-                        here = field[base[0] + i - 1, base[1] + j - 1, base[2] + k - 1, base[3] + m - 1]
-                        line += weights[0, 3, m] * here
-                        slope += weights[1, 3, m] * here
+                        value_at_node = field[base[0] + i - 1, base[1] + j - 1, base[2] + k - 1, base[3] + m - 1]
+                        line += weights[0, 3, m] * value_at_node
+                        slope += weights[1, 3, m] * value_at_node
                 value += wi * wj * wk * line
                 gradient[0] += si * wj * wk * line
                 gradient[1] += wi * sj * wk * line
@@ -431,11 +424,11 @@ def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> Floa
     for e in range(len(edges)):
         axis = edges[e, 4]
         i, j, k, m = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
-        here = field[i, j, k, m]
-        there = field[i + (axis == 0), j + (axis == 1), k + (axis == 2), m + (axis == 3)]
+        tail_value = field[i, j, k, m]
+        head_value = field[i + (axis == 0), j + (axis == 1), k + (axis == 2), m + (axis == 3)]
         for d in range(4):
             start[d] = edges[e, d]
-        start[axis] += here / (here - there)
+        start[axis] += tail_value / (tail_value - head_value)
         for d in range(4):
             place[d] = start[d]
         # Newton's method along the gradient, onto the zero set of the interpolant; back to the crossing if it diverges
@@ -462,7 +455,7 @@ def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> Floa
             square += slope[d] ** 2
         length = np.sqrt(square)
         if length == 0.0:
-            slope[axis] = 1.0 if there > here else -1.0
+            slope[axis] = 1.0 if head_value > tail_value else -1.0
             length = 1.0
         for d in range(4):
             result[e, d] = place[d] * steps[d]

@@ -257,7 +257,7 @@ def _divided(
     low, high = np.minimum(tails, heads), np.maximum(tails, heads)
     row = np.repeat(np.arange(len(low)), high - low)
     place = np.arange(len(row)) - np.repeat(np.cumsum(high - low) - (high - low), high - low) + low[row]
-    face, one, two = records.faces[row], whole[place], whole[place + 1]
+    face, begins_at, ends_at = records.faces[row], whole[place], whole[place + 1]
 
     busy: Bools = np.asarray(counts[table.face_edges].any(axis=1))
     busy[face] = True
@@ -275,8 +275,8 @@ def _divided(
     owner = chosen[side // 3]
     corner = np.append(True, side[1:] != side[:-1])
 
-    inner = Incidence.of(lines.within, (face, one), (face, two)).without((owner, rim))
-    segments = Incidence.of((face * n + np.minimum(one, two), np.maximum(one, two)))
+    inner = Incidence.of(lines.within, (face, begins_at), (face, ends_at)).without((owner, rim))
+    segments = Incidence.of((face * n + np.minimum(begins_at, ends_at), np.maximum(begins_at, ends_at)))
     following = np.empty_like(rim)
     following[:-1] = rim[1:]
     ends = np.append(owner[1:] != owner[:-1], True)
@@ -610,13 +610,13 @@ def _cross(
             if s <= r or faces[s] != faces[r] or lines[s] == lines[r]:
                 continue
             met = False
-            for one, other in ((r, s), (s, r)):
+            for first, second in ((r, s), (s, r)):
                 for k in range(2):
-                    v, a, b = ends[one, k], ends[other, 0], ends[other, 1]
+                    v, a, b = ends[first, k], ends[second, 0], ends[second, 1]
                     if v == a or v == b:
                         met = True
                     elif _is_on(points, v, a, b, slack):
-                        touching.append((lines[other], v))
+                        touching.append((lines[second], v))
                         met = True
             if not met and _closest(points, ends[r, 0], ends[r, 1], ends[s, 0], ends[s, 1], place) < np.inf:
                 crossing.append((r, s))

@@ -10,9 +10,9 @@ from ..compiled import compiled
 from ..frozen import read_only
 
 
-def connected_components(n: int, one: NDArray[np.integer], other: NDArray[np.integer]) -> Ints:
-    """Return (n,) the component of each node of a graph, numbered by first appearance; edges join `one` and `other`."""
-    return _labels(n, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (one, other)))
+def connected_components(n: int, tails: NDArray[np.integer], heads: NDArray[np.integer]) -> Ints:
+    """Return (n,) components of the nodes of a graph with edges from tails to heads, by first appearance."""
+    return _labels(n, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (tails, heads)))
 
 
 def element_components(elements: Ints) -> Ints:
@@ -37,11 +37,11 @@ def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
 
 
 @compiled
-def _labels(n: int, one: Ints, other: Ints) -> Ints:
+def _labels(n: int, tails: Ints, heads: Ints) -> Ints:
     """Join trees whose root is their least node; paths are halved on the way to it."""
     parents = np.arange(n)
-    for k in range(len(one)):
-        a, b = one[k], other[k]
+    for k in range(len(tails)):
+        a, b = tails[k], heads[k]
         while parents[a] != a:
             parents[a] = parents[parents[a]]
             a = parents[a]
@@ -86,8 +86,8 @@ def _grouped(groups: Ints, n: int) -> tuple[Ints, Ints]:
         starts[group + 1] += 1
     for group in range(n):
         starts[group + 1] += starts[group]
-    at, members = starts[:-1].copy(), np.empty(len(groups), dtype=np.int64)
+    places, members = starts[:-1].copy(), np.empty(len(groups), dtype=np.int64)
     for member, group in enumerate(groups):
-        members[at[group]] = member
-        at[group] += 1
+        members[places[group]] = member
+        places[group] += 1
     return starts, members

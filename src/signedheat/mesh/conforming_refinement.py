@@ -141,11 +141,11 @@ class FaceCutter:
 
     def cut_along(self, p: int, edge: int) -> None:
         """Replace segment p, which lies on an edge that was split, by one between each two of its new vertices."""
-        merged, (vertices, at, place) = self.merged, self.along_edge(edge)
+        merged, (vertices, fractions, place) = self.merged, self.along_edge(edge)
         a, b = (place[self.vertex_of[i]] for i in merged.ends[p].tolist())
         step = 1 if a < b else -1
         for k in range(a, b, step):
-            vector = merged.vectors[p] * (abs(at[k + step] - at[k]) / abs(at[b] - at[a]))
+            vector = merged.vectors[p] * (abs(fractions[k + step] - fractions[k]) / abs(fractions[b] - fractions[a]))
             ends = self.node(vertices[k]), self.node(vertices[k + step])
             sub = self.sub_edges[edge][min(k, k + step)]
             self.pieces.append(NewSegment(*ends, -1, sub, vector, merged.owners[p]))
@@ -156,8 +156,8 @@ class FaceCutter:
             chain = self.on_edge[edge]
             tail, head = self.triangles.edges.vertices[edge].tolist()
             vertices = [tail, *(self.vertex_of[i] for i in chain), head]
-            at = [0.0, *self.merged.nodes.along[chain].tolist(), 1.0]
-            self.chains[edge] = vertices, at, {v: k for k, v in reversed(list(enumerate(vertices)))}
+            fractions = [0.0, *self.merged.nodes.along[chain].tolist(), 1.0]
+            self.chains[edge] = vertices, fractions, {v: k for k, v in reversed(list(enumerate(vertices)))}
         return self.chains[edge]
 
     def cut_face(self, face: int, inside: list[int]) -> None:

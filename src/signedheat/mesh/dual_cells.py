@@ -172,8 +172,8 @@ def dual_triangles(
     safe, off, length = np.empty((2, len(quads)), dtype=bool), np.empty((2, len(quads))), np.empty((2, len(quads)))
     for k in range(2):
         turned = np.roll(flat, -k, axis=1), np.roll(height, -k, axis=1)
-        safe[k], at = _safe(*turned)
-        off[k] = np.abs(at - shares)
+        safe[k], crossed_at = _safe(*turned)
+        off[k] = np.abs(crossed_at - shares)
         length[k] = np.linalg.norm(around[:, k] - around[:, k + 2], axis=1)
     nearer = np.where(np.abs(off[0] - off[1]) > SLACK, off[1] < off[0], length[1] < length[0])
     second = safe[1] & (nearer | ~safe[0])

@@ -145,8 +145,8 @@ class EdgeTable(Frozen):
     @cached_property
     def pairs(self) -> Ints:
         """(k, 2) both halfedges of each edge that has exactly two."""
-        one = np.flatnonzero(self.mates > np.arange(len(self.mates)))
-        return read_only(np.stack([one, self.mates[one]], axis=1))
+        first = np.flatnonzero(self.mates > np.arange(len(self.mates)))
+        return read_only(np.stack([first, self.mates[first]], axis=1))
 
     def elimination_order(self, vertex_order: NDArray[np.integer]) -> Ints:
         """Order unknowns at edges to reduce fill, given an order of the vertices: ``order[k]`` is eliminated k-th.
@@ -180,9 +180,9 @@ def edge_table(faces: Ints) -> EdgeTable:
     return EdgeTable(vertices, edges.reshape(-1, 3), forward.reshape(-1, 3))
 
 
-def edge_keys(one: NDArray[np.integer], other: NDArray[np.integer]) -> Ints:
+def edge_keys(tails: NDArray[np.integer], heads: NDArray[np.integer]) -> Ints:
     """Return (k,) a number for each pair of vertices, whichever of the two comes first."""
-    return (np.minimum(one, other).astype(np.int64) << 32) | np.maximum(one, other)
+    return (np.minimum(tails, heads).astype(np.int64) << 32) | np.maximum(tails, heads)
 
 
 @compiled

@@ -305,14 +305,14 @@ def split_edge(g: Gluing, h: int, fraction: float) -> int:
     g.counts[2] = x + 1
     along = fraction if g.forward[h] else 1.0 - fraction
     whole = g.length[e]
-    other = new_edge(g, (1.0 - along) * whole, g.fixed[e])
+    far_edge = new_edge(g, (1.0 - along) * whole, g.fixed[e])
     for k in range(count):
         y, n = around[k], g.counts[0]
         g.counts[0] = n + 1
-        here = along if g.forward[y] else 1.0 - along
+        share = along if g.forward[y] else 1.0 - along
         apex_x, apex_y = apex_position(g, y)
-        record(g, SPLIT_EDGE, y, n, x, 1.0 - here, here, 0.0, 1.0)
-        cut = new_edge(g, np.hypot(apex_x - here * whole, apex_y), False)
+        record(g, SPLIT_EDGE, y, n, x, 1.0 - share, share, 0.0, 1.0)
+        cut = new_edge(g, np.hypot(apex_x - share * whole, apex_y), False)
         second, first, last = 3 * n, following(y), preceding(y)
         head, apex = g.tail[first], g.tail[last]
         move(g, (first,), (second + 1,))
@@ -325,8 +325,8 @@ def split_edge(g: Gluing, h: int, fraction: float) -> int:
         l = (k + 1) % count
         near, far = (around[k], seconds[k]) if g.forward[around[k]] else (seconds[k], around[k])
         next_near, next_far = (around[l], seconds[l]) if g.forward[around[l]] else (seconds[l], around[l])
-        g.edge[near], g.edge[far] = e, other
-        g.start[e], g.start[other] = near, far
+        g.edge[near], g.edge[far] = e, far_edge
+        g.start[e], g.start[far_edge] = near, far
         g.sibling[near], g.sibling[far] = next_near, next_far
     return x
 

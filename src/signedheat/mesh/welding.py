@@ -144,18 +144,18 @@ def _weld(points: Floats, tolerances: Floats) -> Ints:
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         low = (np.floor((x - near_x) / side_x), np.floor((y - near_y) / side_y), np.floor((z - near_z) / side_z))
         high = (np.floor((x + near_x) / side_x), np.floor((y + near_y) / side_y), np.floor((z + near_z) / side_z))
-        found = np.int32(-1)
+        first = np.int32(-1)
         for i in range(np.int64(low[0]), np.int64(high[0]) + 1):
             for j in range(np.int64(low[1]), np.int64(high[1]) + 1):
                 for k in range(np.int64(low[2]), np.int64(high[2]) + 1):
                     q = heads[mixed(i, j, k) & mask]
                     while q >= 0:
                         is_near = abs(points[q, 0] - x) <= near_x and abs(points[q, 1] - y) <= near_y
-                        if is_near and abs(points[q, 2] - z) <= near_z and (found < 0 or q < found):
-                            found = q
+                        if is_near and abs(points[q, 2] - z) <= near_z and (first < 0 or q < first):
+                            first = q
                         q = following[q]
-        if found >= 0:
-            owner[p] = found
+        if first >= 0:
+            owner[p] = first
             continue
         owner[p] = p
         i, j, k = np.int64(np.floor(x / side_x)), np.int64(np.floor(y / side_y)), np.int64(np.floor(z / side_z))
@@ -181,14 +181,14 @@ def _same_rows(rows: Ints) -> Ints:
             key ^= key >> np.uint64(29)
         place = key & mask
         while True:
-            other = table[place]
-            same = other >= 0
+            row = table[place]
+            same = row >= 0
             for d in range(width):
-                same = same and rows[i, d] == rows[other, d]
-            if same or other < 0:
+                same = same and rows[i, d] == rows[row, d]
+            if same or row < 0:
                 break
             place = (place + np.uint64(1)) & mask
-        if other < 0:
-            table[place] = other = i
-        result[i] = other
+        if row < 0:
+            table[place] = row = i
+        result[i] = row
     return result

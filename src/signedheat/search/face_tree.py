@@ -292,21 +292,21 @@ def _nearest_of_candidates(
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         face, square, feature, fx, fy, fz = np.int64(-1), np.inf, 0, x, y, z
         for c in range(candidates.shape[1]):
-            other = np.int64(candidates[p, c])
-            if other >= 0 and other != face and (c == 0 or other != candidates[p, c - 1]):
-                s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
+            candidate = np.int64(candidates[p, c])
+            if candidate >= 0 and candidate != face and (c == 0 or candidate != candidates[p, c - 1]):
+                s, which, u, v, w = foot_on_triangle(rows, candidate, x, y, z)
                 if s < square:
-                    face, square, feature, fx, fy, fz = other, s, which, u, v, w
+                    face, square, feature, fx, fy, fz = candidate, s, which, u, v, w
         for _ in range(STEPS):
             if feature == 0:
                 break
-            other = np.int64(-1)
+            candidate = np.int64(-1)
             if feature <= 3:
                 vertex = np.int64(apexes[face, feature - 1])
                 if vertex >= 0:
                     ax, ay, az = places[vertex, 0] - fx, places[vertex, 1] - fy, places[vertex, 2] - fz
                     if (x - fx) * ax + (y - fy) * ay + (z - fz) * az > 0.0:
-                        other = np.int64(across[face, feature - 1])
+                        candidate = np.int64(across[face, feature - 1])
             else:
                 vertex = np.int64(faces[face, feature - 4])
                 vx, vy, vz = places[vertex, 0], places[vertex, 1], places[vertex, 2]
@@ -326,13 +326,13 @@ def _nearest_of_candidates(
                         if gain > 0.0:
                             gain *= gain / (ex * ex + ey * ey + ez * ez)
                             if gain > steepest:
-                                steepest, other = gain, near
-            if other < 0:
+                                steepest, candidate = gain, near
+            if candidate < 0:
                 break
-            s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
+            s, which, u, v, w = foot_on_triangle(rows, candidate, x, y, z)
             if not s < square:
                 break
-            face, square, feature, fx, fy, fz = other, s, which, u, v, w
+            face, square, feature, fx, fy, fz = candidate, s, which, u, v, w
         out_faces[p], out_distances[p], out_features[p] = face, np.sqrt(square), feature
         out_places[p, 0], out_places[p, 1], out_places[p, 2] = fx, fy, fz
         out_cosines[p], out_regular[p] = facing(features, face, feature, x - fx, y - fy, z - fz)
@@ -344,13 +344,13 @@ def facing(features: FaceFeatures, face: int, feature: int, dx: float, dy: float
     """Return the cosine between a feature's normal and the way from a face, and whether it decides the side."""
     if face < 0:
         return 0.0, False
-    normals, at, regular = features.face_normals, np.int64(face), True
+    normals, row, regular = features.face_normals, np.int64(face), True
     if feature > 3:
-        normals, at = features.vertex_normals, np.int64(features.faces[face, feature - 4])
-        regular = features.vertex_regular[at]
+        normals, row = features.vertex_normals, np.int64(features.faces[face, feature - 4])
+        regular = features.vertex_regular[row]
     elif feature > 0:
-        normals, at = features.edge_normals, np.int64(features.edges[face, feature - 1])
-        regular = features.edge_regular[at]
-    nx, ny, nz = normals[at, 0], normals[at, 1], normals[at, 2]
+        normals, row = features.edge_normals, np.int64(features.edges[face, feature - 1])
+        regular = features.edge_regular[row]
+    nx, ny, nz = normals[row, 0], normals[row, 1], normals[row, 2]
     lengths = np.sqrt((nx * nx + ny * ny + nz * nz) * (dx * dx + dy * dy + dz * dz))
     return (nx * dx + ny * dy + nz * dz) / lengths if lengths > 0.0 else 0.0, regular

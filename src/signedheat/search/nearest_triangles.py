@@ -250,10 +250,10 @@ def _descend(
             node, first, end = np.int64(0), np.int64(0), np.int64(0)  # the range of faces to be measured
             if begun:
                 depth -= 1
-                node, some = stack[depth], 0
+                node, interested = stack[depth], 0
                 for k in range(together):
-                    some += 1 if gaps[depth, k] < best[k] else 0
-                if some == 0:
+                    interested += 1 if gaps[depth, k] < best[k] else 0
+                if interested == 0:
                     continue
             while 0 < node < leaves:
                 kept = 0
@@ -261,7 +261,7 @@ def _descend(
                     child, row = 2 * node + side, depth + side
                     ax, ay, az = bounds[child, 0], bounds[child, 1], bounds[child, 2]
                     bx, by, bz = bounds[child, 3], bounds[child, 4], bounds[child, 5]
-                    some = 0
+                    interested = 0
                     for k in range(together):
                         x, y, z = places[0, k], places[1, k], places[2, k]
                         dx = ax - x if ax - x > x - bx else x - bx
@@ -272,12 +272,12 @@ def _descend(
                         dz = dz if dz > 0.0 else 0.0
                         square = dx * dx + dy * dy + dz * dz
                         gaps[row, k] = square
-                        some += 1 if square < best[k] else 0
-                    if some > 0 and discs[child, 7] >= 0.0:
+                        interested += 1 if square < best[k] else 0
+                    if interested > 0 and discs[child, 7] >= 0.0:
                         ax, ay, az = discs[child, 0], discs[child, 1], discs[child, 2]
                         nx, ny, nz = discs[child, 3], discs[child, 4], discs[child, 5]
                         radius, thick = discs[child, 6], discs[child, 7]
-                        some = 0
+                        interested = 0
                         for k in range(together):
                             x, y, z = places[0, k] - ax, places[1, k] - ay, places[2, k] - az
                             along = x * nx + y * ny + z * nz
@@ -290,8 +290,8 @@ def _descend(
                             square = gaps[row, k]
                             square = flat if flat > square else square
                             gaps[row, k] = square
-                            some += 1 if square < best[k] else 0
-                    kept += 1 + side if some > 0 else 0
+                            interested += 1 if square < best[k] else 0
+                    kept += 1 + side if interested > 0 else 0
                 node = 2 * node + 1 if kept == 2 else 2 * node if kept > 0 else np.int64(0)
                 if kept == 3:  # first the one that is nearer to one of the points
                     if gaps[depth, middle] <= gaps[depth + 1, middle]:
@@ -313,27 +313,27 @@ def _descend(
                 ux, uy, uz = rows[f, 3], rows[f, 4], rows[f, 5]
                 vx, vy, vz = rows[f, 6], rows[f, 7], rows[f, 8]
                 nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-                one, two, three = rows[f, 9], rows[f, 12], rows[f, 15]
+                first_length, second_length, third_length = rows[f, 9], rows[f, 12], rows[f, 15]
                 c, d, g, h = rows[f, 10], rows[f, 11], rows[f, 13], rows[f, 14]
                 for k in range(together):  # as in `away_from_triangle`
                     x, y, z = places[0, k] - ax, places[1, k] - ay, places[2, k] - az
                     p, q, up = x * ux + y * uy + z * uz, x * vx + y * vy + z * vz, x * nx + y * ny + z * nz
-                    r = p - one
+                    r = p - first_length
                     beyond = -q if -q > q * c - p * d else q * c - p * d
                     beyond = beyond if beyond > r * h - q * g else r * h - q * g
                     t = p if p > 0.0 else 0.0
-                    t = t if t < one else one
+                    t = t if t < first_length else first_length
                     square = (p - t) * (p - t) + q * q
                     t = p * c + q * d
                     t = t if t > 0.0 else 0.0
-                    t = t if t < two else two
-                    other = (p - t * c) * (p - t * c) + (q - t * d) * (q - t * d)
-                    square = other if other < square else square
+                    t = t if t < second_length else second_length
+                    square_to_side = (p - t * c) * (p - t * c) + (q - t * d) * (q - t * d)
+                    square = square_to_side if square_to_side < square else square
                     t = r * g + q * h
                     t = t if t > 0.0 else 0.0
-                    t = t if t < three else three
-                    other = (r - t * g) * (r - t * g) + (q - t * h) * (q - t * h)
-                    square = other if other < square else square
+                    t = t if t < third_length else third_length
+                    square_to_side = (r - t * g) * (r - t * g) + (q - t * h) * (q - t * h)
+                    square = square_to_side if square_to_side < square else square
                     square = up * up + (0.0 if beyond < 0.0 else square)
                     nearer = square < best[k]
                     best[k] = square if nearer else best[k]

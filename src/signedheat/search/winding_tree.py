@@ -216,22 +216,22 @@ def moments_of(triangles: Floats, tree: BoxTree, opening: float) -> Floats:
 
 def _of_leaves(triangles: Floats, grouped: Ints) -> tuple[Floats, ...]:
     """Return sums of leaves: area vectors, areas, areas times centres; and their centres, M, S, and radii."""
-    there = grouped >= 0
-    corners = np.where(there[..., None, None], triangles[grouped], 0.0)
+    filled = grouped >= 0
+    corners = np.where(filled[..., None, None], triangles[grouped], 0.0)
     corners = np.ascontiguousarray(corners.transpose(2, 3, 0, 1))  # corner, axis, leaf, place in it
     middles = corners.mean(axis=0)
     own = 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0], axis=0)
     areas = np.linalg.norm(own, axis=0)
     vectors, weights, firsts = own.sum(axis=2), areas.sum(axis=1), (areas * middles).sum(axis=2)
     centres = _over(firsts, weights)
-    offsets = np.where(there, middles - centres[..., None], 0.0)
+    offsets = np.where(filled, middles - centres[..., None], 0.0)
     linear = _product(own, offsets)
     quadratic = _product(linear, offsets)
     for corner in corners:  # the second moment of a triangle about its own centre
         arm = corner - middles
         quadratic += _product(_product(own, arm), arm) / 12
     first, second = linear.sum(axis=2), quadratic.sum(axis=2)
-    reaches = np.where(there, np.linalg.norm(corners - centres[..., None], axis=1), 0.0)
+    reaches = np.where(filled, np.linalg.norm(corners - centres[..., None], axis=1), 0.0)
     radii = reaches.max(axis=(0, 2))
     return vectors, weights, firsts, centres, first, second, radii
 
