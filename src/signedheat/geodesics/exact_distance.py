@@ -40,8 +40,6 @@ MANY_PER_EDGE, MANY_WINDOWS = 30, 50_000
 of a curve is seen."""
 Report: TypeAlias = Callable[[], None]
 """Function that is called about every tenth of a second; an exception that it raises ends the search."""
-_CHUNK = 1 << 16
-"""Windows between two reports."""
 
 
 def distance_to_zero_line(
@@ -144,7 +142,7 @@ class PausedSearch:
                 report()
             if search.counts[WANTED]:
                 search.larger().counts[WANTED] = 0
-            continue_search(faces, search, slack, self.tolerance, min(search.counts[MADE] + _CHUNK, limit))
+            continue_search(faces, search, slack, self.tolerance, min(search.counts[MADE] + (1 << 16), limit))
         return self
 
     def distance(self) -> Floats:

@@ -188,14 +188,10 @@ def _(domain: Grid) -> GridDiscretization:
     return GridDiscretization(domain)
 
 
-TOLERANCE = 1e-6
-"""Relative residual at which conjugate gradients stop."""
 STIFFNESS = 10.0
 """Penalty of the augmented Lagrangian, in 1/h."""
 LEAST, STIFFEST = 1e-6, 30.0
 """Least penalty in the preconditioner, and largest penalty, relative to the default."""
-MULTIPLIER_STEPS = 5
-"""Steps of the augmented Lagrangian."""
 BYTES_IF_EXACT = 83
 """Measured peak memory for each node, beyond what is held already, of imposing levels exactly."""
 NEGLIGIBLE = 1e-6
@@ -259,7 +255,7 @@ class GridIntegration(SolvesEach):
         strength = self.soft_weight
         phi = self.fit(divergence.copy(), source, levels)
         multipliers = np.zeros(len(source.weights))
-        for _ in range(MULTIPLIER_STEPS):
+        for _ in range(5):
             phi = self._penalized(divergence, source, levels, strength, multipliers, phi)
             multipliers += strength * deviation(source.at_samples(phi), source, levels)
         return phi - least_correction(deviation(source.at_samples(phi), source, levels), source).reshape(phi.shape)
@@ -296,7 +292,7 @@ class GridIntegration(SolvesEach):
 
         wanted = strength * deviation(levels.values, source, free) - deviation(multipliers, source, free)
         right_hand_side = (divergence + spread(wanted)).ravel()
-        phi = conjugate_gradients(apply, right_hand_side, precondition, start.ravel(), TOLERANCE)
+        phi = conjugate_gradients(apply, right_hand_side, precondition, start.ravel(), tolerance=1e-6)
         phi += np.average(wanted / strength - deviation(rows @ phi, source, free), weights=source.weights)
         return phi.reshape(self.grid.shape)
 

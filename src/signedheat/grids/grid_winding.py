@@ -21,8 +21,6 @@ from .stencil import solve_poisson
 
 BLOCK = 4
 """Edge of the blocks, in cells, whose area vectors are one dipole as seen from the walls."""
-PATCH = 8
-"""Edge of the patches of the walls, in nodes, at whose corners the field of dipoles is evaluated."""
 CORE = 2.0
 """Distance in cells within which a dipole's field is that of a ball."""
 CLEARANCE = 10
@@ -118,11 +116,11 @@ def _add_divergence(
 
 
 def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, Floats]:
-    """Return a lattice of places, in cells, on a wall of the box, half a cell beyond its last nodes."""
+    """Return a lattice of places, in cells, on a wall of the box, half a cell beyond its last nodes, 8 cells apart."""
     lines = [
         np.array([shape[d] - 0.5 if end else -0.5])
         if d == axis
-        else np.linspace(-0.5, shape[d] - 0.5, max(2, 1 + -(-shape[d] // PATCH)))
+        else np.linspace(-0.5, shape[d] - 0.5, max(2, 1 + -(-shape[d] // 8)))
         for d in range(len(shape))
     ]
     lattice = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)

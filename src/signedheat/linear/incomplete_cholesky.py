@@ -18,10 +18,6 @@ from ..compiled import compiled
 from .conjugate_gradients import conjugate_gradients
 from .ordering import whole
 
-SMALLEST = 1e-290
-"""Residual below which a row counts as solved, since underflow has taken its digits."""
-MOST_ITERATIONS = 5000
-
 
 @dataclass(frozen=True, eq=False)
 class IncompleteCholesky:
@@ -80,7 +76,7 @@ class IncompleteCholesky:
 
         with threadpool_limits(1, "blas"):  # threads only wait between the inner products
             solution = conjugate_gradients(
-                multiply, load.ravel(), precondition, tolerance=0.0, limit=MOST_ITERATIONS, converged=converged
+                multiply, load.ravel(), precondition, tolerance=0.0, limit=5000, converged=converged
             )
         return solution.reshape(shape)
 
@@ -163,6 +159,7 @@ def _settled(diagonal: Floats, x: Floats, r: Floats, componentwise: float) -> bo
         for c in range(width):
             largest = max(largest, abs(x[i, c]))
             residual = max(residual, abs(r[i, c]))
-        if residual > SMALLEST and residual / (diagonal[i] * largest + 1e-320) > componentwise:
+        # unknowns below 1e-290 have lost digits to underflow
+        if residual > 1e-290 and residual / (diagonal[i] * largest + 1e-320) > componentwise:
             return False
     return True

@@ -11,9 +11,6 @@ from scipy import sparse
 from ..arrays import Ints
 from ..compiled import compiled
 
-LEAF = 3
-"""Largest number of unknowns of a region that is not dissected further."""
-
 
 def elimination_order(upper: Any) -> Ints:
     """Order the unknowns of a sparse symmetric matrix, given its upper triangle, by nested dissection.
@@ -43,7 +40,7 @@ def _dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32]) -> Ints:
     regions = 1
     while len(stack) > 0:
         begin, end = stack.pop()
-        if end - begin <= LEAF:
+        if end - begin <= 3:  # not worth dissecting
             continue
         current = region[order[begin]]
         seed = order[begin]

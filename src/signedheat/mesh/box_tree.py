@@ -12,10 +12,6 @@ from ..compiled import compiled
 
 LEAF = 4
 """Boxes in each leaf."""
-USUAL = 64
-"""Boxes near each triangle for which there is room at first; faces of a mesh have about forty around them."""
-FEW = 64
-"""Points that are not worth sorting, which would take as long as searches for them."""
 SPREAD = (
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),
@@ -92,7 +88,7 @@ class BoxTree(NamedTuple):
         """
         corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(3, slack)
         own = np.full(len(corners), -1) if groups is None else np.ascontiguousarray(groups, dtype=np.int64)
-        starts, room = np.zeros(len(corners) + 1, dtype=np.int64), USUAL * len(corners)
+        starts, room = np.zeros(len(corners) + 1, dtype=np.int64), 64 * len(corners)  # faces of a mesh have about 40
         while True:
             near = np.empty(room, dtype=np.int64)
             _meeting(self, corners, slacks, own, starts, near)
@@ -220,7 +216,7 @@ def _slabs(triangles: Floats, items: Ints) -> Floats:
 
 def order_in_space(points: Floats) -> Ints:
     """Return the order of (n, 3) points along a space-filling curve; few points stay as they are."""
-    if len(points) < FEW:
+    if len(points) < 64:  # sorting them would take as long as searching for some
         return np.arange(len(points))
     return np.argsort(morton_codes(points), kind="stable")
 

@@ -150,8 +150,6 @@ def _pieces(edges: Ints, ways: Bools) -> Ints:
 
 SLACK = 1e-6
 """Distance, in cells, that a diagonal keeps from the sides of the tetrahedra."""
-ROUNDS = 8
-"""Rounds of moving vertices whose triangles pass through each other; two are enough for nearly all shapes."""
 
 
 def dual_triangles(
@@ -199,7 +197,7 @@ def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) 
     """
     count = choices.shape[1]
     chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(cells.quads), dtype=bool)
-    for _ in range(ROUNDS):
+    for _ in range(8):  # two rounds are enough for nearly all shapes
         vertices = choices[np.minimum(chosen, 2), np.arange(count)]
         points, faces, centres = dual_triangles(cells, crossings, vertices, fanned)
         held = np.concatenate([chosen > 0, np.zeros(len(centres), dtype=bool)])

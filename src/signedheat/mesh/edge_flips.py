@@ -16,10 +16,6 @@ from .unit_vectors import unit
 
 SHARP = np.deg2rad(25.0)
 """Angle between two faces above which the edge between them is a candidate."""
-GAIN = 1e-9
-"""Least gain of a flip, relative to the length of the new edge times a radian: less is rounding."""
-ROUNDS = 12
-"""Largest number of rounds of flips; nearly all are made in the first four."""
 MOST = 4_000_000
 """Number of faces above which creases stay as they are: the search for them would take more memory than the surface."""
 
@@ -38,7 +34,7 @@ def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = No
     near[faces[sharp // 3]] = True
     chosen = np.flatnonzero(near[faces].any(axis=1))
     result: Ints = faces.copy()
-    for _ in range(ROUNDS):
+    for _ in range(12):  # nearly all flips are made in the first four rounds
         first, second, new_first, new_second = _flips(vertices, result[chosen], near, held)
         if not len(first):
             break
@@ -89,7 +85,7 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
     order = np.argsort(gain, kind="stable")
     rank = np.empty(len(gain), dtype=np.int64)
     rank[order] = np.arange(1, len(gain) + 1)
-    rank[gain <= GAIN * reach] = 0
+    rank[gain <= 1e-9 * reach] = 0  # less is rounding
     best = np.zeros(len(faces), dtype=np.int64)
     for face in faces_around:
         np.maximum.at(best, face, rank)

@@ -14,9 +14,6 @@ FLAT = 1e-13
 DELAUNAY = 1e-10
 """Sine of the excess over π up to which two opposite angles satisfy Delaunay's condition."""
 
-ROUNDS = 64
-"""Largest number of passes over all edges; most faces need three."""
-
 
 class Planar(NamedTuple):
     """The triangulation of one face; edge k of a triangle begins at its vertex k."""
@@ -242,7 +239,7 @@ def _legalize(mesh: Planar, i: int) -> None:
 def _improve(mesh: Planar) -> None:
     """Flip edges that are not Delaunay."""
     tri, adj, fixed = mesh.tri, mesh.adj, mesh.fixed
-    for _ in range(ROUNDS):
+    for _ in range(64):  # most faces need three passes
         flips = 0
         for t in range(len(tri)):
             for k in range(3):

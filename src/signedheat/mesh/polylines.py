@@ -18,9 +18,6 @@ FillRule: TypeAlias = Literal["nonzero", "evenodd"]
 """Rule for the places that outlines fill: those around which they wind a number of times that is not zero, or odd."""
 SIZE = 2.0**30
 """Size to which outlines are scaled for manifold3d, which rounds coordinates to 1e-8."""
-SEAM = 1e-12
-"""Distance, relative to the size of all outlines, within which a corner lies on a line. Where outlines share lines, the
-region they fill is bounded by lines that run there and back, without an area between them."""
 LEAST_SHARE = 1e-9
 """Relative difference of areas below which it is rounding."""
 
@@ -131,7 +128,8 @@ def without_seams(segments: Floats) -> Floats:
     >>> without_seams(np.stack([spike, np.roll(spike, -1, axis=0)], axis=1)).tolist()
     [[[1.0, 0.0], [2.0, 0.0]], [[2.0, 1.0], [1.0, 0.0]], [[2.0, 0.0], [2.0, 1.0]]]
     """
-    near = SEAM * float(np.ptp(segments.reshape(-1, 2), axis=0).max(initial=0.0))
+    # outlines that share lines bound what they fill by lines that run there and back, up to rounding
+    near = 1e-12 * float(np.ptp(segments.reshape(-1, 2), axis=0).max(initial=0.0))
     if near == 0:
         return segments
     _, first, ends = np.unique(np.rint(segments / near).reshape(-1, 2), axis=0, return_index=True, return_inverse=True)

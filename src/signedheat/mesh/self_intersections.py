@@ -20,10 +20,6 @@ FOLDED = 1e-10
 """One minus the cosine between two neighbours, as seen along their edge, up to which one covers the other."""
 CROWD = 64
 """Number of faces around a vertex above which their intersections are found around it, and not in space."""
-NEAR_ARC = 1e-6
-"""Angle by which the arcs of two faces around a vertex may miss each other."""
-UPRIGHT = 1e-13
-"""One minus the cosine between two directions up to which they are one."""
 
 
 def self_intersections(vertices: Floats, faces: Ints) -> Ints:
@@ -67,7 +63,7 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float)
         return overlapping(owners[asked], near[asked])
 
     def of_fans(start: int) -> Ints:
-        starts, near = around.meeting(arcs[start : start + CHUNK], NEAR_ARC)
+        starts, near = around.meeting(arcs[start : start + CHUNK], 1e-6)  # angle against rounding
         owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         asked = (near > owners) & (hubs[fans[owners]] == hubs[fans[near]])
         return overlapping(fans[owners[asked]], fans[near[asked]])
@@ -173,7 +169,7 @@ def overlap(p: Floats, q: Floats, slack: float, depth: float, ways: Floats) -> b
             upright = False
             for t in range(2):
                 cosine = ways[8 + t, 0] * x + ways[8 + t, 1] * y + ways[8 + t, 2] * z
-                upright |= abs(cosine) > 1.0 - UPRIGHT
+                upright |= abs(cosine) > 1.0 - 1e-13
             if upright:
                 continue
         p0 = q0 = np.inf

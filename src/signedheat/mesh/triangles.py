@@ -77,10 +77,6 @@ def gradients_along(sides: Floats, rises: Floats) -> Floats:
     return np.cross(across, normals) / np.where(square > 0, square, np.inf)[:, None]
 
 
-EPSILON = 2.0**-52
-"""Distance from 1 to the next larger number."""
-
-
 @compiled
 def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[Floats, Bools]:
     """Return (p,) areas of polygons, and which are degenerate: without area, to roundoff, or with a repeated vertex.
@@ -110,7 +106,7 @@ def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[F
             for d in range(3):
                 normal[d] += away[d - 2] * after[d - 1] - away[d - 1] * after[d - 2]  # a cross product, cyclically
         areas[f] = 0.5 * np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
-        degenerate[f] |= areas[f] <= 4.0 * EPSILON * radius * largest
+        degenerate[f] |= areas[f] <= 4.0 * 2.0**-52 * radius * largest  # units in the last place
     return areas, degenerate
 
 

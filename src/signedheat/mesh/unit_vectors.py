@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..parallel import n_threads
 
-BLOCK = 1 << 16
-"""Number of vectors scaled at a time, which fit into the processor's cache."""
-
 
 def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
     """Scale vectors to length one: complex numbers as vectors in the plane, rows of a real array as vectors in space.
@@ -42,7 +39,7 @@ def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
         length = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., None]
         np.divide(scaled, np.where(length > 0, length, 1), out=result[rows])
 
-    count = max(1, BLOCK // max(1, math.prod(vectors.shape[1:-1])))
+    count = max(1, (1 << 16) // max(1, math.prod(vectors.shape[1:-1])))  # 65,536 vectors fit into the cache
     if vectors.ndim == 1 or len(vectors) <= count:
         scale(slice(None))
     else:

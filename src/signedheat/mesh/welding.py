@@ -16,8 +16,6 @@ precision."""
 SHORT_EDGES = 0.1
 """Share of the open edges that may be so short that welding collapses them."""
 _HALF = 0xFFFFFFFF
-_CELL = 16.0
-"""Side of the cells in which points are looked up, relative to the tolerance: few points are near a wall."""
 
 
 def welded_vertices(points: Floats, tails: Ints, heads: Ints) -> Ints:
@@ -139,7 +137,7 @@ def _weld(points: Floats, tolerances: Floats) -> Ints:
     mask = (1 << bits) - 1
     heads, following = np.full(1 << bits, -1, dtype=np.int32), np.full(n, -1, dtype=np.int32)
     owner = np.empty(n, dtype=np.int64)
-    (near_x, near_y, near_z), (side_x, side_y, side_z) = tolerances, _CELL * tolerances
+    (near_x, near_y, near_z), (side_x, side_y, side_z) = tolerances, 16.0 * tolerances  # few points are near a wall
     for p in range(n):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         low = (np.floor((x - near_x) / side_x), np.floor((y - near_y) / side_y), np.floor((z - near_z) / side_z))

@@ -30,8 +30,6 @@ FOLD = 0.02
 """Length of the sum of two unit normals below which the edge between them is a fold, and decides no side."""
 RUN = 512
 """Number of points after which a search starts anew: a part of the points that a thread takes at a time."""
-DISC_LEVELS = 8
-"""Levels of the tree, from the leaves up, that have discs."""
 FLAT = 0.5
 """Thickness over radius up to which a disc is used besides the box."""
 FAR = 1e7
@@ -207,7 +205,7 @@ def _discs(corners: Floats, tree: BoxTree) -> Floats:
     bounds, items = tree.bounds, tree.items
     leaves = len(bounds) // 2
     discs = np.full((2 * leaves, 8), -1.0)
-    first = max(1, leaves >> (DISC_LEVELS - 1))
+    first = max(1, leaves >> 7)  # eight levels: higher nodes are not flat
     below = LEAF * leaves // first
     for node in range(first, 2 * leaves):
         if node == 2 * first:
@@ -241,10 +239,6 @@ def _discs(corners: Floats, tree: BoxTree) -> Floats:
             discs[node, 3], discs[node, 4], discs[node, 5] = nx, ny, nz
             discs[node, 6], discs[node, 7] = radius * slack, thickness * slack + 1e-12 * radius
     return discs
-
-
-STEPS = 24
-"""Largest number of faces that a search goes on to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,7 +291,7 @@ def _nearest_of_candidates(
                 s, which, u, v, w = foot_on_triangle(rows, candidate, x, y, z)
                 if s < square:
                     face, square, feature, fx, fy, fz = candidate, s, which, u, v, w
-        for _ in range(STEPS):
+        for _ in range(24):  # few are needed from a near candidate
             if feature == 0:
                 break
             candidate = np.int64(-1)

@@ -176,7 +176,6 @@ CUBES = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 0, 1), (0, 0, 2), (0, 1, 1), (1, 1
 """Terms of S: xxx, yyy, zzz, xxy, xxz, xyy, yyz, xzz, yzz, xyz."""
 BLOCK = 2**13
 """Number of leaves whose moments are computed at a time."""
-WIDTH = 7 + len(SQUARES) + len(CUBES)
 
 
 def moments_of(triangles: Floats, tree: BoxTree, opening: float) -> Floats:
@@ -191,7 +190,7 @@ def moments_of(triangles: Floats, tree: BoxTree, opening: float) -> Floats:
     vectors, weights, firsts, centres, first, second, radii = (
         np.concatenate(part, axis=-1) for part in zip(*blocks, strict=True)
     )
-    moments = np.zeros((2 * leaves, WIDTH))
+    moments = np.zeros((2 * leaves, 7 + len(SQUARES) + len(CUBES)))
     level = leaves
     while True:
         rows = slice(level, 2 * level)

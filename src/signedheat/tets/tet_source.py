@@ -19,9 +19,6 @@ from ..mesh.unit_vectors import unit
 from .tet_clipping import ClippedPolygons, Planes, barycentric, clip_triangles, containing_tets
 from .tet_mesh import TetMesh
 
-WHOLE = 1 - 1e-6
-"""Fraction of a face that a source must cover for the face to count as part of it."""
-
 
 @dataclass(frozen=True, eq=False)
 class TetSource(Frozen):
@@ -187,7 +184,7 @@ def _on_whole_faces(mesh: TetMesh, polygons: ClippedPolygons, components: Ints) 
         face = mesh.faces.tet_faces[polygons.tets[on], polygons.in_face[on]]
         _, which = np.unique(components[on] * n_faces + face, return_inverse=True)
         area = np.linalg.norm(mesh.geometry.area_vectors[polygons.tets[on], polygons.in_face[on]], axis=1)
-        covered[on] = np.bincount(which, weights=polygons.areas[on])[which] >= WHOLE * area
+        covered[on] = np.bincount(which, weights=polygons.areas[on])[which] >= (1 - 1e-6) * area
     return covered
 
 
