@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable
+from os import PathLike
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -12,7 +13,10 @@ from numpy.typing import DTypeLike, NDArray
 from .arrays import Bools, Floats
 from .errors import GeometryError, SourceError, UnsupportedTypeError
 from .grids.grid import Grid
+from .packages import lazy_module
 from .validation import finite_number
+
+files: Any = lazy_module("signedheat.io.field_files", "files")
 
 Change = Callable[[NDArray[Any]], NDArray[Any]]
 Rule = Callable[[Floats, Floats], Floats]
@@ -142,6 +146,28 @@ class Combinable(Arithmetic):
         """Complement: inside and outside exchanged."""
         return self._scaled(-1.0)
 
+    def with_values(self: Solid, values: Floats) -> Solid:
+        """Return other values on the same domain, without what belongs to the present ones.
+
+        Parameters
+        ----------
+        values : array
+            In the shape of `values`.
+
+        Returns
+        -------
+        GridField, TetField or VertexField
+            Without diagnostics, source, confidence and solid.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> line = sh.GridField(sh.Grid(0.0, 1.0, 3), [-1.0, 0.0, 1.0])
+        >>> line.with_values(line.values**2).values.tolist()
+        [1.0, 0.0, 1.0]
+        """
+        return type(self)(self.domain, values)  # type: ignore[call-arg]
+
     def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
         """Combine the values of two fields on one domain by a rule.
 
@@ -157,6 +183,11 @@ class Combinable(Arithmetic):
         GridField, TetField or VertexField
             With the values of the rule.
 
+        Raises
+        ------
+        GeometryError
+            If they are fields in different bands.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -166,6 +197,34 @@ class Combinable(Arithmetic):
         [0.0, 1.0, 1.0, 0.0]
         """
         return self.with_values(rule(self.values, other.values))
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write to a file, in the format given by its extension; `signedheat.load_field` reads it.
+
+        Parameters
+        ----------
+        path : str or path
+            On grids ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` or ``.vdb``, in a band ``.npz`` or ``.vdb``; on tets
+            ``.vtu``, ``.vtk`` or ``.msh``.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is another, or the file cannot be written.
+        MissingPackageError
+            If the format needs meshio, and it is not installed.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> line = sh.GridField(sh.Grid(0.0, 1.0, 2), [0.0, 1.0])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     line.save(f"{folder}/line.npz")
+        ...     sh.load_field(f"{folder}/line.npz").values.tolist()
+        [0.0, 1.0]
+        """
+        files.write_field(self, path)
 
     def _mapped(self: Solid, change: Change) -> Solid:
         """Change the values, and drop the diagnostics."""

@@ -30,7 +30,6 @@ from .marching import Refine, block_contour, closed_surface, contour_parts, leve
 from .polyline import Polyline
 from .solid_queries import Closest, SolidQueries, scaled
 
-files: Any = lazy_module("signedheat.io.field_files", "files")
 ply: Any = lazy_module("signedheat.io.ply", "files")
 
 if TYPE_CHECKING:
@@ -423,53 +422,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         refuse_beyond_walls(walls, distance, "grid", padding)
         return self.contour(distance)
 
-    def with_values(self, values: Floats) -> GridField[Dimension]:
-        """Return other values on the same grid, without what belongs to the present ones.
-
-        Parameters
-        ----------
-        values : (n,) float
-            In the shape of `values`.
-
-        Returns
-        -------
-        GridField
-            Without diagnostics, confidence and solid.
-
-        Examples
-        --------
-        >>> line = GridField(Grid([0.0], 1.0, [2]), np.array([0.0, 1.0]))
-        >>> line.with_values(line.values**2).values.tolist()
-        [0.0, 1.0]
-        """
-        return GridField(self.grid, values)
-
     def combined_with(self, other: GridField[Dimension], rule: Rule) -> GridField[Dimension]:
-        """Combine the values of two fields on one grid by a rule.
-
-        Parameters
-        ----------
-        other : GridField
-            On the same domain.
-        rule : callable
-            Takes two arrays of values and returns one, such as `np.minimum`.
-
-        Returns
-        -------
-        GridField
-            With the values of the rule.
-
-        Raises
-        ------
-        GeometryError
-            If they are fields in different bands.
-
-        Examples
-        --------
-        >>> line = GridField(Grid([0.0], 1.0, [2]), np.array([0.0, 1.0]))
-        >>> line.combined_with(1.0 - line, np.minimum).values.tolist()
-        [0.0, 0.0]
-        """
         if self.blocks is None and other.blocks is None:
             return self.with_values(rule(self.values, other.values))
         ours, theirs = (None if each.blocks is None else each.blocks.places for each in (self, other))
@@ -566,31 +519,6 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         if self.confidence is None or not near.any():
             return None
         return float(self.confidence[near].mean(dtype=np.float64))
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file, in the format given by its extension; `signedheat.load_field` reads it.
-
-        Parameters
-        ----------
-        path : str or path
-            ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` or ``.vdb``; in a band ``.npz`` or ``.vdb``.
-
-        Raises
-        ------
-        FileFormatError
-            If the format is another, or the file cannot be written.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from signedheat import load_field
-        >>> line = GridField(Grid([0.0], 1.0, [2]), np.array([0.0, 1.0]))
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     line.save(f"{folder}/line.npz")
-        ...     load_field(f"{folder}/line.npz").values.tolist()
-        [0.0, 1.0]
-        """
-        files.write_field(self, path)
 
     def _into_box(self, points: Floats) -> Floats:
         return np.clip(points, self.grid.origin, self.grid.upper)

@@ -193,29 +193,6 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
             )
         return field.domain.level_set(field.values, level)
 
-    def with_values(self, values: Floats) -> VertexField[Surface]:
-        """Put other values on the same surface.
-
-        Parameters
-        ----------
-        values : (n,) float
-            Of the shape of `values`.
-
-        Returns
-        -------
-        VertexField
-            Without diagnostics and source.
-
-        Examples
-        --------
-        >>> import signedheat as sh
-        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-        >>> phi = VertexField(mesh, np.array([0.0, 1.0, 2.0]))
-        >>> phi.with_values(2 * phi.values).values.tolist()
-        [0.0, 2.0, 4.0]
-        """
-        return VertexField(self.domain, values)
-
     def combined_with(self, other: VertexField[Surface], rule: Rule) -> VertexField[Surface]:
         # also on the finer triangles of one of them
         result = self.with_values(rule(self.values, other.values))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,15 +17,12 @@ from ..exchange import Displayed, with_values
 from ..field_arithmetic import Combinable
 from ..field_levels import refuse_beyond_walls
 from ..frozen import Frozen
-from ..packages import lazy_module
 from ..search.nearest_triangles import TriangleTree
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import contiguous, finite_number, query_points, shaped
 from .marching_tets import closed_level_set
 from .tet_clipping import Planes, barycentric, containing_tets
 from .tet_mesh import TetMesh
-
-files: Any = lazy_module("signedheat.io.field_files", "files")
 
 if TYPE_CHECKING:
     import pyvista
@@ -199,56 +195,8 @@ class TetField(Displayed, Combinable, Frozen):
         refuse_beyond_walls(self.values[np.unique(self.mesh.boundary.faces)], distance, "tet mesh", remedy)
         return self.contour(distance)
 
-    def with_values(self, values: Floats) -> TetField:
-        """Return other values on the same mesh, without what belongs to the present ones.
-
-        Parameters
-        ----------
-        values : (n,) float
-            In the shape of `values`.
-
-        Returns
-        -------
-        TetField
-            Without diagnostics and source.
-
-        Examples
-        --------
-        >>> phi = TetField(TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]), [0.0, 1.0, 2.0, 3.0])
-        >>> phi.with_values(2 * phi.values).values.tolist()
-        [0.0, 2.0, 4.0, 6.0]
-        """
-        return TetField(self.mesh, values)
-
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
         return with_values(self.mesh.to_pyvista(), self.values)
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write mesh and values to a file; `signedheat.load_field` reads it.
-
-        Parameters
-        ----------
-        path : str or path
-            ``.vtu``, ``.vtk`` or ``.msh``.
-
-        Raises
-        ------
-        FileFormatError
-            If the format is another, or the file cannot be written.
-        MissingPackageError
-            If meshio is not installed.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from signedheat import load_field
-        >>> phi = TetField(TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]), [0.0, 1.0, 2.0, 3.0])
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     phi.save(f"{folder}/phi.vtu")
-        ...     load_field(f"{folder}/phi.vtu").values.tolist()
-        [0.0, 1.0, 2.0, 3.0]
-        """
-        files.write_field(self, path)
 
     @cached_property
     def _vertex_gradients(self) -> Floats:
