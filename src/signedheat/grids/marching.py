@@ -54,12 +54,6 @@ def level_lines(values: Floats, origin: Floats, spacing: Floats, level: float) -
     """Return points (k, 2) of each line of a level set, greater values to the left, and whether it closes.
 
     Lines are closed, unless they end at the box or at NaN values.
-
-    Examples
-    --------
-    >>> [(points, closed)] = level_lines(np.array([[0.0] * 3, [1.0] * 3]), np.zeros(2), np.ones(2), 0.5)
-    >>> points.tolist(), closed
-    ([[0.5, 2.0], [0.5, 1.0], [0.5, 0.0]], False)
     """
     lines = measure.find_contours(heights_above(values, spacing, level), 0.0, positive_orientation="high")
     closed = [len(line) > 3 and bool((line[0] == line[-1]).all()) for line in lines]

@@ -100,11 +100,6 @@ def coarsening(shape: tuple[int, ...], steps: Floats) -> Ints:
 
     An axis with few nodes that is shorter than the spacing along the others is reduced to one node; its factor is then
     larger than the number of its nodes.
-
-    Examples
-    --------
-    >>> coarsening((1, 64, 64, 3), np.array([0.0, 1.0, 1.0, 0.5])).tolist()
-    [1, 2, 2, 4]
     """
     counts = np.array(shape)
     factors = np.ones(4, dtype=np.int64)
@@ -365,13 +360,7 @@ def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int
 
 
 def wavefronts(shape: tuple[int, ...], size: list[int], direction: tuple[int, ...]) -> list[list[list[int]]]:
-    """Return tiles of a plane of lines, in groups whose tiles can run at the same time.
-
-    Examples
-    --------
-    >>> wavefronts((4, 2), [2, 2], (1, -1))
-    [[[0, 2, 1, 1, -1, -1]], [[2, 4, 1, 1, -1, -1]]]
-    """
+    """Return tiles of a plane of lines, in groups whose tiles can run at the same time."""
     starts = [range(0, n, s)[::step] for n, s, step in zip(shape, size, direction, strict=True)]
     waves: list[list[list[int]]] = [[] for _ in range(len(starts[0]) + len(starts[1]) - 1)]
     for a, first in enumerate(starts[0]):

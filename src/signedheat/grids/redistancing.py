@@ -195,13 +195,7 @@ class Contour(NamedTuple):
 
 
 def smoothed_signs(signs: Floats) -> Floats:
-    """Return values with the given signs, ±1, whose contour is smoother.
-
-    Examples
-    --------
-    >>> smoothed_signs(np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])).round(2).tolist()
-    [-0.6, -0.6, -0.4, 0.4, 0.6, 0.6]
-    """
+    """Return values with the given signs, ±1, whose contour is smoother."""
     agreement = scipy.ndimage.gaussian_filter(signs, SMOOTHING, mode="nearest") * signs
     return signs * np.clip(agreement, LEAST, MOST)
 

@@ -27,11 +27,6 @@ def conjugate_gradients(
     each column of `rhs`, (n,) or (n, k), is a system of its own. A column is done once ``rᵀ P r ≤ tolerance² · max(r₀ᵀ
     P r₀, bᵀ P b)``, r the residual of the recurrence, or once A has no curvature left along the search direction; all
     columns after `limit` steps, or once ``converged(x, r)``.
-
-    Examples
-    --------
-    >>> conjugate_gradients(lambda x: np.array([2.0, 4.0]) * x, np.array([2.0, 8.0])).round(12)
-    array([1., 2.])
     """
     apply_p = precondition or np.copy
     x = np.zeros_like(rhs) if start is None else start.copy()

@@ -34,14 +34,6 @@ def solve_with_restarts(solve: Solve, border_forces: Forces, loads: NDArray[Any]
     `border_forces` couples faint rows to the others: `matrix_forces` makes it from A. Loads are scaled to `size`, about
     that of A's diagonal, so that the largest x is about one. Each stage covers the rows on which those before are too
     small.
-
-    Examples
-    --------
-    >>> A = sparse.csr_matrix(sparse.diags_array([-1.0, 1e9, -1.0], offsets=[-1, 0, 1], shape=(50, 50)))
-    >>> factor = sparse.linalg.splu(A.tocsc())
-    >>> stages = solve_with_restarts(factor.solve, matrix_forces(A), np.eye(50)[:, :1], size=1e9)
-    >>> len(stages), round(float((np.log(stages[-1].values[49, 0]) + stages[-1].logarithm) / np.log(1e-9)), 6)
-    (2, 50.0)
     """
     loads, logarithm = scaled(loads, size)
     return restart(solve, border_forces, loads, Stage(solve(loads), logarithm), size)

@@ -29,13 +29,6 @@ def split_rounds(
     """Iterate from K x and z, without end.
 
     `proximal` makes the next z from K x plus the scaled dual, `solve` the x nearest to z minus the scaled dual.
-
-    Examples
-    --------
-    >>> clip = lambda values: np.clip(values, -1.0, 1.0)
-    >>> rounds = split_rounds(clip, lambda target: 0.5 * (target + 3.0), np.copy, np.zeros(1), np.zeros(1))
-    >>> [next(rounds) for _ in range(50)][-1].split.tolist()  # min (x - 3)² with |x| ≤ 1
-    [1.0]
     """
     relaxed, dual = image, np.zeros_like(image)
     while True:

@@ -50,14 +50,7 @@ def following_corners(offsets: Ints) -> NDArray[np.int32]:
 
 
 def pair_halfedges(tails: Ints, heads: Ints, n_vertices: int, used: Bools | None = None) -> HalfedgePairs:
-    """Find the edges of polygons and the first two used halfedges of each. The time is O(n), even at hubs.
-
-    Examples
-    --------
-    >>> pairs = pair_halfedges(np.array([0, 1, 2, 2, 1, 3]), np.array([1, 2, 0, 1, 3, 2]), 4)
-    >>> pairs.edges.tolist(), pairs.second.tolist()
-    ([0, 1, 2, 1, 3, 4], [-1, 3, -1, -1, -1])
-    """
+    """Find the edges of polygons and the first two used halfedges of each. The time is O(n), even at hubs."""
     chosen = tails != heads if used is None else used & (tails != heads)
     edges, _, *table = find_edges(read_only(tails), read_only(heads), chosen, n_vertices)
     return HalfedgePairs(edges, *table)
@@ -67,13 +60,6 @@ def orient_faces(pairs: HalfedgePairs, tails: Ints, owners: NDArray[np.integer],
     """Make faces agree with their neighbours across edges of two faces; in each part the majority by weight stays.
 
     The weights, (n_faces,), are the areas of the faces; negative where a face is rather to be turned.
-
-    Examples
-    --------
-    >>> tails, heads, owners = np.array([0, 1, 2, 2, 3, 1]), np.array([1, 2, 0, 3, 1, 2]), np.array([0, 0, 0, 1, 1, 1])
-    >>> found = orient_faces(pair_halfedges(tails, heads, 4), tails, owners, np.array([1.0, 2.0]))
-    >>> found.turned, found.orientable, found.disagreeing
-    (array([ True, False]), array([ True]), 1)
     """
     two = pairs.counts == 2
     first, second = pairs.first[two], pairs.second[two]
@@ -162,16 +148,7 @@ class EdgeTable(Frozen):
 
 
 def edge_table(faces: Ints) -> EdgeTable:
-    """Find the edges of triangles, numbered by first appearance (corner 0–1, 1–2, 2–0, face after face).
-
-    Examples
-    --------
-    >>> table = edge_table(np.array([[0, 1, 2], [2, 1, 3]]))
-    >>> table.vertices.tolist()
-    [[0, 1], [1, 2], [2, 0], [1, 3], [3, 2]]
-    >>> table.face_edges.tolist()
-    [[0, 1, 2], [1, 3, 4]]
-    """
+    """Find the edges of triangles, numbered by first appearance (corner 0–1, 1–2, 2–0, face after face)."""
     faces = np.asarray(faces, dtype=np.int64)
     tails, heads = faces.flatten(), np.roll(faces, -1, axis=1).ravel()
     every, n_vertices = np.ones(len(tails), dtype=np.bool_), int(tails.max(initial=-1)) + 1

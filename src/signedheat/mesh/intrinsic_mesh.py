@@ -44,11 +44,6 @@ class IntrinsicMesh(Frozen):
 
         Corner 0 is at the origin, corner 1 on the positive real axis, corner 2 above it. The height comes from
         Kahan's stable form of Heron's formula, so that needles keep their shape.
-
-        Examples
-        --------
-        >>> IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.array([[4.0, 5.0, 3.0]]), 3).corner_positions
-        array([[0.+0.j, 4.+0.j, 0.+3.j]])
         """
         base, right, left = lengths.T
         a, b, c = np.sort(lengths, axis=1)[:, ::-1].T
@@ -203,11 +198,6 @@ def mollify(lengths: Floats, margin: float) -> tuple[Floats, float]:
 
     The margin is the least ``a + b − c`` in every triangle, as a fraction of the mean length. Returns the new lengths,
     the given array itself if δ is zero, and δ.
-
-    Examples
-    --------
-    >>> mollify(np.array([[1.0, 1.0, 2.0]]), 0.09375)
-    (array([[1.125, 1.125, 2.125]]), 0.125)
     """
     longest = lengths.max(axis=1)
     slack = float((lengths.sum(axis=1) - 2.0 * longest).min())

@@ -27,12 +27,6 @@ def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[
 
     Segments join nodes; undirected ones are reversed where needed. Returns the segments of each polyline in order,
     which of them run from head to tail, and whether it is closed.
-
-    Examples
-    --------
-    >>> lines = assemble_polylines(np.array([1, 0, 5]), np.array([2, 1, 5]))
-    >>> [(segments.tolist(), closed) for segments, _, closed in lines]
-    [([1, 0], False), ([2], True)]
     """
     nodes, ends = np.unique(np.concatenate([tails, heads]), return_inverse=True)
     (tails, heads), n = ends.reshape(2, -1), len(nodes)
@@ -74,13 +68,6 @@ def leaving(points: Floats, closed: bool, room: Floats) -> Ints:
     """Return which of (n, d) points of a polyline are left for a place farther away than the `room` (n,) of each.
 
     The end of an open polyline is kept as well.
-
-    Examples
-    --------
-    >>> leaving(np.array([[0.0], [0.0], [1.0], [1.1]]), False, np.full(4, 0.5)).tolist()
-    [1, 3]
-    >>> leaving(np.array([[0.0], [1.0], [2.0], [0.0]]), True, np.zeros(4)).tolist()
-    [0, 1, 2]
     """
     moves = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) > room
     if not closed:
@@ -94,14 +81,6 @@ def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
     The result does not cross itself, but may touch itself at vertices; parts without area are left out. By the rule
     "nonzero" an outline within another one is a hole where it runs the other way; otherwise directions do not matter,
     so that outlines that cross are united.
-
-    Examples
-    --------
-    >>> square = np.array([[0.0, 0], [4, 0], [4, 4], [0, 4]])
-    >>> [len(filled_outlines([square, 1 + square / 2], rule)) for rule in ("nonzero", "evenodd")]
-    [1, 2]
-    >>> [len(filled_outlines([square, inner[::-1]], "nonzero")) for inner in (1 + square / 2, 2 + square)]
-    [2, 1]
     """
     if rule not in ("nonzero", "evenodd"):
         raise SignedHeatError(f'fill must be "nonzero" or "evenodd", not {rule!r}', element="fill")
@@ -120,14 +99,7 @@ def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
 
 
 def without_seams(segments: Floats) -> Floats:
-    """Cut (k, 2, 2) segments of outlines where corners lie on them, and leave out those along which others run back.
-
-    Examples
-    --------
-    >>> spike = np.array([[0.0, 0], [2, 0], [2, 1], [1, 0]])
-    >>> without_seams(np.stack([spike, np.roll(spike, -1, axis=0)], axis=1)).tolist()
-    [[[1.0, 0.0], [2.0, 0.0]], [[2.0, 1.0], [1.0, 0.0]], [[2.0, 0.0], [2.0, 1.0]]]
-    """
+    """Cut (k, 2, 2) segments of outlines where corners lie on them, and leave out those along which others run back."""
     # outlines that share lines bound what they fill by lines that run there and back, up to rounding
     near = 1e-12 * float(np.ptp(segments.reshape(-1, 2), axis=0).max(initial=0.0))
     if near == 0:

@@ -18,14 +18,6 @@ def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
 
     Divides by the largest component first, because X falls like exp(−r/√t), and its square underflows long before it.
     With `overwrite` the memory of a real array is used for the result.
-
-    Examples
-    --------
-    >>> unit(np.array([[3e-300, 4e-300], [0.0, 0.0]]))
-    array([[0.6, 0.8],
-           [0. , 0. ]])
-    >>> unit(np.array([3e-300 + 4e-300j]))
-    array([0.6+0.8j])
     """
     if np.iscomplexobj(vectors):
         length = np.abs(vectors)  # np.abs of complex numbers neither overflows nor underflows

@@ -112,13 +112,6 @@ def manifold(positions: Floats, triangles: Ints) -> tuple[Floats, Ints]:
 
     Every halfedge is paired with one that runs in the opposite direction; corners that meet across a pair share a
     vertex.
-
-    Examples
-    --------
-    >>> tet = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-    >>> two = np.concatenate([tet, np.where(tet > 0, tet + 3, 0)])  # sharing vertex 0
-    >>> len(manifold(np.zeros((7, 3)), two)[0])
-    8
     """
     m = len(triangles)
     tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()

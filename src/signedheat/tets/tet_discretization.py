@@ -37,13 +37,7 @@ BYTES_PER_TET, BYTES_PER_FACTORED = 1750, 2900
 
 
 def memory_estimate(n_tets: int) -> float:
-    """Estimate the peak memory, in bytes, of a first distance on a mesh of this many tets.
-
-    Examples
-    --------
-    >>> 0.9e9 < memory_estimate(580_000) < 1.1e9
-    True
-    """
+    """Estimate the peak memory, in bytes, of a first distance on a mesh of this many tets."""
     factored = min(n_tets, DIRECT_FACES // 2)  # a tet has about two faces of its own
     return max(BYTES_PER_TET * n_tets, BYTES_PER_FACTORED * factored)
 
@@ -212,14 +206,7 @@ class HeatSystem:
 
 
 def uphill_roots(heights: Floats, neighbors: Ints, settled: Bools) -> Ints:
-    """Return (m,) the settled tet, or the local maximum, that steepest ascent from tet to tet leads to.
-
-    Examples
-    --------
-    >>> chain = np.array([[1, -1, -1, -1], [0, 2, -1, -1], [1, -1, -1, -1]])
-    >>> uphill_roots(np.array([3.0, 2.0, 1.0]), chain, np.array([True, False, False])).tolist()
-    [0, 0, 0]
-    """
+    """Return (m,) the settled tet, or the local maximum, that steepest ascent from tet to tet leads to."""
     own = np.arange(len(heights))
     around = np.where(neighbors >= 0, heights[neighbors], -np.inf)
     best = around.argmax(axis=1)
