@@ -158,10 +158,7 @@ class PausedSearch:
 
 
 def distances_along_edges(triangles: IntrinsicMesh, vertices: Ints, offsets: Floats) -> Floats:
-    """Return (n,) distances along edges from vertices (k,) that have distances of their own; inf if unconnected.
-
-    A vertex that is given several times starts with the least of its distances.
-    """
+    """Return (n,) distances along edges from vertices (k,) with distances of their own; inf if unconnected."""
     n = triangles.n_vertices
     tails, heads = triangles.edges.vertices.T
     rows, columns = np.concatenate([tails, np.full(len(vertices), n)]), np.concatenate([heads, vertices])

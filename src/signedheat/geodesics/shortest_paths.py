@@ -224,10 +224,7 @@ def _find_sleeve(faces: Faces, routes: Routes, starts: Places, ends: Places, pai
 
 @compiled
 def unfold(faces: Faces, left: Ints, entered: Ints) -> tuple[Complexes, Ints, Complexes]:
-    """Unfold a sleeve into the plane of its first face: tail and head of each halfedge left, and the last face.
-
-    Also returns whether each face, including the last, is turned over in that plane.
-    """
+    """Unfold a sleeve: return its portals in the plane of its first face, which faces are turned over, and the last."""
     portals, over = np.empty((len(left), 2), np.complex128), np.zeros(len(left) + 1, np.int64)
     placed = faces.positions[left[0] // 3].copy()
     for i in range(len(left)):
@@ -402,10 +399,7 @@ def _straighten(
 
 @compiled
 def _shortest_lines(faces: Faces, routes: Routes, starts: Places, ends: Places) -> tuple[Ints, Floats, Ints]:
-    """Return the halfedges that shortest paths cross, fractions along them, and their number for each pair of points.
-
-    The number is −1 where there is no path.
-    """
+    """Return halfedges that shortest paths cross, fractions along them, and their number for each pair; or −1."""
     counts = np.empty(len(starts.first) - 1, np.int64)
     sides, fractions = [0], [0.0]
     sides.pop()

@@ -51,10 +51,7 @@ def bytes_of_area(area: float, spacing: Floats, n_nodes: float) -> float:
 
 
 def refuse_large_grid(grid: Grid, per_node: float | None = None, extra: float = 0.0, area: float = 0.0) -> None:
-    """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory, before allocating any.
-
-    For φ alone, the area of the surface makes the estimate better.
-    """
+    """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory, before allocating."""
     available, needed = available_memory(), memory_estimate(grid, per_node, extra)
     needed += int(bytes_of_area(area, grid.spacing, grid.n_nodes))
     if available is None or needed <= available:

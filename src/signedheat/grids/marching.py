@@ -51,10 +51,7 @@ def closed_surface(
 
 
 def level_lines(values: Floats, origin: Floats, spacing: Floats, level: float) -> list[tuple[Floats, bool]]:
-    """Return points (k, 2) of each line of a level set, greater values to the left, and whether it closes.
-
-    Lines are closed, unless they end at the box or at NaN values.
-    """
+    """Return points (k, 2) of each line of a level set, greater values to the left, and whether it closes."""
     lines = measure.find_contours(heights_above(values, spacing, level), 0.0, positive_orientation="high")
     closed = [len(line) > 3 and bool((line[0] == line[-1]).all()) for line in lines]
     return [(origin + line * spacing, closes) for line, closes in zip(lines, closed, strict=True)]
@@ -132,10 +129,7 @@ def block_contour(
 
 
 def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Iterator[tuple[Ints, Floats, Ints]]:
-    """Yield the place of each window of `WINDOW` blocks that the level set passes, in order, and its part of the set.
-
-    Vertices are in cells from the first node of the grid; those on walls between windows are in each of these.
-    """
+    """Yield the place of each window of blocks that the level set passes, in order, and its part of the set."""
     least = CLEARANCE * float(spacing.min())
     capped = _reaches_walls(values, level)
     for window in np.unique(values.blocks.places // WINDOW, axis=0).astype(np.int64):
@@ -214,10 +208,7 @@ _Seam = tuple[Ints, Ints]
 
 
 def contour_parts(values: BlockValues, spacing: Floats, level: float, refine: Refine | None = None) -> Iterator[Part]:
-    """Yield the vertices and faces of `block_contour` window by window: new vertices, and faces of new and old ones.
-
-    Only the vertices on walls between windows are kept, as long as neighbouring windows are to come.
-    """
+    """Yield vertices and faces of `block_contour` window by window: new vertices, and faces of new and old ones."""
     seams: dict[tuple[int, ...], _Seam] = {}
     count = 0
     for window, points, triangles in window_surfaces(values, spacing, level):

@@ -96,11 +96,7 @@ def diffuse_multilevel(
 
 
 def coarsening(shape: tuple[int, ...], steps: Floats) -> Ints:
-    """Return (4,) cells of a grid per cell of the next coarser one: 2 along its finest axes, 1 along the others.
-
-    An axis with few nodes that is shorter than the spacing along the others is reduced to one node; its factor is then
-    larger than the number of its nodes.
-    """
+    """Return (4,) cells of a grid per cell of the next coarser one; axes shorter than others' spacing get one node."""
     counts = np.array(shape)
     factors = np.ones(4, dtype=np.int64)
     wide = counts > FEW
@@ -179,10 +175,7 @@ def _carried(level: Level, shape: tuple[int, ...], power: float) -> Guess | None
 def collapse(
     levels: list[Level], shape: tuple[int, ...], components: int, extract: Callable[..., None]
 ) -> NDArray[np.float32]:
-    """Return (components, *shape) a function of X at each node, on the finest level whose values are valid there.
-
-    The kernel ``extract(vectors, inside, out, axis, start, stop)`` fills `out` where `inside` is true.
-    """
+    """Return (components, *shape) what ``extract(vectors, inside, out, …)`` makes of X on the finest valid level."""
     shapes = [tuple(shape)]
     for level in levels[:-1]:
         halves = [n if f == 1 else n // 2 + 1 if f == 2 else 1 for n, f in zip(shapes[-1], level.factors, strict=True)]

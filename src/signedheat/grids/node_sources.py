@@ -123,10 +123,7 @@ def _merge(
     sources: NodeSources,
     scale: float,
 ) -> tuple[Floats, Ints, NDArray[np.float32]]:
-    """Sum weight · position, vector and weight for each component and cell.
-
-    Arrays are copied entry by entry, since assignments to slices compile slowly.
-    """
+    """Sum weight · position, vector and weight for each component and cell; copies by entry compile fastest."""
     corners, vectors, weights, components = simplices
     nodes, places = sources.sums, sources.places.reshape(-1, sources.places.shape[3])
     n_corners, dimension = corners.shape[1], corners.shape[2]

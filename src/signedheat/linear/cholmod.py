@@ -16,10 +16,7 @@ cholmod: Any = lazy_module("sksparse.cholmod", "factors of CHOLMOD")
 
 
 class CholmodFactor:
-    """Supernodal Cholesky factor of a Hermitian positive definite matrix, from its upper triangle.
-
-    ``order[k]`` is the unknown eliminated k-th; without it, CHOLMOD finds an order.
-    """
+    """Supernodal Cholesky factor of a Hermitian positive definite matrix; without an order, CHOLMOD finds one."""
 
     backend = "cholmod"
 

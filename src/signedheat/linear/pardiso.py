@@ -30,10 +30,7 @@ _CAUSES = {
 
 
 class PardisoFactor:
-    """Cholesky factor of a Hermitian positive definite matrix, from its `upper_triangle`; its memory is freed with it.
-
-    ``order[k]`` is the unknown eliminated k-th; without an order, METIS finds one.
-    """
+    """Cholesky factor of a Hermitian positive definite matrix; without an order, METIS finds one."""
 
     backend = "pardiso"
 

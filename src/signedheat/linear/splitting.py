@@ -26,10 +26,7 @@ class Round(NamedTuple):
 def split_rounds(
     proximal: Map, solve: Map, apply: Map, image: NDArray[Any], split: NDArray[Any], relaxation: float = RELAXATION
 ) -> Iterator[Round]:
-    """Iterate from K x and z, without end.
-
-    `proximal` makes the next z from K x plus the scaled dual, `solve` the x nearest to z minus the scaled dual.
-    """
+    """Iterate without end from K x and z; `proximal` makes z of K x + dual, and `solve` the x nearest to z − dual."""
     relaxed, dual = image, np.zeros_like(image)
     while True:
         before, target = split, relaxed + dual

@@ -130,10 +130,7 @@ class Triangulation:
             u = apex[u, a]
 
     def connect(self, a: int, b: int) -> list[int]:
-        """Make a segment edges; return the points along it, including those where it crosses other segments.
-
-        Points nearer to the segment than rounding are passed through.
-        """
+        """Make a segment edges, through points nearer than rounding; return the points along it, with crossings."""
         way, line, patience = [a], _Line(self.points[a], self.points[b]), 100 + len(self.apex)
         while way[-1] != b and patience:
             patience -= 1

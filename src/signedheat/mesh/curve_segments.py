@@ -185,10 +185,7 @@ def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegmen
 
 
 def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
-    """Return the nodes at which a segment goes straight on in another, in a face or along an edge, and these two.
-
-    A node is listed once for each source that goes on there.
-    """
+    """Return nodes, for each source, at which a segment goes straight on in another, and these two."""
     k = len(merged.ends)
     of_source = merged.owners[:, None] * len(merged.nodes) + merged.ends
     places, index = np.unique(of_source, return_inverse=True)

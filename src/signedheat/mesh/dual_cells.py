@@ -77,10 +77,7 @@ def cells_around(crossings: Crossings, shape: tuple[int, ...]) -> tuple[Ints, In
 
 
 def dual_cells(crossings: Crossings, shape: tuple[int, ...], inside: Callable[[Floats], Bools]) -> DualCells:
-    """Find the pieces of a level set in the cells of a grid of this shape.
-
-    `inside` tells whether (n, 3) places, in cells, are inside; it is asked about the middles of faces.
-    """
+    """Find the pieces of a level set in the cells of a grid; `inside` is asked about the middles of faces, in cells."""
     places, edges, rows, sides = cells_around(crossings, shape)
     ways = np.zeros((len(places), 6), dtype=np.bool_)
     pieces = _pieces(edges, ways)

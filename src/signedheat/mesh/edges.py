@@ -81,10 +81,7 @@ def orient_faces(pairs: HalfedgePairs, tails: Ints, owners: NDArray[np.integer],
 
 
 def may_coincide(pairs: HalfedgePairs, tails: Ints, following: NDArray[np.integer]) -> bool:
-    """Return whether any two faces may be on the same corners: they would share an edge, and a corner next to it.
-
-    `following` is the halfedge that follows each around its face.
-    """
+    """Return whether any two faces may be on the same corners: they would share an edge, and a corner next to it."""
     two = pairs.counts == 2
     first, second = pairs.first[two], pairs.second[two]
     preceding = np.empty_like(following)

@@ -62,10 +62,7 @@ def preceding(h: int) -> int:
 
 @kernel
 def half_tangent(a: float, b: float, c: float) -> tuple[float, float]:
-    """Return numerator and denominator of tan²(α/2), α the angle opposite side a, without cancellation (Kahan).
-
-    Their product is 16 times the squared area; lengths that violate the triangle inequality count as a flat triangle.
-    """
+    """Return numerator and denominator of tan²(α/2), α opposite side a (Kahan); their product is 16 area²."""
     if b < c:
         b, c = c, b
     difference = a - b
@@ -263,10 +260,7 @@ def apex_position(g: Gluing, h: int) -> tuple[float, float]:
 
 @kernel
 def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
-    """Insert a vertex into a face at barycentric coordinates (u, v, w); return the vertex.
-
-    Face (a, b, c) becomes (a, b, x) and two new faces (b, c, x) and (c, a, x).
-    """
+    """Insert a vertex x at (u, v, w) into a face (a, b, c), which becomes (a, b, x), (b, c, x), (c, a, x); return x."""
     h = 3 * f
     n: int = g.counts[0]
     x: int = g.counts[2]

@@ -169,10 +169,7 @@ class IntrinsicMesh(Frozen):
         return self.edge_directions[faces] * np.where(self.reflected[faces], np.conj(of_face), of_face)
 
     def sums_in_faces(self, vectors: Complexes) -> Complexes:
-        """(m, c) sums over the edges of each face, in its layout, of the columns of an (e, c) edge array.
-
-        Three times the means of Sec. 6.
-        """
+        """Return (m, c) sums of an (e, c) edge array over the edges of each face, in its layout: 3 × Sec. 6."""
         straight, mirrored = self._face_sums
         sums: Complexes = straight @ vectors
         return sums + mirrored @ np.conj(vectors) if mirrored.nnz else sums

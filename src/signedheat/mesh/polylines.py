@@ -65,10 +65,7 @@ def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[
 
 
 def leaving(points: Floats, closed: bool, room: Floats) -> Ints:
-    """Return which of (n, d) points of a polyline are left for a place farther away than the `room` (n,) of each.
-
-    The end of an open polyline is kept as well.
-    """
+    """Return which of (n, d) points of a polyline are left for one beyond their `room` (n,), and the last if open."""
     moves = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) > room
     if not closed:
         moves[-1] = True

@@ -23,10 +23,7 @@ CROWD = 64
 
 
 def self_intersections(vertices: Floats, faces: Ints) -> Ints:
-    """Return (k, 2) pairs of faces that pass through each other, or cover each other in one plane.
-
-    Faces without a common vertex must not touch, either; vertices at one place are one.
-    """
+    """Return (k, 2) pairs of faces that intersect or overlap; without a common vertex they must not touch, either."""
     slack = TOUCHING * float(np.ptp(vertices, axis=0).max(initial=0.0))
     return overlapping_faces(vertices, same_positions(vertices)[faces], slack, -slack)
 

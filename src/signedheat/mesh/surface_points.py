@@ -151,11 +151,8 @@ def barycentric_on_sides(sides: Ints, shares: Floats) -> Floats:
 
 
 def crossed_sides(above: Bools, chosen: Bools) -> tuple[Ints, Ints]:
-    """Return faces that a level set crosses, and the (k, 2) sides where it enters and leaves, with above on its left.
-
-    `above`, (m, 3), tells whether each corner is above the level; only chosen faces, (m,), are considered.
-    """
-    faces = np.flatnonzero(chosen & above.any(axis=1) & ~above.all(axis=1))
+    """Return chosen faces that a level set crosses, and the (k, 2) sides it enters and leaves by."""
+    faces = np.flatnonzero(chosen & above.any(axis=1) & ~above.all(axis=1))  # `above` is to the left of the level set
     starts, ends = above[faces], np.roll(above[faces], -1, axis=1)
     return faces, np.stack([(starts & ~ends).argmax(axis=1), (ends & ~starts).argmax(axis=1)], axis=1)
 

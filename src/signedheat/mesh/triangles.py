@@ -52,12 +52,9 @@ def face_areas(triangles: Floats) -> Floats:
 
 
 def part_volumes(vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:
-    """Return (m,) the connected part of each triangle, and the volume inside each part; negative for cavities.
-
-    Volumes are taken about a vertex of each part, so that nothing cancels far from the origin.
-    """
+    """Return (m,) the connected part of each triangle, and the volume inside each part; negative for cavities."""
     parts = element_components(faces)
-    first = np.unique(parts, return_index=True)[1]
+    first = np.unique(parts, return_index=True)[1]  # a vertex of each part, so that nothing cancels far away
     corners = vertices[faces] - vertices[faces[first, 0]][parts, None]
     return parts, np.bincount(parts, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6
 

@@ -68,8 +68,7 @@ def _is_rounded(points: Floats, single: bool) -> Bools:
 def welded(points: Floats, tolerance: float | Floats) -> Ints:
     """Return (n,) the first point within `tolerance` along each axis of each of (n, 3) points, or its own index.
 
-    Chains are not followed: a point is compared only with points that stand for themselves. The time is O(n) as long as
-    few of these lie within one cell of 16 tolerances.
+    Chains are not followed: a point is compared only with points that stand for themselves.
     """
     smallest = float(np.nextafter(np.abs(points).max(initial=0.0), np.inf)) * 2.0**-60
     return _weld(np.ascontiguousarray(points), np.maximum(np.broadcast_to(tolerance, 3), max(smallest, 1e-300)))

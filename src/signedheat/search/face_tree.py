@@ -154,10 +154,7 @@ class FaceTree:
 
     @cached_property
     def discs(self) -> Floats:
-        """(2 · leaves, 8) centre, normal, radius and half the thickness of all faces below each node.
-
-        The thickness is negative where there is no disc, or none that is flat.
-        """
+        """(2 · leaves, 8) centre, normal, radius and half thickness of the faces below each node; < 0 if not flat."""
         return _discs(self.features.corners, self.tree)
 
     def distances(self, points: Floats) -> Floats:
@@ -166,10 +163,7 @@ class FaceTree:
         return distances
 
     def search(self, points: Floats) -> NearestFaces:
-        """Find the nearest face of each of (n, 3) points, fastest where consecutive points are near each other.
-
-        Each `RUN` of points is searched on its own, so that the points before do not matter.
-        """
+        """Find the nearest face of each of (n, 3) points, fastest where consecutive points are near each other."""
         nearer = self._brought_near(points)
         faces, _ = self.nearest(nearer)
         result = search_from(self.features, nearer, faces[:, None])
@@ -256,10 +250,7 @@ class NearestFaces:
 
 
 def search_from(features: FaceFeatures, points: Floats, candidates: NDArray[np.int32]) -> NearestFaces:
-    """Find the nearest of (n, c) candidate faces of each of (n, 3) points, or one that it leads on to; −1 is none.
-
-    Where a point has no candidate, there is no face, and the distance is infinite.
-    """
+    """Find the nearest of (n, c) candidate faces of each point, or one that it leads on to; −1 is no candidate."""
     return NearestFaces(*_nearest_of_candidates(features, points, candidates))
 
 

@@ -68,10 +68,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 @compiled
 def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tuple[float, int, float, float, float]:
-    """Return the squared distance to triangle f, a feature code, and the three coordinates of the foot.
-
-    The foot is that of the perpendicular if it is inside, else the nearest on three sides.
-    """
+    """Return the squared distance to triangle f, a feature code, and the three coordinates of the foot."""
     px, py, pz = x - rows[f, 0], y - rows[f, 1], z - rows[f, 2]
     p = px * rows[f, 3] + py * rows[f, 4] + pz * rows[f, 5]
     q = px * rows[f, 6] + py * rows[f, 7] + pz * rows[f, 8]

@@ -136,10 +136,7 @@ def sample_points(shape: Shape, spacing: float) -> Floats:
 
 
 def _refuse_too_many(least: float, expected: float, resolution: float, power: int) -> None:
-    """Refuse a lattice whose least number of tets does not fit into memory, and name a resolution that does.
-
-    The `expected` number grows with the given `power` of the resolution.
-    """
+    """Refuse a lattice too large for memory, and name a resolution that fits: tets grow with its `power`."""
 
     def lower(fitting: int) -> str:
         most = resolution * (fitting / expected) ** (1 / power)

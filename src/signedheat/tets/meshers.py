@@ -28,10 +28,7 @@ tetgen: Any = lazy_module("tetgen", "tets of TetGen")
 
 
 def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:
-    """Fill a box around a shape with tets of about the same size, by TetGen.
-
-    Only the box is given to TetGen, which fails on intersecting faces: tets need not conform to the shape.
-    """
+    """Fill a box around a shape with tets of about the same size, by TetGen, which is given the box alone."""
     lower, upper, spacing = _box_around(shape, resolution, padding)
     volume = 1.64 * spacing**3 / (6 * np.sqrt(2))  # an upper bound for TetGen that gives this mean edge length
     mesher = tetgen.TetGen(*box_walls(lower, upper, np.ceil((upper - lower) / (1.4 * spacing)).astype(np.int64)))

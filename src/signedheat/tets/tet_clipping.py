@@ -179,12 +179,9 @@ def _clip(planes: Planes, triangles: Floats, parents: Ints, tets: Ints) -> tuple
 def _cut(
     planes: Planes, tet: int, corner: int, polygon: Floats, n: int, other: Floats, heights: Floats
 ) -> tuple[int, bool]:
-    """Clip a polygon to the inner side of a face of a tet; return its size, and whether it lies in the face's plane.
-
-    Heights and crossings are the same, to the last bit, for the tets on both sides of the plane.
-    """
+    """Clip a polygon to the inner side of a tet's face; return its size, and whether it lies in the face's plane."""
     most, least = 0.0, 0.0
-    for i in range(n):
+    for i in range(n):  # heights and crossings are the same, to the last bit, for the tets on both sides
         height = beyond(planes, tet, corner, polygon[i, 0], polygon[i, 1], polygon[i, 2])
         heights[i] = 0.0 if abs(height) <= planes.tolerances[planes.tet_faces[tet, corner]] else height
         most = max(most, heights[i])

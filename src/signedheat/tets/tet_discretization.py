@@ -64,10 +64,7 @@ class TetDiscretization(DiffusesEach):
 
     @cached_property
     def unknowns(self) -> Ints:
-        """(m, 4) unknown of φ at each corner of each tet; a vertex of several parts has one unknown for each.
-
-        Heat flows through faces only, so parts of the mesh that meet in an edge or a vertex only are separate domains.
-        """
+        """(m, 4) unknown of φ at each corner of each tet; heat flows through faces only, so parts share no unknown."""
         parts = self.mesh.parts
         keys = self.mesh.tets * (parts.max() + 1) + parts[:, None]
         return np.unique(keys, return_inverse=True)[1].reshape(-1, 4)
