@@ -104,8 +104,9 @@ class FaceFeatures(NamedTuple):
         positions = corners, triangle_rows(corners), vertices
         ids_of_faces = faces.astype(np.int32), table.face_edges.astype(np.int32)
         normals = face_normals, edge_normals, vertex_normals
-        around_faces = edge_regular, vertex_regular, across, apexes.astype(np.int32)
-        return cls(*positions, *ids_of_faces, *normals, *around_faces, starts, around.astype(np.int32), trusted, ids)
+        regular, around_vertices = (edge_regular, vertex_regular), (starts, around.astype(np.int32))
+        beyond = across, apexes.astype(np.int32)
+        return cls(*positions, *ids_of_faces, *normals, *regular, *beyond, *around_vertices, trusted, ids)
 
 
 def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: int) -> tuple[Bools, Bools, Ints]:
