@@ -19,6 +19,7 @@ from signedheat import compiled, memory, samples
 from signedheat.curves.jumping_distance import memory_estimate as piecewise_estimate
 from signedheat.grids.grid_discretization import bytes_of_area, fitting_spacing, memory_estimate
 from signedheat.memory import available_memory
+from signedheat.solids import contouring
 from signedheat.surfaces import intrinsic_discretization as intrinsic
 from signedheat.tets.lattice import BYTES_PER_TET
 
@@ -252,3 +253,33 @@ def test_lattices_name_the_resolution_that_fits(monkeypatch):
             sh.tetrahedralize(shape, resolution=100_000, grading=grading)
         fitting = float(caught.value.remedy.split()[-1])
         assert 20 < fitting < 100_000
+
+
+TOO_MANY = np.broadcast_to(np.zeros(3), (10**13, 3))
+BALL = samples.sphere(1)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="others promise any amount of memory")
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: sh.TriangleMesh(TOO_MANY, [[0, 1, 2]]),
+        lambda: sh.complete(BALL).distance(TOO_MANY),
+        lambda: sh.GridField(sh.Grid((0, 0, 0), 1.0, (3, 3, 3)), np.zeros((3, 3, 3)))(TOO_MANY),
+        lambda: sh.deviation(TOO_MANY, BALL),
+        lambda: sh.signed_distance(sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True), resolution=10**8),
+    ],
+)
+def test_allocations_that_fail_are_memory_limits(call):
+    with refused(sh.errors.MemoryLimitError) as caught:
+        call()
+    assert isinstance(caught.value.__cause__, MemoryError)
+
+
+def test_surfaces_in_cells_that_are_too_small_are_refused_with_cells_that_fit(monkeypatch):
+    monkeypatch.setattr(contouring, "available_memory", lambda: 60_000_000 + memory.libraries())
+    with refused(sh.errors.MemoryLimitError) as caught:
+        sh.complete(BALL).surface(spacing=1e-6)
+    fitting = float(caught.value.remedy.rpartition(" ")[2])
+    assert 0.01 < fitting < 0.1
+    assert len(sh.complete(BALL).surface(spacing=fitting).faces) > 1000

@@ -19,6 +19,7 @@ from .grids.grid import Dimension, Grid, room_around
 from .grids.grid_field import GridField
 from .grids.polyline import Polyline
 from .kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
+from .memory import within_memory
 from .mesh.polylines import FillRule
 from .progress import Progress
 from .solids.completion import Completing, Lids
@@ -120,6 +121,7 @@ def signed_distance(
     diffusion: float = 1.0,
     progress: Progress | None = None,
 ) -> Field: ...
+@within_memory
 def signed_distance(
     source: Sources | ElementList | Sequence[ElementList],
     domain: Domain | ForeignShape | None = None,

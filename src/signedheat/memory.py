@@ -6,14 +6,18 @@ import math
 import mmap
 import sys
 from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from .compiled import made
 from .errors import MemoryLimitError
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 GROUPS = Path("/proc/self/cgroup")
 """Lists the control groups of this process, a line ``id:controllers:path`` each."""
@@ -47,6 +51,31 @@ def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float]
         f"{what} needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free",
         remedy=remedy(fitting_count(count, estimate, (available - libraries()) / ROOM)),
     )
+
+
+def within_memory(function: Callable[P, T]) -> Callable[P, T]:
+    """Decorate a public function so that an allocation that fails within it raises a `MemoryLimitError`.
+
+    What takes most is estimated and refused before; this is for the rest.
+
+    Examples
+    --------
+    >>> within_memory(np.zeros)(10**15)
+    Traceback (most recent call last):
+    signedheat.errors.MemoryLimitError: memory does not suffice (Unable to allocate ...
+    """
+
+    @wraps(function)
+    def guarded(*args: P.args, **kwargs: P.kwargs) -> T:
+        try:
+            return function(*args, **kwargs)
+        except MemoryError as error:
+            raise MemoryLimitError(
+                f"memory does not suffice ({error or 'an allocation failed'})",
+                remedy="free some, or ask for less: fewer points, a lower resolution, a smaller shape",
+            ) from error
+
+    return guarded
 
 
 def untouched_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:

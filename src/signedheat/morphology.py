@@ -33,6 +33,7 @@ from .grids.grid_field import GridField
 from .grids.polyline import Polyline
 from .joining import concatenated
 from .kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
+from .memory import within_memory
 from .mesh.triangles import part_volumes
 from .progress import Progress
 from .search.face_tree import FaceFeatures, FaceTree
@@ -109,7 +110,7 @@ class _Morphology(Protocol):
 
 
 def _by_kind_of_shape(function: Callable[..., Boundary]) -> _Morphology:
-    return cast("_Morphology", function)
+    return cast("_Morphology", within_memory(function))
 
 
 @_by_kind_of_shape
@@ -223,6 +224,7 @@ def closing(
     return _offsets(shape, distance, (1, -1), domain, resolution, measure)
 
 
+@within_memory
 def offset(
     shape: Shapes,
     distance: float | ArrayLike | Reach,
@@ -290,6 +292,7 @@ def offset(
     return sharp_surface(Offset(solid, reach, LIMITS[corners]), grid, progress)
 
 
+@within_memory
 def shell(
     shape: Shapes,
     inner: float,
@@ -381,6 +384,7 @@ def shell(
     return wall if hole is None else _drained(wall, hole, float(grid.spacing.max()))
 
 
+@within_memory
 def thicken(
     sheet: TriangleMesh | PolygonMesh | Sequence[TriangleMesh | PolygonMesh],
     above: float,

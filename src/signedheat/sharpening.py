@@ -9,6 +9,7 @@ from .grids import redistancing  # noqa: F401  registers how its fields are shar
 from .grids.grid import Dimension
 from .grids.grid_field import GridField
 from .kinds import Shapes
+from .memory import within_memory
 from .progress import Progress
 from .sharpening_methods import Method, sharpen_field
 from .surfaces import surface_sharpening  # noqa: F401  registers how its fields are sharpened
@@ -36,6 +37,7 @@ def sharpen(
 ) -> TetField: ...
 @overload
 def sharpen(field: Field, *, progress: Progress | None = None) -> Field: ...
+@within_memory
 def sharpen(
     field: Field,
     source: CurvesAndPoints | Shapes | None = None,

@@ -18,6 +18,7 @@ from .frozen import Frozen
 from .grids.grid import Dimension, Grid
 from .grids.grid_field import GridField
 from .kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
+from .memory import within_memory
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .progress import Progress, Stopwatch
 from .surfaces.extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
@@ -139,6 +140,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     ) -> VertexField[AnySurface]: ...
     @overload
     def distance(self, sources: Sources, constraint: Constraint | None = None) -> Field: ...
+    @within_memory
     def distance(self, sources: Sources, constraint: Constraint | None = None) -> Field:
         """Compute the signed distance to sources.
 
@@ -209,6 +211,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     ) -> list[VertexField[AnySurface]]: ...
     @overload
     def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]: ...
+    @within_memory
     def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]:
         """Compute the signed distance to each of several sources, faster than by one call of `distance` for each.
 

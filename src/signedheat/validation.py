@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .arrays import Bools, Floats, Ints, mask_of
 from .errors import GeometryError, SignedHeatError
+from .memory import within_memory
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -33,6 +34,7 @@ def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
     return array
 
 
+@within_memory
 def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Floats:
     """`values` as a new float64 array of any shape; whatever holds anything but real numbers is refused."""
     array = array_of(values, name, error)
@@ -46,6 +48,7 @@ def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryEr
         raise error(f"{name} must be real numbers, not {_described(array)}", element=name) from None
 
 
+@within_memory
 def contiguous(values: object, name: str) -> Floats:
     """`values` as a float64 array of any shape, copied only if it is none yet."""
     if isinstance(values, np.ndarray) and values.dtype == np.float64 and not np.ma.isMaskedArray(values):
@@ -53,6 +56,7 @@ def contiguous(values: object, name: str) -> Floats:
     return numbers(values, name)
 
 
+@within_memory
 def whole_numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Ints:
     """`values` as a new int64 array of any shape; whatever holds anything but integers is refused."""
     array = array_of(values, name, error)

@@ -178,7 +178,7 @@ def use(subject: Loaded) -> str:
     points = np.random.default_rng(0).normal(size=(50, 3))
     distances = loaded.distance(points)
     closest = loaded.closest(points)
-    values = loaded.field(resolution=5).values, loaded.surface(keep_faces=True).vertices, loaded.volume
+    values = loaded.field(resolution=5).values, loaded.surface(resolution=5).vertices, loaded.volume
     if not all(np.isfinite(numbers).all() for numbers in (distances, closest.points, *values)):
         raise Wrong("not finite", subject.changed)
     return "loaded"

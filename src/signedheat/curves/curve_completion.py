@@ -15,6 +15,7 @@ from ..discretization import discretize
 from ..errors import SourceError
 from ..foreign import ForeignShape, as_list, converted
 from ..kinds import SurfaceDomain
+from ..memory import within_memory
 from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..progress import Progress
@@ -34,6 +35,7 @@ WHOLE = 0.5
 nothing, nor do those that are farther away, which are where φ has the wrong sign."""
 
 
+@within_memory
 def close_curves(
     domain: SurfaceDomain | ForeignShape,
     curves: CurvesAndPoints,

@@ -20,7 +20,7 @@ from ..diagnostics import Diagnostics, Jumps
 from ..errors import GeometryError, InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..foreign import ForeignShape, as_list, converted
 from ..linear import chosen_backend
-from ..memory import refuse_beyond_memory
+from ..memory import refuse_beyond_memory, within_memory
 from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs
 from ..mesh.surface_points import VERTEX, barycentric_in
@@ -47,6 +47,7 @@ BYTES = {"pardiso": (2600, 0), "cholmod": (1150, 150), "superlu": (700, 242)}
 which it is taken to need what distance does, with three factors."""
 
 
+@within_memory
 def piecewise_distance(
     domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation | ForeignShape,
     sources: CurvesAndPoints,

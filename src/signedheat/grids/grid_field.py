@@ -19,6 +19,7 @@ from ..exchange import Displayed, with_values
 from ..field_arithmetic import Combinable, Rule
 from ..field_levels import on_level, refuse_beyond_walls
 from ..frozen import Frozen
+from ..memory import within_memory
 from ..mesh.edge_flips import flipped_along_creases
 from ..packages import lazy_module
 from ..parallel import in_chunks
@@ -242,6 +243,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     def contour(self: GridField[Literal[2]], level: float = 0.0) -> list[Polyline]: ...
     @overload
     def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]: ...
+    @within_memory
     def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]:
         """Extract the level set φ = level.
 

@@ -23,6 +23,7 @@ from ..compiled import compiled
 from ..discretization import SourceTerm
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..jobs import run_cancellable
+from ..memory import within_memory
 from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..progress import Progress
@@ -35,6 +36,7 @@ from .solid_queries import Scaled
 from .stencil import padded_shape
 
 
+@within_memory
 def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | Sequence[bool] = False) -> Floats:
     """Compute the signed distance of the nodes of a grid to the zero set of an array: of a level set, or of ±1.
 

@@ -17,7 +17,7 @@ from ..errors import SignedHeatError, SourceError
 from ..foreign import SurfaceShape
 from ..joining import joined_shape
 from ..kinds import ShapeLike
-from ..memory import refuse_beyond_memory
+from ..memory import refuse_beyond_memory, within_memory
 from ..mesh.triangles import face_areas
 from ..mesh.unit_vectors import axes_across
 from ..progress import Progress, Stopwatch
@@ -79,6 +79,7 @@ class Completion:
             flag(getattr(self, name), name)
 
 
+@within_memory
 def complete(
     shape: ShapeLike | Sequence[ShapeLike],
     *,

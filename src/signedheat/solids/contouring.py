@@ -7,17 +7,19 @@ each other (Ju & Udeshi 2006). Only blocks of the grid through which the level p
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..errors import InexactWarning, OutsideError, warn_user
+from ..errors import InexactWarning, MemoryLimitError, OutsideError, warn_user
 from ..field_levels import NodeValues, on_level
 from ..grids.blocks import SIDE, Blocks, BlockValues
 from ..grids.grid import Grid
 from ..grids.marching import CLEARANCE
+from ..memory import available_memory, libraries
 from ..mesh.components import element_components
 from ..mesh.dual_cells import Crossings, DualCells, cells_around, dual_cells, open_cells, separate_triangles
 from ..progress import Progress
@@ -28,6 +30,8 @@ from .node_distances import solved
 from .offsets import Offset
 from .tiles import blocks_where, in_threads, prepared, tiles_of
 
+BYTES_PER_BLOCK = 170_000
+"""Measured peak memory of a contour, for each block of the grid near it."""
 WINDOW = 8
 """Blocks along each edge of a window in which crossed edges are looked for together."""
 AROUND = np.array(list(np.ndindex(3, 3, 3))) - 1
@@ -174,9 +178,28 @@ def blocks_at(offset: Offset, grid: Grid) -> Ints:
     ------
     OutsideError
         If there are none.
+    MemoryLimitError
+        If there are more than fit in memory.
     """
     diagonal = (1.0 if offset.level is not None else STEEPEST) * float(np.linalg.norm(grid.spacing))
-    found = blocks_where(grid, lambda centres, half: np.abs(offset.distance(centres)) <= (half + 1.0) * diagonal)
+    halves = []
+
+    def near(centres: Floats, half: float) -> Bools:
+        halves.append(half)
+        return np.abs(offset.distance(centres)) <= (half + 1.0) * diagonal
+
+    free = available_memory()
+    limit = math.inf if free is None else max(free - libraries(), 0) / BYTES_PER_BLOCK
+    found = blocks_where(grid, near, limit)
+    if len(found) > limit:
+        cell, larger = (
+            float(grid.spacing.max()),
+            3 * (2 * halves[-1] + 1) / SIDE,
+        )  # cubes twice as large were few enough
+        raise MemoryLimitError(
+            f"a surface in cells of {cell:.3g} needs more than the {(free or 0) / 1e9:.2g} GB that are free",
+            remedy=f"use cells of {larger * cell:.3g}",
+        )
     if not len(found):
         raise OutsideError(f"the distance takes {offset.named} nowhere on the grid", remedy="choose another level")
     return found

@@ -16,6 +16,7 @@ from ..foreign import SurfaceShape, as_shape
 from ..frozen import Frozen
 from ..joining import joined_shape
 from ..kinds import ShapeLike
+from ..memory import within_memory
 from ..mesh.triangles import face_areas
 from ..packages import lazy_module
 from ..progress import Progress
@@ -254,6 +255,7 @@ class Deviation(Frozen):
         return f"Deviation({len(self.of_surface)} points, {low:.3g} to {high:.3g}, median {median:.3g})"
 
 
+@within_memory
 def deviation(
     scan: ShapeLike | NDArray[np.floating], nominal: ShapeLike, progress: Progress | None = None
 ) -> Deviation:

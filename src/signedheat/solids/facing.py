@@ -11,6 +11,7 @@ from ..arrays import Ints
 from ..curves.piece_orientation import curve_orientation
 from ..foreign import ForeignShape
 from ..kinds import SurfaceDomain
+from ..memory import within_memory
 from ..mesh.edges import orient_faces, pair_halfedges
 from ..mesh.triangles import face_areas
 from ..mesh.welding import welded_vertices
@@ -23,6 +24,7 @@ from .mesh_orientation import Mesh, orientation
 def orient(shape: Mesh | ForeignShape) -> Mesh: ...
 @overload
 def orient(shape: Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape) -> list[CurveOrPoints]: ...
+@within_memory
 def orient(
     shape: Mesh | ForeignShape | Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape | None = None
 ) -> Mesh | list[CurveOrPoints]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError, SignedHeatError, SourceError
 from ..foreign import ForeignShape, converted
+from ..memory import within_memory
 from ..mesh.components import element_components
 from ..mesh.edges import edge_table
 from ..mesh.welding import same_positions
@@ -74,6 +75,7 @@ def fill_holes(
     rims: ArrayLike | None = None,
     lids: Lids = "bent",
 ) -> FilledMesh: ...
+@within_memory
 def fill_holes(
     mesh: TriangleMesh | PolygonMesh | ForeignShape,
     *,

@@ -14,6 +14,7 @@ from ..field_levels import on_level
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_discretization import refuse_large_grid
 from ..grids.marching import CAP, closed_surface
+from ..memory import within_memory
 from ..mesh.dual_cells import dual_cells
 from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -137,6 +138,7 @@ class NodePlanes:
         return mixed, mean
 
 
+@within_memory
 def contour(
     f: Function | ArrayLike,
     bounds: ArrayLike,

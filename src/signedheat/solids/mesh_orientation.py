@@ -13,6 +13,7 @@ from ..diagnostics import ShapeOriented
 from ..errors import GeometryError
 from ..foreign import ForeignShape, converted
 from ..frozen import Frozen, ShortRepr
+from ..memory import within_memory
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from .bounding import Bounding, bounding
@@ -98,6 +99,7 @@ class Orientation(Frozen, ShortRepr):
         return ShapeOriented(**{entry.name: getattr(self, entry.name) for entry in fields(ShapeOriented)})
 
 
+@within_memory
 def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Orientation:
     """Orient a mesh, and say what was turned, merged and left.
 

@@ -10,7 +10,7 @@ from ..arrays import Floats, Ints
 from ..errors import OutsideError, SignedHeatError, SourceError
 from ..grids.grid_field import GridField
 from ..kinds import Shapes
-from ..memory import refuse_beyond_memory
+from ..memory import refuse_beyond_memory, within_memory
 from ..mesh.triangles import face_areas
 from ..validation import finite_number, whole_number
 from .completion import complete
@@ -22,6 +22,7 @@ BYTES_PER_SAMPLE = 165
 """Peak memory per sample, including the search for its nearest face."""
 
 
+@within_memory
 def sample(
     shape: GridField | Shapes, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = WIDTHS, seed: int = 0
 ) -> Samples:

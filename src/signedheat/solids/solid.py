@@ -20,6 +20,7 @@ from ..frozen import Frozen, short
 from ..grids.grid import Grid
 from ..grids.grid_field import GridField
 from ..grids.solid_queries import Closest
+from ..memory import within_memory
 from ..mesh.box_tree import order_in_space
 from ..mesh.triangles import area_vectors, face_areas
 from ..packages import lazy_module
@@ -167,6 +168,7 @@ class Solid(Displayed, Represented, Frozen):
         """All faces, including the completion and sheets, as one mesh."""
         return _mesh(self.triangles)
 
+    @within_memory
     def distance(self, points: ArrayLike, *, signed: bool = True) -> Floats:
         """Compute exact signed distances of points, negative inside, in time O(n log m) on all threads.
 
@@ -204,6 +206,7 @@ class Solid(Displayed, Represented, Frozen):
             (result[order],) = in_chunks(measure, places[order])
         return shaped(result, shape)
 
+    @within_memory
     def inside(self, points: ArrayLike) -> Bools:
         """Find which points are inside.
 
@@ -226,6 +229,7 @@ class Solid(Displayed, Represented, Frozen):
         places, shape = query_points(points, 3)
         return shaped(self.windings.inside(places), shape)
 
+    @within_memory
     def closest(self, points: ArrayLike) -> Closest:
         """Find the nearest place of the surface for each point.
 
@@ -260,6 +264,7 @@ class Solid(Displayed, Represented, Frozen):
         )
         return Closest(*(shaped(values, shape) for values in results))
 
+    @within_memory
     def field(
         self,
         resolution: int = 128,
@@ -324,6 +329,7 @@ class Solid(Displayed, Represented, Frozen):
             raise SourceError("only bands are stored tile by tile", remedy="give a band, or save the field")
         return dense_field(self, where, progress)
 
+    @within_memory
     def surface(
         self,
         level: float = 0.0,
@@ -377,7 +383,7 @@ class Solid(Displayed, Represented, Frozen):
         SignedHeatError
             If faces are to be kept at another level than 0.
         MemoryLimitError
-            If marching cubes do not fit in memory. Raised before anything is allocated.
+            If the cells do not fit in memory. Raised before they are allocated.
 
         Examples
         --------

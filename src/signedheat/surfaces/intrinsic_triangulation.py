@@ -22,6 +22,7 @@ from ..errors import GeometryError, SourceError
 from ..exchange import Displayed
 from ..foreign import ForeignShape, converted
 from ..frozen import Frozen
+from ..memory import within_memory
 from ..mesh.curve_segments import CurveSegments, without_straight_nodes
 from ..mesh.gluing import flip_all, glue, lay_out
 from ..mesh.intrinsic_mesh import IntrinsicMesh
@@ -385,6 +386,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return f"IntrinsicTriangulation({self.n_vertices} vertices, {self.n_faces} faces: {self.summary})"
 
 
+@within_memory
 def intrinsic_delaunay(
     mesh: TriangleMesh | ForeignShape,
     keep: CurvesAndPoints = (),

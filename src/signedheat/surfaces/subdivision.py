@@ -13,12 +13,14 @@ from scipy.sparse import csr_matrix
 
 from ..arrays import Floats, Ints
 from ..errors import GeometryError
+from ..memory import within_memory
 from ..mesh.surface_points import EDGE, VERTEX, LocatedPoints, locate_points
 from .intrinsic_history import misplaced_lines
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .polygon_mesh import PolygonMesh
 
 
+@within_memory
 def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMesh, csr_matrix]:
     """Subdivide the triangles of an intrinsic triangulation along the edges of its mesh.
 

@@ -21,7 +21,7 @@ from ..errors import GeometryError, MemoryLimitError
 from ..foreign import converted
 from ..grids.grid import room_around
 from ..kinds import Shape, ShapeLike
-from ..memory import refuse_beyond_memory
+from ..memory import refuse_beyond_memory, within_memory
 from ..surfaces.point_cloud import PointCloud
 from ..validation import finite_number, refuse_extreme
 from .tet_mesh import TetMesh
@@ -38,6 +38,7 @@ BYTES_PER_TET = 350
 """Measured peak memory of meshing; distance takes more."""
 
 
+@within_memory
 def tetrahedralize(
     shape: ShapeLike, *, resolution: int = 32, padding: float | None = None, grading: float = 3.0
 ) -> TetMesh:
