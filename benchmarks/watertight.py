@@ -195,6 +195,14 @@ def repaired(mesh: Mesh, cell: float) -> Mesh | None:
     return Mesh(np.asarray(result.vert_properties)[:, :3], np.asarray(result.tri_verts))
 
 
+def meshfix(mesh: Mesh, cell: float) -> Mesh:
+    import pymeshfix
+
+    given = np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32)
+    vertices, faces = pymeshfix.clean_from_arrays(*given, remove_smallest_components=False)
+    return Mesh(np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64))
+
+
 def dual_contouring(mesh: Mesh, cell: float) -> Mesh:
     import gpytoolbox
     import igl
@@ -241,6 +249,7 @@ PROGRAMS: dict[str, Callable[[Mesh, float], Mesh | None]] = {
     "MeshLib": partial(meshlib, sharpening=False),
     "MeshLib, sharpening": partial(meshlib, sharpening=True),
     "trimesh + manifold3d": repaired,
+    "pymeshfix": meshfix,
 }
 
 

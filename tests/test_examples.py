@@ -57,6 +57,7 @@ EXPECTED = {
     "turned_faces": (0.0, 0.005),
     "turned_pieces": (0.0, 0.03),
     "wall_distance": (0.5, 0.01),
+    "wall_thickness": (0.1, 0.005),
     "watertight_scan": (1.0, 0.06),
 }
 """What each measures at its end, and by how much it may be off."""
