@@ -55,9 +55,9 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     intrinsic : "auto", True or False
         Whether the method runs on an intrinsic Delaunay refinement of a triangle mesh. "auto": where large angles or
         needles would make distance inaccurate, the mesh is refined once, and all sources share it and its factors.
-        True: a refinement for every set of sources, along whose edges they run, for curves smaller than triangles. It
-        keeps large triangles, which "auto" makes smaller: with those of CAD, φ is up to twice as far off. False: the
-        triangles as they are. For more control use `intrinsic_delaunay` as the domain.
+        True: a refinement for every set of sources, along whose edges they run, for curves smaller than triangles. On
+        CAD it has .3 to .9 of the error of "auto", for a factorisation for every set. False: the triangles as they
+        are. For more control use `intrinsic_delaunay` as the domain.
 
     Raises
     ------

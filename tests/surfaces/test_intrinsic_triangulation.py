@@ -10,6 +10,7 @@ import signedheat as sh
 from refusals import refused
 from shapes.degenerate_meshes import stretched_square, with_caps, with_needles
 from shapes.surface_cases import band, book, flipped, sphere, square
+from shapes.triangulated import cylinder
 from signedheat.diagnostics import IntrinsicTriangles
 from signedheat.discretization import discretize
 from signedheat.mesh.gluing import flip_all, glue, lay_out
@@ -541,3 +542,14 @@ def test_points_at_which_lines_bend_meet_or_end_become_vertices():
         ([across, sh.SurfacePoints([0], [[0.4, 0.4, 0.2]])], 3),
     ):
         assert sh.intrinsic_delaunay(mesh, curves).n_vertices == 3 + n
+
+
+@pytest.mark.parametrize("sections", [24, 96])
+def test_a_refinement_for_each_curve_is_better_than_one_for_all_on_slender_triangles(sections):
+    """A tall cylinder as CAD programs make it, in triangles from rim to rim: large ones must not stay."""
+    mesh = cylinder(sections, 2, height=6.0)
+    curves = mesh.level_set(mesh.vertices @ [1.5, 0.0, 1.0], 3.0)
+    exact = np.abs(sh.signed_distance(curves, mesh, as_oriented=True).values)
+    fields = [sh.SignedHeatSolver(mesh, intrinsic=way).distance(curves) for way in (True, "auto")]
+    errors = [np.sqrt(np.mean((np.abs(field.values) - exact) ** 2)) for field in fields]
+    assert errors[0] < 0.8 * errors[1] and errors[1] < 0.1 * exact.max()

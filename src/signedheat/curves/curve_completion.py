@@ -108,10 +108,7 @@ def conforming_distance(
     as_oriented: bool = False,
     every_piece: bool = False,
 ) -> VertexField:
-    """Distance on triangles that have the curves along their edges, so that none is too small to be seen.
-
-    Other domains than triangle meshes, and meshes too thin to be triangulated anew, are taken as they are.
-    """
+    """Distance on triangles that have the curves along their edges, where such can be made."""
     as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
     own_levels = isinstance(constraint, EachComponent | LevelValues)
 
@@ -134,12 +131,7 @@ def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints
 
 
 def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list[Curve]:
-    """The zero set of a field as curves: those that follow or complete the given ones.
-
-    Where a curve runs along the rim of the surface, φ has one sign next to it, and is zero up to rounding on it: there
-    the rim counts as the other side. Loops that are shorter than what they would complete, or far from it, are left
-    out.
-    """
+    """The zero set of a field as curves, without loops too short or too far away to complete the given ones."""
     if not isinstance(field.domain, TriangleMesh):
         return field.contour(0.0)
     fine = field.finest

@@ -19,7 +19,8 @@ FAR = 3.0
 """Somewhere on a cut the jump is at least this many times the longest side of a typical triangle."""
 
 TWIG = 5.0
-"""A branch of a cut whose jump is nowhere this many times that side is none, unless the cut itself is as low."""
+"""A branch of a cut needs a jump of this many times that side, or half of the highest: where directions turn within
+several triangles, there are lower ones."""
 
 WIDTH = 10.0
 """Width of `smoothed`, over the root of the area of a part: step 3 to a thousandth. By more M is rounded away."""
@@ -31,12 +32,7 @@ def typical_size(triangles: IntrinsicMesh) -> float:
 
 
 def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(p,) pairs of faces between which (m, 3) values at their corners jump, on lines.
-
-    These are the pairs across which the values jump by more than they change within a triangle, on connected lines with
-    a jump of `FAR` times that somewhere. Errors in bad triangles are about their size, and no cuts. Nor are low
-    branches of a line (`without_twigs`): there the directions turn within several triangles, and so do the jumps.
-    """
+    """(p,) pairs of faces between which (m, 3) values at corners jump, on lines, by more than errors in triangles."""
     longest, typical = triangles.edge_lengths.max(axis=1), typical_size(triangles)
     height = np.abs(pairs.ends(values)).max(axis=1)
     high = np.flatnonzero(height > np.maximum(longest[pairs.faces].max(axis=1), typical))
@@ -56,11 +52,7 @@ def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: NDArray[np.fl
 
 
 def without_twigs(edges: NDArray[np.int64], high: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which edges are left when lines between ends and forks are taken away, if they are high nowhere.
-
-    What is left is joined to longer lines, among which there may be such lines again.
-
-    Shapes: `edges` (k, 2), `high` (k,).
+    """(k,) which (k, 2) edges are left without the lines between ends and forks that are `high`, (k,), nowhere.
 
     Examples
     --------
@@ -87,18 +79,14 @@ def is_continuous(
     directions: NDArray[np.complex128],
     constants: NDArray[np.float64],
 ) -> bool:
-    """Whether the constants of the faces leave no cut, neither as a line nor spread over many small jumps.
-
-    Spread out, it makes ∇φ̄, of the means φ̄ of φ at the vertices, differ from Y by more than a half in two rows of faces
-    around some face. Where Y turns back, at equal distance from two parts of the source, few faces side by side do.
-    """
+    """Whether the constants of the faces leave no cut, neither as a line nor spread over many small jumps."""
     values = slopes + constants[:, None]
     if np.abs(pairs.ends(values)).max(initial=0.0) > FAR * typical_size(triangles):
         return False
     corners, n = triangles.corner_vertices, triangles.n_vertices
     mean = np.bincount(corners.ravel(), values.ravel(), n) / np.maximum(np.bincount(corners.ravel(), minlength=n), 1)
     rough = np.abs(gradients(triangles, mean[corners]) - directions) > 0.5
-    for _ in range(2):
+    for _ in range(2):  # two rows of faces around a rough one: where Y turns back, few are rough side by side
         inner = np.ones(n, dtype=bool)
         inner[corners[~rough]] = False
         rough = np.asarray(inner[corners].all(axis=1))
@@ -118,20 +106,9 @@ def smoothed(
     rough: NDArray[np.float64],
     cut: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
-    """(m, 3) values continuous off the cut, with slopes nearest to Y: ``(M + w² C) φ = M φ₀ + w² b``.
+    """(m, 3) values on the surface cut open: step 3 (Eq. 13), with constants of φ₀: ``(M + w² C) φ = M φ₀ + w² b``.
 
-    It minimises ``∫ (φ − φ₀)² + w² ∫ |∇φ − Y|²`` on the surface cut open: step 3 (Eq. 13), with the constants of φ₀.
-
-    Parameters
-    ----------
-    triangles, pairs : IntrinsicMesh, FacePairs
-        The surface.
-    directions : (m,) complex
-        Y.
-    rough : (m, 3) float
-        φ₀ at the corners of the triangles.
-    cut : (p,) bool
-        The pairs of faces that the cut separates.
+    Shapes: `directions` Y (m,), `rough` φ₀ (m, 3) at the corners of the triangles, `cut` (p,) of the `pairs`.
     """
     opened = cut_open(triangles, pairs, cut)
     owner = opened.corner_vertices.ravel()

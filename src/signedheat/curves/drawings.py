@@ -143,11 +143,7 @@ def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
 def strokes_that_agree(
     lines: Sequence[Polyline], every_piece: bool = False, progress: Progress | None = None
 ) -> tuple[list[Polyline], CurvesTaken | None]:
-    """Strokes turned so that together they bound something, without those that bound nothing; and what was done.
-
-    The plane is a surface like others (`distance_to_pieces`): a rectangle of triangles around the drawing, with a rim
-    to which lines may run. It does not depend on where distance is asked.
-    """
+    """Strokes turned and left out as by `distance_to_pieces` on a rectangle around the drawing; and what was done."""
     if all(line.closed for line in lines):
         return list(lines), None
     bounds = bounds_around(lines)

@@ -205,11 +205,11 @@ def _retriangulated(
         return domain, conforming(discretization, sources)
     fits = conforms(discretization, sources)
     if isinstance(domain, TriangleMesh) and (intrinsic is True or (intrinsic == "auto" and is_spoiled(domain))):
-        angle, coarsest = (28.0, np.inf) if intrinsic is True else (ANGLE, COARSEST)
+        angle = 28.0 if intrinsic is True else ANGLE
         ways = (sources,) if intrinsic is True else ((), sources)  # unoriented curves along edges must keep these
         try:
             for keep in ways:
-                refined = intrinsic_delaunay(domain, keep, refine=True, angle=angle, coarsest=coarsest)
+                refined = intrinsic_delaunay(domain, keep, refine=True, angle=angle, coarsest=COARSEST)
                 if conforms(surface := _lowered(refined), sources):
                     return refined, surface
         except GeometryError:  # faces too thin
@@ -275,14 +275,10 @@ def corner_slopes(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) 
 def jump_problem(
     triangles: IntrinsicMesh, pairs: FacePairs, slopes: NDArray[np.float64], guarded: NDArray[np.bool_]
 ) -> JumpProblem:
-    """The objective of Eq. 16, with one constant per face as unknowns, and the curl κ of Eq. 15 in its weights.
-
-    The jumps at the two ends of an edge e differ by κ |e|, whatever the constants are. What they jump beyond that costs
-    `SOURCE_WEIGHT` times as much across guarded edges.
-    """
+    """The objective of Eq. 16, with one constant per face as unknowns, and the curl κ of Eq. 15 in its weights."""
     offsets = pairs.ends(slopes)
     length = triangles.edge_lengths[pairs.faces[:, 0], pairs.sides[:, 0]]
-    spread = np.abs(offsets[:, 1] - offsets[:, 0])
+    spread = np.abs(offsets[:, 1] - offsets[:, 0])  # κ |e|, whatever the constants are
     weights = length * np.exp(-spread / length) * pairs.shares
     dear = np.where(guarded[pairs.edges], SOURCE_WEIGHT, 1.0)
     return JumpProblem(
@@ -309,10 +305,7 @@ def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> N
 def centered(
     triangles: IntrinsicMesh, values: NDArray[np.float64], parts: Sequence[CurveSegments]
 ) -> NDArray[np.float64]:
-    """Values shifted so that their median over the source is zero, on every connected component of the surface.
-
-    The median is weighted by length, and is robust to jumps that reach the source. Components without a source are NaN.
-    """
+    """Values whose median over the source is zero, by length, on every component; NaN where there is no source."""
     label = triangles.face_components
     faces, heights, weights = [], [], []
     for part in parts:

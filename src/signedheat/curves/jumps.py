@@ -114,28 +114,9 @@ def minimize(
     progress: Callable[[float], None] | None = None,
     enough: Callable[[NDArray[np.float64]], bool] | None = None,
 ) -> JumpSolution:
-    """ADMM (Boyd et al. 2011) on ``min Σ 2w dist(z, [a, b])  s.t.  z = K c``, with one factorisation for all rounds.
+    """Minimise ``Σ 2w dist(z, [a, b])`` with z = K c by ADMM until the gap is certified, or constants are `enough`.
 
-    Penalties proportional to w make the threshold of the proximal step the same length for all edges, which can change
-    without a new factorisation. The multipliers, projected on conserved flows, certify the result.
-
-    Parameters
-    ----------
-    problem : JumpProblem
-        The problem.
-    tolerance : float
-        Stop when the certified `JumpSolution.gap` is below this.
-    max_rounds : int
-        Largest number of iterations.
-    progress : callable, optional
-        Called with the fraction of `max_rounds` done.
-    enough : callable, optional
-        Called with constants whose gap is below `LOOSE`; if it returns True, no better ones are sought.
-
-    Returns
-    -------
-    JumpSolution
-        The best constants found.
+    Penalties proportional to w give all edges the same threshold, which can grow without a new factorisation.
     """
     if not len(problem.faces):
         return JumpSolution(np.zeros(problem.n_faces), problem.floor, problem.floor, 0)
@@ -181,12 +162,7 @@ def minimize(
 
 
 def regions_moved(problem: JumpProblem, constants: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Constants with regions shifted, each to where it costs least, until jumps separate none from all others.
-
-    For many rounds a jump is divided between cuts of nearly equal cost, between which regions lie that could as well
-    be shifted to either side: this moves all of it to one of them. The smallest region is shifted first. Its cost is
-    least at a weighted median, where it is joined to a neighbor.
-    """
+    """Constants with regions between cuts of equal cost moved to a neighbour, smallest first, by weighted medians."""
     constants = constants.copy()
     for _ in range(problem.n_faces):  # each leaves one region less
         difference = problem.differences(constants)

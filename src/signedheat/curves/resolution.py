@@ -33,11 +33,7 @@ def on_resolving_triangles(
     curves: CurvesAndPoints,
     always: bool = False,
 ) -> Found:
-    """What is measured on triangles that resolve the curves: those of the mesh, or smaller ones for small curves.
-
-    Meshes that are too thin to be triangulated anew, and other surfaces, are taken as they are. On loops inside single
-    triangles, which those cannot see, triangles are made that do.
-    """
+    """What is measured on triangles that resolve the curves: those of the mesh, or smaller ones where needed."""
     mesh = solver.domain
     if isinstance(mesh, TriangleMesh) and (always or are_small(solver, curves)):
         try:
@@ -64,9 +60,7 @@ def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
 
 
 def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveOrPoints]) -> SignedHeatSolver[Surface]:
-    """The solver, on the triangles made for the curves if it makes some, which then do for some of them, too, and
-    whichever way they run.
-    """
+    """The solver with the triangles that it makes for the curves, which then serve some of the curves, too."""
     made = solver.discretization
     if not isinstance(made, Retriangulated):
         return solver

@@ -148,11 +148,7 @@ class Decision:
         return not self.bounds_nothing and bool((self.best.explained[~self.loose] >= EXPLAINED).all())
 
     def turned_loops(self) -> NDArray[np.int64]:
-        """Numbers of the pieces turned of loops of which nearly half of the length is turned, or more.
-
-        None if these pieces are a smaller share of all strokes; or if a complete curve is in another loop: that curve
-        shows how the others face.
-        """
+        """Numbers of the pieces turned of loops that are mostly turned, unless they are few or a loop is complete."""
         strokes, best = self.pieces.strokes, self.best
         triangles = strokes.surface.triangles
         signs = best.sides[triangles.corner_vertices]
@@ -175,11 +171,9 @@ class Decision:
         return self.pieces.curves(found & (not few) & (not complete))
 
     def worth_little(self) -> NDArray[np.int64]:
-        """Numbers of the curves on which the inside hangs, and that are worth less than half of their length.
+        """Numbers of the curves without which the inside is another, and the least energy rises by little.
 
-        What a stroke is worth is by how much the least energy rises without it. An arc alone is worth its length less
-        that of its gap, a stroke that fills a gap of others more than its length, and a stray one little, because lines
-        are added for it, or others ignored. On a stroke that was drawn again nothing hangs.
+        An arc alone is worth its length less that of its gap, a stray stroke little, because lines are added for it.
         """
         strokes, best, areas = self.pieces.strokes, self.best, self.pieces.strokes.areas
         missing = cost(strokes, best) + strokes.lengths.sum()  # a stroke is worth its length less this, or more
@@ -204,10 +198,7 @@ def order_in_space(places: Sequence[NDArray[np.float64]]) -> NDArray[np.int64]:
 def likely_curves(
     ends: NDArray[np.float64], stroke: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Which strokes are likely to be one curve, by the (2 j, 3) ends of the j curves that they are made of; its gaps.
-
-    Shapes: `stroke` (j,); returned: group (k,) of each stroke, and the length of the gaps of each group (g,).
-    """
+    """(k,) group of strokes that are likely to be one curve, and (g,) length of its gaps; from (2 j, 3) ends."""
     j = len(stroke)
     nearest = nearest_others(ends)
     tails, heads = np.concatenate([nearest, np.stack([np.arange(j), j + stroke], axis=1)]).T
@@ -234,11 +225,9 @@ def is_piece(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
 
 
 def decide(pieces: Pieces) -> Decision:
-    """The directions of strokes for which the inside costs least; only some strokes may be turned.
+    """The directions of strokes for which the inside costs least; only movable strokes may be turned.
 
-    A cut gives the sides for directions, and sides give directions: from several starts both are improved in turn, then
-    by turning strokes one by one. Where more of the curves is gone than there is, only ends that are near each other
-    are evidence, and sides are taken to be smooth.
+    Cuts and directions are improved in turn; where more of the curves is gone than there is, sides are smooth instead.
     """
     strokes, movable = pieces.strokes, pieces.movable
     smooth = np.where(movable, smooth_signs(strokes, movable), 1.0)
@@ -292,10 +281,7 @@ def misfit(strokes: Strokes, inside: Inside) -> float:
 
 
 def turnable(strokes: Strokes, inside: Inside, movable: NDArray[np.bool_]) -> list[list[int]]:
-    """Strokes that could bound more if turned: those that bound nothing, and others that may be the reason for it.
-
-    These are, too, all that are likely to be one curve.
-    """
+    """Strokes to turn together or alone: those that bound nothing, others that may be the reason, and whole curves."""
     explained = inside.explained >= EXPLAINED
     loose, others = np.flatnonzero(movable & ~explained), np.flatnonzero(movable & explained)
     longest = [longest_of(strokes, rows).tolist() for rows in (loose, others)]

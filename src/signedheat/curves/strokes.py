@@ -143,11 +143,9 @@ class Strokes:
 
     @cached_property
     def agreed(self) -> NDArray[np.float64]:
-        """(k, k) minus the energy that sides with a jump of 1 across two strokes have more than across each alone.
+        """(k, k) by how much ∫ |∇u|² is less for u that jumps by 1 across two strokes than for jumps across each alone.
 
-        Energy is ∫ |∇u|² of sides u that are smooth but for the jumps: those across strokes that follow each other
-        have less together. It is the same on all triangles of a surface, except that jumps within a width of each other
-        count as one: a stroke agrees with its copy.
+        Strokes that follow each other agree, and those within a width of each other, as copies do.
         """
         surface, fluxes = self.surface, self.fluxes
         masses = sparse.diags(self.areas)
@@ -180,10 +178,7 @@ class Strokes:
         return self._found[key]
 
     def either_way(self, inside: Inside) -> float:
-        """Area that could as well be inside: that of least energy is the smallest of all that differ by rounding.
-
-        None if the same strokes bound both: then they differ in the stairs by which the same gaps are closed.
-        """
+        """Area between the smallest and the largest inside of least energy, if other strokes bound the largest."""
         labels = self.surface.triangles.face_components
         parts = np.zeros(self.surface.triangles.n_vertices, dtype=np.int64)
         parts[self.surface.triangles.corner_vertices] = labels[:, None]
@@ -221,10 +216,7 @@ class Strokes:
 
 
 def fluxes_across(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> sparse.csr_matrix:
-    """(k, n) sparse integrals along curves of the slopes of hat functions in the direction in which φ grows.
-
-    Along an edge the mean of the slopes in its faces is taken.
-    """
+    """(k, n) sparse integrals along curves of the slopes of hat functions to their left, along edges of both faces."""
     placed = PlacedSegments.of(triangles, parts)
     owners = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])[placed.given]
     grows = 1j * np.diff(placed.positions, axis=1) * placed.sides[:, None]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -29,7 +29,7 @@ SMALL = 10.0
 ANGLE = 20.0
 """Smallest angle of "auto", in degrees: the vertices that 28 would take are better spent on large triangles."""
 COARSEST = 1.41
-"""Circumradius of the largest triangles of "auto", over the mean one: curves on larger ones are not resolved."""
+"""Circumradius of the largest triangles, over the mean one: larger ones resolve neither curves nor directions."""
 BYTES_REFINED = 750
 """Memory of each triangle of a refinement, besides that of distance on it."""
 SHARE_OF_PIECE = 0.5
@@ -50,10 +50,11 @@ class Retriangulated:
 
     mesh: TriangleMesh
     progress: Progress | None = field(default=None, repr=False)
+    coarsest: ClassVar[float] = COARSEST
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Refine the mesh intrinsically, with the sources along edges."""
-        return refined(self.mesh, self.progress, sources).adapt(sources)
+        return refined(self.mesh, self.progress, sources, coarsest=self.coarsest).adapt(sources)
 
 
 class RetriangulatedForZeroSet(Retriangulated):
@@ -62,6 +63,8 @@ class RetriangulatedForZeroSet(Retriangulated):
     With the t of large triangles, the pieces of a curve smaller than these would be one blot of heat, without the
     curve's course between them. Gaps are about as long as pieces, or shorter. Of several curves the smallest counts.
     """
+
+    coarsest: ClassVar[float] = np.inf
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         surface, groups = super().adapt(sources)
@@ -82,7 +85,7 @@ def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
     """
     if isinstance(domain, TriangleMesh) and is_spoiled(domain):
         try:
-            return refined(domain, progress, (), ANGLE, COARSEST)
+            return refined(domain, progress, angle=ANGLE)
         except GeometryError:
             pass
     return discretize(domain)
@@ -103,7 +106,7 @@ def refined(
     progress: Progress | None = None,
     keep: Sequence[Any] = (),
     angle: float = 28.0,
-    coarsest: float = np.inf,
+    coarsest: float = COARSEST,
 ) -> SurfaceDiscretization:
     """Discretise a mesh by its intrinsic Delaunay refinement; fields are reported on the mesh, and kept on both."""
     refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", more=BYTES_REFINED * mesh.n_faces)  # which only grow
