@@ -81,7 +81,11 @@ def test_samples_for_trainers(tmp_path, folder, capsys):
             ahead, behind = np.abs(places - high) < 1e-6, np.abs(places - low) < 1e-6
             assert ((ahead | behind).sum(axis=1) >= fixed).all()
             np.testing.assert_allclose(normals * length, ahead.astype(float) - behind, atol=1e-6)
-        for name in ("vol", "random_near", "sharp_near"):
+        near = "vol", "random_near", "sharp_near"  # as documented by hy3dshape/tools of Hunyuan3D 2.1
+        assert set(on) == {"random_surface", "sharp_surface"}
+        assert set(around) == {f"{name}_{kind}" for name in near for kind in ("points", "label")}
+        for name in near:
+            assert (around[f"{name}_points"].shape, around[f"{name}_label"].shape) == ((300, 3), (300,))
             expected = distance_to_box(around[f"{name}_points"], low, high)
             np.testing.assert_allclose(around[f"{name}_label"], expected, atol=1e-6)
     figures(tmp_path, capsys, folder / "plank.ply", "--sample", "300", "--normalize")

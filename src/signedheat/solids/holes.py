@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError, SignedHeatError, SourceError
 from ..foreign import ForeignShape, converted
 from ..memory import within_memory
 from ..mesh.components import element_components
 from ..mesh.edges import edge_table
 from ..mesh.welding import same_positions
-from ..surfaces.polygon_mesh import PolygonMesh, Polygons
+from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import element_ids, positive_number
 from .bounding import Bounding, bounding
@@ -24,12 +24,11 @@ from .closing import NONE, closed_by
 from .completion import Lids
 from .rims import boundary, loops
 
-Rims = Sequence[NDArray[np.int64]]
+Rims = Sequence[Ints]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class FilledMesh(TriangleMesh):
-    """Triangles whose holes were closed by `fill_holes`: those that were given, then new ones.
+class Filled:
+    """What `fill_holes` says of the mesh that it returns.
 
     Attributes
     ----------
@@ -41,26 +40,17 @@ class FilledMesh(TriangleMesh):
         Vertices around each rim that is open still: holes that are larger, outlines of sheets.
     """
 
-    origins: NDArray[np.int64]
+    origins: Ints
     filled: Rims
     left: Rims
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike, origins: NDArray[np.int64], filled: Rims, left: Rims):
-        super().__init__(vertices, faces)
-        vars(self).update(origins=origins, filled=filled, left=left)
+
+class FilledMesh(Filled, TriangleMesh):
+    """Triangles whose holes were closed by `fill_holes`: those that were given, then new ones; see `Filled`."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class FilledPolygonMesh(PolygonMesh):
-    """Polygons whose holes were closed, like `FilledMesh`: those that were given, then triangles."""
-
-    origins: NDArray[np.int64]
-    filled: Rims
-    left: Rims
-
-    def __init__(self, vertices: ArrayLike, polygons: Polygons, origins: NDArray[np.int64], filled: Rims, left: Rims):
-        super().__init__(vertices, polygons)
-        vars(self).update(origins=origins, filled=filled, left=left)
+class FilledPolygonMesh(Filled, PolygonMesh):
+    """Polygons whose holes were closed: those that were given, then triangles; see `Filled`."""
 
 
 @overload
@@ -151,21 +141,22 @@ def fill_holes(
     added = _as_neighbours(faces, turned, added)
     added = np.where(added < given.n_vertices, added, added - virtual)
     points = np.concatenate([given.vertices, points[len(vertices) :]])
+    n = given.n_polygons if isinstance(given, PolygonMesh) else given.n_faces
+    made: FilledMesh | FilledPolygonMesh
     if isinstance(given, PolygonMesh):
-        origins = np.append(np.arange(given.n_polygons), np.full(len(added), -1))
-        return FilledPolygonMesh(points, [*given.polygons, *added], origins, filled, left)
-    origins = np.append(np.arange(given.n_faces), np.full(len(added), -1))
-    return FilledMesh(points, np.concatenate([given.faces, added]), origins, filled, left)
+        made = FilledPolygonMesh(points, [*given.polygons, *added])
+    else:
+        made = FilledMesh(points, np.concatenate([given.faces, added]))
+    vars(made).update(origins=np.append(np.arange(n), np.full(len(added), -1)), filled=filled, left=left)
+    return made
 
 
-def _length(corners: NDArray[np.float64]) -> float:
+def _length(corners: Floats) -> float:
     """Length of a closed loop."""
     return float(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1).sum())
 
 
-def _holes(
-    around: Rims, lengths: NDArray[np.float64], faces: NDArray[np.int64], decided: Bounding, used: NDArray[np.int64]
-) -> NDArray[np.bool_]:
+def _holes(around: Rims, lengths: Floats, faces: Ints, decided: Bounding, used: Ints) -> Bools:
     """(l,) which loops are holes: along what bounds, scraps of it included; of sheets, all of one but its longest."""
     n = int(faces.max(initial=-1)) + 1
     keys = (faces * n + np.roll(faces, -1, axis=1)).ravel()
@@ -183,11 +174,11 @@ def _holes(
             if piece not in longest or lengths[k] > lengths[longest[piece]]:
                 longest[piece] = k
     outlines = np.isin(np.arange(len(around)), list(longest.values()))
-    result: NDArray[np.bool_] = chosen | ((single >= 0) & ~outlines)
+    result: Bools = chosen | ((single >= 0) & ~outlines)
     return result
 
 
-def _through(around: Rims, vertices: NDArray[np.float64], named: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _through(around: Rims, vertices: Floats, named: Ints) -> Bools:
     """(l,) which loops pass through a vertex of those named, or another one at its place."""
     places = same_positions(vertices)
     there = [np.isin(places[named], places[loop]) for loop in around]
@@ -198,7 +189,7 @@ def _through(around: Rims, vertices: NDArray[np.float64], named: NDArray[np.int6
     return np.array([hits.any() for hits in there], dtype=bool)
 
 
-def _as_neighbours(faces: NDArray[np.int64], turned: NDArray[np.bool_], added: NDArray[np.int64]) -> NDArray[np.int64]:
+def _as_neighbours(faces: Ints, turned: Bools, added: Ints) -> Ints:
     """New faces, turned where most of the faces along their edges were turned from the way that they were given."""
     if not len(added):
         return added
