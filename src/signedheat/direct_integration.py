@@ -192,10 +192,7 @@ class DirectIntegration(Frozen):
 
 
 def _grounded(matrix: sparse.csr_matrix, vertices: Ints) -> sparse.csr_matrix:
-    """Make the matrix definite by larger entries at some vertices.
-
-    Since b sums to zero on each connected component, the solution is zero at these vertices.
-    """
+    """Make the matrix definite by larger entries at one vertex of each component, where the solution is then zero."""
     data = matrix.data.copy()
     diagonal = matrix.indptr[vertices]
     data[diagonal] += np.where(data[diagonal] > 0, data[diagonal], 1.0)

@@ -58,10 +58,9 @@ def run_limited(job: Callable[[], Any], seconds: float) -> Any:
 
 
 def command_for(entry: str, *arguments: str) -> list[str]:
-    """Make the command that calls a function, given as ``"module:name"``, in a new Python process.
+    """Make the command that calls a function, as ``"module:name"``, in a new Python process.
 
-    The process can import what this one can, but nothing from the current folder, which ``python -c`` and
-    `multiprocessing` would search first.
+    It can import what this one can, and nothing from the current folder, which ``python -c`` would search first.
     """
     path = [os.path.abspath(folder) for folder in sys.path if folder]
     return [sys.executable, "-I", "-c", RUN, json.dumps(path), entry, *arguments]

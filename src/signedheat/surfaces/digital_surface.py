@@ -333,10 +333,9 @@ def count_surfels(volume: Bools) -> int:
 
 
 def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: float) -> Floats:
-    """(m, 3) unit normals: mean area vectors of the surfels around each, by a Gaussian of standard deviation radius/2.
+    """(m, 3) unit normals: mean area vectors around each surfel, by a Gaussian of standard deviation radius/2.
 
-    By the divergence theorem that mean is the negative gradient of the blurred volume. A radius of 0 gives the
-    surfels' own normals.
+    By the divergence theorem that is the negative gradient of the blurred volume; with radius 0 the surfels' own.
     """
     own = np.zeros((len(surfels.axes), 3))
     own[np.arange(len(own)), surfels.axes] = surfels.signs

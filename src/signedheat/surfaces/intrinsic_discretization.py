@@ -79,10 +79,7 @@ class RetriangulatedForZeroSet(Retriangulated):
 
 
 def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
-    """Discretise a domain; refine triangle meshes with many large or small angles intrinsically.
-
-    Those whose faces are too thin for that stay as they are, with the note `LargeAngles`.
-    """
+    """Discretise a domain; refine meshes with many large or small angles, unless faces are too thin for that."""
     if isinstance(domain, TriangleMesh) and is_spoiled(domain):
         try:
             return refined(domain, progress, angle=ANGLE)

@@ -201,11 +201,7 @@ def transfer_forward(
     barycentric: Floats,
     vectors: Floats,
 ) -> None:
-    """Transfer points and vectors at them from the first triangulation of a history to the last, in place.
-
-    Every point takes only the steps that change its face. `first` and `later` are from `find_successors`; for the rest
-    see `transfer_backward`.
-    """
+    """Transfer points and vectors as `transfer_backward`, forward; `first` and `later` are from `find_successors`."""
     around, start = np.empty(3, np.int64), np.zeros(3, np.int64)
     for p in range(len(faces)):
         n = first[faces[p]]

@@ -263,10 +263,7 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
 
 @kernel
 def too_near(g: Gluing, h: int, f: int, px: float, py: float) -> bool:
-    """Whether p, the circumcentre of the face with shortest side h in the frame of face f, is too near a corner of f.
-
-    Only rounding can make it so: in a Delaunay triangulation no vertex is nearer than the circumradius.
-    """
+    """Whether p, the circumcentre for shortest side h, is too near a corner of face f, which only rounding can do."""
     n, d = tangent_at(g, preceding(h))
     radius = 0.25 * g.length[g.edge[h]] * (n + d) / np.sqrt(n * d)
     x, y = apex_position(g, 3 * f)
@@ -476,10 +473,7 @@ INSIDE, BLOCKED, LOST = 0, 1, 2
 
 @kernel
 def unfold(g: Gluing, h: int, side: int, tx: float, ty: float, hx: float, hy: float) -> tuple[float, float, int]:
-    """Unfold the face on the other side of halfedge h, which runs from (tx, ty) to (hx, hy): its apex and its sense.
-
-    `side` is 1 where the face of h is laid out counter-clockwise, −1 where clockwise; so is the sense returned.
-    """
+    """Unfold the face beyond halfedge h, from (tx, ty) to (hx, hy): its apex, and its side, 1 if counter-clockwise."""
     t = g.sibling[h]
     if g.forward[t] == g.forward[h]:
         side = -side
@@ -548,10 +542,7 @@ def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, float, float]:
 
 @kernel
 def encroached(g: Gluing, f: int, px: float, py: float, ends: Floats, halfedges: Ints) -> int:
-    """Find a segment that p encroaches upon: visible from p, which lies in its diametral circle; −1 if there is none.
-
-    p is given in the frame of face f. `ends` and `halfedges` are work arrays for the search.
-    """
+    """Find a segment that p, in the frame of face f, sees and that has p in its diametral circle; −1 if none."""
     x, y = np.zeros(3), np.zeros(3)
     x[1] = g.length[g.edge[3 * f]]
     x[2], y[2] = apex_position(g, 3 * f)

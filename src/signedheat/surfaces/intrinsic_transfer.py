@@ -42,11 +42,7 @@ class ConformingRefinement(Frozen):
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments], heights: Floats) -> ConformingRefinement:
-        """Cut faces along all segments inside them, and put vertices at all points of the sources.
-
-        Faces are sorted by the heights (n,) of the vertices, so that nothing depends on the order in which they were
-        given.
-        """
+        """Cut faces along segments, put vertices at points, and sort faces by heights (n,), not as they were given."""
         finer, parents, corners = triangles, np.arange(triangles.n_faces), np.eye(3)[None]
         along = np.empty(0, dtype=np.int64)
         if parts:

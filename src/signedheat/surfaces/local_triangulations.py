@@ -278,11 +278,7 @@ def nonoverlapping_triangles(planes: TangentPlanes, triangles: Ints) -> Ints:
 
 
 def split_at_points_left(points: Floats, faces: Ints, candidates: Ints) -> Ints:
-    """Split the triangle nearest to each point that has candidates but no triangle in three.
-
-    Tangent planes around such a point differ so much that each triangle proposed at it overlaps others. Points without
-    candidates are outliers.
-    """
+    """Split the triangle nearest to each point whose candidates all overlap others; those without any are outliers."""
     while len(left := np.setdiff1d(candidates, faces)):
         nearest, _ = TriangleTree.of(points[faces]).nearest(points[left])
         split, first = np.unique(nearest, return_index=True)
@@ -415,11 +411,7 @@ MOST_SIDES = 12
 
 
 def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
-    """Triangles that fill holes of at most `MOST_SIDES` sides, without edges that exist already.
-
-    A boundary loop is a hole if the faces lie outside it. Faces must run counter-clockwise as seen from their normals,
-    except across a few edges, and an edge must have at most two of them.
-    """
+    """Fill holes of at most `MOST_SIDES` sides, which faces surround, by triangles without edges that exist already."""
     edges = edge_table(faces)
     face, side = np.nonzero(edges.face_counts[edges.face_edges] == 1)
     tails, heads = faces[face, side], faces[face, (side + 1) % 3]

@@ -163,10 +163,7 @@ def _shared(signs: Floats, groups: Ints) -> Floats:
 
 
 def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = False) -> tuple[Links, bool]:
-    """Link the signs of axes (n, 3) by balls and by neighbours; return also whether there were balls.
-
-    Node n is the outside, whose sign is 1. Points in a plane have no tets, and no links with the outside.
-    """
+    """Link the signs of axes (n, 3) by neighbours, balls, and with the outside, node n; say whether there are balls."""
     near = _neighbor_links(places, axes, 1.0 if noisy else DIRECT_WEIGHT)
     moves = np.random.default_rng(0).uniform(-1, 1, places.shape) * (JOGGLE * reaches[:, None])
     try:

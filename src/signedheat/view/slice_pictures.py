@@ -103,10 +103,7 @@ def draw_slices(
 
 
 def clearest_layer(field: GridField, axis: int) -> int:
-    """Choose the layer across an axis with most nodes inside or, if there are none, near the zero set.
-
-    Of equal layers, it is the one closest to the middle.
-    """
+    """Choose the layer across an axis, near the middle, with most nodes inside or, if there are none, near zero."""
     inside = field.values < 0
     if not inside.any():
         inside = np.abs(field.values) < 1.5 * field.grid.spacing.max()
