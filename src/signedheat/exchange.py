@@ -278,7 +278,10 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         >>> sh.samples.sphere(1).to_trimesh().is_watertight
         True
         """
-        return to_trimesh(self._elements)
+        shape = self._elements
+        if not len(shape.counts):
+            return trimesh.PointCloud(np.array(shape.points))
+        return trimesh.Trimesh(np.array(shape.points), _triangles_only(shape, "trimesh"), process=False)
 
     @classmethod
     def from_pyvista(cls: type[Kind], thing: object) -> Kind:
@@ -306,7 +309,14 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         return cls._of(from_pyvista(thing))
 
     def to_pyvista(self) -> pyvista.PolyData:
-        return to_pyvista(self._elements)
+        shape = self._elements
+        points, corners, counts = np.array(shape.points), shape.corners, shape.counts
+        if len(counts):
+            return pyvista.PolyData(points, np.insert(corners, np.cumsum(counts) - counts, counts))
+        cloud = pyvista.PolyData(points)
+        if shape.normals is not None:
+            cloud.point_data["Normals"] = np.array(shape.normals)
+        return cloud
 
     @classmethod
     def from_meshio(cls: type[Kind], thing: object) -> Kind:
@@ -346,7 +356,21 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         >>> sh.samples.sphere(1).to_meshio().cells[0].type
         'triangle'
         """
-        return to_meshio(self._elements)
+        shape = self._elements
+        points, corners, counts = np.array(shape.points), shape.corners, shape.counts
+        if not len(counts):
+            normals = (
+                {} if shape.normals is None else dict(zip(("nx", "ny", "nz"), shape.normals.T.copy(), strict=True))
+            )
+            return meshio.Mesh(points, [("vertex", np.arange(len(points))[:, None])], point_data=normals)
+        starts = np.cumsum(counts) - counts
+        change = np.flatnonzero(np.diff(counts, prepend=-1))  # a block has faces of one kind; the order is kept
+        cells = []
+        for first, last in zip(change, [*change[1:], len(counts)], strict=True):
+            sides = int(counts[first])
+            name = next((name for name, n in _SIDES.items() if n == sides), "polygon")
+            cells.append((name, corners[starts[first] : starts[first] + sides * (last - first)].reshape(-1, sides)))
+        return meshio.Mesh(points, cells)
 
     @classmethod
     def from_open3d(cls: type[Kind], thing: object) -> Kind:
@@ -382,7 +406,15 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         >>> import signedheat as sh
         >>> sh.samples.sphere(1).to_open3d()  # doctest: +SKIP
         """
-        return to_open3d(self._elements)
+        shape = self._elements
+        points = open3d.utility.Vector3dVector(np.array(shape.points))
+        if not len(shape.counts):
+            cloud = open3d.geometry.PointCloud(points)
+            if shape.normals is not None:
+                cloud.normals = open3d.utility.Vector3dVector(np.array(shape.normals))
+            return cloud
+        faces = open3d.utility.Vector3iVector(_triangles_only(shape, "Open3D").astype(np.int32))
+        return open3d.geometry.TriangleMesh(points, faces)
 
 
 def from_trimesh(thing: Any) -> Elements:
@@ -394,13 +426,6 @@ def from_trimesh(thing: Any) -> Elements:
     if not hasattr(thing, "vertices") or hasattr(thing, "entities"):
         raise _no_shape(thing, "a Trimesh, PointCloud or Scene", "lines in the plane are a signedheat.Polyline")
     return Elements.of_triangles(np.asarray(thing.vertices), getattr(thing, "faces", ()))
-
-
-def to_trimesh(shape: Elements) -> Any:
-    """As a `trimesh.Trimesh` (not processed: nothing is merged) or `trimesh.PointCloud`."""
-    if not len(shape.counts):
-        return trimesh.PointCloud(np.array(shape.points))
-    return trimesh.Trimesh(np.array(shape.points), _triangles_only(shape, "trimesh"), process=False)
 
 
 def from_pyvista(thing: Any) -> Elements:
@@ -450,17 +475,6 @@ def tets_of_pyvista(grid: Any) -> Ints:
     return np.asarray(cells[_VTK_TETRA], dtype=np.int64)
 
 
-def to_pyvista(shape: Elements) -> Any:
-    """As a `pyvista.PolyData`; normals of points are point data ``Normals``."""
-    points, corners, counts = np.array(shape.points), shape.corners, shape.counts
-    if len(counts):
-        return pyvista.PolyData(points, np.insert(corners, np.cumsum(counts) - counts, counts))
-    cloud = pyvista.PolyData(points)
-    if shape.normals is not None:
-        cloud.point_data["Normals"] = np.array(shape.normals)
-    return cloud
-
-
 def from_meshio(thing: Any, as_points: bool = False) -> Elements:
     """From a `meshio.Mesh`: its triangles, quadrilaterals and polygons, block after block; or else its tets.
 
@@ -493,22 +507,6 @@ def tets_of_meshio(mesh: Any) -> Ints:
     return np.concatenate(blocks)
 
 
-def to_meshio(shape: Elements) -> Any:
-    """As a `meshio.Mesh`; normals of points are point data ``nx``, ``ny``, ``nz``."""
-    points, corners, counts = np.array(shape.points), shape.corners, shape.counts
-    if not len(counts):
-        normals = {} if shape.normals is None else dict(zip(("nx", "ny", "nz"), shape.normals.T.copy(), strict=True))
-        return meshio.Mesh(points, [("vertex", np.arange(len(points))[:, None])], point_data=normals)
-    starts = np.cumsum(counts) - counts
-    change = np.flatnonzero(np.diff(counts, prepend=-1))  # a block has faces of one kind; the order is kept
-    cells = []
-    for first, last in zip(change, [*change[1:], len(counts)], strict=True):
-        sides = int(counts[first])
-        name = next((name for name, n in _SIDES.items() if n == sides), "polygon")
-        cells.append((name, corners[starts[first] : starts[first] + sides * (last - first)].reshape(-1, sides)))
-    return meshio.Mesh(points, cells)
-
-
 def from_open3d(thing: Any) -> Elements:
     """From a `TriangleMesh` or `PointCloud` of ``open3d.geometry`` or ``open3d.t.geometry``."""
     tensors = getattr(thing, "vertex", None) or getattr(thing, "point", None)
@@ -521,18 +519,6 @@ def from_open3d(thing: Any) -> Elements:
     points = np.asarray(thing.vertices if hasattr(thing, "triangles") else thing.points)
     normals = np.asarray(thing.normals) if hasattr(thing, "normals") and thing.has_normals() else None
     return Elements.of_triangles(points, np.asarray(getattr(thing, "triangles", ())), normals)
-
-
-def to_open3d(shape: Elements) -> Any:
-    """As a `TriangleMesh` or `PointCloud` of ``open3d.geometry``, with the normals of points."""
-    points = open3d.utility.Vector3dVector(np.array(shape.points))
-    if not len(shape.counts):
-        cloud = open3d.geometry.PointCloud(points)
-        if shape.normals is not None:
-            cloud.normals = open3d.utility.Vector3dVector(np.array(shape.normals))
-        return cloud
-    faces = open3d.utility.Vector3iVector(_triangles_only(shape, "Open3D").astype(np.int32))
-    return open3d.geometry.TriangleMesh(points, faces)
 
 
 def from_arrays(pair: Any) -> Elements:
