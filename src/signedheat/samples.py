@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Floats
 from .grids.grid import Grid
 from .grids.grid_field import GridField
 from .joining import joined_triangles
@@ -156,11 +155,7 @@ def oriented_points(mesh: TriangleMesh, n_points: int, seed: int = 0) -> PointCl
     """Draw random points on the surface, uniform in area, with the normals of their faces."""
     rng = np.random.default_rng(seed)
     face = rng.choice(mesh.n_faces, size=n_points, p=mesh.face_areas / mesh.face_areas.sum())
-    weights = _barycentric(rng, n_points)
+    root, share = np.sqrt(rng.random(n_points)), rng.random(n_points)
+    weights = np.stack([1 - root, root * (1 - share), root * share], axis=1)
     points = np.einsum("ij,ijk->ik", weights, mesh.vertices[mesh.faces[face]])
     return PointCloud(points, mesh.face_area_vectors[face])
-
-
-def _barycentric(rng: np.random.Generator, n: int) -> Floats:
-    root, share = np.sqrt(rng.random(n)), rng.random(n)
-    return np.stack([1 - root, root * (1 - share), root * share], axis=1)

@@ -91,7 +91,7 @@ def lowered_for_times(discretization: Discretization, sources: Sequence[Any], di
             "directions are extrapolated in time on surfaces only", remedy="pass a number", element="diffusion"
         )
     at_ends = replace(source, time=AT_ENDS * source.time)
-    if source.ends_everywhere:
+    if all(source.ending[part.nodes.faces].all() for part in source.parts):  # no part has closed curves alone
         return [at_ends]
     everywhere = replace(source, extrapolated=True)
     return [everywhere, at_ends] if source.ending.any() else [everywhere]

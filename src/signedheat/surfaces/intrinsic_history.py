@@ -76,13 +76,6 @@ class History(Frozen):
         return first, later
 
     @cached_property
-    def new_vertices(self) -> tuple[Ints, Floats]:
-        """Positions on `before` of the vertices that only `after` has: faces and barycentric coordinates."""
-        count = self.after.n_vertices - self.before.n_vertices
-        faces, barycentric, _ = self.backward(np.full(count, -1), np.zeros((count, 3)))
-        return faces, barycentric
-
-    @cached_property
     def gluing_before(self) -> Gluing:
         """The gluing of `before`, to trace lines on."""
         return for_tracing(self.before)

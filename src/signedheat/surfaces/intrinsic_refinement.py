@@ -51,7 +51,8 @@ def refine_all(
     goal = Goal(np.tan(angle / 2) ** 2, np.inf, max_vertices)
     gluing, agenda, status = refined(gluing, agenda, goal, progress)
     if status == DONE and coarsest < np.inf:
-        goal = goal._replace(radius=coarsest * mean_radius(gluing))
+        mean_radius = float(np.sqrt(4 / 27**0.5 * lay_out(gluing).face_areas.mean())) / gluing.unit
+        goal = goal._replace(radius=coarsest * mean_radius)
         report = None if progress is None else lambda _: progress(1.0)  # it may cancel
         gluing, agenda, status = refined(gluing, agenda, goal, report)
     n_edges = int(gluing.counts[1])
@@ -79,11 +80,6 @@ def refined(
             agenda = agenda._replace(**{k: doubled(getattr(agenda, k)) for k in TO_GROW})
         if status not in (PAUSED, GROW):
             return gluing, agenda, status
-
-
-def mean_radius(gluing: Gluing) -> float:
-    """Circumradius of an equilateral triangle of the mean area of the faces, in the unit of the gluing."""
-    return float(np.sqrt(4 / 27**0.5 * lay_out(gluing).face_areas.mean())) / gluing.unit
 
 
 def close_faces(gluing: Gluing, agenda: Agenda) -> Bools:

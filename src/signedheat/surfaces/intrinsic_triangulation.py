@@ -120,7 +120,8 @@ class IntrinsicTriangulation(Displayed, Frozen):
         extra, corner = np.unique(cut.corner_vertices.ravel(), return_index=True)
         corner = corner[extra >= self.mesh.n_vertices]
         put = self.refinement.pull_back(corner // 3, np.eye(3)[corner % 3])
-        new = self.refinement.pull_back(*self.history.new_vertices)
+        count = self.n_vertices - self.history.before.n_vertices
+        new = self.refinement.pull_back(*self.history.backward(np.full(count, -1), np.zeros((count, 3)))[:2])
         return np.concatenate([faces, put[0], new[0]]), np.concatenate([weights, put[1], new[1]])
 
     @cached_property

@@ -136,7 +136,8 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False, groups: In
     if len(rest):
         signs[rest] = _followed(places, axes[chosen] * signs[chosen, None], fits.places[rest], axes[rest])
     coherence = links.coherence(found)
-    signs = signs if groups is None else _shared(signs, groups)
+    if groups is not None:  # the sign of the majority of each group
+        signs = np.where(np.bincount(groups, signs) >= 0, 1.0, -1.0)[groups]
     if given and min((signs < 0).mean(), (signs > 0).mean()) <= MOST_WRONG * (1 - coherence):
         signs = np.full(n, 1.0 if signs.sum() >= 0 else -1.0)
     return OutwardSigns(signs, sided, coherence)
@@ -155,11 +156,6 @@ def _followed(places: Floats, normals: Floats, others: Floats, axes: Floats) -> 
     weights = 1.0 / (distances + 1e-9 * max(float(distances.max()), np.finfo(float).tiny))
     cosines = np.einsum("nj,nkj->nk", axes, normals[near])
     return np.where((weights * cosines * np.abs(cosines)).sum(axis=1) >= 0, 1.0, -1.0)
-
-
-def _shared(signs: Floats, groups: Ints) -> Floats:
-    """Signs of the majority of each group."""
-    return np.where(np.bincount(groups, signs) >= 0, 1.0, -1.0)[groups]
 
 
 def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = False) -> tuple[Links, bool]:

@@ -184,7 +184,10 @@ def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> Virtua
     Triangles are not subdivided. A polygon so far from convex that a triangle of its fan would turn over is cut along
     diagonals instead. A corner that equals the one before it is skipped.
     """
-    corners, polygons = _without_repeats(corners, offsets)
+    before = np.roll(corners, 1)
+    before[offsets[:-1]] = corners[offsets[1:] - 1]
+    differs = corners != before
+    corners, polygons = corners[differs], np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))[differs]
     counts = np.bincount(polygons, minlength=len(offsets) - 1)
     begin = np.cumsum(counts) - counts
     following = np.arange(1, len(corners) + 1)
@@ -255,15 +258,6 @@ def _cut(polygon: Floats) -> Ints:
     center = np.broadcast_to(polygon.mean(axis=0), polygon.shape)
     normal = area_vectors(np.stack([polygon, np.roll(polygon, -1, axis=0), center], axis=1)).sum(axis=0)
     return np.sort(cut_into_ears(polygon, normal), axis=1)
-
-
-def _without_repeats(corners: Ints, offsets: Ints) -> tuple[Ints, Ints]:
-    """Corners that differ from the one before them in their polygon, and the polygon of each."""
-    polygons = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
-    before = np.roll(corners, 1)
-    before[offsets[:-1]] = corners[offsets[1:] - 1]
-    differs = corners != before
-    return corners[differs], polygons[differs]
 
 
 def _solve_symmetric(matrices: Floats, loads: Floats) -> Floats:

@@ -59,11 +59,6 @@ class SurfaceSource(Frozen):
         parts = triangles.face_components
         return np.isin(parts, parts[incident_faces(triangles, free[np.flatnonzero(~outer)])[1]])
 
-    @property
-    def ends_everywhere(self) -> bool:
-        """Whether there is no connected part of the surface in which all curves are closed."""
-        return all(self.ending[part.nodes.faces].all() for part in self.parts)
-
 
 def lie_along(triangles: IntrinsicMesh, points: LocatedPoints, edges: Bools) -> Bools:
     """(p,) points on some of the edges (e,), or at vertices of them."""

@@ -76,16 +76,12 @@ def html_of(thing: object) -> str:
         return text
     if not drawn:
         return text
-    data = base64.b64encode(_small_png(figure)).decode()
-    return f'{text}<br><img alt="{html.escape(type(thing).__name__)}" src="data:image/png;base64,{data}">'
-
-
-def _small_png(figure: Any) -> bytes:
-    """Write the picture with few colours, since notebooks store it with every output."""
     whole, small = io.BytesIO(), io.BytesIO()
     figure.savefig(whole, dpi=DPI, format="png")
+    # with few colours, since notebooks store it with every output
     pillow.open(whole).convert("RGB").quantize(N_COLORS).save(small, format="png", optimize=True)
-    return small.getvalue()
+    data = base64.b64encode(small.getvalue()).decode()
+    return f'{text}<br><img alt="{html.escape(type(thing).__name__)}" src="data:image/png;base64,{data}">'
 
 
 @singledispatch

@@ -133,15 +133,10 @@ def save_surface(
     with picture(path, 8.0, 7.0) as figure:
         axes = figure.add_subplot()
         draw_surface(field, axes, sources, n_contours, up=up)
-        add_legend(axes, with_sources=bool(sources))
-
-
-def add_legend(axes: Axes, with_sources: bool) -> None:
-    """Add a legend for the heavy lines."""
-    axes.plot([], [], color="0.1", linewidth=1.6, label="φ = 0")
-    if with_sources:
-        axes.plot([], [], color="#ffd83b", linewidth=2.5, label="source")
-    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=2, frameon=False, fontsize=8)
+        axes.plot([], [], color="0.1", linewidth=1.6, label="φ = 0")
+        if sources:
+            axes.plot([], [], color="#ffd83b", linewidth=2.5, label="source")
+        axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=2, frameon=False, fontsize=8)
 
 
 def draw_surface(
