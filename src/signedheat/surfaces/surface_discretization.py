@@ -82,7 +82,11 @@ class SurfaceDiscretization:
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Refine the triangles to conform to unoriented curves; choose frames at nonmanifold edges."""
         triangles, segments = refine_to_conform(self.triangles, self.segments(sources))
-        surface = self if triangles is self.triangles else self._cut_into(triangles)
+        surface = self
+        if triangles is not self.triangles:  # their first vertices are the present ones
+            own = np.arange(self.triangles.n_vertices) if self.restriction is None else self.restriction
+            notes = *self.notes, VerticesAdded(triangles.n_vertices - self.triangles.n_vertices)
+            surface = replace(self, triangles=triangles, restriction=own, transfer=None, notes=notes)
         triangles, groups = nonmanifold_frames(triangles, segments)
         return surface._turned_to(triangles), groups
 
@@ -106,17 +110,6 @@ class SurfaceDiscretization:
             return other
 
         return self._turned(fingerprint(triangles.first_halfedges), turned)
-
-    def _cut_into(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
-        """Refine the triangles, which keep their vertices as the first ones."""
-        added = triangles.n_vertices - self.triangles.n_vertices
-        return replace(
-            self,
-            triangles=triangles,
-            restriction=np.arange(self.triangles.n_vertices) if self.restriction is None else self.restriction,
-            transfer=None,
-            notes=(*self.notes, VerticesAdded(added)),
-        )
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
         """X₀ (Eq. 11, Eq. 19) and the rows that interpolate φ along the sources (Eq. 14)."""
