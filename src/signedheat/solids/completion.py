@@ -150,7 +150,7 @@ def complete(
 def completed(
     shape: ShapeLike | Sequence[ShapeLike], options: Completion, method: Heat, progress: Progress | None = None
 ) -> Solid:
-    """The solid of a shape, or a solid as it is: see `complete`."""
+    """Return the solid of a shape, or a solid as it is: see `complete`."""
     if isinstance(shape, Solid):
         return shape
     joined = joined_shape(shape)
@@ -201,7 +201,7 @@ def oriented_points(cloud: PointCloud) -> tuple[PointCloud, tuple[Note, ...]]:
 
 
 def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
-    """The solid of a mesh, from the decision which of its faces bound it; origins are triangles of the mesh."""
+    """Return the solid of a mesh, from the decision which of its faces bound it; origins are triangles of the mesh."""
     vertices = mesh.vertices
     counts = np.abs(decided.counts)
     faces = np.where((decided.counts < 0)[:, None], chain.faces[:, ::-1], chain.faces)
@@ -230,7 +230,7 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
 
 
 def _made_from(places: Floats, faces: Ints, added: Ints, origins: Ints) -> Surface:
-    """A closed surface of faces and those added to them; only the first faces have origins."""
+    """Return a closed surface of faces and those added to them; only the first faces have origins."""
     whole = np.concatenate([faces, added])
     return Surface(places[whole], whole, np.append(origins, np.full(len(whole) - len(origins), -1)), True)
 
@@ -261,7 +261,7 @@ def _torn(vertices: Floats, faces: Ints, origins: Ints, scatter: float, method: 
 
 
 def scatter_of(triangles: Floats, labels: Ints) -> float:
-    """The distance of corners that noise has separated, if it has separated most of them; otherwise 0."""
+    """Return the distance of corners that noise has separated, if it has separated most of them; otherwise 0."""
     points = triangles.reshape(-1, 3)
     owners = np.repeat(labels, 3)
     near, which = scipy.spatial.cKDTree(points).query(points, min(8, len(points)), workers=-1)
@@ -273,7 +273,7 @@ def scatter_of(triangles: Floats, labels: Ints) -> float:
 
 
 def _from_points(cloud: PointCloud, method: Heat) -> Solid:
-    """The solid that oriented points sample; if they bound nothing, a small triangle for each."""
+    """Return the solid that oriented points sample; if they bound nothing, a small triangle for each."""
     if cloud.normals is None:
         raise SourceError("the point cloud has no normals, which say what is inside", remedy="give it normals")
     gap = mean_gap(np.asarray(cloud.points))

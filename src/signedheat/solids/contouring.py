@@ -72,7 +72,7 @@ def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
 
 
 def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) -> TriangleMesh:
-    """A surface at a distance from a solid, closed and manifold, with its edges and corners.
+    """Return a surface at a distance from a solid, closed and manifold, with its edges and corners.
 
     Raises
     ------

@@ -28,7 +28,7 @@ def orient(shape: Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape)
 def orient(
     shape: Mesh | ForeignShape | Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape | None = None
 ) -> Mesh | list[CurveOrPoints]:
-    """A mesh with its faces turned so that neighbours agree and every part points outwards; or curves that agree.
+    """Turn the faces of a mesh so that neighbours agree and every part points outwards; or curves so that they agree.
 
     See `orientation` and `curve_orientation`, which also say what was turned.
 

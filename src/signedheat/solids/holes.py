@@ -190,7 +190,7 @@ def _through(around: Rims, vertices: Floats, named: Ints) -> Bools:
 
 
 def _as_neighbours(faces: Ints, turned: Bools, added: Ints) -> Ints:
-    """New faces, turned where most of the faces along their edges were turned from the way that they were given."""
+    """Turn new faces where most of the faces along their edges were turned from the way that they were given."""
     if not len(added):
         return added
     table = edge_table(np.concatenate([faces, added]))

@@ -234,7 +234,7 @@ def contour(
 def _of_function(
     f: Function, gradient: Function | ArrayLike | None, box: NDArray[np.float64], grid: Grid, level: float
 ) -> Implicit:
-    """The level set of a function; of its differences, steps balance rounding and curvature."""
+    """Return the level set of a function; of its differences, steps balance rounding and curvature."""
 
     def values(points: NDArray[np.float64]) -> NDArray[np.float64]:
         return _called(f, points, ())[..., 0] - level
@@ -280,7 +280,7 @@ def _called(f: Function, points: NDArray[np.float64], shape: tuple[int, ...]) ->
 def _of_array(
     f: ArrayLike, gradient: Function | ArrayLike | None, box: NDArray[np.float64], level: float
 ) -> tuple[Implicit, Grid]:
-    """The level set of values at nodes, and the grid with one more node on each side."""
+    """Return the level set of values at nodes, and the grid with one more node on each side."""
     values = array_of(f, "f").astype(np.float64)
     if values.ndim != 3 or min(values.shape) < 2 or not np.isfinite(values).all():
         raise GeometryError(

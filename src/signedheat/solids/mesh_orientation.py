@@ -145,7 +145,7 @@ def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Ori
 
 
 def oriented_as(shape: Mesh, chain: Chain, decided: Bounding) -> Orientation:
-    """What a decision about the chain of a mesh makes of the mesh."""
+    """Return what a decision about the chain of a mesh makes of the mesh."""
     owners = owners_of(shape)
     n = int(owners.max()) + 1
     there = chain.numbers >= 0
@@ -208,7 +208,7 @@ def owners_of(shape: Mesh) -> Ints:
 
 
 def _turned_mesh(shape: Mesh, kept: Ints, flipped: Bools) -> Mesh:
-    """Some faces of a mesh, some of them turned; the mesh itself where nothing changes."""
+    """Return some faces of a mesh, some of them turned; the mesh itself where nothing changes."""
     if not flipped.any() and len(kept) == (shape.n_faces if isinstance(shape, TriangleMesh) else shape.n_polygons):
         return shape
     if isinstance(shape, TriangleMesh):
