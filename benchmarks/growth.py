@@ -153,6 +153,13 @@ def overlapping_balls(n: int) -> Callable[[], object]:
     return lambda: sh.complete(copies(ball, list(ball.vertices + middles[:, None])))
 
 
+def clustered_balls(n: int) -> Callable[[], object]:
+    """The solid of n balls in a cube, each of which overlaps a few others."""
+    ball = samples.sphere(1)
+    middles = n ** (1 / 3) * np.random.default_rng(0).random((n, 3)) * 1.6
+    return lambda: sh.complete(copies(ball, list(ball.vertices + middles[:, None])))
+
+
 def loose_pieces(n: int) -> Callable[[], object]:
     """The solid of a ball of n triangles that do not touch each other."""
     points = spiral(n // 2 + 2)
@@ -179,8 +186,8 @@ def voxels(n: int) -> Callable[[], object]:
     """The solid of a ball of about n voxels."""
     side = round((6 * n / np.pi) ** (1 / 3))
     at = np.stack(np.indices((side,) * 3), axis=-1) - (side - 1) / 2
-    shape = sh.DigitalSurface(np.linalg.norm(at, axis=-1) < side / 2)
-    return lambda: sh.complete(shape)
+    inside = np.linalg.norm(at, axis=-1) < side / 2
+    return lambda: sh.complete(sh.DigitalSurface(inside).smooth_surface)
 
 
 def hull_of(corners: np.ndarray) -> sh.TriangleMesh:
@@ -211,6 +218,7 @@ CASES = {
     corners_of_polygons: 2000,
     loose_pieces: 500,
     overlapping_balls: 50,
+    clustered_balls: 60,
     crossing_faces: 40,
     bars: 5,
 }
