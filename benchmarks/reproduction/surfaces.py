@@ -218,8 +218,7 @@ def drawn_on_higher_genus(page: Page) -> None:
 @figure("22", "Intrinsic triangulations")
 def intrinsic_triangulations(page: Page) -> None:
     """A disk of slivers, made in a plane stretched more and more: ε of the distance from a circle, on the mesh as it
-    is and on an intrinsic Delaunay refinement of it. Means of eight meshes, of which the best has half the error of the
-    worst.
+    is and on an intrinsic Delaunay refinement of it, whose largest triangles are limited. Means of eight meshes.
     """
     picture = new_figure(12, 5)
     for stretch in (1.0, 4.0, 10.0, 25.0):

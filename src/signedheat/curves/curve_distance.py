@@ -47,7 +47,8 @@ class CurvesTaken(Note):
     left_out : (k,) int
         Curves that bound nothing together with the others.
     share_left_out : float
-        Their share of the length of all curves.
+        Their share of the length of all curves. It is no warning: of 515 drawings on which every wrong answer is
+        announced otherwise, it is more than a twentieth on a quarter of those that are right.
     """
 
     turned: list[int]
