@@ -72,11 +72,6 @@ def zipped(members: dict[str, bytes]) -> bytes:
     return file.getvalue()
 
 
-def right(files: Files, _: int, __: Path) -> Iterator[Files]:
-    """The files as they are; reading these compiles what it needs, which takes longer than any attack may."""
-    yield files
-
-
 def truncated(files: Files, places: int, _: Path) -> Iterator[Files]:
     """The beginning alone."""
     data = next(iter(files.values()))
@@ -213,20 +208,6 @@ def outcome(read: Callable[[Path], Any], files: Files, folder: Path, opened: lis
     return result
 
 
-def outcomes(
-    attack: Attack, variants: list[tuple[Callable[[Path], Any], Files]], places: int, opened: list[str]
-) -> Counter[str]:
-    """How often each outcome came of an attack on files of a format."""
-    kinds: Counter[str] = Counter()
-    for read, files in variants:
-        with tempfile.TemporaryDirectory() as root:
-            folder, outside = Path(root) / "in", Path(root) / "outside.bin"
-            folder.mkdir()
-            outside.write_text(f"{SECRET} {SECRET} {SECRET}\n")
-            kinds.update(outcome(read, attacked, folder, opened) for attacked in attack(files, places, outside))
-    return kinds
-
-
 def formats() -> dict[str, list[tuple[Callable[[Path], Any], Files]]]:
     """Files that are right, and what reads them, by ending."""
     found: dict[str, list[tuple[Callable[[Path], Any], Files]]] = {}
@@ -248,11 +229,18 @@ def main(wanted: list[str]) -> int:
         if wanted and ending not in wanted:
             continue
         cells, places = [], FEW if ending in ISOLATED else PLACES
-        for name, attack in {"right": right, **ATTACKS}.items():
-            kinds = outcomes(attack, variants, max(places // len(variants), 4), opened)
-            failures += [f".{ending} {name}: {kind[:200]}" for kind in kinds if kind not in ("read", "refused")]
-            if attack is right:
-                continue
+        for name, attack in ATTACKS.items():
+            kinds: Counter[str] = Counter()
+            for read, files in variants:
+                with tempfile.TemporaryDirectory() as root:
+                    folder, outside = Path(root) / "in", Path(root) / "outside.bin"
+                    folder.mkdir()
+                    outside.write_text(f"{SECRET} {SECRET} {SECRET}\n")
+                    for attacked in attack(files, max(places // len(variants), 4), outside):
+                        kind = outcome(read, attacked, folder, opened)
+                        kinds[kind] += 1
+                        if kind not in ("read", "refused"):
+                            failures.append(f".{ending} {name}: {kind[:200]}")
             tried, wrong = kinds.total(), kinds.total() - kinds["read"] - kinds["refused"]
             cell = f"{tried:,} ({kinds['read']:,})" + (f" **{wrong} wrong**" if wrong else "")
             cells.append(cell if tried else "–")

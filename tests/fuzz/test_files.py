@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from fuzz.attacks import entities, formats, outcomes, traversal
 from fuzz.cases_files import KINDS
 from fuzz.frame import families, run
 
@@ -21,15 +20,9 @@ def test_files_that_are_right_are_read(tmp_path, kind):
         assert read(tmp_path / str(number) / next(iter(files))) is not None
 
 
-@pytest.mark.parametrize("ending", ["3mf", "gltf", "npz", "nrrd", "obj", "svg", "vti", "vtp"])
-def test_files_that_name_others_read_none_outside_their_folder(ending):
-    tried = [kind for attack in (entities, traversal) for kind in outcomes(attack, formats()[ending], 1, [])]
-    assert set(tried) & {"read", "refused"} == set(tried) != set()
-
-
 def test_a_short_run_on_damaged_files():
-    names = [name for name in families() if name.startswith(("files ", "loaded ", "3MF ", "glTF "))]
-    assert len(names) == len(KINDS) + 3
+    names = [name for name in families() if name.startswith("files ")]
+    assert len(names) == len(KINDS)
     tally = run(names, CASES, seed=1)
     assert not tally.failures, "\n".join(map(str, tally.failures))
     assert sum(sum(kinds.values()) for kinds in tally.counts.values()) == CASES * len(names)

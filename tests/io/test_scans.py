@@ -1,7 +1,5 @@
 """LAS, LAZ and E57: points as other packages write them."""
 
-import struct
-
 import numpy as np
 import pytest
 
@@ -26,21 +24,6 @@ def test_las(tmp_path, kind):
     path.write_bytes(path.read_bytes()[:200])
     with refused(sh.errors.FileFormatError):
         sh.read(path)
-
-
-def test_a_laz_file_that_announces_any_number_of_chunks(tmp_path):
-    """Lazrs allocates as many, and ends its process."""
-    laspy = pytest.importorskip("laspy")
-    pytest.importorskip("lazrs")
-    cloud = laspy.LasData(laspy.LasHeader(point_format=3, version="1.2"))
-    cloud.x, cloud.y, cloud.z = POINTS.T
-    cloud.write(tmp_path / "scan.laz")
-    data = bytearray((tmp_path / "scan.laz").read_bytes())
-    (table,) = struct.unpack_from("<q", data, struct.unpack_from("<I", data, 96)[0])
-    struct.pack_into("<I", data, table + 4, 2**32 - 1)
-    (tmp_path / "scan.laz").write_bytes(data)
-    with refused(sh.errors.FileFormatError):
-        sh.read(tmp_path / "scan.laz")
 
 
 def test_e57_puts_each_scan_into_its_place(tmp_path):

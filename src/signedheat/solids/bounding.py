@@ -247,8 +247,7 @@ def open_bounding(
             whole = replace(whole, within=within)
             signs = signs_of(whole)
     while alive.any():
-        names = np.flatnonzero(alive)
-        system = whole.chosen(alive)
+        names, system = np.flatnonzero(alive), whole.chosen(alive)
         values = system.levels(signs[names])
         rows, levels = names[system.owners], np.zeros(n)
         levels[names] = means(values, system.owners, system.areas, len(names))

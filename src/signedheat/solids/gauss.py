@@ -156,7 +156,7 @@ class Matrix:
         return np.asarray(scipy.linalg.solve(normal, weighted.T @ (0.5 + self.within), assume_a="pos"))
 
     def levels(self, signs: Floats) -> Floats:
-        """(n,) levels at the samples, less the bodies around them."""
+        """(n,) levels at the samples, less the bodies that do not matter there."""
         return np.asarray(self.matrix @ signs - self.within)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
@@ -252,7 +252,7 @@ class Dipoles:
     softening : (n,) float
         Distance below which the field of a dipole levels off.
     within : (n,) float
-        Bodies around each place.
+        Winding numbers of the bodies that do not matter at each place.
     """
 
     places: Floats
@@ -322,7 +322,7 @@ class Dipoles:
         return weights
 
     def levels(self, signs: Floats) -> Floats:
-        """(n,) levels at the places, less the bodies around them."""
+        """(n,) levels at the places, less the bodies that do not matter there."""
         return self._numbers(signs) - self.within
 
     def _numbers(self, signs: Floats) -> Floats:

@@ -1,12 +1,14 @@
 """Bodies that overlap, or lie within others, among open pieces.
 
 Gauss's formula asks for a level of ½ on all faces, so that what lies within a body must be a cavity of it. Parts of an
-assembly overlap, however, and have bodies within them: there the level is higher by one for each body around.
+assembly overlap, however, and have bodies within them. What is a body by itself therefore does not see the others,
+unless one of the two is a cavity in the other.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..arrays import Bools, Floats, Ints
+from ..mesh.box_tree import BoxTree
 from ..search.winding_tree import WindingTree
 from .gauss import Dipoles, Matrix, Pieces
 from .part_levels import levels_of_pieces
@@ -25,6 +28,8 @@ SHEET = 0.146
 Flat and wavy sheets have 0, a seventh of a ball .16, half of one .31, all of it ½."""
 HINT = 0.5
 """Share of the area of a piece that faces one way, less the rest, from which on it was given that way."""
+STEP = 1e-5
+"""Distance of the sides of faces, over the size of what a place stands for."""
 APART = 0.05
 """Share of a body's area outside of another one from which on they overlap, and of its rims up to which it lies within.
 The rims of a bowl's or a vase's inside lie half outside its outside."""
@@ -81,23 +86,29 @@ def bodies_around(
     closed: Floats,
     nested: Nesting,
 ) -> Floats:
-    """(n,) how many open bodies lie around each place of a system, as bodies and not as what it is a cavity in.
+    """(n,) winding numbers, at places of a system, of the bodies that do not matter to what lies there.
 
-    `closed` are triangles of closed bodies, (k, 3, 3), which are not in the system: if a place is of a cavity in one
-    of them, they count as −1. A body within others bounds a cavity unless it was clearly given as a body.
+    These are all but the own body, that around a cavity, and the cavities in it. What is no body belongs to the nearest
+    one. A body within others bounds a cavity unless it was clearly given as a body. `closed` are triangles of closed
+    bodies, (k, 3, 3), which are not in the system: those around a cavity count as negative.
     """
     directed = np.where((signs < 0)[pieces.labels, None, None], pieces.triangles[:, ::-1], pieces.triangles)
     bodies = Bodies.of(pieces, directed, groups, alone, signs * given)
     count, n = len(bodies.levels), len(system.places)
     if count < 2 and not (count and len(closed)):
         return np.zeros(n)
+    numbers = bodies.numbers[pieces.labels]
+    directed = np.where((bodies.levels < 0)[numbers, None, None], directed[:, ::-1], directed)
     places = np.concatenate([system.places, rims.middles])
     homes = bodies.numbers[np.concatenate([system.owners, rims.owners])]
     own = homes >= 0
     away = np.flatnonzero(~own)
-    if len(away):  # what is no body belongs to the nearest one
+    if len(away):
         homes[away] = homes[own][scipy.spatial.cKDTree(places[own]).query(places[away], workers=-1)[1]]
-    rows, others, there = _windings(places, homes, directed, bodies, bodies.numbers[pieces.labels], closed)
+    steps = np.zeros(places.shape)  # to both sides of faces
+    steps[:n] = STEP * np.sqrt(system.areas)[:, None] * system.normals
+    parts = parts_of(directed[np.argsort(numbers, kind="stable")], np.sort(numbers), count, closed)
+    rows, others, there = _windings(places, steps, parts)
     here = homes[rows]
     weights = np.where(own, np.concatenate([system.areas, rims.lengths]), 0.0)
     on_rim = np.arange(len(places)) >= n
@@ -115,26 +126,31 @@ def bodies_around(
     overlap, enclosed = within < 1 - APART, mean(on_rim, share, here, others) >= 1 - APART
     every = np.ones(count, dtype=bool)
     stays = {"given": bodies.as_given, "cavities": ~every, "bodies": every}[nested][here]
-    counted = np.where(others == count, -1.0 * (enclosed & ~stays), overlap | (enclosed & stays))
-    return np.round(np.bincount(rows, there * counted, len(places))[:n])
+    apart = (here != others) & (overlap | (enclosed & stays))
+    seen = np.where(others == count, enclosed & ~stays, ~apart) & (rows < n)
+    everything = WindingTree.of(np.concatenate(parts[:count]))
+    sides = [everything.numbers(places[:n] + way * steps[:n]) for way in (-1, 1)]
+    return 0.5 * (sides[0] + sides[1]) - np.bincount(rows[seen], there[seen], n)
 
 
-def _windings(
-    places: Floats, homes: Ints, triangles: Floats, bodies: Bodies, numbers: Ints, closed: Floats
-) -> tuple[Ints, Ints, Floats]:
-    """Places, other bodies whose box they lie in, and their winding numbers; what is closed is one more body."""
-    count = len(bodies.levels)
-    order = np.argsort(numbers, kind="stable")
-    cuts = np.searchsorted(numbers[order], np.arange(count + 1))
-    rows, others, there = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
-    for body, level in enumerate([*bodies.levels, 0.5]):
-        corners = closed if body == count else triangles[order[cuts[body] : cuts[body + 1]]]
-        if not len(corners):
-            continue
-        inside_box = (places >= corners.min(axis=(0, 1))) & (places <= corners.max(axis=(0, 1)))
-        near = np.flatnonzero(inside_box.all(axis=1) & (homes != body))
-        if len(near):
-            rows.append(near)
-            others.append(np.full(len(near), body))
-            there.append(np.sign(level) * WindingTree.of(corners).numbers(places[near]))
-    return np.concatenate(rows), np.concatenate(others), np.concatenate(there)
+def parts_of(triangles: Floats, numbers: Ints, count: int, closed: Floats) -> list[Floats]:
+    """Triangles of each body, from ascending numbers of bodies of all; what is closed, if anything is, is one more."""
+    parts = np.split(triangles, np.searchsorted(numbers, np.arange(count + 1)))[1:]
+    return [*parts[:count], closed] if len(closed) else parts[:count]
+
+
+def _windings(places: Floats, steps: Floats, parts: list[Floats]) -> tuple[Ints, Ints, Floats]:
+    """Places, bodies whose box they lie in, and their winding numbers there: means of both sides of faces."""
+    boxes = np.array([(corners.min(axis=(0, 1)), corners.max(axis=(0, 1))) for corners in parts])
+    starts, others = BoxTree.of(boxes[:, 0], boxes[:, 1]).meeting(np.repeat(places[:, None], 3, axis=1))
+    rows = np.repeat(np.arange(len(places)), np.diff(starts))
+    inside_box = (places[rows] >= boxes[others, 0]) & (places[rows] <= boxes[others, 1])
+    kept = np.flatnonzero(inside_box.all(axis=1))
+    kept = kept[np.argsort(others[kept], kind="stable")]
+    rows, others, there = rows[kept], others[kept], np.zeros(len(kept))
+    for body, (begin, end) in enumerate(pairwise(np.searchsorted(others, np.arange(len(parts) + 1)))):
+        if end > begin:
+            some, tree = rows[begin:end], WindingTree.of(parts[body])
+            sides = [tree.numbers(places[some] + way * steps[some]) for way in (-1, 1)]
+            there[begin:end] = 0.5 * (sides[0] + sides[1])
+    return rows, others, there

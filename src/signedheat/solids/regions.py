@@ -80,7 +80,7 @@ def _windings(points: Floats, faces: Ints, normals: Floats, times: Ints, winding
         np.maximum(DEPTH * np.sqrt(face_areas(some)), _slack(points)), 0.1 * _widths(points, faces[chosen])
     )
     away, centres = away[:, None] * normals[chosen], some.mean(axis=1)
-    there = np.concatenate([windings.numbers(centres - away), windings.numbers(centres + away)])
+    there = windings.numbers_once(np.concatenate([centres - away, centres + away]))
     offsets, owners = there - levels[chosen].T.ravel(), np.tile(labels[chosen], 2)
     order = np.lexsort((offsets, owners))
     counts = np.bincount(owners)

@@ -59,10 +59,12 @@ class Windings(Frozen):
         return WindingTree.of(self.triangles)
 
     def numbers(self, points: Floats) -> Floats:
-        """(n,) winding numbers; around few points without a tree."""
-        if len(points) <= FEW and "tree" not in vars(self):
-            return winding_sums(self.triangles, points)
-        return self.tree.numbers(points) if len(self.triangles) else np.zeros(len(points))
+        """(n,) winding numbers."""
+        return self.tree.numbers(points) if len(self.triangles) and len(points) else np.zeros(len(points))
+
+    def numbers_once(self, points: Floats) -> Floats:
+        """(n,) winding numbers, without a tree if the points are few: for who will not ask again."""
+        return winding_sums(self.triangles, points) if len(points) <= FEW else self.numbers(points)
 
     def inside(self, points: Floats) -> Bools:
         """(n,) whether points are inside."""
