@@ -54,13 +54,7 @@ MANY = (
 """Options of commands on many shapes."""
 WANTED = group(
     "results for each shape, at least one of",
-    option(
-        "--volume",
-        nargs="?",
-        const="npz",
-        choices=("npz", "vti", "nrrd", "npy", "vdb"),
-        help="the field (npz)",
-    ),
+    option("--volume", nargs="?", const="npz", choices=("npz", "vti", "nrrd", "npy", "vdb"), help="the field (npz)"),
     option("--offset", type=finite, nargs="+", default=[], metavar="D", help="closed surfaces at distances"),
     option("--sample", type=whole_number(1), nargs="?", const=250_000, metavar="N", help="training points (250000)"),
     option("--info", action="store_true", help="counts and defects, in the manifest"),

@@ -215,10 +215,7 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
     method = Heat(constraint_of(arguments.constraint), arguments.diffusion)
     as_oriented = arguments.as_oriented
     options = Completion(
-        lids=arguments.lids,
-        nested=arguments.nested,
-        as_oriented=as_oriented,
-        keep_overlaps=arguments.keep_overlaps,
+        lids=arguments.lids, nested=arguments.nested, as_oriented=as_oriented, keep_overlaps=arguments.keep_overlaps
     )
     with ProgressBar(is_quiet(arguments)) as progress:
         if isinstance(domain, Grid) and arguments.band is not None:

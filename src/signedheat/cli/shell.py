@@ -33,10 +33,7 @@ TICK = 0.5
 def warmup(arguments: Namespace) -> Summary:
     """Run everything once on small shapes, in several processes."""
     begin, spent = time.perf_counter(), sum(os.times()[:4])
-    with (
-        ProgressBar(is_quiet(arguments)) as progress,
-        ThreadPoolExecutor(parallel.n_threads()) as pool,
-    ):
+    with ProgressBar(is_quiet(arguments)) as progress, ThreadPoolExecutor(parallel.n_threads()) as pool:
         names = {pool.submit(_run_apart, name): name for name in kernel_runs.JOBS}
         waiting = set(names)
         try:

@@ -18,19 +18,7 @@ from ..errors import FileFormatError, MissingPackageError, SignedHeatError, prin
 from ..jobs import run_limited
 from .late_imports import inputs, inspection, reports, samples
 from .late_imports import operands as shapes
-from .options import (
-    PLACE,
-    REPAIR,
-    UNITS_OPTION,
-    UP,
-    Option,
-    Summary,
-    command,
-    is_quiet,
-    option,
-    positive,
-    whole_number,
-)
+from .options import PLACE, REPAIR, UNITS_OPTION, UP, Option, Summary, command, is_quiet, option, positive, whole_number
 from .terminal import ProgressBar, say, say_error
 
 PATIENCE = 5.0

@@ -8,8 +8,8 @@ from typing import cast
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..discretization import discretize
 from ..errors import SourceError
@@ -125,8 +125,7 @@ def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints
     """Raise `SourceError` if no curve is oriented: an unsigned distance has no zero set besides its sources."""
     if all(isinstance(curve, Curve | SurfacePoints) and not getattr(curve, "oriented", False) for curve in curves):
         raise SourceError(
-            "curves without sides, and points, bound nothing that could be completed",
-            remedy="orient the curves",
+            "curves without sides, and points, bound nothing that could be completed", remedy="orient the curves"
         )
 
 
@@ -155,7 +154,7 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
     return whole or found
 
 
-def beyond_the_rim(triangles: IntrinsicMesh, values: NDArray[np.float64]) -> None:
+def beyond_the_rim(triangles: IntrinsicMesh, values: Floats) -> None:
     """Give zeros in rows along the rim the sign of the rim beyond both ends; else the one that neighbours lack."""
     least = ZERO * float(triangles.lengths_of_edges.mean())
     zero, ends = np.abs(values) <= least, triangles.edges.vertices
@@ -164,7 +163,7 @@ def beyond_the_rim(triangles: IntrinsicMesh, values: NDArray[np.float64]) -> Non
     in_row = np.zeros(len(values), dtype=bool)
     in_row[rim[zero[rim]]] = True
 
-    def neighbor_signs(edges: NDArray[np.int64]) -> NDArray[np.float64]:
+    def neighbor_signs(edges: Ints) -> Floats:
         """Sum of the signs at the other ends of edges from each row."""
         tail, head = np.concatenate([edges, edges[:, ::-1]]).T
         out = in_row[tail] & ~zero[head]

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Ints
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..diagnostics import Note
 from ..errors import ConstraintError, InexactWarning, warn_user
@@ -125,7 +125,7 @@ def has_sides(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool:
     if (mesh.edges.face_counts == 2 - (mesh.edges.balance != 0)).all():
         return True
     crossed = [segments_of(curve, mesh.intrinsic, mesh.vertices).faces for curve in curves]
-    sheet = in_sheet(mesh, np.concatenate(crossed))
+    sheet = sheet_faces(mesh, np.concatenate(crossed))
     edges = TriangleMesh(mesh.vertices, mesh.faces[sheet]).edges
     label = np.full(mesh.n_faces, -1)
     label[sheet] = connected_components(int(sheet.sum()), *(edges.pairs // 3).T)
@@ -134,8 +134,12 @@ def has_sides(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool:
     return not any(bool(bad[faces].any() or np.ptp(label[faces]) > 0) for faces in crossed if len(faces))
 
 
-def in_sheet(mesh: TriangleMesh, crossed: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(m,) faces without fins and tents: at most two share an edge, those that curves cross first, then large parts."""
+def sheet_faces(mesh: TriangleMesh, crossed: Ints) -> Bools:
+    """(m,) faces of a sheet in a mesh some of whose edges have three faces or more.
+
+    Parts that hang together across edges of two faces are added one by one, those that curves cross first, then the
+    largest. A part is left out if it would put a third face on an edge that others use, as fins and tents do.
+    """
     edges = mesh.edges
     part = connected_components(mesh.n_faces, *(edges.pairs // 3).T)
     areas = np.bincount(part, mesh.face_areas)
@@ -193,7 +197,7 @@ def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[Curv
     return ""
 
 
-def named(numbers: NDArray[np.int64]) -> str:
+def named(numbers: Ints) -> str:
     """Return the numbers of some curves in words."""
     some = ", ".join(map(str, numbers[:8].tolist())) + (", …" if len(numbers) > 8 else "")
     return f"curves number {some}" if len(numbers) > 1 else f"curve number {some}"

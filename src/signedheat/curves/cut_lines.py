@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Bools, Complexes, Floats, Ints
 from ..linear import factorize
 from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, split_corners
@@ -31,7 +31,7 @@ def typical_size(triangles: IntrinsicMesh) -> float:
     return float(np.average(triangles.edge_lengths.max(axis=1), weights=triangles.face_areas))
 
 
-def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: Floats) -> Bools:
     """(p,) pairs of faces between which (m, 3) values at corners jump, on lines, by more than errors in triangles."""
     longest, typical = triangles.edge_lengths.max(axis=1), typical_size(triangles)
     height = np.abs(pairs.ends(values)).max(axis=1)
@@ -51,7 +51,7 @@ def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: NDArray[np.fl
     return result
 
 
-def without_twigs(edges: NDArray[np.int64], high: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def without_twigs(edges: Ints, high: Bools) -> Bools:
     """(k,) which (k, 2) edges are left without the lines between ends and forks that are `high`, (k,), nowhere.
 
     Examples
@@ -73,11 +73,7 @@ def without_twigs(edges: NDArray[np.int64], high: NDArray[np.bool_]) -> NDArray[
 
 
 def is_continuous(
-    triangles: IntrinsicMesh,
-    pairs: FacePairs,
-    slopes: NDArray[np.float64],
-    directions: NDArray[np.complex128],
-    constants: NDArray[np.float64],
+    triangles: IntrinsicMesh, pairs: FacePairs, slopes: Floats, directions: Complexes, constants: Floats
 ) -> bool:
     """Whether the constants of the faces leave no cut, neither as a line nor spread over many small jumps."""
     values = slopes + constants[:, None]
@@ -93,19 +89,13 @@ def is_continuous(
     return not bool(rough.any())
 
 
-def gradients(triangles: IntrinsicMesh, at_corners: NDArray[np.float64]) -> NDArray[np.complex128]:
+def gradients(triangles: IntrinsicMesh, at_corners: Floats) -> Complexes:
     """(m,) gradients of functions that are linear in every face, in its layout."""
     opposite = 1j * np.roll(triangles.edge_vectors, -1, axis=1)
     return (at_corners * opposite).sum(axis=1) / (2.0 * triangles.areas_as_divisors)
 
 
-def smoothed(
-    triangles: IntrinsicMesh,
-    pairs: FacePairs,
-    directions: NDArray[np.complex128],
-    rough: NDArray[np.float64],
-    cut: NDArray[np.bool_],
-) -> NDArray[np.float64]:
+def smoothed(triangles: IntrinsicMesh, pairs: FacePairs, directions: Complexes, rough: Floats, cut: Bools) -> Floats:
     """(m, 3) values on the surface cut open: step 3 (Eq. 13), with constants of φ₀: ``(M + w² C) φ = M φ₀ + w² b``.
 
     Shapes: `directions` Y (m,), `rough` φ₀ (m, 3) at the corners of the triangles, `cut` (p,) of the `pairs`.
@@ -122,21 +112,21 @@ def smoothed(
     return factorize(matrix).solve(pulled)[opened.corner_vertices]
 
 
-def slope_error(triangles: IntrinsicMesh, at_corners: NDArray[np.float64], directions: NDArray[np.complex128]) -> float:
+def slope_error(triangles: IntrinsicMesh, at_corners: Floats, directions: Complexes) -> float:
     """Root mean square of ∇φ − Y, where φ is known."""
     finite = ~np.isnan(at_corners[:, 0])
     error = np.abs(gradients(triangles, at_corners) - directions)
     return float(np.sqrt(np.average(error[finite] ** 2, weights=triangles.face_areas[finite])))
 
 
-def integration_error(phi: PiecewiseField, directions: NDArray[np.complex128]) -> float:
+def integration_error(phi: PiecewiseField, directions: Complexes) -> float:
     """Root mean square of ∇φ̄ − Y, where φ̄ averages φ over the corners at each vertex of the split surface."""
     owner = phi.split_vertices[0]
     mean = np.bincount(owner, phi.values.ravel()) / np.bincount(owner)
     return slope_error(phi.triangles, mean[owner].reshape(-1, 3), directions)
 
 
-def cut_open(triangles: IntrinsicMesh, pairs: FacePairs, cut: NDArray[np.bool_]) -> IntrinsicMesh:
+def cut_open(triangles: IntrinsicMesh, pairs: FacePairs, cut: Bools) -> IntrinsicMesh:
     """The triangles with vertices doubled along a cut."""
     owner = split_corners(triangles, pairs, cut)
     return replace(triangles, corner_vertices=owner.reshape(-1, 3), n_vertices=int(owner.max(initial=-1)) + 1)

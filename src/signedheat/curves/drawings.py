@@ -9,9 +9,10 @@ from functools import cached_property
 from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..area_elements import bounds_around
+from ..arrays import Bools, Floats, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..diagnostics import Diagnostics, Note
 from ..errors import ConstraintError
@@ -162,7 +163,7 @@ def strokes_that_agree(
     return [line.reversed() if k in turned else line for k, line in enumerate(lines) if k not in left_out], note
 
 
-def _triangles_around(bounds: NDArray[np.float64]) -> TriangleMesh:
+def _triangles_around(bounds: Floats) -> TriangleMesh:
     """A rectangle around a box, with the usual room: squares that are cut along one diagonal or the other in turn."""
     nodes = Grid.around(bounds, STROKE_NODES)
     index = np.arange(nodes.n_nodes).reshape(nodes.shape)
@@ -173,7 +174,7 @@ def _triangles_around(bounds: NDArray[np.float64]) -> TriangleMesh:
     return TriangleMesh(np.pad(nodes.points.reshape(-1, 2), ((0, 0), (0, 1))), np.hstack([first, second]).T)
 
 
-def _segments(lines: Sequence[Polyline]) -> NDArray[np.float64]:
+def _segments(lines: Sequence[Polyline]) -> Floats:
     return np.concatenate([np.empty((0, 2, 2)), *(line.segments for line in lines)])
 
 
@@ -191,12 +192,12 @@ class Drawing(Frozen):
         Decides the sides of the completion, and away from lines. Without it lines bound what they go around.
     """
 
-    lines: NDArray[np.float64]
-    completion: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2, 2)))
+    lines: Floats
+    completion: Floats = field(default_factory=lambda: np.empty((0, 2, 2)))
     phi: GridField[Literal[2]] | None = None
 
     @classmethod
-    def completed(cls, lines: NDArray[np.float64], phi: GridField[Literal[2]]) -> Drawing:
+    def completed(cls, lines: Floats, phi: GridField[Literal[2]]) -> Drawing:
         """Lines, and the zero set of φ where that is far from them."""
         crosses = bool((phi.values < 0).any() and (phi.values >= 0).any())
         zero_set = _segments(phi.contour()) if crosses else np.empty((0, 2, 2))
@@ -206,12 +207,12 @@ class Drawing(Frozen):
         return cls(lines, zero_set, phi)
 
     @property
-    def triangles(self) -> NDArray[np.float64]:
+    def triangles(self) -> Floats:
         """(m + k, 3, 2) the segments, as triangles without area."""
         return self._segments[:, [0, 1, 1]]
 
     @cached_property
-    def _segments(self) -> NDArray[np.float64]:
+    def _segments(self) -> Floats:
         return np.concatenate([self.lines, self.completion])
 
     @cached_property
@@ -219,7 +220,7 @@ class Drawing(Frozen):
         return _tree(self._segments)
 
     @cached_property
-    def _corners(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    def _corners(self) -> tuple[Ints, Floats, Ints]:
         """(m, 2) corners of the lines; sums of the unit normals of the lines that meet there; and their number."""
         along = self.lines[:, 1] - self.lines[:, 0]
         normals = unit(np.stack([-along[:, 1], along[:, 0]], axis=1))
@@ -230,12 +231,12 @@ class Drawing(Frozen):
             np.bincount(at.ravel()),
         )
 
-    def distance(self, points: ArrayLike) -> NDArray[np.float64]:
+    def distance(self, points: ArrayLike) -> Floats:
         """(...) signed distances of (..., 2) points, negative inside and to the right of lines."""
         places, shape = query_points(points, 2)
         return shaped(self._closest(places)[0], shape)
 
-    def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
+    def inside(self, points: ArrayLike) -> Bools:
         """(...) whether (..., 2) points are inside."""
         return self.distance(points) < 0
 
@@ -259,9 +260,7 @@ class Drawing(Frozen):
         )
         return Closest(*(shaped(result, shape) for result in results))
 
-    def _closest(
-        self, points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    def _closest(self, points: Floats) -> tuple[Floats, Floats, Ints]:
         """Signed distances of (n, 2) points, the nearest places, and the segments on which they are."""
         found = self._tree.search(_in_space(points))
         nearest, places = self._tree.features.ids[found.faces], found.places[:, :2]
@@ -272,9 +271,7 @@ class Drawing(Frozen):
         sides[on_line] = self._sides(points[on_line], places[on_line], nearest[on_line])
         return sides * found.distances, places, nearest
 
-    def _sides(
-        self, points: NDArray[np.float64], places: NDArray[np.float64], nearest: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
+    def _sides(self, points: Floats, places: Floats, nearest: Ints) -> Floats:
         """1 to the left of lines, −1 to their right; at a corner by the sum of the normals of all that meet there."""
         corners, sums, counts = self._corners
         ends = self.lines[nearest]
@@ -292,11 +289,11 @@ class Drawing(Frozen):
         return sides
 
 
-def _in_space(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _in_space(points: Floats) -> Floats:
     return np.pad(points, ((0, 0), (0, 1)))
 
 
-def _tree(segments: NDArray[np.float64]) -> FaceTree:
+def _tree(segments: Floats) -> FaceTree:
     """Of a triangle that stands on each segment, whose nearest place is at its foot."""
     a, b = segments.transpose(1, 0, 2)
     corners = np.pad(np.stack([a, b, (a + b) / 2], axis=1), ((0, 0), (0, 0), (0, 1)))
@@ -304,7 +301,7 @@ def _tree(segments: NDArray[np.float64]) -> FaceTree:
     return FaceTree.of_triangles(corners)
 
 
-def _enclosed(outlines: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _enclosed(outlines: Floats, points: Floats) -> Bools:
     """(n,) whether points are within outlines that do not cross: rays from them meet an odd number of segments."""
     inside = np.zeros(len(points), dtype=bool)
     a, b = outlines.transpose(1, 0, 2)

@@ -14,8 +14,8 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Complexes, Floats
 from ..diagnostics import Diagnostics, Jumps
 from ..errors import GeometryError, InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..foreign import ForeignShape, as_list, converted
@@ -224,10 +224,7 @@ def _retriangulated(
 
 
 def _field(
-    domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation,
-    triangles: IntrinsicMesh,
-    values: NDArray[np.float64],
-    cut: NDArray[np.bool_],
+    domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation, triangles: IntrinsicMesh, values: Floats, cut: Bools
 ) -> PiecewiseField:
     if isinstance(domain, IntrinsicTriangulation):
         return IntrinsicPiecewiseField(domain, domain, values, triangles, cut)
@@ -238,10 +235,7 @@ def _lowered(domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation) -> Sur
     """The discretisation, if there is memory for the field; factors are made for one diffusion time only."""
     n = len(domain.corners) if isinstance(domain, PolygonMesh) else domain.n_faces
     refuse_beyond_memory(
-        f"piecewise distance on {n:,} triangles",
-        n,
-        memory_estimate,
-        lambda number: f"use at most {number:,} triangles",
+        f"piecewise distance on {n:,} triangles", n, memory_estimate, lambda number: f"use at most {number:,} triangles"
     )
     if isinstance(domain, IntrinsicTriangulation):
         return lowered(domain)
@@ -266,15 +260,13 @@ def conforming(
     )
 
 
-def corner_slopes(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
+def corner_slopes(triangles: IntrinsicMesh, directions: Complexes) -> Floats:
     """(m, 3) ``Y_f · (q_k − centroid)``: φ at the corners, if it were zero at the centroid (constraint of Eq. 16)."""
     centroid = triangles.corner_positions.mean(axis=1, keepdims=True)
     return (np.conj(directions)[:, None] * (triangles.corner_positions - centroid)).real
 
 
-def jump_problem(
-    triangles: IntrinsicMesh, pairs: FacePairs, slopes: NDArray[np.float64], guarded: NDArray[np.bool_]
-) -> JumpProblem:
+def jump_problem(triangles: IntrinsicMesh, pairs: FacePairs, slopes: Floats, guarded: Bools) -> JumpProblem:
     """The objective of Eq. 16, with one constant per face as unknowns, and the curl κ of Eq. 15 in its weights."""
     offsets = pairs.ends(slopes)
     length = triangles.edge_lengths[pairs.faces[:, 0], pairs.sides[:, 0]]
@@ -291,7 +283,7 @@ def jump_problem(
     )
 
 
-def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.bool_]:
+def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> Bools:
     """(e,) edges with an end on the source, and edges of faces that it crosses."""
     touched = np.zeros(triangles.n_vertices, dtype=bool)
     for part in parts:
@@ -302,9 +294,7 @@ def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> N
     return np.any(touched[triangles.edges.vertices], axis=1)
 
 
-def centered(
-    triangles: IntrinsicMesh, values: NDArray[np.float64], parts: Sequence[CurveSegments]
-) -> NDArray[np.float64]:
+def centered(triangles: IntrinsicMesh, values: Floats, parts: Sequence[CurveSegments]) -> Floats:
     """Values whose median over the source is zero, by length, on every component; NaN where there is no source."""
     label = triangles.face_components
     faces, heights, weights = [], [], []

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from threadpoolctl import threadpool_limits
 
+from ..arrays import Floats, Ints
 from ..linear import factorize
 from ..linear.splitting import split_rounds
 from ..mesh.components import connected_components
@@ -47,23 +47,23 @@ class JumpProblem:
         The cost that does not depend on the constants.
     """
 
-    faces: NDArray[np.int64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    weights: NDArray[np.float64]
+    faces: Ints
+    low: Floats
+    high: Floats
+    weights: Floats
     n_faces: int
     floor: float = 0.0
 
-    def differences(self, constants: NDArray[np.float64]) -> NDArray[np.float64]:
+    def differences(self, constants: Floats) -> Floats:
         """x = K c: (p,) constants of the first faces minus those of the second."""
         return constants[self.faces[:, 0]] - constants[self.faces[:, 1]]
 
-    def objective(self, constants: NDArray[np.float64]) -> float:
+    def objective(self, constants: Floats) -> float:
         """The value to be minimised."""
         difference = self.differences(constants)
         return self.floor + 2.0 * float(self.weights @ np.abs(difference - np.clip(difference, self.low, self.high)))
 
-    def bound(self, flow: NDArray[np.float64]) -> float:
+    def bound(self, flow: Floats) -> float:
         """Lower bound of the objective from a flow (p,) that is conserved in every face (weak duality)."""
         excess = np.abs(flow / (2.0 * self.weights)).max(initial=1.0)
         return self.floor - float(np.maximum(self.low * flow, self.high * flow).sum() / excess)
@@ -96,7 +96,7 @@ class JumpSolution:
         Number of iterations.
     """
 
-    constants: NDArray[np.float64]
+    constants: Floats
     objective: float
     bound: float
     rounds: int
@@ -112,7 +112,7 @@ def minimize(
     tolerance: float = 2e-3,
     max_rounds: int = 3000,
     progress: Callable[[float], None] | None = None,
-    enough: Callable[[NDArray[np.float64]], bool] | None = None,
+    enough: Callable[[Floats], bool] | None = None,
 ) -> JumpSolution:
     """Minimise ``Σ 2w dist(z, [a, b])`` with z = K c by ADMM until the gap is certified, or constants are `enough`.
 
@@ -133,11 +133,11 @@ def minimize(
         threshold = _THRESHOLD * problem.scale
         negligible = 1e-9 * threshold * problem.weights.sum()
 
-        def proximal(target: NDArray[np.float64]) -> NDArray[np.float64]:
+        def proximal(target: Floats) -> Floats:
             excess = target - np.clip(target, low, high)
             return target - np.clip(excess, -threshold, threshold)
 
-        def solve(target: NDArray[np.float64]) -> NDArray[np.float64]:
+        def solve(target: Floats) -> Floats:
             return factor.solve(transposed @ (spring * target))
 
         steps, rounds = split_rounds(proximal, solve, problem.differences, step, step), 0
@@ -161,7 +161,7 @@ def minimize(
     return JumpSolution(moved, problem.objective(moved), bound, rounds)
 
 
-def regions_moved(problem: JumpProblem, constants: NDArray[np.float64]) -> NDArray[np.float64]:
+def regions_moved(problem: JumpProblem, constants: Floats) -> Floats:
     """Constants with regions between cuts of equal cost moved to a neighbour, smallest first, by weighted medians."""
     constants = constants.copy()
     for _ in range(problem.n_faces):  # each leaves one region less
@@ -186,13 +186,7 @@ def regions_moved(problem: JumpProblem, constants: NDArray[np.float64]) -> NDArr
 
 
 def _lags(
-    spring: NDArray[np.float64],
-    difference: NDArray[np.float64],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-    z: NDArray[np.float64],
-    before: NDArray[np.float64],
-    scaled: NDArray[np.float64],
+    spring: Floats, difference: Floats, low: Floats, high: Floats, z: Floats, before: Floats, scaled: Floats
 ) -> bool:
     """Whether the multipliers converge slowly: the relative dual residual is more than twice the primal one."""
     primal = np.sqrt(spring @ (difference - z) ** 2)
@@ -201,7 +195,7 @@ def _lags(
     return bool(dual * jumps > 2.0 * primal * np.sqrt(spring @ scaled**2))
 
 
-def _grounded_laplacian(incidence: sparse.csr_matrix, spring: NDArray[np.float64]) -> sparse.csr_matrix:
+def _grounded_laplacian(incidence: sparse.csr_matrix, spring: Floats) -> sparse.csr_matrix:
     """``KᵀSK``, S the diagonal matrix `spring`, with one face of each connected component grounded."""
     laplacian = sparse.csr_matrix(incidence.T @ sparse.diags_array(spring) @ incidence)
     parts = sparse.csgraph.connected_components(laplacian, directed=False)[1]

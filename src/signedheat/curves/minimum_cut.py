@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.components import grouped
 
@@ -30,13 +31,13 @@ class CutGraph:
         Edge of each arc, plus e if it runs backwards.
     """
 
-    starts: NDArray[np.int64]
-    heads: NDArray[np.int64]
-    reverse: NDArray[np.int64]
-    order: NDArray[np.int64]
+    starts: Ints
+    heads: Ints
+    reverse: Ints
+    order: Ints
 
     @classmethod
-    def of(cls, edges: NDArray[np.int64], n: int) -> CutGraph:
+    def of(cls, edges: Ints, n: int) -> CutGraph:
         """Make the graph of n nodes and (e, 2) edges, each of which is two arcs: number k and, backwards, k + e."""
         tails, heads = np.concatenate([edges, edges[:, ::-1]]).T
         starts, order = grouped(tails, n)
@@ -44,9 +45,7 @@ class CutGraph:
         place[order] = np.arange(len(order))
         return cls(starts, np.ascontiguousarray(heads[order]), place[(order + len(edges)) % len(order)], order)
 
-    def cut(
-        self, falling: NDArray[np.float64], rising: NDArray[np.float64], pull: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def cut(self, falling: Floats, rising: Floats, pull: Floats) -> Floats:
         """(n,) signs s = ±1 of nodes with the least cost of edges that are cut, less Σ pull s.
 
         Of several such signs, those with the fewest positive. An edge whose first node is positive and whose second is
@@ -66,14 +65,14 @@ class CutGraph:
         return np.where(source_side(self.starts, self.heads, self.reverse, residual, pulls), 1.0, -1.0)
 
 
-Ids = NDArray[np.int64]
+Ids = Ints
 
 FREE, TERMINAL, ORPHAN = -1, -2, -3
 """What a node has for an arc to its parent that lies in no tree, next to a terminal, or cut off from its parent."""
 
 
 @compiled
-def source_side(starts: Ids, heads: Ids, reverse: Ids, residual: Ids, pull: Ids) -> NDArray[np.bool_]:
+def source_side(starts: Ids, heads: Ids, reverse: Ids, residual: Ids, pull: Ids) -> Bools:
     """(n,) bool: nodes that the source still reaches when the flow is greatest; `residual` and `pull` are overwritten.
 
     Arcs of node i are those from starts[i] to starts[i + 1]; `reverse` is the arc back. A pull is the capacity from the

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats
 from ..errors import UnsupportedTypeError
 from ..foreign import ForeignShape, converted
 from ..frozen import Frozen, ShortRepr
@@ -42,8 +42,8 @@ class CurveOrientation(Frozen, ShortRepr):
     """
 
     curves: list[CurveOrPoints]
-    turned: NDArray[np.bool_]
-    agreement: NDArray[np.float64]
+    turned: Bools
+    agreement: Floats
 
     def agreeing(self, least: float) -> list[CurveOrPoints]:
         """Return the curves that agree with the others at least that well.
@@ -126,7 +126,7 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | F
     return CurveOrientation(with_turned(listed, turned), turned, agreement)
 
 
-def with_turned(curves: Sequence[CurveOrPoints], turned: NDArray[np.bool_]) -> list[CurveOrPoints]:
+def with_turned(curves: Sequence[CurveOrPoints], turned: Bools) -> list[CurveOrPoints]:
     """Return the curves, some with their positive side negative."""
     return [_turned(curve) if turn else curve for curve, turn in zip(curves, turned, strict=True)]
 

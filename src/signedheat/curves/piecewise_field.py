@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..diagnostics import Diagnostics
 from ..errors import GeometryError
 from ..exchange import Displayed
@@ -49,10 +50,10 @@ class Cut(Frozen):
         Length of each edge, along the surface.
     """
 
-    vertices: NDArray[np.int64]
-    points: NDArray[np.float64]
-    jumps: NDArray[np.float64]
-    steps: NDArray[np.float64]
+    vertices: Ints
+    points: Floats
+    jumps: Floats
+    steps: Floats
 
     @property
     def length(self) -> float:
@@ -100,16 +101,16 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
 
     domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation
     surface: TriangleMesh | IntrinsicTriangulation
-    values: NDArray[np.float64]
+    values: Floats
     triangles: IntrinsicMesh = field(repr=False)
-    is_cut: NDArray[np.bool_] = field(repr=False)
+    is_cut: Bools = field(repr=False)
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
 
     def _mapped(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> PiecewiseField:
         """Return the field with changed values, without the diagnostics of this one."""
         return PiecewiseField(self.domain, self.surface, change(self.values), self.triangles, self.is_cut)
 
-    def gradient(self, points: SurfacePoints) -> NDArray[np.float64]:
+    def gradient(self, points: SurfacePoints) -> Floats:
         """∇φ in the triangles that contain the points.
 
         Parameters
@@ -134,12 +135,12 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         return self.face_gradients[places.faces]
 
     @property
-    def face_gradients(self) -> NDArray[np.float64]:
+    def face_gradients(self) -> Floats:
         """(m, 3) ∇φ in each triangle, in space."""
         corners = self.surface.vertices[self.surface.faces]
         return gradients_along(corners[:, 1:] - corners[:, :1], self.values[:, 1:] - self.values[:, :1])
 
-    def __call__(self, points: SurfacePoints) -> NDArray[np.float64]:
+    def __call__(self, points: SurfacePoints) -> Floats:
         """φ at points of the surface; on edges and at vertices, the value in the face through which the point is given.
 
         Raises
@@ -151,7 +152,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         return (self.values[places.faces] * places.barycentric).sum(axis=1)
 
     @cached_property
-    def jumps(self) -> NDArray[np.float64]:
+    def jumps(self) -> Floats:
         """(p, 2) jump at the two ends of the edge between the faces of each of the `pairs`."""
         return self.pairs.ends(self.values)
 
@@ -204,7 +205,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         return VertexField(mesh, values, self.diagnostics)
 
     @cached_property
-    def split_vertices(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def split_vertices(self) -> tuple[Ints, Ints]:
         """(3m,) vertex of the split mesh at each corner, and the original vertex of each vertex of the split mesh."""
         owner = split_corners(self.triangles, self.pairs, self.is_cut)
         _, first = np.unique(owner, return_index=True)
@@ -278,18 +279,18 @@ class IntrinsicPiecewiseField(PiecewiseField):
     surface: IntrinsicTriangulation
 
     @property
-    def face_gradients(self) -> NDArray[np.float64]:
+    def face_gradients(self) -> Floats:
         """Not defined in space, since intrinsic triangles bend over the edges of the mesh: raises `GeometryError`."""
         raise GeometryError(
             "the triangles of an intrinsic triangulation are not flat in space, so φ has no one gradient in each",
             remedy="use gradient(points), or split().face_gradients",
         )
 
-    def gradient(self, points: SurfacePoints) -> NDArray[np.float64]:
+    def gradient(self, points: SurfacePoints) -> Floats:
         """(n, 3) ∇φ in space at points of the mesh, in the triangles on which φ is linear."""
         return self.domain.gradient_of_corners(self.values, points.faces, points.barycentric)
 
-    def __call__(self, points: SurfacePoints) -> NDArray[np.float64]:
+    def __call__(self, points: SurfacePoints) -> Floats:
         """(n,) φ at points of the mesh."""
         faces, weights = self.domain.locate(points.faces, points.barycentric)
         return (self.values[faces] * weights).sum(axis=1)

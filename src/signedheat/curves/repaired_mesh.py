@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Ints
 from ..diagnostics import Note
 from ..mesh.edges import orient_faces, pair_halfedges
 from ..mesh.welding import coincident_faces, joined_rims
@@ -50,9 +50,9 @@ class RepairedMesh:
 
     given: Any
     mesh: Any
-    vertices: NDArray[np.int64]
-    faces: NDArray[np.int64]
-    corners: NDArray[np.int64]
+    vertices: Ints
+    faces: Ints
+    corners: Ints
     note: MeshRepaired
 
     @classmethod
@@ -109,7 +109,7 @@ class RepairedMesh:
         return VertexField(self.given, values, diagnostics)
 
 
-def copied_faces(faces: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]:
+def copied_faces(faces: Ints, n_vertices: int) -> Ints:
     """(m,) first face on the vertices of each, where edges have more faces than two; elsewhere the face itself."""
     first = np.arange(len(faces))
     crowded = np.flatnonzero((_pairs(faces, n_vertices).around > 2).reshape(-1, 3).all(axis=1))
@@ -119,5 +119,5 @@ def copied_faces(faces: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]
     return first
 
 
-def _pairs(faces: NDArray[np.int64], n_vertices: int) -> Any:
+def _pairs(faces: Ints, n_vertices: int) -> Any:
     return pair_halfedges(faces.ravel(), np.roll(faces, -1, axis=1).ravel(), n_vertices)

@@ -9,9 +9,9 @@ from typing import cast
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Bools, Floats, Ints
 from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at, joined_end_to_end, without_copies
 from ..mesh.intrinsic_mesh import IntrinsicMesh
@@ -43,7 +43,7 @@ Halved and doubled, none of 46 drawings changes by what is turned."""
 TURNED = 0.399
 """Share of the length of a loop, and of all strokes, from which turning it is a guess: less for two of five pieces. Of
 515 drawings (`benchmarks/strokes.py`, seeds 0 to 51) none is wrong in silence and 12 are right with a warning; at .36
-0 and 17, at .45 1 and 10, at .5 3 and 9."""
+0 and 17, at .45 1 and 9, at .5 3 and 8."""
 WORTH = 0.5
 """What a stroke on which the inside hangs is worth, relative to its length, below which that is a guess. Of 350
 drawings, 140 of them with long strays, 9 are wrong in silence and 10 right with a warning; halved 15 and 5, doubled 4
@@ -72,9 +72,9 @@ class Pieces:
         The energy of the sets that they may bound.
     """
 
-    numbers: NDArray[np.int64]
-    stroke: NDArray[np.int64]
-    movable: NDArray[np.bool_]
+    numbers: Ints
+    stroke: Ints
+    movable: Bools
     strokes: Strokes
 
     @classmethod
@@ -100,7 +100,7 @@ class Pieces:
         strokes = Strokes.of(surface, parts, float(domain.triangulation.edge_lengths.mean()), group, is_loop)
         return cls(np.array(numbers, dtype=np.int64)[order], stroke[copy], movable, strokes)
 
-    def curves(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    def curves(self, chosen: Bools) -> Ints:
         """Numbers of the curves that make up the strokes chosen by (k,) bool."""
         return np.sort(self.numbers[chosen[self.stroke]])
 
@@ -126,19 +126,19 @@ class Decision:
     bounds_nothing: bool = False
     tied: bool = False
 
-    def turned(self, n: int) -> NDArray[np.bool_]:
+    def turned(self, n: int) -> Bools:
         """(n,) which of all curves given are turned."""
         result = np.zeros(n, dtype=bool)
         result[self.pieces.curves(self.best.signs < 0)] = True
         return result
 
     @property
-    def loose(self) -> NDArray[np.bool_]:
+    def loose(self) -> Bools:
         """(k,) which strokes bound nothing, where others do."""
         movable, explained = self.pieces.movable, self.best.explained >= EXPLAINED
         return movable & ~explained & (movable & explained).any()
 
-    def loops_left_out(self) -> NDArray[np.int64]:
+    def loops_left_out(self) -> Ints:
         """Numbers of the curves that are left out although they are likely to be a closed curve."""
         return self.pieces.curves(self.pieces.strokes.whole_loops(self.loose)[self.pieces.strokes.group])
 
@@ -147,7 +147,7 @@ class Decision:
         """Whether every stroke that is not left out bounds the inside."""
         return not self.bounds_nothing and bool((self.best.explained[~self.loose] >= EXPLAINED).all())
 
-    def turned_loops(self) -> NDArray[np.int64]:
+    def turned_loops(self) -> Ints:
         """Numbers of the pieces turned of loops that are mostly turned, unless they are few or a loop is complete."""
         strokes, best = self.pieces.strokes, self.best
         triangles = strokes.surface.triangles
@@ -170,7 +170,7 @@ class Decision:
         few = explained[found].sum() < TURNED * explained[found | (best.signs > 0)].sum()  # others turned prove nothing
         return self.pieces.curves(found & (not few) & (not complete))
 
-    def worth_little(self) -> NDArray[np.int64]:
+    def worth_little(self) -> Ints:
         """Numbers of the curves without which the inside is another, and the least energy rises by little.
 
         An arc alone is worth its length less that of its gap, a stray stroke little, because lines are added for it.
@@ -187,7 +187,7 @@ class Decision:
         return self.pieces.curves(found)
 
 
-def order_in_space(places: Sequence[NDArray[np.float64]]) -> NDArray[np.int64]:
+def order_in_space(places: Sequence[Floats]) -> Ints:
     """(k,) the order of curves by their middles and first points, each (j, 3), whatever their number and scale."""
     keys = np.array([[*points.mean(axis=0), *points[0]] for points in places])
     low = np.minimum(keys[:, :3].min(axis=0), keys[:, 3:].min(axis=0))
@@ -195,9 +195,7 @@ def order_in_space(places: Sequence[NDArray[np.float64]]) -> NDArray[np.int64]:
     return np.lexsort(np.rint((keys - np.tile(low, 2)) / (TIE * size)).T[::-1])
 
 
-def likely_curves(
-    ends: NDArray[np.float64], stroke: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def likely_curves(ends: Floats, stroke: Ints) -> tuple[Ints, Floats]:
     """(k,) group of strokes that are likely to be one curve, and (g,) length of its gaps; from (2 j, 3) ends."""
     j = len(stroke)
     nearest = nearest_others(ends)
@@ -254,9 +252,9 @@ def least_of(strokes: Strokes, insides: list[Inside]) -> Inside:
     return insides[int(np.argmax(costs <= costs.min() + TIE * strokes.lengths.sum()))]
 
 
-def altered(signs: NDArray[np.float64], rows: list[int], factor: float) -> NDArray[np.float64]:
+def altered(signs: Floats, rows: list[int], factor: float) -> Floats:
     """(k,) the directions of strokes with some of them turned (-1) or left out (0)."""
-    result: NDArray[np.float64] = signs.copy()
+    result: Floats = signs.copy()
     result[rows] *= factor
     return result
 
@@ -280,7 +278,7 @@ def misfit(strokes: Strokes, inside: Inside) -> float:
     return cost(strokes, inside) + AS_GIVEN * float(strokes.lengths[loose].sum())
 
 
-def turnable(strokes: Strokes, inside: Inside, movable: NDArray[np.bool_]) -> list[list[int]]:
+def turnable(strokes: Strokes, inside: Inside, movable: Bools) -> list[list[int]]:
     """Strokes to turn together or alone: those that bound nothing, others that may be the reason, and whole curves."""
     explained = inside.explained >= EXPLAINED
     loose, others = np.flatnonzero(movable & ~explained), np.flatnonzero(movable & explained)
@@ -291,18 +289,18 @@ def turnable(strokes: Strokes, inside: Inside, movable: NDArray[np.bool_]) -> li
     return [*together, loose.tolist(), *([k] for k in longest[0] + longest[1])] if len(loose) else together
 
 
-def longest_of(strokes: Strokes, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+def longest_of(strokes: Strokes, rows: Ints) -> Ints:
     """The `SINGLY` longest of some strokes, which are tried one by one."""
     return rows[np.argsort(-strokes.lengths[rows], kind="stable")[:SINGLY]]
 
 
-def settled_from(strokes: Strokes, starts: list[NDArray[np.float64]], movable: NDArray[np.bool_]) -> list[Inside]:
+def settled_from(strokes: Strokes, starts: list[Floats], movable: Bools) -> list[Inside]:
     """What `settled` finds from each start, on all cores."""
     with ThreadPoolExecutor(n_threads()) as pool:
         return list(pool.map(lambda signs: settled(strokes, signs, movable), starts))
 
 
-def settled(strokes: Strokes, signs: NDArray[np.float64], movable: NDArray[np.bool_]) -> Inside:
+def settled(strokes: Strokes, signs: Floats, movable: Bools) -> Inside:
     """Sides and directions that fit each other, improved in turn until nothing changes."""
     best = inside = strokes.inside(signs)
     for _ in range(ROUNDS):
@@ -314,7 +312,7 @@ def settled(strokes: Strokes, signs: NDArray[np.float64], movable: NDArray[np.bo
     return best
 
 
-def smooth_signs(strokes: Strokes, movable: NDArray[np.bool_]) -> NDArray[np.float64]:
+def smooth_signs(strokes: Strokes, movable: Bools) -> Floats:
     """(k,) directions of least energy if sides are smooth."""
     agreed, given = strokes.agreed, np.where(movable, WEAKLY, 1e6) * strokes.lengths
     given = given / strokes.lengths.mean()

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arrays import Bools, Floats, Ints
 from ..geodesics.geodesic_sources import PlacedSegments
 from ..linear import factorize
 from ..mesh.components import members_of
@@ -55,9 +55,9 @@ class Inside:
         explained.
     """
 
-    signs: NDArray[np.float64]
-    sides: NDArray[np.float64]
-    explained: NDArray[np.float64]
+    signs: Floats
+    sides: Floats
+    explained: Floats
     energy: float
 
 
@@ -86,23 +86,18 @@ class Strokes:
     """
 
     surface: SurfaceDiscretization
-    lengths: NDArray[np.float64]
+    lengths: Floats
     means: sparse.csr_matrix
     crossed: sparse.csr_matrix
     fluxes: sparse.csr_matrix
     width: float
-    group: NDArray[np.int64]
-    is_loop: NDArray[np.bool_]
+    group: Ints
+    is_loop: Bools
     _found: dict[bytes, Inside] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(
-        cls,
-        surface: SurfaceDiscretization,
-        parts: Sequence[CurveSegments],
-        edge: float,
-        group: NDArray[np.int64],
-        is_loop: NDArray[np.bool_],
+        cls, surface: SurfaceDiscretization, parts: Sequence[CurveSegments], edge: float, group: Ints, is_loop: Bools
     ) -> Strokes:
         """See where the vertices lie from each stroke; `edge` is how far those may be apart that are drawn for one."""
         triangles = surface.triangles
@@ -122,7 +117,7 @@ class Strokes:
         return cls(surface, lengths, means, crossed, fluxes_across(triangles, parts), width, group, is_loop)
 
     @property
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """(n,) area that belongs to each vertex."""
         return self.surface.triangles.vertex_areas
 
@@ -132,7 +127,7 @@ class Strokes:
         return CutGraph.of(self.surface.triangles.edges.vertices, self.surface.triangles.n_vertices)
 
     @cached_property
-    def costs(self) -> NDArray[np.float64]:
+    def costs(self) -> Floats:
         """(e,) length of the boundary between the vertices of each edge, if one of them is inside."""
         triangles = self.surface.triangles
         corners = triangles.corner_positions
@@ -142,7 +137,7 @@ class Strokes:
         return STAIRS * total.astype(np.float64)
 
     @cached_property
-    def agreed(self) -> NDArray[np.float64]:
+    def agreed(self) -> Floats:
         """(k, k) by how much ∫ |∇u|² is less for u that jumps by 1 across two strokes than for jumps across each alone.
 
         Strokes that follow each other agree, and those within a width of each other, as copies do.
@@ -160,9 +155,9 @@ class Strokes:
             result[:, begin : begin + BLOCK] = fluxes @ blur.solve(np.asfortranarray(masses @ sides))
         return 0.5 * (result + result.T)
 
-    def whole_loops(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def whole_loops(self, chosen: Bools) -> Bools:
         """(g,) the loops all of whose strokes, (k,), are chosen."""
-        whole: NDArray[np.bool_] = self.is_loop & (np.bincount(self.group, chosen) == np.bincount(self.group))
+        whole: Bools = self.is_loop & (np.bincount(self.group, chosen) == np.bincount(self.group))
         return whole
 
     @property
@@ -170,7 +165,7 @@ class Strokes:
         """All that was asked of `inside`."""
         return list(self._found.values())
 
-    def inside(self, signs: NDArray[np.float64]) -> Inside:
+    def inside(self, signs: Floats) -> Inside:
         """The sides of least energy for strokes with these directions, 0 if one is left out: a minimum cut."""
         key = signs.tobytes()
         if key not in self._found:
@@ -188,12 +183,12 @@ class Strokes:
             return 0.0
         return float(self.areas[reached & (largest != inside.sides)].sum())
 
-    def _least(self, signs: NDArray[np.float64]) -> Inside:
+    def _least(self, signs: Floats) -> Inside:
         sides, boundary = self._cut(signs, -1.0)
         explained = signs * (self.means @ sides)
         return Inside(signs, sides, explained, boundary - REWARD * float(self.lengths @ explained))
 
-    def _cut(self, signs: NDArray[np.float64], larger: float) -> tuple[NDArray[np.float64], float]:
+    def _cut(self, signs: Floats, larger: float) -> tuple[Floats, float]:
         """The sides of least energy, of several the largest inside (1) or the smallest (-1), and what it costs."""
         falling, rising = self._uncovered(signs)
         pull = self.means.T @ (REWARD * self.lengths * signs)
@@ -201,15 +196,13 @@ class Strokes:
         sides = self.graph.cut(falling, rising, pull)
         return sides, float(self._boundary(sides, falling, rising).sum())
 
-    def _uncovered(self, signs: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    def _uncovered(self, signs: Floats) -> list[Floats]:
         """(e,) cost of each edge between sides that fall from its first vertex to its second, and that rise."""
         along = self.crossed.multiply(signs[:, None]).tocsr()
         free = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
         return [np.where(each, 0.0, self.costs) for each in free]
 
-    def _boundary(
-        self, sides: NDArray[np.float64], falling: NDArray[np.float64], rising: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _boundary(self, sides: Floats, falling: Floats, rising: Floats) -> Floats:
         """(e,) cost of each edge between these sides."""
         first, second = sides[self.surface.triangles.edges.vertices].T
         return np.where(first > second, falling, np.where(first < second, rising, 0.0))
@@ -281,7 +274,7 @@ def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, width: float) -> 
     return sparse.csr_matrix((values, (rows, columns)), shape=seen.shape)
 
 
-def _means(chosen: sparse.csr_matrix, areas: NDArray[np.float64]) -> sparse.csr_matrix:
+def _means(chosen: sparse.csr_matrix, areas: Floats) -> sparse.csr_matrix:
     """(k, n) rows that take the mean over the vertices chosen, by area."""
     weighted = sparse.csr_matrix(chosen.astype(bool).astype(float) @ sparse.diags(areas))
     total = np.asarray(weighted.sum(axis=1)).ravel()

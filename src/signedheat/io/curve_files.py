@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..errors import FileFormatError, SignedHeatError, SourceError, UnsupportedTypeError
 from ..foreign import ForeignShape, converted
 from ..geodesics.shortest_paths import gaps
@@ -165,7 +165,7 @@ def placed(group: Group, domain: EmbeddedSurface) -> CurveOrPoints:
     return Curve(faces[:end], weights[:end], closed=closed, oriented=group.kind == SIGNED)
 
 
-def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[Ints, Floats]:
     """Face and barycentric coordinates of nodes."""
     mesh = domain.triangulation
     count = np.array([len(node.vertices) for node in nodes])
@@ -288,7 +288,7 @@ def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]
     return found
 
 
-def nodes_of(faces: NDArray[np.int64], weights: NDArray[np.float64], domain: EmbeddedSurface) -> list[Node]:
+def nodes_of(faces: Ints, weights: Floats, domain: EmbeddedSurface) -> list[Node]:
     """Points on faces, as nodes."""
     corners = domain.triangulation.faces[faces]
     return [
@@ -339,13 +339,6 @@ def write_obj(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
     return "\n".join([*vertices, *elements]) + "\n"
 
 
-READERS: dict[str, Callable[..., Iterable[Group | Curve]]] = {
-    ".csv": read_csv,
-    ".json": read_json,
-    ".obj": read_obj,
-}
-WRITERS: dict[str, Callable[..., str]] = {
-    ".json": write_json,
-    ".obj": write_obj,
-}
+READERS: dict[str, Callable[..., Iterable[Group | Curve]]] = {".csv": read_csv, ".json": read_json, ".obj": read_obj}
+WRITERS: dict[str, Callable[..., str]] = {".json": write_json, ".obj": write_obj}
 CURVE_FORMATS = frozenset(WRITERS)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..arrays import Floats
 from ..errors import GeometryError
 from ..grids.polyline import Polyline
 from .files import PathLike, format_for, reading, replacing
@@ -91,7 +89,7 @@ def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> Non
         temporary.write_text(content, encoding="utf-8")
 
 
-READERS: dict[str, Callable[[PathLike], list[tuple[NDArray[np.float64], bool]]]] = {
+READERS: dict[str, Callable[[PathLike], list[tuple[Floats, bool]]]] = {
     ".csv": lambda path: read_point_lists(path, 2),
     ".svg": read_svg,
 }

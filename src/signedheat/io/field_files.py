@@ -295,10 +295,7 @@ def _write_vertex_npz(field: VertexField[SurfaceShape], path: PathLike) -> None:
 
 
 _VALUES: dict[str, Callable[[PathLike, tuple[str, ...]], Elements]] = {".ply": read_ply, ".vtp": read_vtp}
-VALUE_FORMATS: dict[str, Callable[[Elements, PathLike], bytes]] = {
-    ".ply": write_ply,
-    ".vtp": write_vtp,
-}
+VALUE_FORMATS: dict[str, Callable[[Elements, PathLike], bytes]] = {".ply": write_ply, ".vtp": write_vtp}
 """Formats of surfaces with values at their vertices."""
 _GRID_WRITERS: dict[str, Callable[[GridField, Path], None]] = {
     ".npy": _write_npy,

@@ -12,6 +12,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..errors import FileFormatError
 from ..joining import Body, placed
 from .files import PathLike, companion_contents, contents, damaged, ensure_fits
@@ -144,7 +145,7 @@ def _opened(path: PathLike) -> _Scene:
     return _Scene(tree, buffers)
 
 
-def _triangles(corners: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
+def _triangles(corners: Ints, mode: int) -> Ints:
     """(m, 3) triangles of a list, strip or fan of corners."""
     if mode == TRIANGLES:
         if len(corners) % 3:
@@ -164,7 +165,7 @@ def _corner_count(tree: dict[str, Any], mesh: dict[str, Any]) -> int:
     return sum(tree["accessors"][index]["count"] for index in named if index is not None)
 
 
-def _places(tree: dict[str, Any]) -> Iterator[tuple[int, NDArray[np.float64]]]:
+def _places(tree: dict[str, Any]) -> Iterator[tuple[int, Floats]]:
     """Yield meshes with the (4, 3) transforms of rows that place them; a node occurs once, as glTF demands."""
     nodes, scenes = tree.get("nodes", []), tree.get("scenes", [])
     if not nodes:
@@ -185,7 +186,7 @@ def _places(tree: dict[str, Any]) -> Iterator[tuple[int, NDArray[np.float64]]]:
         stack += [(child, matrix) for child in reversed(nodes[index].get("children", []))]
 
 
-def _matrix(node: dict[str, Any]) -> NDArray[np.float64]:
+def _matrix(node: dict[str, Any]) -> Floats:
     """(4, 4) transform from a node to its parent."""
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import FileFormatError
 from ..packages import lazy_module
 from .files import (
@@ -84,13 +85,13 @@ class Image:
     """
 
     values: NDArray[Any]
-    axes: NDArray[np.float64]
-    origin: NDArray[np.float64]
+    axes: Floats
+    origin: Floats
     space: str | None = None
     confidence: NDArray[Any] | None = None
 
     @property
-    def spacing(self) -> NDArray[np.float64]:
+    def spacing(self) -> Floats:
         """(d,) distances between places along x, y, z; raises `FileFormatError` if the image is rotated."""
         spacing = np.diag(self.axes) if self.axes.ndim == 2 else np.zeros(self.values.ndim)
         if not np.array_equal(self.axes, np.diag(spacing)):
@@ -176,7 +177,7 @@ def _nrrd_header(data: bytes) -> tuple[dict[str, str], bytes]:
     return fields, data[lines.tell() :]
 
 
-def _nrrd_vectors(text: str) -> NDArray[np.float64]:
+def _nrrd_vectors(text: str) -> Floats:
     """(n, d) vectors like ``(1,0,0) (0,1,0)``; those of axes outside of space, ``none``, are NaN."""
     words = re.findall(r"\([^)]*\)|none", text)
     rows = [[math.nan] if word == "none" else word.strip("()").split(",") for word in words]
@@ -211,12 +212,7 @@ def _truncated(there: int, announced: int) -> FileFormatError:
 
 
 def write_nrrd(
-    path: PathLike,
-    values: NDArray[Any],
-    axes: NDArray[np.float64],
-    origin: NDArray[np.float64],
-    space: str | None = None,
-    **keys: str,
+    path: PathLike, values: NDArray[Any], axes: Floats, origin: Floats, space: str | None = None, **keys: str
 ) -> None:
     """Write values, indexed [x, y, z]; the columns of `axes` are the steps along x, y, z. `keys` go into the header."""
     data = np.asfortranarray(values).astype(values.dtype.newbyteorder("<"), copy=False)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..errors import FileFormatError, InexactWarning, warn_user
 from ..exchange import Elements
 from ..mesh.unit_vectors import unit
@@ -72,7 +73,7 @@ def write_stl(shape: Elements, path: PathLike) -> bytes:
     return b"signedheat".ljust(80) + len(facets).to_bytes(4, "little") + facets.tobytes()
 
 
-def warn_of_rounding(points: NDArray[np.float64], rounded: NDArray[np.float64]) -> None:
+def warn_of_rounding(points: Floats, rounded: Floats) -> None:
     """Warn if rounding joins vertices of a shape, or moves them far relative to its size."""
     largest_move = float(np.abs(points - rounded).max())
     places, rounded_places = (np.count_nonzero(same_positions(p) == np.arange(len(p))) for p in (points, rounded))
@@ -85,7 +86,7 @@ def warn_of_rounding(points: NDArray[np.float64], rounded: NDArray[np.float64]) 
         )
 
 
-def _text_corners(data: bytes) -> NDArray[np.float64]:
+def _text_corners(data: bytes) -> Floats:
     """(3 m, 3) corners of the facets of all solids; each facet must have three."""
     ends = len(re.findall(rb"(?mi)^[ \t]*endsolid\b", data))
     words = re.sub(rb"(?mi)^[ \t]*(end)?solid\b[^\r\n]*", b"", data).lower().split()  # names may hold keywords
@@ -116,7 +117,7 @@ def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:
     return TriangleMesh(corners[firsts].astype(np.float64), ids.reshape(-1, 3))
 
 
-def _rows_of_words(words: list[str], counts: NDArray[np.int64]) -> Iterator[str]:
+def _rows_of_words(words: list[str], counts: Ints) -> Iterator[str]:
     """As many words on each line as it counts."""
     return (" ".join(islice(left, count)) for left in [iter(words)] for count in counts.tolist())
 
@@ -136,7 +137,7 @@ def read_obj(path: PathLike) -> Elements:
     return Elements(vertices, normals=normals)
 
 
-def read_obj_elements(path: PathLike) -> tuple[NDArray[np.float64], list[list[int]], list[list[int]]]:
+def read_obj_elements(path: PathLike) -> tuple[Floats, list[list[int]], list[list[int]]]:
     """All vertices of an OBJ file, and the vertex ids, from 0, of each of its lines, and of its sets of points."""
     with reading(path):
         lines = _lines_by_keyword(path)
@@ -190,7 +191,7 @@ def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
     return {keyword: rest for keyword, rest in lines.items() if rest}
 
 
-def _coordinates(rows: list[list[Any]], what: str) -> NDArray[np.float64]:
+def _coordinates(rows: list[list[Any]], what: str) -> Floats:
     """(n, 3) numbers, the first three of each line; weights and colours are ignored."""
     short = next((k for k, row in enumerate(rows) if len(row) < 4), None)
     if short is not None:
@@ -199,7 +200,7 @@ def _coordinates(rows: list[list[Any]], what: str) -> NDArray[np.float64]:
     return parsed_numbers([row[1:4] for row in rows], what).reshape(-1, 3)
 
 
-def _elements(words: list[list[Any]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _elements(words: list[list[Any]]) -> tuple[Ints, Ints]:
     """Vertex ids, from 0, of all elements, and their number in each; −1 is the vertex before."""
     counts = np.array([len(element) - 1 for element in words], dtype=np.int64)
     flat = [word for element in words for word in element[1:]]

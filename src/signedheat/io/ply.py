@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..errors import FileFormatError
 from ..exchange import Elements
 from .files import PathLike, contents, damaged, ensure_writable, parsed_numbers, replacing
@@ -114,7 +115,7 @@ def _header_of(
     return ("\n".join([*lines, "end_header"]) + "\n").encode()
 
 
-def write_parts(parts: Iterator[tuple[NDArray[np.float64], NDArray[np.int64]]], path: PathLike) -> tuple[int, int]:
+def write_parts(parts: Iterator[tuple[Floats, Ints]], path: PathLike) -> tuple[int, int]:
     """Write triangles that are more than fit into memory to a binary PLY file as they come, in double precision."""
     ensure_writable(path, {".ply"}, "a mesh part by part")
     n_vertices = n_faces = 0
@@ -150,11 +151,11 @@ def _tables(path: PathLike) -> dict[str, dict[str, Any]]:
     return {element.name: read_element(element) for element in elements}
 
 
-def _columns(table: dict[str, Any], names: Any) -> NDArray[np.float64]:
+def _columns(table: dict[str, Any], names: Any) -> Floats:
     return np.stack([table[name] for name in names], axis=1).astype(np.float64)
 
 
-def _unrolled(strip: NDArray[np.int64]) -> NDArray[np.int64]:
+def _unrolled(strip: Ints) -> Ints:
     """Return the triangles of strips separated by −1; every second one has the opposite orientation."""
     windows = np.stack([strip[:-2], strip[1:-1], strip[2:]], axis=1)
     index = np.arange(len(strip))

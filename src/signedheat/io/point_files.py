@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import FileFormatError
 from ..exchange import Elements
 from ..packages import ensure_installed
@@ -31,7 +31,7 @@ SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance "
 """Namespace of the attributes by which XML names schemas."""
 
 
-def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[NDArray[np.float64]]:
+def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
     """Numbers of each block of lines, between empty lines: all lines have as many, one of `widths`.
 
     They are separated by commas, semicolons, tabs or spaces; where all commas stand between digits, and something else
@@ -80,14 +80,14 @@ def _has_decimal_commas(content: str) -> bool:
     return bool(rows) and all(len(words) > 1 and all(map(WITH_COMMA.fullmatch, words)) for words in rows)
 
 
-def read_point_lists(path: PathLike, dimension: int) -> list[tuple[NDArray[np.float64], bool]]:
+def read_point_lists(path: PathLike, dimension: int) -> list[tuple[Floats, bool]]:
     """Points (n, dimension) of each polyline, and whether it is closed (its last point equals its first)."""
     lists = read_rows(path, (dimension,))
     closed = [len(points) > 3 and bool((points[0] == points[-1]).all()) for points in lists]
     return [(points[:-1] if end else points, end) for points, end in zip(lists, closed, strict=True)]
 
 
-def write_point_lists(lists: Sequence[tuple[NDArray[np.float64], bool]]) -> str:
+def write_point_lists(lists: Sequence[tuple[Floats, bool]]) -> str:
     """Return the text that `read_point_lists` reads."""
     blocks = []
     for points, closed in lists:
@@ -134,7 +134,7 @@ def read_pcd(path: PathLike) -> Elements:
     return Elements(points[finite], normals=normals[finite] if normals is not None and whole else None)
 
 
-def _table(header: dict[str, list[str]], body: bytes) -> dict[str, NDArray[np.float64]]:
+def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
     """Columns of numbers by name of the field."""
     try:
         names, kind = header["FIELDS"], header["DATA"][0].lower()
@@ -232,7 +232,7 @@ def _refuse_references(description: bytes) -> None:
         raise damaged(f"its description is no XML ({error})") from error
 
 
-def _cloud(points: NDArray[np.float64], path: PathLike) -> PointCloud:
+def _cloud(points: Floats, path: PathLike) -> PointCloud:
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         raise FileFormatError("it has no points", path=path)

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..errors import FileFormatError
 from ..joining import Body, concatenated, placed
 from ..mesh.welding import welded
@@ -77,9 +77,9 @@ def read_dae(path: PathLike) -> TriangleMesh:
 class _Object:
     """A mesh, or other objects, each with a (4, 3) transform that multiplies rows from the right."""
 
-    vertices: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
-    faces: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
-    parts: list[tuple[Key, NDArray[np.float64]]] = field(default_factory=list)
+    vertices: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    faces: Ints = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+    parts: list[tuple[Key, Floats]] = field(default_factory=list)
 
 
 def read_3mf(path: PathLike) -> TriangleMesh:
@@ -169,7 +169,7 @@ class _Package:
             self._counts[key] = len(item.faces) + sum(count for count, _ in inner), height
         return self._counts[key]
 
-    def placed(self, key: Key, matrix: NDArray[np.float64]) -> Iterator[Body]:
+    def placed(self, key: Key, matrix: Floats) -> Iterator[Body]:
         """Vertices and faces of an object and its components; those without triangles are not visited."""
         if not self.count(key)[0]:
             return
@@ -205,7 +205,7 @@ def _key(element: ElementTree.Element, part: str, name: str = "objectid") -> Key
     return part if other is None else _part(other), element.get(name, "")
 
 
-def _matrix(element: ElementTree.Element) -> NDArray[np.float64]:
+def _matrix(element: ElementTree.Element) -> Floats:
     words = element.get("transform")
     if words is None:
         return np.eye(4, 3)
@@ -225,7 +225,7 @@ def _object(element: ElementTree.Element, part: str) -> _Object:
     return _Object(np.array(vertices, dtype=np.float64).reshape(-1, 3), ids, parts)
 
 
-def read_step(path: PathLike, deflection: float | None = None) -> tuple[TriangleMesh, NDArray[np.int64]]:
+def read_step(path: PathLike, deflection: float | None = None) -> tuple[TriangleMesh, Ints]:
     """Triangles of a ``.step`` or ``.stp`` file, and the number of the CAD face that each is part of.
 
     `Closest.faces` are triangles: the second array, taken at them, says on which CAD face the nearest place lies.

@@ -11,8 +11,8 @@ from itertools import pairwise
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Complexes, Floats
 from ..errors import FileFormatError
 from ..grids.polyline import Polyline
 from ..mesh.polylines import filled_outlines
@@ -39,7 +39,7 @@ FILL_RULE = re.compile(r"fill-rule\s*:\s*(\w+)")
 TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
 
 
-def read_svg(path: PathLike) -> list[tuple[NDArray[np.float64], bool]]:
+def read_svg(path: PathLike) -> list[tuple[Floats, bool]]:
     """Points of each subpath in drawing order, with y upwards, and whether it is closed."""
     data = contents(path)
     try:
@@ -62,13 +62,8 @@ class _Drawing:
     n_used: int = 0
 
     def drawn(
-        self,
-        element: ElementTree.Element,
-        outer: NDArray[np.float64],
-        depth: int = 0,
-        is_used: bool = False,
-        rule: str = "nonzero",
-    ) -> Iterator[list[tuple[NDArray[np.float64], bool]]]:
+        self, element: ElementTree.Element, outer: Floats, depth: int = 0, is_used: bool = False, rule: str = "nonzero"
+    ) -> Iterator[list[tuple[Floats, bool]]]:
         """Subpaths of an element and its children; those with the evenodd rule as outlines of their fill."""
         self.n_used += is_used
         if depth > DEPTH or self.n_used > MOST_USES:
@@ -158,7 +153,7 @@ def _size(root: ElementTree.Element) -> tuple[float, float]:
     return width, height
 
 
-def _transform(text: str) -> NDArray[np.float64]:
+def _transform(text: str) -> Floats:
     """(3, 3) the product of a list of transforms."""
     matrix = np.eye(3)
     for kind, inside in TRANSFORM.findall(text):
@@ -205,9 +200,9 @@ def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
         command = {"M": "L", "m": "l"}.get(command, command)
 
 
-def _subpaths(data: str) -> Iterator[tuple[NDArray[np.float64], bool]]:
+def _subpaths(data: str) -> Iterator[tuple[Floats, bool]]:
     """Points of each subpath with a length, and whether it is closed."""
-    points: list[NDArray[np.complex128]] = []
+    points: list[Complexes] = []
     place = start = control = 0j
     before, closed = "", False
     for command, numbers in _steps(data):
@@ -241,7 +236,7 @@ def _subpaths(data: str) -> Iterator[tuple[NDArray[np.float64], bool]]:
     yield from _whole(points, closed)
 
 
-def _whole(parts: list[NDArray[np.complex128]], closed: bool) -> Iterator[tuple[NDArray[np.float64], bool]]:
+def _whole(parts: list[Complexes], closed: bool) -> Iterator[tuple[Floats, bool]]:
     """Return a subpath, if it has a length; it is closed if it ends where it begins, too."""
     points = np.concatenate([np.zeros(0, dtype=np.complex128), *parts])
     if len(points) == 0 or (points == points[0]).all():
@@ -251,7 +246,7 @@ def _whole(parts: list[NDArray[np.complex128]], closed: bool) -> Iterator[tuple[
     yield np.stack([points.real, points.imag], axis=1), closed
 
 
-def _bezier(corners: list[complex]) -> NDArray[np.complex128]:
+def _bezier(corners: list[complex]) -> Complexes:
     """Points of a Bézier curve of any degree, by de Casteljau, without the first."""
     t = np.arange(1, CURVE_PIECES + 1) / CURVE_PIECES
     rows = [np.full(CURVE_PIECES, corner) for corner in corners]
@@ -263,7 +258,7 @@ def _bezier(corners: list[complex]) -> NDArray[np.complex128]:
 
 def _arc(
     begin: complex, end: complex, rx: float, ry: float, degrees: float, is_large: float, is_clockwise: float
-) -> NDArray[np.complex128]:
+) -> Complexes:
     """Points of an elliptical arc without the first: SVG 1.1, F.6.5, on the circle that the ellipse is mapped to."""
     rx, ry = abs(rx), abs(ry)
     if rx * ry == 0 or begin == end:

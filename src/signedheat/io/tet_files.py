@@ -22,16 +22,7 @@ from ..packages import require
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
-from .files import (
-    PathLike,
-    contents,
-    damaged,
-    extension,
-    format_for,
-    parsed_numbers,
-    replacing,
-    writing,
-)
+from .files import PathLike, contents, damaged, extension, format_for, parsed_numbers, replacing, writing
 from .sandbox import parsed
 from .vtk_xml import Block, Cells, read_vtu
 
@@ -52,15 +43,7 @@ TET_FORMATS = frozenset(MODULES)
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
 
 
-COUNTED = {
-    "PhysicalNames": 1,
-    "Entities": 4,
-    "Nodes": 2,
-    "Elements": 2,
-    "Periodic": 1,
-    "NodeData": 1,
-    "ElementData": 1,
-}
+COUNTED = {"PhysicalNames": 1, "Entities": 4, "Nodes": 2, "Elements": 2, "Periodic": 1, "NodeData": 1, "ElementData": 1}
 """Sections of Gmsh files, and the number of counts at the beginning of each (one in version 2)."""
 IN_TEXT = ("PhysicalNames", "NodeData", "ElementData")
 """Sections that begin with text even in binary files."""

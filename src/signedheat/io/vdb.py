@@ -17,6 +17,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints
 from ..errors import FileFormatError
 from ..exchange import NAME
 from ..grids.blocks import SIDE, Blocks
@@ -32,7 +33,7 @@ SIDES, SIZES = (32, 16), (128, SIDE)
 CONVENTION = (
     "signed distance, negative inside, in the units of the shape; voxel (i, j, k) at origin + (i, j, k) * spacing"
 )
-Outside = Callable[[NDArray[np.int64], int], NDArray[np.float32]]
+Outside = Callable[[Ints, int], NDArray[np.float32]]
 """Values of cubes of some number of voxels along each edge in which there are no blocks, from their first voxels."""
 
 
@@ -53,9 +54,9 @@ class _Tree:
     """
 
     background: np.float32
-    places: NDArray[np.int64]
+    places: Ints
     values: NDArray[np.floating]
-    active: NDArray[np.bool_]
+    active: Bools
     outside: Outside
 
 
@@ -111,7 +112,7 @@ def _band(field: GridField) -> _Tree:
     finite = ~np.isnan(field.values)
     values = np.where(finite, np.clip(field.values, -background, background), background)
 
-    def outside(places: NDArray[np.int64], size: int) -> NDArray[np.float32]:
+    def outside(places: Ints, size: int) -> NDArray[np.float32]:
         middle = places + 0.5 * (size - 1)
         on_grid = (middle < np.array(grid.shape)).all(axis=1)
         result = np.full(len(places), background, dtype=np.float32)
@@ -136,14 +137,14 @@ def _whole(field: GridField) -> _Tree:
     values = values[np.ravel_multi_index(tuple(blocks.places.astype(np.int64).T), tuple(counts))]
     active = ~np.isnan(values)
 
-    def outside(places: NDArray[np.int64], size: int) -> NDArray[np.float32]:
+    def outside(places: Ints, size: int) -> NDArray[np.float32]:
         return np.full(len(places), background, dtype=np.float32)
 
     return _in_order(blocks, np.where(active, values, background), active, background, outside)
 
 
 def _in_order(
-    blocks: Blocks, values: NDArray[np.floating], active: NDArray[np.bool_], background: np.float32, outside: Outside
+    blocks: Blocks, values: NDArray[np.floating], active: Bools, background: np.float32, outside: Outside
 ) -> _Tree:
     """Return the tree with its blocks in the order of the file: by top node, by cube, by place."""
     places = SIDE * blocks.places.astype(np.int64)
@@ -153,12 +154,7 @@ def _in_order(
 
 
 def _write_file(
-    file: BinaryIO,
-    tree: _Tree,
-    metadata: dict[str, str | bool],
-    origin: NDArray[np.float64],
-    spacing: NDArray[np.float64],
-    half: bool,
+    file: BinaryIO, tree: _Tree, metadata: dict[str, str | bool], origin: Floats, spacing: Floats, half: bool
 ) -> None:
     """Write the header, and the grid with where it begins, where its voxels do, and where it ends."""
     kind = np.dtype("<f2" if half else "<f4")
@@ -195,7 +191,7 @@ def _write_topology(file: BinaryIO, tree: _Tree, kind: np.dtype) -> None:
                 file.write(_mask(next(masks).ravel()))
 
 
-def _node(place: NDArray[np.int64], level: int, children: NDArray[np.int64], outside: Outside, kind: np.dtype) -> bytes:
+def _node(place: Ints, level: int, children: Ints, outside: Outside, kind: np.dtype) -> bytes:
     """Return a node: a mask of places with children, of active ones (none), and values of all places, 0 at children."""
     side, size = SIDES[level], SIZES[level]
     inner = place + size * np.stack(np.unravel_index(np.arange(side**3), (side,) * 3), axis=1)
@@ -205,7 +201,7 @@ def _node(place: NDArray[np.int64], level: int, children: NDArray[np.int64], out
     return _mask(has_child) + _mask(np.zeros(side**3, dtype=bool)) + _packed(values, kind)
 
 
-def _transform(origin: NDArray[np.float64], step: NDArray[np.float64]) -> bytes:
+def _transform(origin: Floats, step: Floats) -> bytes:
     """Return translation, scale, voxel size, and what the library keeps of the scale's inverse."""
     uniform = "Uniform" if bool((step == step[0]).all()) else ""
     rows = np.concatenate([origin, step, step, 1 / step, 1 / step**2, 0.5 / step])
@@ -227,7 +223,7 @@ def _text(given: str) -> bytes:
     return struct.pack("<I", len(given.encode())) + given.encode()
 
 
-def _mask(chosen: NDArray[np.bool_]) -> bytes:
+def _mask(chosen: Bools) -> bytes:
     return np.packbits(chosen, bitorder="little").tobytes()
 
 
@@ -240,7 +236,7 @@ def _packed(values: NDArray[np.floating], kind: np.dtype) -> bytes:
     return bytes([ALL_VALUES]) + size + (packed if is_shorter else data)
 
 
-def _by_parent(places: NDArray[np.int64], size: int) -> dict[tuple[int, ...], NDArray[np.int64]]:
+def _by_parent(places: Ints, size: int) -> dict[tuple[int, ...], Ints]:
     """Places of nodes, each once, by the place of the node of `size` voxels around them; both in order."""
     nodes = np.unique(places, axis=0)
     parents, rows = np.unique(nodes // size * size, axis=0, return_inverse=True)

@@ -9,6 +9,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..errors import FileFormatError, GeometryError
 from ..exchange import NAME
 from ..foreign import Represented
@@ -67,12 +68,12 @@ class LabelImage(Represented, Frozen):
     """
 
     labels: NDArray[np.generic]
-    axes: NDArray[np.float64]
-    origin: NDArray[np.float64]
+    axes: Floats
+    origin: Floats
     space: str | None = None
 
     @property
-    def spacing(self) -> NDArray[np.float64]:
+    def spacing(self) -> Floats:
         """(3,) distance between the centres of neighbouring voxels."""
         return np.linalg.norm(self.axes, axis=0)
 
@@ -82,7 +83,7 @@ class LabelImage(Represented, Frozen):
         return Grid((0.0, 0.0, 0.0), self.spacing, self.labels.shape)
 
     @property
-    def matrix(self) -> NDArray[np.float64]:
+    def matrix(self) -> Floats:
         """(4, 4) from positions along the axes of the image to those in the world."""
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = self.axes / self.spacing, self.origin
@@ -135,7 +136,7 @@ class LabelImage(Represented, Frozen):
         return DigitalSurface(inside, self.spacing).smooth_surface
 
     def to_world(self, surface: Mesh) -> Mesh:
-        """Move a mesh along the axes of the image to its place in the world; outside stays outside.
+        """Map a mesh from the axes of the image to the world; faces turn if these are left-handed: inside stays so.
 
         Parameters
         ----------
@@ -229,7 +230,7 @@ class LabelImage(Represented, Frozen):
         voxels = " × ".join(map(str, self.labels.shape))
         return f"LabelImage({voxels} voxels of {short(self.spacing)}, {_listed(np.unique(self.labels))})"
 
-    def _nifti(self, field: GridField, axes: NDArray[np.float64], first: NDArray[np.float64], path: PathLike) -> bytes:
+    def _nifti(self, field: GridField, axes: Floats, first: Floats, path: PathLike) -> bytes:
         affine = np.eye(4)
         affine[:3, :3], affine[:3, 3] = axes, first
         signs = SPACES[self.space] if self.space is not None else (1, 1, 1)

@@ -19,6 +19,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..errors import FileFormatError
 from ..exchange import Elements
 from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers, unpacked
@@ -41,9 +42,7 @@ KINDS = {
 """Names of VTK's types of cells in meshio."""
 
 
-def write_vti(
-    origin: NDArray[np.float64], spacing: NDArray[np.float64], values: Mapping[str, NDArray[Any]], convention: str
-) -> bytes:
+def write_vti(origin: Floats, spacing: Floats, values: Mapping[str, NDArray[Any]], convention: str) -> bytes:
     """Image data of up to three axes; a missing axis has one node. ParaView shows the first of the values."""
     name, first = next(iter(values.items()))
     missing = 3 - first.ndim
@@ -62,9 +61,7 @@ def write_vti(
     return writer.file("ImageData", body)
 
 
-def read_vti(
-    path: PathLike, other: str = ""
-) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64], NDArray[Any] | None]:
+def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Floats, NDArray[Any] | None]:
     """Read the first scalar array, origin and spacing of image data, and the array named `other`, if present."""
     root, arrays = parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
@@ -168,14 +165,14 @@ class Block:
     """Cells of one kind, as rows of point ids."""
 
     type: str
-    data: NDArray[np.int64]
+    data: Ints
 
 
 @dataclass(frozen=True)
 class Cells:
     """Read points, cells and values at the points, named as in a `meshio.Mesh`."""
 
-    points: NDArray[np.float64]
+    points: Floats
     cells: list[Block]
     point_data: dict[str, NDArray[Any]] = field(default_factory=dict)
 

@@ -36,9 +36,9 @@ ALONG = 0.25
 REACH = 1.5
 """Distance of faces of two pieces, over the size of the smaller, up to which these belong together."""
 NEAREST = 9
-"""Faces next to each, itself included, that may be of the same cluster."""
+"""Nearest sampled faces that each one is compared with, itself included."""
 PLACES = 100_000
-"""Faces at most that are looked at for this, evenly spread."""
+"""Sampled faces, evenly spread, besides one of each piece."""
 PROBES = 16
 """Triangles of a closed piece, spread evenly, at all of which it must lie within others to be nested."""
 
@@ -228,12 +228,16 @@ def open_bounding(
     nested: Nesting = "given",
     as_oriented: bool = False,
 ) -> tuple[Floats, Bools, Ints, Floats]:
-    """(p,) signs of open pieces; which bound something; clusters of which most is loose, or −1, and their levels.
+    """Decide for open pieces, (p,) each: signs, what bounds something, clusters of what is loose, and their levels.
 
-    Pieces of one group, (p,), hang together, which chance does not make them do. Of the area of each, `given` faces as
-    it was given, less what does not. `closed` are triangles of closed bodies.
+    A piece is loose if neither it nor its group is a body by itself. Clusters of other pieces are −1, their levels ½.
 
-    Of the pieces that bound nothing those go that leave most unexplained, and all is solved again.
+    Pieces of one group share edges or rims, which is no coincidence. `given` is the area of each that faces as it was
+    given, less what does not; `closed` are triangles of closed bodies. With `as_oriented` all signs stay 1.
+
+    Until every piece has the level that it needs, those that fail and leave at least half as much unexplained as the
+    worst are left out, and the system is solved again. A body by itself needs `SHEET`; what is loose needs a cluster
+    that passes `CHANCE` and `COHERENT`, and among few pieces a level in proportion to its cluster's.
     """
     n, areas = len(pieces.areas), pieces.areas
     shared = np.bincount(groups, minlength=n)[groups] > 1
@@ -261,7 +265,7 @@ def open_bounding(
         square = means(values**2, clusters[rows], weights, n)
         amount = _counted(areas * loose, groups, clusters)
         body = (mean * np.sqrt(amount + 1) >= CHANCE) & (mean**2 >= COHERENT * square)
-        each = np.minimum(SHEET, 2 * SHEET * mean) if isinstance(system, Matrix) else -np.inf  # noise is no litter
+        each = np.minimum(SHEET, 2 * SHEET * mean) if isinstance(system, Matrix) else -np.inf  # dipoles are noisy
         least = np.where(body, each, np.inf)[clusters]
         wrong = alive & (levels < np.where(loose, least, SHEET * np.minimum(1.0, 2.0 * by_itself)))
         unexplained = np.where(wrong, areas * (0.5 - levels) ** 2, 0.0)
@@ -324,7 +328,11 @@ def _along(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | Ints) ->
 
 
 def clusters_of(pieces: Pieces) -> Ints:
-    """(p,) cluster of each piece: those of which faces are near each other, for the size of the smaller, are of one."""
+    """(p,) connected components of pieces that are near each other.
+
+    Two are joined where a sampled face of one is nearer than `REACH` times the size of the smaller piece, the diagonal
+    of its box, to one of the other. Only the `NEAREST` samples around each are compared.
+    """
     n = len(pieces.areas)
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     np.minimum.at(low, pieces.labels, pieces.triangles.min(axis=1))

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import TypeAlias, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Bools, Floats
 from ..errors import GeometryError, OutsideError, SignedHeatError
 from ..field_levels import on_level
 from ..grids.grid import RESOLUTION, Grid
@@ -21,7 +22,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import array_of, finite_number, flag, positive_steps, whole_number
 from .contouring import crossings_in, joined_crossings, traced
 
-Function: TypeAlias = Callable[[NDArray[np.float64]], ArrayLike]
+Function: TypeAlias = Callable[[Floats], ArrayLike]
 """One number for each of (n, 3) points; of gradients, three."""
 TOGETHER = 1 << 17
 """Points at which a function is asked for at once."""
@@ -51,15 +52,15 @@ class Implicit:
         Lower and upper corner.
     """
 
-    function: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-    gradient: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-    box: NDArray[np.float64]
+    function: Callable[[Floats], Floats]
+    gradient: Callable[[Floats], Floats]
+    box: Floats
 
-    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def distance(self, points: Floats) -> Floats:
         """(n,) values, or distances from the walls where these are greater."""
         return np.maximum(self.function(np.clip(points, *self.box)), self._beyond(points).max(axis=1))
 
-    def slopes(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def slopes(self, points: Floats) -> tuple[Floats, Floats]:
         """(n,) distances from the surface, by the slope of the function, and (n, 3) unit vectors of its growth."""
         places = np.clip(points, *self.box)
         gradients = self.gradient(places)
@@ -71,12 +72,12 @@ class Implicit:
         normals = np.concatenate([-np.eye(3), np.eye(3)])[nearest]
         return np.where(outside, walls[at, nearest], away), np.where(outside[:, None], normals, ways)
 
-    def planes(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def planes(self, points: Floats) -> tuple[Floats, Floats]:
         """(n, 3) places on the surface near points, and its normals there."""
         away, ways = self.slopes(points)
         return points - away[:, None] * ways, ways
 
-    def _beyond(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _beyond(self, points: Floats) -> Floats:
         """(n, 6) how far points lie beyond each wall."""
         return np.concatenate([self.box[0] - points, points - self.box[1]], axis=1)
 
@@ -89,21 +90,21 @@ class NodePlanes:
     the values at the nodes, as it does of what is convex; or their minimum, which does so of what is concave.
     """
 
-    origin: NDArray[np.float64]
-    spacing: NDArray[np.float64]
-    values: NDArray[np.float64]
-    gradients: NDArray[np.float64]
-    known: NDArray[np.bool_]  # nodes whose slopes are known well; others take those of their neighbours that are
+    origin: Floats
+    spacing: Floats
+    values: Floats
+    gradients: Floats
+    known: Bools  # nodes whose slopes are known well; others take those of their neighbours that are
 
-    def function(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def function(self, points: Floats) -> Floats:
         """(n,) values."""
         return self._values_and_slopes(points)[0]
 
-    def gradient(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def gradient(self, points: Floats) -> Floats:
         """(n, 3) slopes of the plane that counts, or of a mixture."""
         return self._values_and_slopes(points)[1]
 
-    def _values_and_slopes(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _values_and_slopes(self, points: Floats) -> tuple[Floats, Floats]:
         cells = (points - self.origin) / self.spacing
         base = np.clip(np.floor(cells).astype(np.int64), 0, np.array(self.values.shape) - 2)
         shares = (cells - base)[:, None]
@@ -231,19 +232,17 @@ def contour(
     return TriangleMesh(*traced(surface, grid, values, crossings, pieces, lambda fraction, step: None))
 
 
-def _of_function(
-    f: Function, gradient: Function | ArrayLike | None, box: NDArray[np.float64], grid: Grid, level: float
-) -> Implicit:
+def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats, grid: Grid, level: float) -> Implicit:
     """Return the level set of a function; of its differences, steps balance rounding and curvature."""
 
-    def values(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def values(points: Floats) -> Floats:
         return _called(f, points, ())[..., 0] - level
 
     precision = np.asarray(f(box.mean(axis=0, keepdims=True))).dtype
     rounding = np.finfo(precision if precision.kind == "f" else float).eps
     steps = float(rounding) ** 0.25 * grid.spacing
 
-    def differences(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def differences(points: Floats) -> Floats:
         ways = steps * np.eye(3)
         around = np.stack([points[:, None] + ways, points[:, None] - ways])
         ahead, back = values(np.clip(around, *box).reshape(-1, 3)).reshape(2, len(points), 3)
@@ -256,7 +255,7 @@ def _of_function(
     return Implicit(values, lambda points: _called(gradient, points, (3,)), box)
 
 
-def _called(f: Function, points: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
     """(n, 1) or (n, 3) finite numbers that a function returns for points."""
     parts = [np.empty((0, *(shape or (1,))))]
     for begin in range(0, len(points), TOGETHER):
@@ -277,9 +276,7 @@ def _called(f: Function, points: NDArray[np.float64], shape: tuple[int, ...]) ->
     return np.concatenate(parts)
 
 
-def _of_array(
-    f: ArrayLike, gradient: Function | ArrayLike | None, box: NDArray[np.float64], level: float
-) -> tuple[Implicit, Grid]:
+def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, level: float) -> tuple[Implicit, Grid]:
     """Return the level set of values at nodes, and the grid with one more node on each side."""
     values = array_of(f, "f").astype(np.float64)
     if values.ndim != 3 or min(values.shape) < 2 or not np.isfinite(values).all():
@@ -295,7 +292,7 @@ def _of_array(
         known = np.linalg.norm(bends, axis=-1) <= ROUND * np.linalg.norm(slopes, axis=-1)
     else:
         known = np.ones(values.shape, dtype=bool)
-        slopes = cast("NDArray[np.float64]", array_of(cast("ArrayLike", gradient), "gradient").astype(np.float64))
+        slopes = cast("Floats", array_of(cast("ArrayLike", gradient), "gradient").astype(np.float64))
         if slopes.shape != (*values.shape, 3) or not np.isfinite(slopes).all():
             raise GeometryError(f"gradients must be finite, of shape {(*values.shape, 3)}", element="gradient")
     planes = NodePlanes(box[0], steps, values - level, slopes, known)
@@ -308,7 +305,7 @@ def _of_array(
     ), grid
 
 
-def _slopes(values: NDArray[np.float64], axis: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _slopes(values: Floats, axis: int) -> tuple[Floats, Floats]:
     """Differences from node to node along an axis, of the second order, and by how much these change.
 
     Of the three parabolas through a node and its neighbours that bends least counts (Harten et al. 1987), so that

@@ -86,11 +86,14 @@ def bodies_around(
     closed: Floats,
     nested: Nesting,
 ) -> Floats:
-    """(n,) winding numbers, at places of a system, of the bodies that do not matter to what lies there.
+    """(n,) winding numbers, at the places of a system, of the bodies that each place ignores.
 
-    These are all but the own body, that around a cavity, and the cavities in it. What is no body belongs to the nearest
-    one. A body within others bounds a cavity unless it was clearly given as a body. `closed` are triangles of closed
-    bodies, (k, 3, 3), which are not in the system: those around a cavity count as negative.
+    It sees its own body, the body in which this is a cavity, and the cavities in it; bodies beside it, and those that
+    overlap or contain it as bodies, it ignores. A piece of no body belongs to the nearest one. `nested` decides which
+    bodies within others are cavities; as given, all but those whose faces clearly faced outwards (`HINT`). The system
+    lacks what is closed, (k, 3, 3): its winding numbers are negative at places of cavities in it.
+
+    Pieces have levels by themselves, first signs, and areas that face as given, less the rest, (p,) each.
     """
     directed = np.where((signs < 0)[pieces.labels, None, None], pieces.triangles[:, ::-1], pieces.triangles)
     bodies = Bodies.of(pieces, directed, groups, alone, signs * given)
@@ -122,15 +125,15 @@ def bodies_around(
 
     full = 2 * np.abs(np.append(bodies.levels, 0.5))[others]
     share = np.clip(there / full, 0.0, 1.0)  # 1 as if nothing of the other body was gone
-    within = np.maximum(*(mean(~on_rim, share > 0.25, *pair) for pair in ((here, others), (others, here))))
-    overlap, enclosed = within < 1 - APART, mean(on_rim, share, here, others) >= 1 - APART
+    surface_within = np.maximum(*(mean(~on_rim, share > 0.25, *pair) for pair in ((here, others), (others, here))))
+    not_nested, enclosed = surface_within < 1 - APART, mean(on_rim, share, here, others) >= 1 - APART
     every = np.ones(count, dtype=bool)
     stays = {"given": bodies.as_given, "cavities": ~every, "bodies": every}[nested][here]
-    apart = (here != others) & (overlap | (enclosed & stays))
-    seen = np.where(others == count, enclosed & ~stays, ~apart) & (rows < n)
+    ignored = (here != others) & (not_nested | (enclosed & stays))
+    subtracted = np.where(others == count, enclosed & ~stays, ~ignored) & (rows < n)
     everything = WindingTree.of(np.concatenate(parts[:count]))
     sides = [everything.numbers(places[:n] + way * steps[:n]) for way in (-1, 1)]
-    return 0.5 * (sides[0] + sides[1]) - np.bincount(rows[seen], there[seen], n)
+    return 0.5 * (sides[0] + sides[1]) - np.bincount(rows[subtracted], there[subtracted], n)
 
 
 def parts_of(triangles: Floats, numbers: Ints, count: int, closed: Floats) -> list[Floats]:

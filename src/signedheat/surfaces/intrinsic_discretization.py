@@ -114,12 +114,16 @@ def refined(
 
 
 def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDiscretization:
-    """Discretise an intrinsic triangulation, and mollify triangles that are nearly flat."""
+    """Discretise an intrinsic triangulation; if triangles are nearly degenerate, all edges are first made longer.
+
+    All become longer by the same length (`mollify`). Options override fields of the result.
+    """
     triangles = triangulation.triangles
     lengths, added = mollify(triangles.edge_lengths, THICKNESS)
     if added:
         thicker = IntrinsicMesh.from_lengths(triangles.corner_vertices, lengths, triangles.n_vertices, triangles.edges)
-        triangles = replace(triangles, corner_positions=thicker.corner_positions)  # the first faces of edges stay first
+        # which halfedge leads each edge must not change
+        triangles = replace(triangles, corner_positions=thicker.corner_positions)
     options = {
         "domain": triangulation,
         "transfer": triangulation.transfer,

@@ -194,7 +194,12 @@ def transfer_forward(
     barycentric: Floats,
     vectors: Floats,
 ) -> None:
-    """Transfer points and vectors as `transfer_backward`, forward; `first` and `later` are from `find_successors`."""
+    """Carry points of the first triangulation, and vectors at them, through all steps to the last, in place.
+
+    Faces (p,), barycentric coordinates (p, 3) and vectors (p, k, 3), differences of such, are overwritten. `first` has
+    the first step that changes each face, and `later`, (n, 3), the next one that changes each face of a step, −1 if
+    there is none: see `find_successors`.
+    """
     around, start = np.empty(3, np.int64), np.zeros(3, np.int64)
     for p in range(len(faces)):
         n = first[faces[p]]

@@ -51,7 +51,7 @@ balls of 200 random points have a hole."""
 NEAREST = 7
 """Number of neighbours from which spacing is estimated."""
 GIVEN = 1.0
-"""Weight of a given normal, relative to that of each of the six neighbours in the same plane."""
+"""Weight of an estimated normal, relative to that of each of the six neighbours in the same plane."""
 _CHUNK = 65536
 
 
@@ -289,15 +289,16 @@ def split_at_points_left(points: Floats, faces: Ints, candidates: Ints) -> Ints:
 
 
 def aligned(axes: Floats, faces: Ints, normals: Floats, given: Floats) -> Ints:
-    """(n,) signs that make axes agree with those of their neighbours and with normals.
+    """(n,) signs that orient normals of planes alike across edges, and towards estimated normals.
 
-    Each connected component is then turned to the side to which most of the given normals point.
+    Node n of the graph stands for the side of the estimates. Each connected component is then turned as a whole if the
+    sum of its cosines with the given normals is negative.
     """
     n = len(axes)
     tail, head = edge_table(faces).vertices.T
     parts = connected_components(n, tail, head)
     across = (axes[tail] * axes[head]).sum(axis=1)
-    links = Links(tail, head, across * np.abs(across))  # planes at a crease say little
+    links = Links(tail, head, across * np.abs(across))  # creases weigh little
     own = GIVEN * (axes * normals).sum(axis=1)
     found = signs_of(Links.joined(links, Links(np.arange(n), np.full(n, n), own)), n + 1)
     signs = (found[:n] * found[n]).astype(np.int64)
