@@ -130,7 +130,7 @@ def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints
 
 
 def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list[Curve]:
-    """The zero set of a field as curves, without loops too short or too far away to complete the given ones."""
+    """Return the zero set of a field as curves, without loops too short or too far away to complete the given ones."""
     if not isinstance(field.domain, TriangleMesh):
         return field.contour(0.0)
     fine = field.finest

@@ -27,7 +27,7 @@ WIDTH = 10.0
 
 
 def typical_size(triangles: IntrinsicMesh) -> float:
-    """The longest side of a typical triangle."""
+    """Return the longest side of a typical triangle."""
     return float(np.average(triangles.edge_lengths.max(axis=1), weights=triangles.face_areas))
 
 
@@ -127,6 +127,6 @@ def integration_error(phi: PiecewiseField, directions: Complexes) -> float:
 
 
 def cut_open(triangles: IntrinsicMesh, pairs: FacePairs, cut: Bools) -> IntrinsicMesh:
-    """The triangles with vertices doubled along a cut."""
+    """Return the triangles with vertices doubled along a cut."""
     owner = split_corners(triangles, pairs, cut)
     return replace(triangles, corner_vertices=owner.reshape(-1, 3), n_vertices=int(owner.max(initial=-1)) + 1)

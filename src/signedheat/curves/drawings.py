@@ -122,7 +122,7 @@ class OutlinesFilled(Note):
 
 
 def outlines_filled(lines: Sequence[Polyline], rule: FillRule) -> tuple[list[Polyline], OutlinesFilled | None]:
-    """The outlines of what closed lines fill, and lines that are not closed; and what was done, if any are filled."""
+    """Return the outlines of what closed lines fill, lines that are not closed, and a note if any are filled."""
     closed = [line for line in lines if line.closed]
     filled = [Polyline(points, closed=True) for points in filled_outlines([line.points for line in closed], rule)]
     if not filled:
@@ -133,7 +133,7 @@ def outlines_filled(lines: Sequence[Polyline], rule: FillRule) -> tuple[list[Pol
 
 
 def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
-    """A grid around all sources, with cells at most as large as those where distance is asked; around a point those."""
+    """Return a grid around all sources, with cells at most as large as those where distance is asked."""
     bounds = bounds_around(sources)
     size = float(np.ptp(bounds, axis=0).max())
     if size == 0:
@@ -164,7 +164,7 @@ def strokes_that_agree(
 
 
 def _triangles_around(bounds: Floats) -> TriangleMesh:
-    """A rectangle around a box, with the usual room: squares that are cut along one diagonal or the other in turn."""
+    """Return a rectangle around a box, with the usual room: squares cut along one diagonal or the other in turn."""
     nodes = Grid.around(bounds, STROKE_NODES)
     index = np.arange(nodes.n_nodes).reshape(nodes.shape)
     a, b, c, d = (each.ravel() for each in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
@@ -241,7 +241,7 @@ class Drawing(Frozen):
         return self.distance(points) < 0
 
     def closest(self, points: ArrayLike) -> Closest:
-        """The nearest place for each of (..., 2) points; the faces are segments, with weights of their two ends."""
+        """Return the nearest place for each of (..., 2) points; faces are segments, with weights of their two ends."""
         places, shape = query_points(points, 2)
         distances, nearest, segments = self._closest(places)
         ends = self._segments[segments]

@@ -164,12 +164,12 @@ def piecewise_distance(
 
 
 def part_of(progress: Progress | None, start: float, stop: float, step: str) -> Callable[[float], None] | None:
-    """What is called with the fraction done of a part of one step."""
+    """Return what is called with the fraction done of a part of one step."""
     return None if progress is None else lambda share: progress(start + (stop - start) * share, step)
 
 
 def jumps_of(phi: PiecewiseField, solution: JumpSolution, error: float) -> Jumps:
-    """The note on the jumps of a field, and on the objective that it minimises."""
+    """Return the note on the jumps of a field, and on the objective that it minimises."""
     return Jumps(
         objective=solution.objective,
         bound=solution.bound,
@@ -199,7 +199,7 @@ def _retriangulated(
     sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]],
     intrinsic: bool | Literal["auto"],
 ) -> tuple[TriangleMesh | PolygonMesh | IntrinsicTriangulation, SurfaceDiscretization]:
-    """The domain, or the intrinsic triangulation of it that bad triangles or unoriented curves need."""
+    """Return the domain, or the intrinsic triangulation of it that bad triangles or unoriented curves need."""
     discretization = _lowered(domain)
     if isinstance(domain, IntrinsicTriangulation):
         return domain, conforming(discretization, sources)
@@ -232,7 +232,7 @@ def _field(
 
 
 def _lowered(domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation) -> SurfaceDiscretization:
-    """The discretisation, if there is memory for the field; factors are made for one diffusion time only."""
+    """Return the discretisation, if there is memory for the field; factors are made for one diffusion time only."""
     n = len(domain.corners) if isinstance(domain, PolygonMesh) else domain.n_faces
     refuse_beyond_memory(
         f"piecewise distance on {n:,} triangles", n, memory_estimate, lambda number: f"use at most {number:,} triangles"
@@ -251,7 +251,7 @@ def conforms(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoi
 def conforming(
     discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]
 ) -> SurfaceDiscretization:
-    """The discretisation itself, if unoriented curves run along its edges; rounding may move them off edges."""
+    """Return the discretisation itself, if unoriented curves run along its edges; rounding may move them off edges."""
     if conforms(discretization, sources):
         return discretization
     raise SourceError(
@@ -267,7 +267,7 @@ def corner_slopes(triangles: IntrinsicMesh, directions: Complexes) -> Floats:
 
 
 def jump_problem(triangles: IntrinsicMesh, pairs: FacePairs, slopes: Floats, guarded: Bools) -> JumpProblem:
-    """The objective of Eq. 16, with one constant per face as unknowns, and the curl κ of Eq. 15 in its weights."""
+    """Return the objective of Eq. 16: unknowns are one constant per face, and weights have the curl κ of Eq. 15."""
     offsets = pairs.ends(slopes)
     length = triangles.edge_lengths[pairs.faces[:, 0], pairs.sides[:, 0]]
     spread = np.abs(offsets[:, 1] - offsets[:, 0])  # κ |e|, whatever the constants are

@@ -59,7 +59,7 @@ class JumpProblem:
         return constants[self.faces[:, 0]] - constants[self.faces[:, 1]]
 
     def objective(self, constants: Floats) -> float:
-        """The value to be minimised."""
+        """Return the value to be minimised."""
         difference = self.differences(constants)
         return self.floor + 2.0 * float(self.weights @ np.abs(difference - np.clip(difference, self.low, self.high)))
 

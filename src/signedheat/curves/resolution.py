@@ -33,7 +33,7 @@ def on_resolving_triangles(
     curves: CurvesAndPoints,
     always: bool = False,
 ) -> Found:
-    """What is measured on triangles that resolve the curves: those of the mesh, or smaller ones where needed."""
+    """Return what is measured on triangles that resolve the curves: those of the mesh, or smaller ones where needed."""
     mesh = solver.domain
     if isinstance(mesh, TriangleMesh) and (always or are_small(solver, curves)):
         try:
@@ -60,7 +60,7 @@ def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
 
 
 def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveOrPoints]) -> SignedHeatSolver[Surface]:
-    """The solver with the triangles that it makes for the curves, which then serve some of the curves, too."""
+    """Return the solver with the triangles that it makes for the curves, which then serve some of the curves, too."""
     made = solver.discretization
     if not isinstance(made, Retriangulated):
         return solver
@@ -70,7 +70,7 @@ def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveO
 
 
 def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
-    """The discretisation that the solver uses for all sources, or else that of its domain."""
+    """Return the discretisation that the solver uses for all sources, or else that of its domain."""
     made = solver.discretization
     found = made if isinstance(made, SurfaceDiscretization) else discretize(solver.domain)
     if not isinstance(found, SurfaceDiscretization):
@@ -80,7 +80,7 @@ def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
 
 
 def flattened(curves: CurvesAndPoints) -> list[CurveOrPoints]:
-    """The curves and points, without the groups that they were given in."""
+    """Return the curves and points, without the groups that they were given in."""
     listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
     return list(chain.from_iterable(c if isinstance(c, Sequence) else [c] for c in listed))
 
@@ -88,7 +88,7 @@ def flattened(curves: CurvesAndPoints) -> list[CurveOrPoints]:
 def for_zero_set(
     mesh: TriangleMesh, diffusion: Diffusion | None, progress: Progress | None = None
 ) -> SignedHeatSolver[TriangleMesh]:
-    """A solver with ``intrinsic=True``, and with diffusion times that suit the pieces, however small they are."""
+    """Return a solver with ``intrinsic=True`` and diffusion times that suit the pieces, however small they are."""
     solver = SignedHeatSolver(mesh, diffusion, progress, intrinsic=True)
     report = None if progress is None else lambda share, _: progress((1 + share) / 5, "refine")
     solver.__dict__["discretization"] = RetriangulatedForZeroSet(mesh, report)

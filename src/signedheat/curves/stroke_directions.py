@@ -79,7 +79,7 @@ class Pieces:
 
     @classmethod
     def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> Pieces | None:
-        """The pieces; None if there are none."""
+        """Return the pieces; None if there are none."""
         numbers = [k for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented]
         listed = [cast("Curve", curves[k]) for k in numbers]
         if not listed:
@@ -206,7 +206,7 @@ def likely_curves(ends: Floats, stroke: Ints) -> tuple[Ints, Floats]:
 
 
 def given_domain(surface: SurfaceDiscretization) -> Surface:
-    """The surface that curves are given on."""
+    """Return the surface that curves are given on."""
     domain: Surface = surface.domain.mesh if isinstance(surface.domain, IntrinsicTriangulation) else surface.domain
     return domain
 
@@ -223,7 +223,7 @@ def is_piece(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
 
 
 def decide(pieces: Pieces) -> Decision:
-    """The directions of strokes for which the inside costs least; only movable strokes may be turned.
+    """Return the directions of strokes for which the inside costs least; only movable strokes may be turned.
 
     Cuts and directions are improved in turn; where more of the curves is gone than there is, sides are smooth instead.
     """
@@ -247,7 +247,7 @@ def decide(pieces: Pieces) -> Decision:
 
 
 def least_of(strokes: Strokes, insides: list[Inside]) -> Inside:
-    """The first of those that cost the least, but for rounding."""
+    """Return the first of those that cost the least, but for rounding."""
     costs = np.array([misfit(strokes, inside) for inside in insides])
     return insides[int(np.argmax(costs <= costs.min() + TIE * strokes.lengths.sum()))]
 
@@ -266,14 +266,14 @@ def mostly_loose(strokes: Strokes, inside: Inside) -> bool:
 
 
 def cost(strokes: Strokes, inside: Inside) -> float:
-    """The energy, and what turning costs: less for all strokes of a curve, which say one and the same thing."""
+    """Return the energy, and what turning costs: less for all strokes of a curve, which say one and the same thing."""
     turned, total = (np.bincount(strokes.group, strokes.lengths * way) for way in (inside.signs < 0, inside.signs != 0))
     together = (turned == total) & strokes.is_loop & (np.bincount(strokes.group) > 1)
     return inside.energy + AS_GIVEN * float((np.where(together, TOGETHER, 1.0) * turned).sum())
 
 
 def misfit(strokes: Strokes, inside: Inside) -> float:
-    """The same, and what loops cost that bound nothing: as much as if all of their strokes were turned one by one."""
+    """Return the same, and what loops cost that bound nothing: as if all of their strokes were turned one by one."""
     loose = strokes.whole_loops((inside.signs > 0) & (inside.explained < EXPLAINED))[strokes.group]
     return cost(strokes, inside) + AS_GIVEN * float(strokes.lengths[loose].sum())
 
@@ -290,12 +290,12 @@ def turnable(strokes: Strokes, inside: Inside, movable: Bools) -> list[list[int]
 
 
 def longest_of(strokes: Strokes, rows: Ints) -> Ints:
-    """The `SINGLY` longest of some strokes, which are tried one by one."""
+    """Return the `SINGLY` longest of some strokes, which are tried one by one."""
     return rows[np.argsort(-strokes.lengths[rows], kind="stable")[:SINGLY]]
 
 
 def settled_from(strokes: Strokes, starts: list[Floats], movable: Bools) -> list[Inside]:
-    """What `settled` finds from each start, on all cores."""
+    """Return what `settled` finds from each start, on all cores."""
     with ThreadPoolExecutor(n_threads()) as pool:
         return list(pool.map(lambda signs: settled(strokes, signs, movable), starts))
 

@@ -166,7 +166,7 @@ class Strokes:
         return list(self._found.values())
 
     def inside(self, signs: Floats) -> Inside:
-        """The sides of least energy for strokes with these directions, 0 if one is left out: a minimum cut."""
+        """Return the sides of least energy for strokes with these directions, 0 if one is left out: a minimum cut."""
         key = signs.tobytes()
         if key not in self._found:
             self._found[key] = self._least(signs)
@@ -189,7 +189,7 @@ class Strokes:
         return Inside(signs, sides, explained, boundary - REWARD * float(self.lengths @ explained))
 
     def _cut(self, signs: Floats, larger: float) -> tuple[Floats, float]:
-        """The sides of least energy, of several the largest inside (1) or the smallest (-1), and what it costs."""
+        """Return the sides of least energy, of several the largest inside (1) or the smallest (−1), and the cost."""
         falling, rising = self._uncovered(signs)
         pull = self.means.T @ (REWARD * self.lengths * signs)
         pull += larger * TIE * self.lengths.sum() / self.areas.sum() * self.areas
