@@ -104,6 +104,7 @@ OBJECTS: dict[str, Callable[[], object]] = {
     "tets": tets,
     "grid": grid,
     "triangulation": triangulation,
+    "thickness": lambda: sh.thickness(samples.sphere(1)),
     "filled triangles": lambda: sh.fill_holes(sh.TriangleMesh(BALL.vertices, BALL.faces[1:])),
     "filled polygons": lambda: sh.fill_holes(sh.PolygonMesh(BALL.vertices, BALL.faces[1:].tolist())),
     "polyline": lambda: sh.Polyline([[0, 0], [1, 0], [1, 1]]),

@@ -256,7 +256,7 @@ def test_lattices_name_the_resolution_that_fits(monkeypatch):
 
 
 TOO_MANY = np.broadcast_to(np.zeros(3), (10**13, 3))
-BALL = samples.sphere(1)
+SMALL_BALL = samples.sphere(1)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="others promise any amount of memory")
@@ -264,9 +264,9 @@ BALL = samples.sphere(1)
     "call",
     [
         lambda: sh.TriangleMesh(TOO_MANY, [[0, 1, 2]]),
-        lambda: sh.complete(BALL).distance(TOO_MANY),
+        lambda: sh.complete(SMALL_BALL).distance(TOO_MANY),
         lambda: sh.GridField(sh.Grid((0, 0, 0), 1.0, (3, 3, 3)), np.zeros((3, 3, 3)))(TOO_MANY),
-        lambda: sh.deviation(TOO_MANY, BALL),
+        lambda: sh.deviation(TOO_MANY, SMALL_BALL),
         lambda: sh.signed_distance(sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True), resolution=10**8),
     ],
 )
@@ -279,7 +279,7 @@ def test_allocations_that_fail_are_memory_limits(call):
 def test_surfaces_in_cells_that_are_too_small_are_refused_with_cells_that_fit(monkeypatch):
     monkeypatch.setattr(contouring, "available_memory", lambda: 60_000_000 + memory.libraries())
     with refused(sh.errors.MemoryLimitError) as caught:
-        sh.complete(BALL).surface(spacing=1e-6)
+        sh.complete(SMALL_BALL).surface(spacing=1e-6)
     fitting = float(caught.value.remedy.rpartition(" ")[2])
     assert 0.01 < fitting < 0.1
-    assert len(sh.complete(BALL).surface(spacing=fitting).faces) > 1000
+    assert len(sh.complete(SMALL_BALL).surface(spacing=fitting).faces) > 1000

@@ -430,7 +430,7 @@ def thicken(
     Examples
     --------
     >>> sheet = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    >>> thicken(sheet, 0.1, side="outside", resolution=40).bounds.round(6).tolist()
+    >>> np.abs(thicken(sheet, 0.1, side="outside", resolution=40).bounds).round(6).tolist()
     [[0.0, 0.0, 0.0], [1.0, 1.0, 0.1]]
     """
     above = finite_number(above, "the reach above", least=0)

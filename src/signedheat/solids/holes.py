@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import overload
 
 import numpy as np
@@ -27,6 +28,7 @@ from .rims import boundary, loops
 Rims = Sequence[Ints]
 
 
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class Filled:
     """What `fill_holes` says of the mesh that it returns.
 
@@ -45,10 +47,12 @@ class Filled:
     left: Rims
 
 
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class FilledMesh(Filled, TriangleMesh):
     """Triangles whose holes were closed by `fill_holes`: those that were given, then new ones; see `Filled`."""
 
 
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class FilledPolygonMesh(Filled, PolygonMesh):
     """Polygons whose holes were closed: those that were given, then triangles; see `Filled`."""
 

@@ -38,6 +38,7 @@ class Samples:
 
     Examples
     --------
+    >>> import numpy as np
     >>> from signedheat import sample, samples, signed_distance
     >>> taken = sample(signed_distance(samples.sphere(2, radius=5.0), resolution=24), 1000, near=0.8)
     >>> taken
@@ -64,6 +65,7 @@ class Samples:
 
         Examples
         --------
+        >>> import numpy as np
         >>> import signedheat as sh
         >>> taken = sh.complete(sh.samples.sphere(2, radius=5.0)).sample(10)
         >>> bool(np.abs(taken.normalized().points).max() < 2 < np.abs(taken.points).max())
@@ -102,6 +104,7 @@ class Samples:
 
         Examples
         --------
+        >>> import numpy as np
         >>> import tempfile
         >>> from signedheat import sample, samples, signed_distance
         >>> taken = sample(signed_distance(samples.sphere(2), resolution=16), 10)
