@@ -49,6 +49,12 @@ class WindingTree:
         (numbers,) = in_chunks(lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk),), points)
         return numbers
 
+    def levels(self, places: Floats, normals: Floats, areas: Floats) -> Floats:
+        """Return (n,) means of the numbers on both sides of places on faces with these unit normals and areas."""
+        steps = DEPTH * np.sqrt(areas)[:, None] * normals
+        sides: Floats = 0.5 * (self.numbers(places - steps) + self.numbers(places + steps))
+        return sides
+
     def behind(self, faces: NDArray[np.integer], places: Floats) -> Floats:
         """Return (n,) winding numbers just behind places (n, 3) in faces (n,): 1 more than in front of single faces.
 

@@ -197,9 +197,9 @@ def _nested(
     names, labels = np.unique(owners, return_inverse=True)
     faces, places = sampled(Pieces(triangles, labels), PROBES * len(names))
     probes, own = owners[faces], np.abs(counts[some[faces]])
-    steps = unit(area_vectors(triangles[faces])) * (np.sqrt(chain.areas[some[faces]]) * 1e-5)[:, None]
+    normals = unit(area_vectors(triangles[faces]))
     tree = WindingTree.of(_directed(chain, counts * outward[pieces]))
-    around = 0.5 * (tree.numbers(places - steps) + tree.numbers(places + steps)) - 0.5 * own
+    around = tree.levels(places, normals, chain.areas[some[faces]]) - 0.5 * own
     depth = np.full(n, np.inf)
     np.minimum.at(depth, probes, np.round(around))
     depth = np.where(closed & np.isfinite(depth), depth, 0.0)

@@ -21,6 +21,7 @@ from ..mesh.box_tree import BoxTree
 from ..search.winding_tree import WindingTree
 from .gauss import Dipoles, Matrix, Pieces
 from .part_levels import levels_of_pieces
+from .winding import INSIDE
 
 Nesting = Literal["given", "cavities", "bodies"]
 SHEET = 0.146
@@ -28,8 +29,6 @@ SHEET = 0.146
 Flat and wavy sheets have 0, a seventh of a ball .16, half of one .31, all of it ½."""
 HINT = 0.5
 """Share of the area of a piece that faces one way, less the rest, from which on it was given that way."""
-STEP = 1e-5
-"""Distance of the sides of faces, over the size of what a place stands for."""
 APART = 0.05
 """Share of a body's area outside of another one from which on they overlap, and of its rims up to which it lies within.
 The rims of a bowl's or a vase's inside lie half outside its outside."""
@@ -108,12 +107,12 @@ def bodies_around(
     away = np.flatnonzero(~own)
     if len(away):
         homes[away] = homes[own][scipy.spatial.cKDTree(places[own]).query(places[away], workers=-1)[1]]
-    steps = np.zeros(places.shape)  # to both sides of faces
-    steps[:n] = STEP * np.sqrt(system.areas)[:, None] * system.normals
+    normals = np.concatenate([system.normals, np.zeros(rims.middles.shape)])
+    sizes = np.concatenate([system.areas, rims.lengths])
     parts = parts_of(directed[np.argsort(numbers, kind="stable")], np.sort(numbers), count, closed)
-    rows, others, there = _windings(places, steps, parts)
+    rows, others, there = _windings(places, normals, sizes, parts)
     here = homes[rows]
-    weights = np.where(own, np.concatenate([system.areas, rims.lengths]), 0.0)
+    weights = np.where(own, sizes, 0.0)
     on_rim = np.arange(len(places)) >= n
 
     def mean(chosen: Bools, values: NDArray[Any], one: Ints, other: Ints) -> Floats:
@@ -125,15 +124,15 @@ def bodies_around(
 
     full = 2 * np.abs(np.append(bodies.levels, 0.5))[others]
     share = np.clip(there / full, 0.0, 1.0)  # 1 as if nothing of the other body was gone
-    surface_within = np.maximum(*(mean(~on_rim, share > 0.25, *pair) for pair in ((here, others), (others, here))))
+    surface_within = np.maximum(*(mean(~on_rim, share > INSIDE, *pair) for pair in ((here, others), (others, here))))
     not_nested, enclosed = surface_within < 1 - APART, mean(on_rim, share, here, others) >= 1 - APART
     every = np.ones(count, dtype=bool)
     stays = {"given": bodies.as_given, "cavities": ~every, "bodies": every}[nested][here]
     ignored = (here != others) & (not_nested | (enclosed & stays))
     subtracted = np.where(others == count, enclosed & ~stays, ~ignored) & (rows < n)
     everything = WindingTree.of(np.concatenate(parts[:count]))
-    sides = [everything.numbers(places[:n] + way * steps[:n]) for way in (-1, 1)]
-    return 0.5 * (sides[0] + sides[1]) - np.bincount(rows[subtracted], there[subtracted], n)
+    around = everything.levels(system.places, system.normals, system.areas)
+    return around - np.bincount(rows[subtracted], there[subtracted], n)
 
 
 def parts_of(triangles: Floats, numbers: Ints, count: int, closed: Floats) -> list[Floats]:
@@ -142,7 +141,7 @@ def parts_of(triangles: Floats, numbers: Ints, count: int, closed: Floats) -> li
     return [*parts[:count], closed] if len(closed) else parts[:count]
 
 
-def _windings(places: Floats, steps: Floats, parts: list[Floats]) -> tuple[Ints, Ints, Floats]:
+def _windings(places: Floats, normals: Floats, sizes: Floats, parts: list[Floats]) -> tuple[Ints, Ints, Floats]:
     """Places, bodies whose box they lie in, and their winding numbers there: means of both sides of faces."""
     boxes = np.array([(corners.min(axis=(0, 1)), corners.max(axis=(0, 1))) for corners in parts])
     starts, others = BoxTree.of(boxes[:, 0], boxes[:, 1]).meeting(np.repeat(places[:, None], 3, axis=1))
@@ -153,7 +152,6 @@ def _windings(places: Floats, steps: Floats, parts: list[Floats]) -> tuple[Ints,
     rows, others, there = rows[kept], others[kept], np.zeros(len(kept))
     for body, (begin, end) in enumerate(pairwise(np.searchsorted(others, np.arange(len(parts) + 1)))):
         if end > begin:
-            some, tree = rows[begin:end], WindingTree.of(parts[body])
-            sides = [tree.numbers(places[some] + way * steps[some]) for way in (-1, 1)]
-            there[begin:end] = 0.5 * (sides[0] + sides[1])
+            some = rows[begin:end]
+            there[begin:end] = WindingTree.of(parts[body]).levels(places[some], normals[some], sizes[some])
     return rows, others, there

@@ -10,6 +10,8 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..compiled import compiled
+from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.unit_vectors import unit
 from ..search.winding_tree import WindingTree, mean_angle
 from .gauss import Pieces, sampled
 
@@ -45,11 +47,7 @@ def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) ->
         there = np.repeat(members, np.abs(counts[members]))
         directed = np.where((counts[there] < 0)[:, None, None], triangles[there, ::-1], triangles[there])
         tree, some = WindingTree.of(directed), triangles[faces[chosen]]
-        normals = np.cross(some[:, 1] - some[:, 0], some[:, 2] - some[:, 0])
-        lengths = np.linalg.norm(normals, axis=1)
-        step = 1e-5 * normals / np.sqrt(np.where(lengths > 0, lengths, 1.0))[:, None]
-        centres = some.mean(axis=1)
-        levels[chosen] = 0.5 * (tree.numbers(centres - step) + tree.numbers(centres + step))
+        levels[chosen] = tree.levels(some.mean(axis=1), unit(area_vectors(some)), face_areas(some))
     return levels
 
 
