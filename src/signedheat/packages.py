@@ -18,7 +18,6 @@ REMEDIES = {
     "collada": "pip install pycollada",
     "mpl_toolkits": "pip install matplotlib",
     "skimage": "pip install scikit-image",
-    "sksparse": "conda install -c conda-forge scikit-sparse",
 }
 """Commands to install packages whose name differs from the name of the import."""
 

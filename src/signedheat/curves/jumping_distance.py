@@ -42,9 +42,8 @@ ROUGH = 1.0
 
 SOURCE_WEIGHT = 100.0
 """Factor by which a cut along or across the source is more expensive than elsewhere."""
-BYTES = {"pardiso": (2600, 0), "cholmod": (1150, 150), "superlu": (700, 242)}
-"""Peak for each triangle, and what every doubling of their number adds, by back end; measured, but for CHOLMOD, of
-which it is taken to need what distance does, with three factors."""
+BYTES = {"pardiso": (2600, 0), "superlu": (525, 182)}
+"""Peak for each triangle, and what every doubling of their number adds, by back end; measured."""
 
 
 @within_memory

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import SignedHeatError
 from ..progress import Announcement
-from . import cholmod, pardiso
-from .cholmod import CholmodFactor
+from . import pardiso
 from .ordering import elimination_order, upper_triangle, whole
 from .pardiso import PardisoFactor
 from .superlu import SuperLUFactor
@@ -42,7 +41,7 @@ class Factor(Protocol):
 
 def available_backends() -> list[str]:
     """Return the names of the back ends available on this machine, fastest first."""
-    return ["pardiso"] * pardiso.is_available() + ["cholmod"] * cholmod.is_available() + ["superlu"]
+    return ["pardiso"] * pardiso.is_available() + ["superlu"]
 
 
 def chosen_backend(backend: str | None = None) -> str:
@@ -78,8 +77,6 @@ def factorize(
         return again
     if name == "pardiso":
         return PardisoFactor(upper, None if reused else order)
-    if name == "cholmod":
-        return CholmodFactor(upper, order)
     if upper.shape[0] >= LARGE and backend is None and HAS_MKL:
         advise()
     return SuperLUFactor(upper, order)

@@ -168,9 +168,9 @@ def large_angles(triangles: IntrinsicMesh) -> float:
     return share if share >= 0.01 else 0.0
 
 
-BYTES = {"pardiso": (1200, 40), "cholmod": (1150, 150), "superlu": (800, 200)}
+BYTES = {"pardiso": (1200, 40), "superlu": (100, 200)}
 """Peak memory of each triangle by back end, and its growth with every doubling of their number, by the fill of factors.
-Measured on 20,000 to 310,000 triangles with one diffusion time; CHOLMOD with three."""
+Measured on 20,000 to 310,000 triangles with one diffusion time."""
 
 
 def memory_estimate(n_triangles: int) -> float:
