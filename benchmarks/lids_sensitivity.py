@@ -14,24 +14,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from signedheat import samples
-from signedheat.solids import bending, creases, lids, lost_faces, rims, spanning, walls
+from signedheat.solids import closing, lids, rims, spanning, walls
 from signedheat.solids.closing import closed_by
 
 NUMBERS: list[tuple[ModuleType, str]] = [
-    (lost_faces, "MOST_SIDES"),
-    (lost_faces, "BENT"),
+    (closing, "MOST_SIDES"),
+    (closing, "BENT"),
     (rims, "ALONG"),
     (rims, "OPPOSITE"),
     (rims, "STRAIGHT"),
     (walls, "NARROW"),
     (walls, "LARGE"),
-    (creases, "FLAT"),
-    (creases, "FOLDED"),
-    (creases, "MOST_RUNS"),
-    (bending, "REACH"),
-    (bending, "SHARP"),
-    (bending, "STIFF"),
-    (bending, "AGREEMENT"),
+    (lids, "FLAT"),
+    (lids, "FOLDED"),
+    (lids, "MOST_RUNS"),
+    (closing, "REACH"),
+    (closing, "SHARP"),
+    (closing, "STIFF"),
+    (closing, "AGREEMENT"),
     (lids, "SMOOTH"),
     (lids, "PIECES"),
     (lids, "CLOSE"),

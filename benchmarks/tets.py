@@ -23,7 +23,7 @@ import numpy as np
 import trimesh
 
 import signedheat as sh
-from signedheat.tets.meshers import box_walls
+from signedheat.tets.lattice import box_walls
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 from shapes.tet_cases import plain_recipe

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import signedheat as sh
-from signedheat.batches.worker import Done, Task
+from signedheat.batches.pool import Done, Task
 
 
 def measure(path: Path, stem: Path) -> dict[str, object]:

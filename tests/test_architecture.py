@@ -22,13 +22,11 @@ FLOORS = [
         "compiled",
         "diagnostics",
         "errors",
-        "frozen",
         "jobs",
         "memory",
         "packages",
         "parallel",
         "processes",
-        "progress",
         "validation",
     },
     {"mesh"},
@@ -73,7 +71,7 @@ def test_imports_point_down():
 SLICES = "surfaces", "grids", "tets"
 SHAPES = {"surfaces.triangle_mesh", "surfaces.point_cloud"}
 """What contours are and what distance in space is measured to: the slices share them."""
-LEFT: set[tuple[str, str]] = {("tets.lattice", "grids.grid"), ("tets.meshers", "grids.grid")}
+LEFT: set[tuple[str, str]] = {("tets.lattice", "grids.grid")}
 """Imports from slice to slice that are still there."""
 
 

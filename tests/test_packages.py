@@ -14,7 +14,7 @@ from refusals import refused
 from signedheat.cli import main
 from signedheat.io import parsers
 from signedheat.packages import REMEDIES, lazy_module, require
-from signedheat.tets.meshers import tetrahedralize_with_tetgen, tetrahedralize_with_tetwild
+from signedheat.tets.lattice import tetrahedralize_with_tetgen, tetrahedralize_with_tetwild
 from signedheat.view import save_scene
 
 SOURCES = sorted(set(Path(sh.__file__).parent.rglob("*.py")) - {Path(parsers.__file__)})

@@ -34,7 +34,6 @@ FEATURES: dict[str, tuple[str, ...]] = {
         "tets.tet_discretization",
         "tets.tet_source",
         "tets.lattice",
-        "tets.meshers",
         "io.tet_files",
         "tets.tet_sharpening",
     ),
@@ -54,7 +53,6 @@ FEATURES: dict[str, tuple[str, ...]] = {
     "curves that are completed": (
         "curves.curve_distance",
         "curves.curve_completion",
-        "curves.piece_orientation",
         "curves.strokes",
     ),
     "surfaces of solids": ("solids.contouring", "solids.offsets", "solids.watertight", "solids.kept_faces"),

@@ -1,8 +1,9 @@
-"""Names for the types of arrays, so that signatures stay short."""
+"""Types of arrays with short names, and frozen dataclasses that hold arrays."""
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from dataclasses import fields, is_dataclass
+from typing import TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,3 +19,62 @@ def mask_of(n: int, ids: NDArray[np.integer] | list[int]) -> Bools:
     mask = np.zeros(n, dtype=bool)
     mask[ids] = True
     return mask
+
+
+Number = TypeVar("Number", bound=np.generic)
+MOST = 6
+"""Arrays and sequences of up to this many numbers are written out."""
+
+
+class Frozen:
+    """A frozen dataclass whose copies and pickles hold only its fields; read-only arrays stay read-only.
+
+    Cached properties are computed anew, since they are often larger than the fields, or in memory of other libraries.
+    """
+
+    def __getstate__(self) -> tuple[dict[str, object], frozenset[str]]:
+        names = {entry.name for entry in fields(self)} if is_dataclass(self) else self.__dict__.keys()
+        held = {name: value for name, value in self.__dict__.items() if name in names}
+        arrays = {name: value for name, value in held.items() if isinstance(value, np.ndarray)}
+        return held, frozenset(name for name, array in arrays.items() if not array.flags.writeable)
+
+    def __setstate__(self, state: tuple[dict[str, object], frozenset[str]]) -> None:
+        held, read_only = state
+        self.__dict__.update(held)
+        for name in read_only:
+            cast("NDArray[np.generic]", held[name]).flags.writeable = False
+
+
+def read_only(array: NDArray[Number]) -> NDArray[Number]:
+    """Return a read-only view, since kernels would be compiled again for writable arrays."""
+    view: NDArray[Number] = array.view()
+    view.flags.writeable = False
+    return view
+
+
+class ShortRepr:
+    """A dataclass, made with ``repr=False``, whose representation is short."""
+
+    def __repr__(self) -> str:
+        assert is_dataclass(self)
+        parts = (f"{entry.name}={short(getattr(self, entry.name))}" for entry in fields(self) if entry.repr)
+        return f"{type(self).__name__}({', '.join(parts)})"
+
+
+def short(value: object) -> str:
+    """Write a value as a short text: four digits of numbers, the size of arrays."""
+    if isinstance(value, np.ndarray):
+        if value.ndim == 1 and value.size <= MOST and value.dtype.kind in "biuf":
+            return f"[{', '.join(short(entry) for entry in value.tolist())}]"
+        what = {"b": "booleans", "f": "numbers", "i": "numbers", "u": "numbers"}.get(value.dtype.kind, "entries")
+        return f"{' × '.join(map(str, value.shape))} {what}"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{name}: {short(entry)}' for name, entry in value.items())}}}"
+    if type(value) in (tuple, list) and isinstance(value, tuple | list):
+        if len(value) > MOST:
+            return f"{len(value)} entries"
+        inner = ", ".join(short(entry) for entry in value)
+        return f"({inner})" if isinstance(value, tuple) else f"[{inner}]"
+    return repr(value)

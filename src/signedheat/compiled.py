@@ -24,8 +24,8 @@ from typing import Any, Generic, ParamSpec, TypeVar, overload
 import numpy as np
 
 from .errors import SignedHeatError
+from .jobs import Announcement
 from .packages import lazy_module
-from .progress import Announcement
 
 numba: Any = lazy_module("numba", "compiled kernels")
 extending: Any = lazy_module("numba.extending", "compiled kernels")

@@ -8,10 +8,9 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from .arrays import Floats
+from .arrays import Floats, ShortRepr
 from .discretization import Integration, Levels, SourceTerm
 from .errors import ConstraintError
-from .frozen import ShortRepr
 from .validation import LARGEST, numbers, positive_number
 
 

@@ -8,8 +8,7 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from .arrays import Ints
-from .frozen import Frozen, ShortRepr
+from .arrays import Frozen, Ints, ShortRepr
 
 SMALL = 0.005
 """Fraction of the surface below which its completion, or parts that bound nothing, are not important."""

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .arrays import Floats, Ints
+from .arrays import Floats, Frozen, Ints
 from .cache import LastUsed, fingerprint
 from .discretization import Levels, SourceTerm
 from .errors import ConstraintError
-from .frozen import Frozen
 from .linear import Factor, PardisoFactor, factorize, upper_triangle, whole
 from .linear.conjugate_gradients import conjugate_gradients
 

@@ -18,13 +18,13 @@ from .foreign import ForeignShape, as_list, as_shapes, converted
 from .grids.grid import Dimension, Grid, room_around
 from .grids.grid_field import GridField
 from .grids.polyline import Polyline
+from .jobs import Progress
 from .kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
 from .memory import within_memory
 from .mesh.polylines import FillRule
-from .progress import Progress
 from .solids.completion import Completing, Lids
-from .solids.facing import orient
 from .solids.heat_surfaces import Heat
+from .solids.mesh_orientation import orient
 from .solids.overlaps import Nesting
 from .solids.solid import Solid
 from .solids.solid_distance import distance_to_shapes

@@ -1,16 +1,83 @@
-"""Run a job on a thread with progress reports or a time limit, or a function in a new Python process."""
+"""Jobs on threads or in new processes, with time limits; and the time and progress of the steps of a computation."""
 
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeout  # the builtin one only since Python 3.11
+from concurrent.futures import TimeoutError as FutureTimeout
+from contextlib import contextmanager
+from functools import partial
 from threading import Thread
-from typing import Any
+from typing import Any, TypeVar
+
+Result = TypeVar("Result")
+
+logger: logging.Logger = logging.getLogger("signedheat")
+
+CLEAR_LINE = "\r\x1b[2K"
+"""Clears a progress bar from a terminal."""
+
+Progress = Callable[[float, str], None]
+"""Called with the fraction done, from 0 to 1, and the name of the step that begins."""
+
+
+class Announcement:
+    """A message that is logged once per process, and printed in terminals and notebooks."""
+
+    are_wanted = True
+    """Whether announcements are printed."""
+
+    def __init__(self, text: str) -> None:
+        self._text, self._is_made = text, False
+
+    def __call__(self) -> None:
+        if self._is_made:
+            return
+        self._is_made = True
+        logger.info(self._text)
+        is_terminal = sys.stderr is not None and sys.stderr.isatty()
+        if self.are_wanted and (is_terminal or "ipykernel" in sys.modules):
+            sys.stderr.write(f"{CLEAR_LINE if is_terminal else ''}signedheat: {self._text}\n")
+
+
+class Stopwatch:
+    """Times named steps, logs them, and reports progress."""
+
+    def __init__(self, progress: Progress | None, steps: int) -> None:
+        self.seconds: dict[str, float] = {}
+        self._progress, self._steps = progress, steps
+
+    def skip(self, steps: int) -> None:
+        """Reduce the number of expected steps."""
+        self._steps -= steps
+
+    @contextmanager
+    def __call__(self, step: str) -> Iterator[Callable[[Callable[[], Result]], Result]]:
+        """Time a step; the yielded function runs jobs, during which progress is reported and may raise to cancel."""
+        progress, share, report = self._progress, len(self.seconds) / self._steps, None
+        if progress is not None:
+            progress(share, step)
+            report = partial(progress, share, step)
+        begin = time.perf_counter()
+        yield lambda job: run_cancellable(job, report)
+        self.seconds[step] = time.perf_counter() - begin
+        logger.info("%s: %.3f s", step, self.seconds[step])
+        if self._progress is not None and len(self.seconds) == self._steps:
+            self._progress(1.0, "done")
+
+
+def within(progress: Progress | None, start: float, stop: float) -> Progress | None:
+    """Progress of a part of a computation, from `start` to `stop` of the whole."""
+    if progress is None:
+        return None
+    whole = progress
+    return lambda fraction, step: whole(start + fraction * (stop - start), step)
+
 
 INTERVAL = 0.1
 """Seconds between progress reports."""

@@ -31,19 +31,18 @@ from .foreign import as_list, as_shape
 from .grids.grid import RESOLUTION, Grid, room_around
 from .grids.grid_field import GridField
 from .grids.polyline import Polyline
+from .jobs import Progress
 from .joining import concatenated
 from .kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
 from .memory import within_memory
 from .mesh.triangles import part_volumes
-from .progress import Progress
 from .search.face_tree import FaceFeatures, FaceTree
 from .search.nearest_triangles import weights_in
 from .sharpening import sharpen
 from .solids.completion import complete
 from .solids.contouring import sharp_surface
 from .solids.implicit_surfaces import contour
-from .solids.offsets import Offset, Reach, checked_reach
-from .solids.sheet_walls import SheetWall
+from .solids.offsets import Offset, Reach, SheetWall, checked_reach
 from .solids.solid import Solid
 from .solver import SignedHeatSolver
 from .surfaces.digital_surface import DigitalSurface

@@ -4,8 +4,8 @@ from . import batches, errors, io, morphology, results, samples, torch, view  # 
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
 from .curves.curve_completion import close_curves
 from .curves.jumping_distance import piecewise_distance
-from .curves.piece_orientation import curve_orientation
 from .curves.piecewise_field import PiecewiseField
+from .curves.stroke_directions import curve_orientation
 from .distances import signed_distance
 from .errors import (
     CancellingNormalsError,
@@ -33,10 +33,9 @@ from .sharpening import sharpen
 from .sharpening_methods import Convex, Geodesic
 from .solids.completion import complete
 from .solids.deviations import deviation
-from .solids.facing import orient
 from .solids.holes import fill_holes
 from .solids.implicit_surfaces import contour
-from .solids.mesh_orientation import orientation
+from .solids.mesh_orientation import orient, orientation
 from .solids.sampling import sample
 from .solids.solid import Solid
 from .solids.thickness import thickness

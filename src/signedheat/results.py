@@ -1,6 +1,6 @@
 """Classes of what functions and methods return, for annotations; users make none of them."""
 
-from .curves.piece_orientation import CurveOrientation
+from .curves.stroke_directions import CurveOrientation
 from .diagnostics import Diagnostics
 from .grids.solid_queries import Closest
 from .solids.deviations import Deviation

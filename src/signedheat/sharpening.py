@@ -8,9 +8,9 @@ from .field_kinds import Field
 from .grids import redistancing  # noqa: F401  registers how its fields are sharpened
 from .grids.grid import Dimension
 from .grids.grid_field import GridField
+from .jobs import Progress
 from .kinds import Shapes
 from .memory import within_memory
-from .progress import Progress
 from .sharpening_methods import Method, sharpen_field
 from .surfaces import surface_sharpening  # noqa: F401  registers how its fields are sharpened
 from .surfaces.surface_curves import CurvesAndPoints

@@ -30,10 +30,10 @@ from .errors import (
 )
 from .field_kinds import Field
 from .geodesics.exact_distance import Report
+from .jobs import Progress
 from .linear.splitting import split_rounds
 from .mesh.intrinsic_mesh import IntrinsicMesh
 from .mesh.tet_shapes import Tetrahedra
-from .progress import Progress
 from .surfaces.vertex_field import VertexField
 from .tets.tet_field import TetField
 from .validation import finite_number, positive_number

@@ -8,19 +8,19 @@ from functools import cached_property
 from itertools import groupby
 from typing import Any, Generic, Literal, TypeVar, overload
 
+from .arrays import Frozen
 from .constraints import Constraint, ZeroSet
 from .diagnostics import Diagnostics
 from .discretization import Adaptable, Discretization, discretize
 from .errors import InexactWarning, SignedHeatError, UnsupportedTypeError, warn_user
 from .field_kinds import Field, to_field, warned
 from .foreign import ForeignShape, as_list, converted
-from .frozen import Frozen
 from .grids.grid import Dimension, Grid
 from .grids.grid_field import GridField
+from .jobs import Progress, Stopwatch
 from .kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
 from .memory import within_memory
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
-from .progress import Progress, Stopwatch
 from .surfaces.extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
 from .surfaces.intrinsic_discretization import Retriangulated, lowered_by_angles
 from .surfaces.intrinsic_triangulation import triangle_mesh

@@ -17,7 +17,7 @@ from signedheat import samples
 from signedheat.batches import pool
 from signedheat.batches.inputs import expand
 from signedheat.batches.manifest import Manifest
-from signedheat.batches.worker import Worker
+from signedheat.batches.pool import Worker
 
 
 @pytest.fixture

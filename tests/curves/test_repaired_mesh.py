@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 import signedheat as sh
 from shapes.surface_cases import band
 from shapes.triangulated import klein_bottle
-from signedheat.curves.repaired_mesh import MeshRepaired
+from signedheat.curves.curve_distance import MeshRepaired
 from signedheat.errors import InexactWarning, UnreachedWarning
 from signedheat.samples import sphere, union
 

@@ -12,8 +12,8 @@ import signedheat as sh
 from shapes import strokes
 from shapes.surfaces import disk
 from signedheat.curves.curve_distance import CurvesTaken
-from signedheat.curves.minimum_cut import CutGraph
 from signedheat.curves.stroke_directions import Pieces
+from signedheat.curves.strokes import CutGraph
 from signedheat.discretization import discretize
 from signedheat.samples import sphere, torus, with_flipped_faces
 

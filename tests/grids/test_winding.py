@@ -5,7 +5,7 @@ import pytest
 
 from signedheat import Grid, Polyline, TriangleMesh, samples
 from signedheat.area_elements import sample_on_grid
-from signedheat.grids.grid_winding import blocks_of_dipoles, winding_numbers
+from signedheat.solids.heat_surfaces import blocks_of_dipoles, winding_numbers
 
 
 def winding_on(shape, grid):

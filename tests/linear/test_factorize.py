@@ -13,8 +13,8 @@ from refusals import refused
 from shapes.surface_cases import sphere
 from signedheat import linear
 from signedheat.discretization import discretize
+from signedheat.jobs import Announcement
 from signedheat.linear import available_backends, elimination_order, factorize, pardiso, upper_triangle, whole
-from signedheat.progress import Announcement
 from signedheat.surfaces.vector_heat import vector_heat_matrix
 
 backends = pytest.mark.parametrize("backend", available_backends())

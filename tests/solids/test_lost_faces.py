@@ -5,8 +5,7 @@ import pytest
 
 from signedheat import samples
 from signedheat.mesh.edges import edge_table
-from signedheat.solids.closing import small_lids
-from signedheat.solids.lost_faces import MOST_SIDES
+from signedheat.solids.closing import MOST_SIDES, small_lids
 
 
 def unordered(faces):

@@ -13,7 +13,7 @@ from signedheat.diagnostics import PointsLeftOut
 from signedheat.samples import sphere
 from signedheat.solids.point_orientation import orient_points
 from signedheat.surfaces.local_triangulations import hole_fillings, local_triangulations
-from signedheat.surfaces.outward_signs import spread_out
+from signedheat.surfaces.point_cloud import spread_out
 
 
 def sphere_with_circle(n, height=0.3, seed=0):

@@ -174,11 +174,11 @@ def test_open_level_sets_end_at_the_boundary():
 @pytest.mark.parametrize("package", ["tetgen", "pytetwild"])
 def test_tets_of_other_programs(package):
     pytest.importorskip(package)
-    from signedheat.tets import meshers as tet_meshers
+    from signedheat.tets import lattice
 
     mesher = {
-        "tetgen": tet_meshers.tetrahedralize_with_tetgen,
-        "pytetwild": tet_meshers.tetrahedralize_with_tetwild,
+        "tetgen": lattice.tetrahedralize_with_tetgen,
+        "pytetwild": lattice.tetrahedralize_with_tetwild,
     }[package]
     whole = sphere(3)
     broken = sh.TriangleMesh(whole.vertices, whole.faces[np.random.default_rng(0).random(whole.n_faces) > 0.1])

@@ -55,7 +55,7 @@ def _run(argv: Sequence[str] | None) -> int:
     public = import_module("signedheat.public")
     if arguments.preview is not None:
         public.view.ensure_picture_writable(arguments.preview)
-    import_module("signedheat.progress").Announcement.are_wanted = not (arguments.quiet or arguments.json)
+    import_module("signedheat.jobs").Announcement.are_wanted = not (arguments.quiet or arguments.json)
     with import_module(f"{__name__}.standard").standard_files(arguments) as standard:
         summary, text = arguments.run(arguments)
     if arguments.json and not standard.takes_output:

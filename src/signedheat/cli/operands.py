@@ -39,8 +39,8 @@ from ..io.key_figures import describe as describe
 from ..io.scenes import scale_to, unit_of
 from ..io.solid_arrays import holds_solid
 from ..io.voxel_files import LabelImage, read_labels
+from ..jobs import Progress, within
 from ..memory import refuse_beyond_memory
-from ..progress import Progress, within
 from ..solids.completion import Completion, complete, completed
 from ..solids.heat_surfaces import Heat
 from ..solids.solid_distance import completed_distance

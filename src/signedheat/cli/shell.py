@@ -10,8 +10,7 @@ from argparse import Namespace
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 
 from ..errors import SignedHeatError
-from ..jobs import command_for
-from ..progress import Announcement
+from ..jobs import Announcement, command_for
 from .batch_commands import batch, watertight
 from .curve_commands import close, surface
 from .late_imports import compiled, kernel_runs, parallel

@@ -14,11 +14,11 @@ from ..constraints import Constraint, EachComponent, LevelValues
 from ..discretization import discretize
 from ..errors import SourceError
 from ..foreign import ForeignShape, as_list, converted
+from ..jobs import Progress
 from ..kinds import SurfaceDomain
 from ..memory import within_memory
 from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import IntrinsicMesh
-from ..progress import Progress
 from ..solver import SignedHeatSolver, distance_unwarned
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, SurfacePoints
 from ..surfaces.surface_discretization import SurfaceDiscretization

@@ -12,21 +12,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..area_elements import bounds_around
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Frozen, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..diagnostics import Diagnostics, Note
 from ..errors import ConstraintError
 from ..foreign import as_list
-from ..frozen import Frozen
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_field import GridField
 from ..grids.polyline import Polyline
 from ..grids.solid_queries import Closest
+from ..jobs import Progress, within
 from ..kinds import Sources
 from ..mesh.components import sums_of
 from ..mesh.polylines import LEAST_SHARE, FillRule, filled_outlines, without_seams
 from ..mesh.unit_vectors import unit
-from ..progress import Progress, within
 from ..search.face_tree import FaceTree
 from ..solver import SignedHeatSolver
 from ..surfaces.extrapolation import Diffusion

@@ -19,13 +19,13 @@ from ..arrays import Bools, Complexes, Floats
 from ..diagnostics import Diagnostics, Jumps
 from ..errors import GeometryError, InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..foreign import ForeignShape, as_list, converted
+from ..jobs import Progress, Stopwatch
 from ..linear import chosen_backend
 from ..memory import refuse_beyond_memory, within_memory
 from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs
 from ..mesh.surface_points import VERTEX, barycentric_in
 from ..method import diffuse, normalize
-from ..progress import Progress, Stopwatch
 from ..surfaces.intrinsic_discretization import ANGLE, COARSEST, is_spoiled, lowered
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from ..surfaces.polygon_mesh import PolygonMesh
@@ -33,8 +33,7 @@ from ..surfaces.surface_curves import CurveOrPoints, CurvesAndPoints
 from ..surfaces.surface_discretization import SurfaceDiscretization, lowered_mesh, lowered_polygons
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import flag, positive_number
-from .cut_lines import high_jumps, integration_error, is_continuous, smoothed
-from .jumps import JumpProblem, JumpSolution, minimize
+from .jumps import JumpProblem, JumpSolution, high_jumps, integration_error, is_continuous, minimize, smoothed
 from .piecewise_field import IntrinsicPiecewiseField, PiecewiseField
 
 ROUGH = 1.0

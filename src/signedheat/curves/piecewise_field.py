@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Frozen, Ints
 from ..diagnostics import Diagnostics
 from ..errors import GeometryError
 from ..exchange import Displayed
 from ..field_arithmetic import Arithmetic
-from ..frozen import Frozen
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs, split_corners
 from ..mesh.polylines import assemble_polylines
 from ..mesh.surface_points import barycentric_in, locate_points

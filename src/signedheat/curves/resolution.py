@@ -10,12 +10,12 @@ from typing import Any, TypeVar
 from ..discretization import discretize
 from ..errors import CancellingNormalsError, GeometryError, SourceError
 from ..foreign import as_list
+from ..jobs import Progress
 from ..kinds import SurfaceDomain
-from ..progress import Progress
 from ..solver import SignedHeatSolver
-from ..surfaces.curve_groups import CurveGroups
 from ..surfaces.extrapolation import Diffusion
 from ..surfaces.intrinsic_discretization import Retriangulated, RetriangulatedForZeroSet
+from ..surfaces.source_segments import CurveGroups
 from ..surfaces.surface_curves import CurveOrPoints, CurvesAndPoints
 from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.triangle_mesh import TriangleMesh

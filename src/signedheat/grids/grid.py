@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Bools, Floats
+from ..arrays import Bools, Floats, Frozen, short
 from ..errors import GeometryError, MemoryLimitError
 from ..exchange import Displayed
 from ..foreign import ForeignShape, Shape, as_shapes
-from ..frozen import Frozen, short
 from ..packages import lazy_module
 from ..validation import (
     coordinates,

@@ -12,13 +12,12 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Frozen
 from ..diagnostics import Diagnostics
 from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError
 from ..exchange import Displayed, with_values
 from ..field_arithmetic import Combinable, Rule
 from ..field_levels import on_level, refuse_beyond_walls
-from ..frozen import Frozen
 from ..memory import within_memory
 from ..mesh.edge_flips import flipped_along_creases
 from ..packages import lazy_module

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats
+from ..arrays import Floats, Frozen
 from ..errors import GeometryError
 from ..exchange import Displayed
-from ..frozen import Frozen
 from ..packages import lazy_module
 from ..validation import boolean, coordinates, flag, numbers, positive_steps
 from .marching import level_lines

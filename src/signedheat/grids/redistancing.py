@@ -22,11 +22,10 @@ from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..discretization import SourceTerm
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
-from ..jobs import run_cancellable
+from ..jobs import Progress, run_cancellable
 from ..memory import within_memory
 from ..packages import lazy_module
 from ..parallel import in_chunks
-from ..progress import Progress
 from ..search.face_tree import FaceFeatures, FaceTree
 from ..sharpening_methods import Method, Nearest, distance_to_nearest, nearest, sharpen_field, timed
 from ..validation import array_of, flag, numbers, positive_steps

@@ -1,15 +1,306 @@
-"""Read and write polylines in the plane: drawings (SVG) and tables of points (CSV)."""
+"""Read and write polylines in the plane: SVG drawings, with their shapes and transforms, and tables of points (CSV)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import cmath
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from xml.etree import ElementTree
 
-from ..arrays import Floats
-from ..errors import GeometryError
+import numpy as np
+
+from ..arrays import Complexes, Floats
+from ..errors import FileFormatError, GeometryError
 from ..grids.polyline import Polyline
-from .files import PathLike, format_for, reading, replacing
+from ..mesh.polylines import filled_outlines
+from .files import PathLike, contents, damaged, format_for, reading, replacing
 from .point_files import read_point_lists, write_point_lists
-from .svg import read_svg, svg
+
+CURVE_PIECES = 64
+"""Number of segments that approximate a Bézier curve or an arc."""
+NUMBER = re.compile(r"[\s,]*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
+FLAG = re.compile(r"[\s,]*([01])")
+COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])")
+ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
+"""Number of arguments of each command of a path."""
+FLAGS = (3, 4)
+"""Arguments of an arc that are flags, which need no space after them."""
+UNITS = {"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "q": 96 / 101.6, "in": 96.0}
+"""User units per unit of length; ems are those of the default font."""
+UNITS |= {"em": 16.0, "ex": 8.0}
+CONTAINERS = ("svg", "g", "a", "switch")
+AXES = {"x": 0, "x1": 0, "x2": 0, "cx": 0, "rx": 0, "width": 0, "y": 1, "y1": 1, "y2": 1, "cy": 1, "ry": 1, "height": 1}
+"""Axes of attributes that are lengths along an axis."""
+DEPTH, MOST_USES = 100, 10**5
+"""Limits on nested groups, and on elements drawn, including repeated uses."""
+FILL_RULE = re.compile(r"fill-rule\s*:\s*(\w+)")
+TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
+
+
+def read_svg(path: PathLike) -> list[tuple[Floats, bool]]:
+    """Points of each subpath in drawing order, with y upwards, and whether it is closed."""
+    data = contents(path)
+    try:
+        root = ElementTree.fromstring(data)
+    except ElementTree.ParseError as error:
+        raise damaged(f"it is no XML ({error})") from error
+    drawing = _Drawing({key: each for each in root.iter() if (key := each.get("id")) is not None}, _size(root))
+    lines = [line for part in drawing.drawn(root, np.eye(3)) for line in part]
+    if not lines:
+        raise FileFormatError("there is no line in the drawing", remedy="convert text and images to paths first")
+    return [(points * (1.0, -1.0), closed) for points, closed in lines]
+
+
+@dataclass
+class _Drawing:
+    """Elements of a drawing by id, and its size in user units."""
+
+    named: dict[str, ElementTree.Element]
+    size: tuple[float, float]
+    n_used: int = 0
+
+    def drawn(
+        self, element: ElementTree.Element, outer: Floats, depth: int = 0, is_used: bool = False, rule: str = "nonzero"
+    ) -> Iterator[list[tuple[Floats, bool]]]:
+        """Subpaths of an element and its children; those with the evenodd rule as outlines of their fill."""
+        self.n_used += is_used
+        if depth > DEPTH or self.n_used > MOST_USES:
+            raise damaged("its elements contain themselves or too many others")
+        kind = str(element.tag).rpartition("}")[2]
+        if element.get("display") == "none" or "display:none" in element.get("style", "").replace(" ", ""):
+            return
+        matrix = outer @ _transform(element.get("transform", ""))
+        stated = FILL_RULE.search(element.get("style", ""))
+        rule = stated[1] if stated else element.get("fill-rule", rule)
+        if kind in CONTAINERS:
+            for child in element:
+                yield from self.drawn(child, matrix, depth + 1, is_used, rule)
+        elif kind == "use":
+            name = next((value for key, value in element.attrib.items() if key.rpartition("}")[2] == "href"), "")
+            if name[1:] in self.named:
+                move = np.eye(3)
+                move[:2, 2] = self._length(element, "x"), self._length(element, "y")
+                yield from self.drawn(self.named[name[1:]], matrix @ move, depth + 1, True, rule)
+        else:
+            parts = list(_subpaths(self._path(element, kind)))
+            if rule == "evenodd" and any(closed for _, closed in parts):
+                filled = filled_outlines([points for points, closed in parts if closed], "evenodd")
+                parts = [*((outline[::-1], True) for outline in filled), *(part for part in parts if not part[1])]
+            yield [(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in parts]
+
+    def _path(self, element: ElementTree.Element, kind: str) -> str:
+        """Return the path data of an element; circles and ellipses run clockwise in the drawing."""
+        if kind == "path":
+            return element.get("d", "")
+        if kind == "line":
+            x1, y1, x2, y2 = (self._length(element, name) for name in ("x1", "y1", "x2", "y2"))
+            return f"M{x1},{y1} L{x2},{y2}"
+        if kind in ("polyline", "polygon"):
+            return f"M{element.get('points', '')}{'Z' if kind == 'polygon' else ''}" if element.get("points") else ""
+        if kind in ("circle", "ellipse"):
+            x, y, r, rx, ry = (self._length(element, name) for name in ("cx", "cy", "r", "rx", "ry"))
+            rx, ry = rx or r or ry, ry or r or rx
+            return f"M{x + rx},{y} A{rx},{ry} 0 1 1 {x - rx},{y} A{rx},{ry} 0 1 1 {x + rx},{y} Z" if rx * ry else ""
+        if kind == "rect":
+            x, y, w, h, rx, ry = (self._length(element, name) for name in ("x", "y", "width", "height", "rx", "ry"))
+            rx, ry = min(rx or ry, w / 2), min(ry or rx, h / 2)
+            if w * h == 0:
+                return ""
+            if rx * ry == 0:
+                return f"M{x},{y} h{w} v{h} h{-w} Z"
+            arc = f"a{rx},{ry} 0 0 1"
+            return (
+                f"M{x + rx},{y} h{w - 2 * rx} {arc} {rx},{ry} v{h - 2 * ry} {arc} {-rx},{ry} "
+                f"h{2 * rx - w} {arc} {-rx},{-ry} v{2 * ry - h} {arc} {rx},{-ry} Z"
+            )
+        return ""
+
+    def _length(self, element: ElementTree.Element, name: str) -> float:
+        """Return an attribute in user units, including percentages of the width, height or diagonal."""
+        whole = self.size[AXES[name]] if name in AXES else math.hypot(*self.size) / math.sqrt(2)
+        return length(element.get(name, "0"), whole, name)
+
+
+def length(word: str, whole: float = math.nan, name: str = "length") -> float:
+    """Return a length in user units, 96 of which are an inch.
+
+    Examples
+    --------
+    >>> length("25.4mm"), length("3"), length("50%", 8.0)
+    (96.0, 3.0, 4.0)
+    """
+    match = NUMBER.match(word)
+    unit = word[match.end() :].strip().lower() if match else ""
+    if word.strip() == "auto":
+        return 0.0
+    if match is None or (unit != "%" and unit not in UNITS):
+        raise damaged(f"{name} is '{word:.40}', which is not a length", element=name)
+    value = float(match[1]) * (whole / 100 if unit == "%" else UNITS[unit])
+    if not math.isfinite(value):
+        raise FileFormatError(f"{name} is '{word:.40}' of a drawing without a size", remedy="give it a viewBox")
+    return value
+
+
+def _size(root: ElementTree.Element) -> tuple[float, float]:
+    """Width and height in user units; NaN if not given."""
+    box = [float(word) for word in NUMBER.findall(root.get("viewBox", ""))]
+    if len(box) == 4:
+        return box[2], box[3]
+    sides = (root.get(name, "100%") for name in ("width", "height"))
+    width, height = (math.nan if "%" in side else length(side) for side in sides)
+    return width, height
+
+
+def _transform(text: str) -> Floats:
+    """(3, 3) the product of a list of transforms."""
+    matrix = np.eye(3)
+    for kind, inside in TRANSFORM.findall(text):
+        numbers = [float(word) for word in NUMBER.findall(inside)]
+        step = np.eye(3)
+        if kind == "matrix" and len(numbers) == 6:
+            step[:2] = np.reshape(numbers, (3, 2)).T
+        elif kind == "translate" and numbers:
+            step[:2, 2] = (*numbers, 0.0)[:2]
+        elif kind == "scale" and numbers:
+            step[0, 0], step[1, 1] = numbers[0], numbers[-1]
+        elif kind == "rotate" and len(numbers) in (1, 3):
+            cos, sin = math.cos(math.radians(numbers[0])), math.sin(math.radians(numbers[0]))
+            step[:2, :2] = [[cos, -sin], [sin, cos]]
+            center = np.array(numbers[1:] or (0.0, 0.0))
+            step[:2, 2] = center - step[:2, :2] @ center
+        elif kind.startswith("skew") and numbers:
+            step[(0, 1) if kind == "skewX" else (1, 0)] = math.tan(math.radians(numbers[0]))
+        else:
+            raise damaged(f"'{kind}({inside[:40]})' is not a transform")
+        matrix = matrix @ step
+    return matrix
+
+
+def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
+    """Commands of a path with their arguments; repeated commands are expanded."""
+    at, command = 0, ""
+    end = len(data.rstrip())
+    while at < end:
+        word = COMMAND.match(data, at)
+        if word:
+            at, command = word.end(), word[1]
+        elif command in "Zz":  # valid even at the beginning
+            raise damaged(f"a path goes on with '{data[at : at + 20].strip()}', which is not a command")
+        numbers = []
+        for place in range(ARGUMENTS[command.upper()]):
+            pattern = FLAG if command in "Aa" and place in FLAGS else NUMBER
+            number = pattern.match(data, at)
+            if number is None:
+                raise damaged(f"a path has '{data[at : at + 20].strip()}' where a number of '{command}' must be")
+            at = number.end()
+            numbers.append(float(number[1]))
+        yield command, numbers
+        command = {"M": "L", "m": "l"}.get(command, command)
+
+
+def _subpaths(data: str) -> Iterator[tuple[Floats, bool]]:
+    """Points of each subpath with a length, and whether it is closed."""
+    points: list[Complexes] = []
+    place = start = control = 0j
+    before, closed = "", False
+    for command, numbers in _steps(data):
+        name, origin = command.upper(), place if command.islower() else 0j
+        if name == "M" or (before == "Z" and name != "Z"):
+            yield from _whole(points, closed)
+            start = place = origin + complex(*numbers) if name == "M" else start
+            points, closed = [np.array([start])], False
+        if not points:
+            raise damaged(f"a path begins with '{command}', and not with M")
+        ends = [origin + complex(x, y) for x, y in zip(numbers[::2], numbers[1::2], strict=False)]
+        if name == "Z":
+            closed, place = True, start
+        elif name in "HV":
+            across, along = (place.imag, origin.real) if name == "H" else (place.real, origin.imag)
+            place = complex(along + numbers[0], across) if name == "H" else complex(across, along + numbers[0])
+            points.append(np.array([place]))
+        elif name == "L":
+            place = ends[0]
+            points.append(np.array([place]))
+        elif name in "CSQT":
+            smooth = 2 * place - control if before and before in ("CS" if name in "CS" else "QT") else place
+            corners = [place, *([smooth] if name in "ST" else []), *ends]
+            points.append(_bezier(corners))
+            control, place = corners[-2], corners[-1]
+        elif name == "A":
+            end = origin + complex(*numbers[5:])
+            points.append(_arc(place, end, *numbers[:5]))
+            place = end
+        before = name
+    yield from _whole(points, closed)
+
+
+def _whole(parts: list[Complexes], closed: bool) -> Iterator[tuple[Floats, bool]]:
+    """Return a subpath, if it has a length; it is closed if it ends where it begins, too."""
+    points = np.concatenate([np.zeros(0, dtype=np.complex128), *parts])
+    if len(points) == 0 or (points == points[0]).all():
+        return
+    if len(points) > 2 and abs(points[-1] - points[0]) <= 1e-9 * np.abs(points).max():
+        points, closed = points[:-1], True
+    yield np.stack([points.real, points.imag], axis=1), closed
+
+
+def _bezier(corners: list[complex]) -> Complexes:
+    """Points of a Bézier curve of any degree, by de Casteljau, without the first."""
+    t = np.arange(1, CURVE_PIECES + 1) / CURVE_PIECES
+    rows = [np.full(CURVE_PIECES, corner) for corner in corners]
+    while len(rows) > 1:
+        rows = [(1 - t) * row + t * after for row, after in pairwise(rows)]
+    rows[0][-1] = corners[-1]
+    return rows[0]
+
+
+def _arc(
+    begin: complex, end: complex, rx: float, ry: float, degrees: float, is_large: float, is_clockwise: float
+) -> Complexes:
+    """Points of an elliptical arc without the first: SVG 1.1, F.6.5, on the circle that the ellipse is mapped to."""
+    rx, ry = abs(rx), abs(ry)
+    if rx * ry == 0 or begin == end:
+        return np.array([end])
+    turn = complex(math.cos(math.radians(degrees)), math.sin(math.radians(degrees)))
+
+    def on_circle(point: complex) -> complex:
+        turned = point / turn
+        return complex(turned.real / rx, turned.imag / ry)
+
+    first, last = on_circle(begin), on_circle(end)
+    half = (last - first) / 2
+    rise = math.sqrt(max(1 / abs(half) ** 2 - 1, 0.0))  # 0 where the radii are too small: they are scaled up
+    center = (first + last) / 2 + half * 1j * (rise if bool(is_large) != bool(is_clockwise) else -rise)
+    sweep = cmath.phase((last - center) / (first - center))
+    if is_clockwise and sweep < 0:
+        sweep += 2 * math.pi
+    elif not is_clockwise and sweep > 0:
+        sweep -= 2 * math.pi
+    t = np.arange(1, CURVE_PIECES + 1) / CURVE_PIECES
+    circle = center + (first - center) * np.exp(1j * sweep * t)
+    points = (circle.real * rx + 1j * circle.imag * ry) * turn
+    points[-1] = end
+    return points
+
+
+def svg(lines: Sequence[Polyline]) -> str:
+    """Return an SVG drawing of polylines, with the y axis pointing down."""
+    points = np.concatenate([line.points for line in lines])
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    margin = 0.05 * float((upper - lower).max())
+    box = [lower[0] - margin, -upper[1] - margin, *(upper - lower + 2 * margin)]
+    paths = []
+    for line in lines:
+        steps = " L ".join(f"{x!r},{-y!r}" for x, y in line.points.tolist())
+        paths.append(f'<path d="M {steps}{" Z" if line.closed else ""}"/>')
+    style = f'fill="none" stroke="black" stroke-width="{0.1 * margin:.6g}"'
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{" ".join(f"{value:.9g}" for value in box)}">\n'
+        f"<g {style}>\n" + "\n".join(paths) + "\n</g>\n</svg>\n"
+    )
 
 
 def read_polylines(path: PathLike) -> list[Polyline]:

@@ -9,11 +9,10 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Frozen, short
 from ..errors import FileFormatError, GeometryError
 from ..exchange import NAME
 from ..foreign import Represented
-from ..frozen import Frozen, short
 from ..grids.grid import Grid
 from ..grids.grid_field import GridField
 from ..packages import require

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SignedHeatError
-from ..progress import Announcement
+from ..jobs import Announcement
 from . import pardiso
 from .ordering import elimination_order, upper_triangle, whole
 from .pardiso import PardisoFactor

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, read_only
 from ..compiled import compiled
-from ..frozen import read_only
 
 
 def connected_components(n: int, tails: NDArray[np.integer], heads: NDArray[np.integer]) -> Ints:

@@ -8,9 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Frozen, Ints, read_only
 from ..compiled import compiled
-from ..frozen import Frozen, read_only
 from .components import connected_components, grouped
 
 

@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, Number
 from ..compiled import compiled
-from ..frozen import Number
 from .edges import EdgeTable
 from .intrinsic_mesh import IntrinsicMesh
 

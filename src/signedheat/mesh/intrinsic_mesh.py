@@ -13,9 +13,8 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from ..arrays import Bools, Complexes, Floats, Ints
+from ..arrays import Bools, Complexes, Floats, Frozen, Ints
 from ..errors import GeometryError
-from ..frozen import Frozen
 from .components import connected_components, element_components
 from .edges import EdgeTable, edge_table
 from .triangles import Triangles

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, read_only
 from ..compiled import compiled
-from ..frozen import read_only
 from .edges import find_edges
 
 SINGLE, DOUBLE = 2.0**-22, 2.0**-46

@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from ..arrays import Bools, Floats, Ints
-from ..frozen import Frozen
+from ..arrays import Bools, Floats, Frozen, Ints
 from ..mesh.components import connected_components, sums_of
 from ..mesh.triangles import area_vectors
 from ..mesh.unit_vectors import unit

@@ -1,4 +1,10 @@
-"""Close the boundary of a chain of triangles by lids."""
+"""Close the boundary of a chain of triangles by lids.
+
+A small hole that lost no vertices is known but for its diagonals. Of all triangulations of its loop, the one whose
+edges bend least, ``Σ length · angle`` with the rim's edges included (twice the total absolute mean curvature),
+continues the faces around it; dynamic programming over the loop finds it (Barequet and Sharir 1995, Liepa 2003).
+Larger ones get lids that bend as the surface does towards its rim (`continuation`).
+"""
 
 from __future__ import annotations
 
@@ -9,16 +15,286 @@ import numpy as np
 import scipy
 from threadpoolctl import threadpool_limits
 
-from ..arrays import Floats, Ints
-from ..frozen import Frozen
+from ..arrays import Bools, Floats, Frozen, Ints
+from ..compiled import compiled
 from ..mesh.box_tree import BoxTree
-from ..mesh.components import element_components
+from ..mesh.components import connected_components, element_components, sums_of
 from ..mesh.edges import edge_keys, edge_table
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import unit
-from . import bending, creases, lids, lost_faces, walls
+from . import lids, walls
+from .lids import Lid, running_mean, vertex_normals
 from .rims import boundary, corners_of, loops, open_edges
 from .spanning import Frame, frame_of
+
+REACH = 0.25
+"""Share of an opening's width in which the surface behind its rim is looked at."""
+SHARP = 0.7
+"""Cosine between the normals of two faces below which the edge between them is sharp."""
+SAMPLES = 16
+"""Samples across that strip."""
+MOST = 32768
+"""Samples around a rim at most, or nearly."""
+DIVIDED = 1 << 20
+"""Triangles behind a rim that are made by division at most, of which `MOST` are taken: those of a flat side behind
+slots .0012 to .1 as wide as they are long are 430,000 to 140,000."""
+STIFF = 0.03
+"""Depth of a wall, over that strip's, whose bending counts by half."""
+AGREEMENT = 0.35
+"""Ratio of how far a surface bends and how far it would have to, or of the latter and the former, up to which its lid
+does not bend; from twice that on it is clamped. 1 on a ball."""
+NARROWEST = 1e-9
+"""Least width of an opening, over the length of its rim: about what rounding leaves of one."""
+UNBENT = 1e-6
+"""Turn of a surface, in radians, that rounding makes of none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Places on faces near a rim: (k, 3) positions, (k, 3) unit normals, (k,) areas and smooth patches they are of."""
+
+    positions: Floats
+    normals: Floats
+    areas: Floats
+    patches: Ints
+
+
+def width_of(lid: Lid) -> float:
+    """Four areas over the length of the rim, the diameter of a circle; of slits without area not nothing."""
+    rim = lid.vertices[: lid.n_rim]
+    length = float(np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1).sum())
+    return max(4.0 * float(face_areas(lid.vertices[lid.faces]).sum()) / length, NARROWEST * length)
+
+
+def smooth_patches(triangles: Floats, ids: Ints) -> Ints:
+    """(m,) which faces hang together across edges that are not sharp."""
+    table = edge_table(ids)
+    normals, (one, other) = unit(area_vectors(triangles)), table.pairs.T // 3
+    smooth = (normals[one] * normals[other]).sum(axis=1) > SHARP
+    return connected_components(len(ids), one[smooth], other[smooth])
+
+
+def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spatial.cKDTree, reach: float) -> Samples:
+    """Sample triangles in a tree within reach of a rim, at most reach / `SAMPLES` apart, unless too many are."""
+    size = reach / SAMPLES
+    some = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
+    triangles, patches = triangles[some], patches[some]
+    near, labels, divided = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)], 0
+    while len(triangles):
+        centres = triangles.mean(axis=1)
+        radii = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
+        away = rim.query(centres)[0]
+        triangles, patches, radii, away = (each[away < reach + radii] for each in (triangles, patches, radii, away))
+        fine = radii <= size
+        divided += 4 * int((~fine).sum())
+        fine |= divided > DIVIDED
+        chosen = fine & (away < reach)
+        near.append(triangles[chosen])
+        labels.append(patches[chosen])
+        a, b, c = triangles[~fine].transpose(1, 0, 2)
+        d, e, f = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        triangles = np.concatenate([np.stack(t, axis=1) for t in ((a, d, f), (d, b, e), (f, e, c), (d, e, f))])
+        patches = np.tile(patches[~fine], 4)
+    found = np.concatenate(near)
+    vectors, areas = area_vectors(found), face_areas(found)
+    proper = np.flatnonzero(areas > 0)
+    proper = proper[:: max(1, len(proper) // MOST)]
+    normals = vectors[proper] / areas[proper, None]
+    return Samples(found.mean(axis=1)[proper], normals, areas[proper], np.concatenate(labels)[proper])
+
+
+def continuation(lid: Lid, samples: Samples, patches: Ints, width: float) -> tuple[Floats, Floats, Floats]:
+    """Return normals and curvatures with which the surface would continue over its rim, and how much that counts.
+
+    Across an opening of width W a surface that meets the flat lid at angle β must turn by 2 sin β, the chord of a
+    circle; if its curvature towards the rim is k, it would turn by k W. On a ball both are the same, on a box k is 0.
+    The samples are of the surface behind the flat lid; at each place of the rim the smooth patch `patches` ends.
+
+    Returns
+    -------
+    normals : (n, 3) float
+        Unit normals of the surface at the rim.
+    curvatures : (n,) float
+        Sums of its principal curvatures there, positive on a ball.
+    held : (n,) float
+        1 where the surface bends as it must, 0 where it does not.
+    """
+    n, loop = lid.n_rim, lid.vertices[: lid.n_rim]
+    reach = REACH * width
+    steps = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    m = max(1, min(n // 4, round(reach / steps.mean())))
+    along = unit(np.roll(loop, -m, axis=0) - np.roll(loop, m, axis=0))
+    rows, near = _within(samples, loop, patches, reach)
+
+    def means(values: Floats) -> Floats:
+        """Over the samples near each place."""
+        return sums_of(np.einsum("k,k...->k...", weights, values), rows, n)
+
+    x, normals, areas = samples.positions[near] - loop[rows], samples.normals[near], samples.areas[near]
+    weights = areas * (1.0 - (x * x).sum(axis=1) / reach**2)  # what comes into reach weighs nothing yet
+    weights /= np.maximum(np.bincount(rows, weights, n), 1e-300)[rows]
+    middle = means(normals)
+    way = np.cross(middle, along)
+    enough = (np.bincount(rows, minlength=n) >= 3) & (np.linalg.norm(way, axis=1) > 1e-6)
+    way = unit(way)
+    frame = np.stack([way, unit(np.cross(middle, way))], axis=1)
+    at = np.einsum("kij,kj->ki", frame[rows], x)
+    mean = means(at)
+    at = at - mean[rows]
+    spread = means(at[:, :, None] * at[:, None, :]) + (STIFF * reach) ** 2 * np.eye(2)
+    slopes = np.linalg.solve(spread, means(at[:, :, None] * (normals - middle[rows])[:, None, :]))
+    at_rim = unit(middle - np.einsum("ni,nij->nj", mean, slopes)) * enough[:, None]
+    outwards = unit(np.cross(at_rim, along))
+    bends, must = width * (slopes[:, 0] * outwards).sum(axis=1), 2.0 * (outwards * vertex_normals(lid)[:n]).sum(axis=1)
+    least, most = np.minimum(np.abs(bends), np.abs(must)), np.maximum(np.abs(bends), np.abs(must))
+    ratio = np.sign(bends * must) * least / np.maximum(most, UNBENT)
+    held = enough * np.clip(ratio / AGREEMENT - 1.0, 0.0, 1.0)
+    fits = np.minimum(1.0, np.abs(must) / np.maximum(np.abs(bends), UNBENT))  # more curved, it would not come round
+    curvatures = np.where(enough, fits * (slopes * frame).sum(axis=(1, 2)), 0.0)
+    return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(held, m), 0.0)
+
+
+def _within(samples: Samples, loop: Floats, patches: Ints, reach: float) -> tuple[Ints, Ints]:
+    """Pairs of a place of a rim and a sample within reach of it, of the patch that ends there."""
+    if not len(samples.positions):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    found = scipy.spatial.cKDTree(samples.positions).query_ball_point(loop, reach, return_sorted=True)
+    rows = np.repeat(np.arange(len(loop)), [len(each) for each in found])
+    near = np.concatenate([np.asarray(each, dtype=np.int64) for each in found])
+    own = samples.patches[near] == patches[rows]
+    return rows[own], near[own]
+
+
+MOST_SIDES = 16
+"""Sides of a hole from which on vertices, too, may be lost."""
+BENT = np.deg2rad(70.0)
+"""Root mean square of the angles at the rim from which on a lid does not continue the surface around it: at the end of
+a tube it is 90°."""
+
+
+def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints, most: float) -> list[Ints]:
+    """(n − 2, 3) triangles on the vertices of each loop of n; none where they do not continue the surface around it.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        Positions.
+    loops : list of (n,) int
+        Vertices around each hole, counterclockwise as seen from outside.
+    normals : (k, 3) float
+        Unit normals of the faces behind the edges that begin at them, loop after loop.
+    taken : (e,) int
+        Sorted `edge_keys` of edges that may not be made, since they are there already.
+    most : float
+        Root mean square of the angles at the rim up to which they continue it.
+    """
+    starts = np.concatenate([[0], np.cumsum([len(loop) for loop in loops], dtype=np.int64)])
+    if not len(loops):
+        return []
+    every = np.concatenate(loops)
+    faces, closed = _least_bent(vertices[every], every, np.ascontiguousarray(normals), starts, taken, most)
+    begins = starts - 2 * np.arange(len(starts))
+    return [
+        every[a + faces[b:c]] if closes else np.empty((0, 3), dtype=np.int64)
+        for a, b, c, closes in zip(starts[:-1], begins[:-1], begins[1:], closed.tolist(), strict=True)
+    ]
+
+
+@compiled
+def _least_bent(
+    corners: Floats, ids: Ints, normals: Floats, starts: Ints, taken: Ints, most: float
+) -> tuple[Ints, Bools]:
+    """Triangles, by places in their loops, and whether each loop's bend at its rim at most by an angle.
+
+    `cost[i, j]` is how much the best lid between the i-th and the j-th corner bends, but for the edge that joins the
+    two; `rims[i, j]` the sum of lengths times squared angles at the rim, `across[i, j]` the normal of its triangle
+    there.
+    """
+    n_loops = len(starts) - 1
+    faces, closed = np.empty((len(corners) - 2 * n_loops, 3), dtype=np.int64), np.zeros(n_loops, dtype=np.bool_)
+    size = 0
+    for h in range(n_loops):
+        size = max(size, starts[h + 1] - starts[h])
+    cost, rims, across = np.empty((size, size)), np.empty((size, size)), np.empty((size, size, 3))
+    split, stack, normal = np.empty((size, size), dtype=np.int64), np.empty((size, 2), dtype=np.int64), np.empty(3)
+    count = 0
+    for h in range(n_loops):
+        begin, n = starts[h], starts[h + 1] - starts[h]
+        points = corners[begin : begin + n]
+        around = 0.0
+        for i in range(n):
+            around += _length(points[i], points[(i + 1) % n])
+            if i < n - 1:
+                cost[i, i + 1] = rims[i, i + 1] = 0.0
+                across[i, i + 1] = normals[begin + i]
+        for span in range(2, n):
+            for i in range(n - span):
+                j = i + span
+                cost[i, j], split[i, j] = np.inf, i + 1
+                if span < n - 1 and _is_among(taken, ids[begin + i], ids[begin + j]):
+                    continue
+                for k in range(i + 1, j):
+                    if not cost[i, k] + cost[k, j] < cost[i, j]:
+                        continue
+                    _normal(points[i], points[k], points[j], normal)
+                    before, behind = _angle(normal, across[i, k]), _angle(normal, across[k, j])
+                    one, other = _length(points[i], points[k]), _length(points[k], points[j])
+                    total = cost[i, k] + cost[k, j] + one * before + other * behind
+                    if not normal.any():  # without area, which others have if there are any
+                        total += np.pi * (one + other)
+                    if total < cost[i, j]:
+                        cost[i, j], split[i, j], across[i, j] = total, k, normal
+                        rims[i, j] = rims[i, k] + rims[k, j]
+                        if k == i + 1:
+                            rims[i, j] += one * before**2
+                        if k == j - 1:
+                            rims[i, j] += other * behind**2
+        last = _length(points[n - 1], points[0])
+        bend = rims[0, n - 1] + last * _angle(across[0, n - 1], normals[begin + n - 1]) ** 2
+        closed[h] = cost[0, n - 1] < np.inf and bend <= most**2 * around
+        stack[0, 0], stack[0, 1], depth = 0, n - 1, 1
+        while depth > 0:
+            depth -= 1
+            i, j = stack[depth]
+            if j - i > 1:
+                k = split[i, j]
+                faces[count, 0], faces[count, 1], faces[count, 2] = i, k, j
+                count += 1
+                stack[depth, 0], stack[depth, 1], stack[depth + 1, 0], stack[depth + 1, 1] = i, k, k, j
+                depth += 2
+    return faces, closed
+
+
+@compiled
+def _length(a: Floats, b: Floats) -> float:
+    return float(np.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2))
+
+
+@compiled
+def _normal(a: Floats, b: Floats, c: Floats, normal: Floats) -> None:
+    """Write the unit normal of a triangle; 0 if it has no area."""
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    size = np.sqrt(x * x + y * y + z * z)
+    scale = 1.0 / size if size > 0 else 0.0
+    normal[0], normal[1], normal[2] = x * scale, y * scale, z * scale
+
+
+@compiled
+def _angle(a: Floats, b: Floats) -> float:
+    """Return the angle between two unit vectors; 0 where one of them is 0."""
+    if (a[0] == 0 and a[1] == 0 and a[2] == 0) or (b[0] == 0 and b[1] == 0 and b[2] == 0):
+        return 0.0
+    return float(np.arccos(min(max(a[0] * b[0] + a[1] * b[1] + a[2] * b[2], -1.0), 1.0)))
+
+
+@compiled
+def _is_among(taken: Ints, i: int, j: int) -> bool:
+    key = (min(i, j) << 32) | max(i, j)
+    at = np.searchsorted(taken, key)
+    return bool(at < len(taken) and taken[at] == key)
+
 
 NONE = np.empty((0, 2), dtype=np.int64)
 """No edges."""
@@ -121,7 +397,7 @@ class _Surface(Frozen):
     @cached_property
     def patches(self) -> Ints:
         """(m,) faces that hang together across edges that are not sharp."""
-        return bending.smooth_patches(self.triangles, self.faces)
+        return smooth_patches(self.triangles, self.faces)
 
     @cached_property
     def tree(self) -> BoxTree:
@@ -157,7 +433,7 @@ def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
         places = corners_of(surface.vertices[loop])
         if len(places) < 3:
             triangles.append(_fan(loop))
-        elif len(places) <= lost_faces.MOST_SIDES:
+        elif len(places) <= MOST_SIDES:
             chosen.append(loop)
             corners.append(places)
     if not chosen:
@@ -172,7 +448,7 @@ def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
     for loop, places, lid in zip(
         chosen,
         corners,
-        lost_faces.least_bent(surface.vertices, rims, np.concatenate(normals), taken, lost_faces.BENT),
+        least_bent(surface.vertices, rims, np.concatenate(normals), taken, BENT),
         strict=True,
     ):
         if len(lid):
@@ -225,7 +501,7 @@ def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
     corners = surface.vertices[loop]
     if len(loop) == 3:
         return np.empty((0, 3)), np.array([[0, 1, 2]])
-    if not bent and creases.is_flat(corners) and (flat := creases.flat_lid(corners)):
+    if not bent and lids.is_flat(corners) and (flat := lids.flat_lid(corners)):
         return flat
     for frame in (frame_of(corners), None):
         if lid := _spanned(surface, loop, frame, bent):
@@ -243,22 +519,20 @@ def _spanned(surface: _Surface, loop: Ints, frame: Frame | None, bent: bool) -> 
     flat = lids.film(smooth)
     plate = None
     if bent:
-        width, points = bending.width_of(flat), flat.vertices[: flat.n_rim]
-        near = bending.samples_near(
-            surface.triangles, surface.tree, surface.patches, scipy.spatial.cKDTree(points), bending.REACH * width
+        width, points = width_of(flat), flat.vertices[: flat.n_rim]
+        near = samples_near(
+            surface.triangles, surface.tree, surface.patches, scipy.spatial.cKDTree(points), REACH * width
         )
         ends = surface.patches[behind[rim.edges_at(flat.places)]]
-        normals, curvatures, held = bending.continuation(flat, near, ends, width)
+        normals, curvatures, held = continuation(flat, near, ends, width)
         plate = lids.plate(flat, normals, curvatures, held, width) if held.any() else None
     if plate is None:
         normals = surface.normals[behind]
-        lid = creases.creased(corners, normals)
+        lid = lids.creased(corners, normals)
         if lid is not None:
             return lid
         places = corners_of(corners)
-        if len(places) <= lost_faces.MOST_SIDES:
-            triangles = lost_faces.least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[
-                0
-            ]
+        if len(places) <= MOST_SIDES:
+            triangles = least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[0]
             return np.empty((0, 3)), _with_sides(np.arange(len(loop)), places, triangles)
     return lids.draped(corners, rim.starts, frame, plate or flat)

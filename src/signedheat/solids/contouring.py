@@ -19,10 +19,10 @@ from ..field_levels import NodeValues, on_level
 from ..grids.blocks import SIDE, Blocks, BlockValues
 from ..grids.grid import Grid
 from ..grids.marching import CLEARANCE
+from ..jobs import Progress
 from ..memory import available_memory, libraries
 from ..mesh.components import element_components
 from ..mesh.dual_cells import Crossings, DualCells, cells_around, dual_cells, open_cells, separate_triangles
-from ..progress import Progress
 from ..surfaces.triangle_mesh import TriangleMesh
 from .dual_vertices import ImplicitSurface, divided_along_creases, placed
 from .gauss import Pieces, sampled

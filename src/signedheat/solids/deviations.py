@@ -10,26 +10,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Frozen, Ints
 from ..errors import SourceError
 from ..foreign import SurfaceShape, as_shape
-from ..frozen import Frozen
+from ..jobs import Progress
 from ..joining import joined_shape
 from ..kinds import ShapeLike
 from ..memory import within_memory
 from ..mesh.triangles import face_areas
 from ..packages import lazy_module
-from ..progress import Progress
 from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
 from .completion import complete
-from .facing import agreeing_faces
+from .mesh_orientation import agreeing_faces
 from .solid import Solid
 
-pictures: Any = lazy_module("signedheat.view.measured_pictures", "pictures")
+pictures: Any = lazy_module("signedheat.view.surface_pictures", "pictures")
 
 PERCENTILES = (0.0, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 100.0)
 """Percentiles of deviations in summaries."""

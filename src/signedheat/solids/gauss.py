@@ -22,9 +22,8 @@ import numpy as np
 import scipy
 from scipy import sparse
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Frozen, Ints
 from ..compiled import compiled
-from ..frozen import Frozen
 from ..mesh.box_tree import LEAF, BoxTree, morton_codes
 from ..mesh.components import sums_of
 from ..mesh.triangles import area_vectors, face_areas

@@ -1,26 +1,175 @@
-"""The surface that the signed heat method makes of points, and of loose triangles that scatter around it."""
+"""The surface that the signed heat method makes of points, and of loose triangles that scatter around it.
+
+The winding number of a surface falls by one where it is crossed along its normal and is harmonic elsewhere (Jacobson et
+al. 2013). So one Poisson equation gives it on a grid, ``−Δw = ∇·(n δ)``, with n δ the area vectors spread over the
+nodes around them. On the walls of the box w is the far field of the area vectors.
+"""
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from ..area_elements import sample_on_grid
 from ..arrays import Floats, Ints
+from ..compiled import compiled
 from ..constraints import Constraint, ZeroSet
 from ..discretization import discretize
 from ..errors import OutsideError
-from ..grids import grid_discretization  # noqa: F401  registers grids
 from ..grids.grid import Grid
 from ..grids.grid_discretization import GridSource
-from ..grids.grid_winding import winding_numbers
 from ..grids.marching import closed_surface
+from ..grids.node_sources import STRETCH, NodeSources
+from ..grids.stencil import solve_poisson
+from ..mesh.components import sums_of
 from ..method import diffuse, integrate, normalize
+from ..parallel import n_threads
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
-from .fitted_points import fitted_to_points
+from .point_orientation import fitted_to_points
+
+BLOCK = 4
+"""Edge of the blocks, in cells, whose area vectors are one dipole as seen from the walls."""
+CORE = 2.0
+"""Distance in cells within which a dipole's field is that of a ball."""
+CLEARANCE = 10
+"""Cells that the far field needs between the shape and the walls; missing ones are added."""
+
+
+def winding_numbers(nodes: NodeSources, shape: tuple[int, ...], positions: Floats, vectors: Floats) -> Floats:
+    """Return winding numbers around the nodes of a grid of a shape with area vectors (s, d), smooth over two cells."""
+    dimension = len(shape)
+    spacing = nodes.steps[4 - dimension :]
+    room = _room(nodes, dimension)
+    inner = tuple(slice(below, below + n) for (below, _), n in zip(room, shape, strict=True))
+    shape = tuple(n + below + above for n, (below, above) in zip(shape, room, strict=True))
+    positions = positions + [below for below, _ in room]
+    right = _sources(nodes, shape, [below for below, _ in room], spacing)
+    dipoles, strengths = blocks_of_dipoles(positions, vectors)
+    walls = [_wall(axis, end, shape) for axis in range(dimension) for end in (0, 1)]
+    core = CORE * float(spacing.max())
+    with ThreadPoolExecutor(n_threads()) as pool:
+        jobs = [
+            pool.submit(_far_field, lattice.reshape(-1, dimension) * spacing, dipoles * spacing, strengths, axis, core)
+            for axis, _, lattice in walls
+        ]
+    fields = []
+    for (axis, end, lattice), job in zip(walls, jobs, strict=True):
+        w, flux = job.result()
+        flux = _refined(flux.reshape(lattice.shape[:-1]), shape, axis) / spacing[axis]
+        layer = np.moveaxis(right, axis, 0)[-1 if end else 0]
+        layer += flux if end else -flux
+        fields.append(_refined(w.reshape(lattice.shape[:-1]), shape, axis))
+    result = solve_poisson(right, spacing, overwrite=True)
+    excess = [
+        result.take(-1 if end else 0, axis=axis) - field for (axis, end, _), field in zip(walls, fields, strict=True)
+    ]
+    result -= np.median(np.concatenate([part.ravel() for part in excess]))
+    return result[inner]
+
+
+def _room(nodes: NodeSources, dimension: int) -> list[tuple[int, int]]:
+    """Return layers of nodes to add before and behind along each axis, so that no vectors are close to the walls."""
+    taken = nodes.nonzero()[0][:, 4 - dimension :]
+    before, behind = taken.min(axis=0), np.array(nodes.shape[4 - dimension :]) - 1 - taken.max(axis=0)
+    rooms = np.maximum(0, CLEARANCE - np.stack([before, behind], axis=1))
+    return [(int(below), int(above)) for below, above in rooms]
+
+
+def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Floats]:
+    """Return mean positions and sums of the area vectors in each block of `BLOCK` cells."""
+    blocks = np.floor(positions / BLOCK).astype(np.int64)
+    blocks -= blocks.min(axis=0)
+    which = blocks[:, 0]
+    for column in blocks.T[1:]:
+        if float(which.max()) * float(column.max()) > 2.0**60:  # a shape far larger than the grid
+            which, column = (np.unique(part, return_inverse=True)[1] for part in (which, column))
+        which = which * (column.max() + 1) + column
+    _, which = np.unique(which, return_inverse=True)
+    weights = np.linalg.norm(vectors, axis=1) + 1e-300
+    total = np.bincount(which, weights)
+    n = len(total)
+    return sums_of(weights[:, None] * positions, which, n) / total[:, None], sums_of(vectors, which, n)
+
+
+def _sources(nodes: NodeSources, shape: tuple[int, ...], below: list[int], spacing: Floats) -> Floats:
+    """Return ∇·(n δ) on a grid with these layers of nodes before its own; there are no vectors at its walls."""
+    dimension = len(shape)
+    right = np.zeros((1,) * (4 - dimension) + shape)
+    first, scales = np.zeros(4, dtype=np.int64), np.zeros(4)
+    first[4 - dimension :] = below
+    volume = float(np.prod(spacing))
+    scales[4 - dimension :] = -0.5 / spacing * volume ** ((dimension - 1) / dimension) / volume
+    _add_divergence(np.argwhere(nodes.places >= 0), nodes.places, nodes.sums, first, scales, right)
+    return right.reshape(shape)
+
+
+@compiled
+def _add_divergence(
+    stretches: Ints, places: NDArray[np.int32], sums: NDArray[np.float32], first: Ints, scales: Floats, right: Floats
+) -> None:
+    """Add differences of the vectors in some stretches, between the nodes before and behind."""
+    skipped = 0
+    while scales[skipped] == 0.0:
+        skipped += 1
+    for s in range(len(stretches)):
+        a, b, c, d = stretches[s]
+        i, j, k = a + first[0], b + first[1], c + first[2]
+        for m in range(STRETCH):
+            n = STRETCH * d + m + first[3]
+            for axis in range(skipped, 4):
+                flow = scales[axis] * sums[places[a, b, c, d], m, axis - skipped]
+                if flow != 0.0:
+                    right[i + (axis == 0), j + (axis == 1), k + (axis == 2), n + (axis == 3)] += flow
+                    right[i - (axis == 0), j - (axis == 1), k - (axis == 2), n - (axis == 3)] -= flow
+
+
+def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, Floats]:
+    """Return a lattice of places, in cells, on a wall of the box, half a cell beyond its last nodes, 8 cells apart."""
+    lines = [
+        np.array([shape[d] - 0.5 if end else -0.5])
+        if d == axis
+        else np.linspace(-0.5, shape[d] - 0.5, max(2, 1 + -(-shape[d] // 8)))
+        for d in range(len(shape))
+    ]
+    lattice = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
+    return axis, end, lattice.squeeze(axis=axis)
+
+
+def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
+    """Interpolate values on a wall's lattice to its nodes."""
+    for d, n in enumerate(m for k, m in enumerate(shape) if k != axis):
+        place = (np.arange(n) + 0.5) / n * (values.shape[d] - 1)
+        below = np.minimum(place.astype(np.int64), values.shape[d] - 2)
+        f = (place - below).reshape(-1, *(1,) * (values.ndim - 1 - d))
+        values = values.take(below, axis=d) * (1 - f) + values.take(below + 1, axis=d) * f
+    return values
+
+
+@compiled
+def _far_field(places: Floats, dipoles: Floats, strengths: Floats, axis: int, core: float) -> tuple[Floats, Floats]:
+    """Return the winding number at places, and its derivative along an axis."""
+    dimension = places.shape[1]
+    sphere = 2.0 * np.pi if dimension == 2 else 4.0 * np.pi
+    value, slope = np.zeros(len(places)), np.zeros(len(places))
+    for i in range(len(places)):
+        for j in range(len(dipoles)):
+            square, product = 0.0, 0.0
+            for d in range(dimension):
+                away = dipoles[j, d] - places[i, d]
+                square += away * away
+                product += away * strengths[j, d]
+            square = max(square, core * core)
+            power = square * np.sqrt(square) if dimension == 3 else square
+            value[i] += product / (sphere * power)
+            away = dipoles[j, axis] - places[i, axis]
+            slope[i] += (dimension * product * away / square - strengths[j, axis]) / (sphere * power)
+    return value, slope
+
 
 ROOM = 0.15
 """Room around the shape, over its longest side: the surface stays within it, whatever the room of later grids."""

@@ -11,21 +11,20 @@ from typing import TYPE_CHECKING, Any, Literal, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Frozen, Ints, short
 from ..diagnostics import Diagnostics
 from ..errors import InexactWarning, SignedHeatError, SourceError, warn_user
 from ..exchange import Displayed
 from ..foreign import Represented
-from ..frozen import Frozen, short
 from ..grids.grid import Grid
 from ..grids.grid_field import GridField
 from ..grids.solid_queries import Closest
+from ..jobs import Progress
 from ..memory import within_memory
 from ..mesh.box_tree import order_in_space
 from ..mesh.triangles import area_vectors, face_areas
 from ..packages import lazy_module
 from ..parallel import in_chunks
-from ..progress import Progress
 from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
 from ..search.nearest_triangles import weights_in
 from ..surfaces.triangle_mesh import TriangleMesh

@@ -11,9 +11,9 @@ from ..constraints import Constraint
 from ..errors import UnsupportedTypeError
 from ..grids.grid import Grid
 from ..grids.grid_field import GridField
+from ..jobs import Progress, within
 from ..joining import joined_shape
 from ..kinds import Shapes
-from ..progress import Progress, within
 from ..sharpening import sharpen
 from ..solver import SignedHeatSolver, checked
 from ..surfaces.point_cloud import PointCloud

@@ -27,9 +27,9 @@ from ..diagnostics import Note
 from ..errors import FileFormatError, SignedHeatError
 from ..grids.blocks import SIDE, Blocks
 from ..grids.grid import Grid
+from ..jobs import Progress
 from ..packages import lazy_module
 from ..parallel import connected, n_threads
-from ..progress import Progress
 from ..search.face_tree import FaceTree
 from .node_distances import solved
 from .winding import Windings

@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Frozen, Ints
 from ..compiled import compiled
 from ..errors import SourceError
-from ..frozen import Frozen
 from ..kinds import ShapeLike
 from ..mesh.box_tree import LEAF
 from ..mesh.components import connected_components, sums_of
@@ -36,7 +35,7 @@ from .completion import complete
 from .mesh_orientation import Mesh
 from .sampling import evenly_on
 
-pictures: Any = lazy_module("signedheat.view.measured_pictures", "pictures")
+pictures: Any = lazy_module("signedheat.view.surface_pictures", "pictures")
 
 N_PLACES = 10_000
 """Number of places at which walls and gaps of a shape are measured."""

@@ -22,9 +22,9 @@ from ..grids.grid import Grid
 from ..grids.grid_discretization import refuse_large_grid
 from ..grids.grid_field import GridField
 from ..grids.solid_queries import SolidQueries
+from ..jobs import Progress
 from ..memory import available_memory, libraries
 from ..parallel import n_threads
-from ..progress import Progress
 from ..search.face_tree import FaceTree
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import positive_number

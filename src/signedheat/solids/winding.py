@@ -7,9 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Bools, Floats
+from ..arrays import Bools, Floats, Frozen
 from ..errors import GeometryError
-from ..frozen import Frozen
 from ..mesh.edges import edge_table
 from ..mesh.triangles import area_vectors
 from ..mesh.welding import same_positions

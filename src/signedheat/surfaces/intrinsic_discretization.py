@@ -11,10 +11,10 @@ import numpy as np
 from ..diagnostics import IntrinsicTriangles
 from ..discretization import discretize
 from ..errors import GeometryError
+from ..jobs import Progress
 from ..mesh.intrinsic_mesh import IntrinsicMesh, mollify
-from ..progress import Progress
-from .curve_groups import CurveGroups
 from .intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
+from .source_segments import CurveGroups
 from .surface_discretization import SurfaceDiscretization, refuse_too_many
 from .triangle_mesh import TriangleMesh
 

@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints
-from ..frozen import Frozen
+from ..arrays import Floats, Frozen, Ints
 from ..mesh.gluing import (
     FLIP,
     SPLIT_EDGE,

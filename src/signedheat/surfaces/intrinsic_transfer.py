@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Complexes, Floats, Ints
+from ..arrays import Bools, Complexes, Floats, Frozen, Ints
 from ..errors import SourceError
-from ..frozen import Frozen
 from ..geodesics.exact_distance import cleared
 from ..geodesics.geodesic_sources import zero_line
 from ..mesh.components import grouped, members_of

@@ -17,23 +17,22 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Frozen, Ints
 from ..errors import GeometryError, SourceError
 from ..exchange import Displayed
 from ..foreign import ForeignShape, converted
-from ..frozen import Frozen
+from ..jobs import Progress, Stopwatch
 from ..memory import within_memory
 from ..mesh.curve_segments import CurveSegments, without_straight_nodes
 from ..mesh.gluing import flip_all, glue, lay_out
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.triangles import gradients_along
-from ..progress import Progress, Stopwatch
 from ..validation import finite_rows, flag, frozen
 from .intrinsic_history import History
 from .intrinsic_refinement import refine_all
 from .intrinsic_transfer import ConformingRefinement, level_lines, transfer_segments
-from .level_sets import is_consistent, level_set, without_repeats
 from .source_segments import segments_of, segments_of_each
+from .surface import is_consistent, level_set, without_repeats
 from .surface_curves import Curve, CurveOrPoints, CurvesAndPoints
 from .triangle_mesh import TriangleMesh
 

@@ -19,11 +19,11 @@ from ..errors import GeometryError, InexactWarning, SourceError, UnsupportedType
 from ..foreign import as_list
 from ..geodesics.exact_distance import Report, cleared, distance_to_segments, distance_to_zero_line, window_limit
 from ..geodesics.geodesic_sources import PlacedSegments, zero_line
+from ..jobs import Progress
 from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import EDGE, VERTEX, incident_faces
-from ..progress import Progress
 from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_field, sharpened
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .surface_curves import CurvesAndPoints

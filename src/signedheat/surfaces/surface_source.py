@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array, csr_matrix, vstack
 
-from ..arrays import Bools, Complexes, Floats, Ints, mask_of
+from ..arrays import Bools, Complexes, Floats, Frozen, Ints, mask_of
 from ..errors import CancellingNormalsError, SourceError
-from ..frozen import Frozen
 from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at
 from ..mesh.intrinsic_mesh import IntrinsicMesh

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any, Generic, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Frozen, Ints
 from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
 from ..errors import OutsideError
 from ..exchange import Displayed, with_values
 from ..field_arithmetic import Combinable, Rule
 from ..foreign import SurfaceShape
-from ..frozen import Frozen
 from ..kinds import EmbeddedSurface, SurfaceDomain
 from ..mesh.triangles import gradients_along
 from ..packages import lazy_module

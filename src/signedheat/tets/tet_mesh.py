@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Frozen, Ints
 from ..errors import GeometryError
 from ..exchange import Displayed, shapes, tets_of_meshio, tets_of_pyvista
-from ..frozen import Frozen
 from ..mesh.components import element_components
 from ..mesh.tet_shapes import FaceTable, Tetrahedra, signed_volumes
 from ..packages import lazy_module

@@ -10,10 +10,9 @@ import numpy as np
 from scipy import sparse
 
 from ..area_elements import AreaElements, area_elements
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Frozen, Ints
 from ..diagnostics import Note, OutsideMesh
 from ..errors import SourceError
-from ..frozen import Frozen
 from ..mesh.components import sums_of
 from ..mesh.unit_vectors import unit
 from .tet_clipping import ClippedPolygons, Planes, barycentric, clip_triangles, containing_tets

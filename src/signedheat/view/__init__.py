@@ -2,9 +2,8 @@
 
 from .drawing import save_row
 from .figures import PICTURE_FORMATS, ensure_picture_writable, new_figure
-from .measured_pictures import DEVIATION_FORMATS, THICKNESS_FORMATS
 from .slice_pictures import draw_plane, draw_slices, save_slices
-from .surface_pictures import draw_shape, draw_surface, save_scene, save_surface
+from .surface_pictures import DEVIATION_FORMATS, THICKNESS_FORMATS, draw_shape, draw_surface, save_scene, save_surface
 
 __all__ = [
     "DEVIATION_FORMATS", "PICTURE_FORMATS", "THICKNESS_FORMATS", "draw_plane", "draw_shape", "draw_slices",
