@@ -20,7 +20,7 @@ FLOORS = [
     ("surfaces   grids   tets", "slices: domain, operators, sources, discretisation, sharpening, field", "#d3e8ea"),
     (
         (
-            "area_elements field_arithmetic field_kinds field_levels foreign inspection joining kinds "
+            "area_elements field_arithmetic field_kinds field_levels foreign inspection kinds "
             "sharpening_methods transforms"
         ),
         "one function for all slices, by type",
@@ -35,7 +35,7 @@ FLOORS = [
     ("search   linear   exchange", "nearest faces, winding numbers; sparse solvers; other packages", "#c9dcee"),
     ("mesh", "arrays in, arrays out: edges, welding, components, cutting, intrinsic meshes", "#bccfe8"),
     (
-        ("arrays cache compiled diagnostics errors jobs memory packages parallel validation"),
+        ("arrays compiled diagnostics errors jobs memory packages parallel validation"),
         "used by all",
         "#d9d9e3",
     ),

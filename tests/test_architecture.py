@@ -18,7 +18,6 @@ PACKAGE = Path(signedheat.__file__).parent
 FLOORS = [
     {
         "arrays",
-        "cache",
         "compiled",
         "diagnostics",
         "errors",
@@ -41,7 +40,6 @@ FLOORS = [
         "field_levels",
         "foreign",
         "inspection",
-        "joining",
         "kinds",
         "sharpening_methods",
         "transforms",

@@ -9,20 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from signedheat.arrays import Frozen, ShortRepr, short
+from signedheat.arrays import Frozen, LastUsed, ShortRepr, fingerprint, short
 from signedheat.batches.inputs import _without_extension
 from signedheat.batches.pool import duration
-from signedheat.cache import LastUsed, fingerprint
 from signedheat.errors import MissingPackageError, SignedHeatError
 from signedheat.foreign import is_pair, package_of, what_to_pass
 from signedheat.inspection import inspect
 from signedheat.jobs import command_for, run_cancellable, run_limited, within
-from signedheat.joining import concatenated, placed
 from signedheat.memory import fitting_count, untouched_zeros
 from signedheat.packages import ensure_installed, missing_package, require
 from signedheat.parallel import connected, in_chunks
 from signedheat.sharpening_methods import LinearElements
 from signedheat.surfaces.triangle_mesh import TriangleMesh
+from signedheat.transforms import concatenated, placed
 from signedheat.validation import coordinates, finite_number, numbers, shaped, used_bounds
 
 

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .arrays import Floats, Frozen, Ints
-from .cache import LastUsed, fingerprint
+from .arrays import Floats, Frozen, Ints, LastUsed, fingerprint
 from .discretization import Levels, SourceTerm
 from .errors import ConstraintError
 from .linear import Factor, PardisoFactor, factorize, upper_triangle, whole

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, Literal, cast, get_args, overload
 
 from numpy.typing import ArrayLike
@@ -18,24 +19,27 @@ from .foreign import ForeignShape, as_list, as_shapes, converted
 from .grids.grid import Dimension, Grid, room_around
 from .grids.grid_field import GridField
 from .grids.polyline import Polyline
-from .jobs import Progress
+from .jobs import Progress, within
 from .kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
 from .memory import within_memory
 from .mesh.polylines import FillRule
-from .solids.completion import Completing, Lids
+from .sharpening import sharpen
+from .solids.completion import Completing, Completion, Lids, completed
 from .solids.heat_surfaces import Heat
 from .solids.mesh_orientation import orient
 from .solids.overlaps import Nesting
 from .solids.solid import Solid
-from .solids.solid_distance import distance_to_shapes
-from .solver import SignedHeatSolver
+from .solver import SignedHeatSolver, checked
 from .surfaces.extrapolation import Diffusion
+from .surfaces.point_cloud import PointCloud
 from .surfaces.polygon_mesh import PolygonMesh
 from .surfaces.surface_curves import Curve, CurvesAndPoints, ElementList, SurfacePoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .surfaces.vertex_field import VertexField
 from .tets.tet_field import TetField
 from .tets.tet_mesh import TetMesh
+from .transforms import joined_shape
+from .validation import positive_number
 
 
 @overload
@@ -292,3 +296,65 @@ def _refuse_other_dimension(sources: Sequence[Any], grid: Grid) -> None:
                 remedy="pass a grid with one axis for each dimension, or leave it out",
                 element=f"source {index}",
             )
+
+
+def distance_to_shapes(
+    shape: Shapes,
+    domain: Grid | TetMesh | None = None,
+    *,
+    resolution: int = 128,
+    spacing: ArrayLike | None = None,
+    padding: float | None = None,
+    band: float | None = None,
+    completion: Completing = "lids",
+    lids: Lids = "bent",
+    nested: Nesting = "given",
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    as_oriented: bool = False,
+    keep_overlaps: bool = False,
+    progress: Progress | None = None,
+) -> GridField | TetField:
+    """Compute the signed distance to shapes in space: see `signed_distance`.
+
+    On tets, distance is along paths around walls, with the signs of the solid: where none is in between, it is the
+    solid's.
+    """
+    options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
+    method = Heat(checked(constraint), positive_number(diffusion, "diffusion"))
+    joined = joined_shape(shape)
+    if domain is None:
+        domain = Grid.around(bounds_around([joined]), resolution, padding, spacing)
+    return completed_distance(joined, domain, options, method, band, progress)
+
+
+def completed_distance(
+    shape: Shapes,
+    domain: Grid | TetMesh,
+    options: Completion,
+    method: Heat,
+    band: float | None = None,
+    progress: Progress | None = None,
+) -> GridField | TetField:
+    """Complete a shape, then measure the distance to it on a grid or on tets."""
+    if not isinstance(domain, Grid | TetMesh):
+        kind = type(domain).__name__
+        raise UnsupportedTypeError(
+            f"distance to a shape in space is measured on a Grid or a TetMesh, not on a {kind}", element="domain"
+        )
+    in_space = isinstance(domain, Grid) and domain.dimension == 3
+    if band is not None and not in_space:
+        raise UnsupportedTypeError(
+            "a band is computed around solids, on a grid in space without walls", remedy="leave out the band"
+        )
+    joined = shape if isinstance(shape, Solid) else joined_shape(shape)
+    solid = completed(joined, options, method, within(progress, 0.0, 0.5))
+    progress = within(progress, 0.5, 1.0)
+    if isinstance(domain, Grid) and in_space:
+        return solid.field(grid=domain, band=band, progress=progress)
+    if isinstance(domain, TetMesh):
+        phi: GridField | TetField = sharpen(TetField(domain, solid.distance(domain.vertices)), solid.boundary)
+    else:
+        source = joined if isinstance(joined, PointCloud) else solid.boundary
+        phi = SignedHeatSolver(domain, method.diffusion, progress).distance(source, method.constraint)
+    return replace(phi, diagnostics=phi.diagnostics.noting(*solid.diagnostics.notes))

@@ -32,7 +32,6 @@ from .grids.grid import RESOLUTION, Grid, room_around
 from .grids.grid_field import GridField
 from .grids.polyline import Polyline
 from .jobs import Progress
-from .joining import concatenated
 from .kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
 from .memory import within_memory
 from .mesh.triangles import part_volumes
@@ -52,6 +51,7 @@ from .surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .surfaces.vertex_field import VertexField
 from .tets.tet_mesh import TetMesh
+from .transforms import concatenated
 from .validation import finite_number, positive_number
 
 __all__ = [

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from .grids.grid import Grid
 from .grids.grid_field import GridField
-from .joining import joined_triangles
 from .surfaces.point_cloud import PointCloud
 from .surfaces.triangle_mesh import TriangleMesh
+from .transforms import joined_triangles
 
 
 def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0, 0)) -> TriangleMesh:

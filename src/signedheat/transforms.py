@@ -1,18 +1,23 @@
-"""Shapes moved, turned, scaled or sheared."""
+"""Shapes moved, turned, scaled or sheared; and several meshes joined to one."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import singledispatch
+from typing import TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Floats
-from .errors import GeometryError, UnsupportedTypeError
-from .foreign import ForeignShape, Represented, converted
+from .arrays import Floats, Ints
+from .errors import GeometryError, SourceError, UnsupportedTypeError
+from .foreign import ForeignShape, Represented, SurfaceShape, as_shape, as_shapes, converted, refuse_arrays
+from .grids.polyline import Polyline
+from .kinds import ShapeLike
 from .surfaces.digital_surface import DigitalSurface
 from .surfaces.point_cloud import PointCloud
 from .surfaces.polygon_mesh import PolygonMesh
+from .surfaces.surface_curves import Curve, SurfacePoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
 from .validation import LARGEST, SMALLEST, numbers
@@ -108,3 +113,55 @@ def _(shape: PointCloud, linear: Floats, move: Floats) -> PointCloud:
 def _(shape: TetMesh, linear: Floats, move: Floats) -> TetMesh:
     tets = shape.tets if np.linalg.det(linear) > 0 else shape.tets[:, [1, 0, 2, 3]]
     return TetMesh(shape.vertices @ linear.T + move, tets)
+
+
+Body: TypeAlias = tuple[Floats, Ints]
+"""(n, 3) vertices and (m, 3) faces."""
+
+
+def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
+    """Join several meshes to one shape; return a single shape as it is, and of tets their boundary."""
+    shapes = as_shapes(shape)
+    if not shapes:
+        raise SourceError("there is no shape", remedy="pass at least one")
+    if len(shapes) == 1:
+        whole = shapes[0]
+        if isinstance(whole, TetMesh):
+            return whole.boundary
+        if not isinstance(whole, TriangleMesh | PolygonMesh | PointCloud):
+            if not isinstance(whole, Curve | SurfacePoints | Polyline):
+                as_shape(cast("SurfaceShape", whole))  # which refuses paths and bare arrays
+            raise SourceError(
+                f"distance in space is measured to meshes and points, not to a {type(whole).__name__}",
+                remedy="pass a mesh, or a point cloud; curves are measured on their surface",
+                element="source 0",
+            )
+        return whole
+    refuse_arrays(shapes)
+    meshes = []
+    for index, part in enumerate(shapes):
+        if not isinstance(part, TriangleMesh | PolygonMesh):
+            raise SourceError(
+                f"only meshes can be joined, and shape {index} is a {type(part).__name__}", element=f"shape {index}"
+            )
+        meshes.append(part)
+    return TriangleMesh(*joined_triangles(meshes))
+
+
+def joined_triangles(parts: Sequence[TriangleMesh | PolygonMesh], origin: Floats | float = 0.0) -> Body:
+    """Return the vertices, relative to `origin`, and the triangles of all meshes together."""
+    meshes = [part.triangulation for part in parts]
+    return concatenated([(mesh.vertices - origin, mesh.faces) for mesh in meshes])
+
+
+def concatenated(bodies: Sequence[Body]) -> Body:
+    """Concatenate the vertices and faces of several bodies without merging any."""
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
+    faces = [own + start for (_, own), start in zip(bodies, starts, strict=False)]
+    return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
+
+
+def placed(body: Body, matrix: Floats) -> Body:
+    """Move a body by a (4, 3) matrix that multiplies rows from the right; a mirrored body keeps its outside."""
+    vertices, faces = body
+    return vertices @ matrix[:3] + matrix[3], faces if np.linalg.det(matrix[:3]) >= 0 else faces[:, ::-1]

@@ -21,7 +21,7 @@ from fuzz.cases_files import Damaged, check, written
 from fuzz.frame import Wrong, family
 from fuzz.mutations import damaged
 from signedheat import samples
-from signedheat.cache import fingerprint
+from signedheat.arrays import fingerprint
 from signedheat.io.numpy_files import write_npz
 from signedheat.io.solid_arrays import NEEDED, SOURCE
 

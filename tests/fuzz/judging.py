@@ -12,7 +12,7 @@ import numpy as np
 
 import signedheat as sh
 from fuzz.frame import Wrong, fail_on_warnings
-from signedheat.cache import fingerprint
+from signedheat.arrays import fingerprint
 
 BEYOND_REASON = 100.0
 """Times the length of all edges, or the diameter and the levels."""

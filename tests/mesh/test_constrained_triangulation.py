@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from signedheat.mesh.constrained_triangulation import Triangulation, edges_of, turn
+from signedheat.mesh.conforming_refinement import Triangulation, edges_of, turn
 
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 

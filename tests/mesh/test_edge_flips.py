@@ -8,8 +8,8 @@ import signedheat as sh
 from signedheat import samples
 from signedheat.field_levels import on_level
 from signedheat.grids.marching import closed_surface
-from signedheat.mesh.edge_flips import SHARP, flipped_along_creases
 from signedheat.mesh.edges import edge_table
+from signedheat.mesh.triangles import SHARP, flipped_along_creases
 
 
 def bends(mesh):

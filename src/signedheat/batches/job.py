@@ -11,7 +11,7 @@ from typing import Literal, cast
 import numpy as np
 
 from ..constraints import Constraint, ZeroSet
-from ..distances import grid_around, plain_distance
+from ..distances import completed_distance, grid_around, plain_distance
 from ..errors import FileFormatError, InexactWarning, SignedHeatError
 from ..foreign import as_shape
 from ..grids.grid import RESOLUTION, Grid
@@ -28,9 +28,7 @@ from ..solids.completion import Completion, Lids, complete
 from ..solids.heat_surfaces import Heat
 from ..solids.overlaps import Nesting
 from ..solids.sample_set import Layout
-from ..solids.sampling import WIDTHS, sample
-from ..solids.solid_distance import completed_distance
-from ..solids.training import training_points
+from ..solids.sampling import WIDTHS, sample, training_points
 from ..solids.watertight import closed_surface, faults_of, figures_of
 from ..solver import checked
 from ..surfaces.digital_surface import DigitalSurface

@@ -16,7 +16,7 @@ from ..arrays import Floats
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..curves.drawings import distance_to_lines
 from ..diagnostics import Diagnostics, SampledSource
-from ..distances import grid_around, plain_distance
+from ..distances import completed_distance, grid_around, plain_distance
 from ..errors import FileFormatError, GeometryError, SignedHeatError, SourceError, printable
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_field import GridField
@@ -43,7 +43,6 @@ from ..jobs import Progress, within
 from ..memory import refuse_beyond_memory
 from ..solids.completion import Completion, complete, completed
 from ..solids.heat_surfaces import Heat
-from ..solids.solid_distance import completed_distance
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..tets.lattice import tetrahedralize

@@ -19,7 +19,7 @@ from ..exchange import Displayed, with_values
 from ..field_arithmetic import Combinable, Rule
 from ..field_levels import on_level, refuse_beyond_walls
 from ..memory import within_memory
-from ..mesh.edge_flips import flipped_along_creases
+from ..mesh.triangles import flipped_along_creases
 from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..surfaces.triangle_mesh import TriangleMesh

@@ -12,9 +12,8 @@ from .field_files import (
 )
 from .files import ensure_writable
 from .scenes import read_step
-from .shape_files import SHAPE_FORMATS, read, save
+from .shape_files import SAMPLE_FORMATS, SHAPE_FORMATS, read, save
 from .solid_arrays import load
-from .solid_files import SAMPLE_FORMATS
 from .tet_files import TET_FIELD_FORMATS
 from .vdb import write_vdb
 from .voxel_files import LabelImage, read_labels, read_volume

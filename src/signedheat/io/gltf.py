@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError
-from ..joining import Body, placed
+from ..transforms import Body, placed
 from .files import PathLike, companion_contents, contents, damaged, ensure_fits
 
 NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}

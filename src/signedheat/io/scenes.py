@@ -13,10 +13,10 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError
-from ..joining import Body, concatenated, placed
 from ..mesh.welding import welded
 from ..packages import ensure_installed
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..transforms import Body, concatenated, placed
 from . import gltf
 from .files import PathLike, contents, damaged, ensure_fits, extension, reading
 from .sandbox import parsed

@@ -1,9 +1,11 @@
-"""Reading and writing of shapes, with one table of formats for each direction."""
+"""Reading and writing of shapes, with one table of formats for each direction; NumPy archives of solids and samples."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import cast
+
+import numpy as np
 
 from ..errors import FileFormatError
 from ..exchange import Elements
@@ -11,17 +13,19 @@ from ..foreign import ForeignShape, as_shape, elements, shape_of
 from ..grids.grid_field import GridField
 from ..kinds import Shape
 from ..memory import refuse_beyond_memory
+from ..solids.sample_set import Layout, Samples
 from ..solids.solid import Solid
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
-from .field_files import load_field
-from .files import PathLike, format_for, reading, replacing
+from .field_files import CONVENTION, load_field
+from .files import PathLike, ensure_writable, extension, format_for, reading, replacing
 from .mesh_files import read_obj, read_off, read_stl, write_obj, write_off, write_pc, write_stl
+from .numpy_files import write_npz
 from .ply import read_ply, write_ply
 from .point_files import read_e57, read_las, read_pcd, read_xyz, write_xyz
 from .scenes import read_3mf, read_dae, read_glb, step_mesh
-from .solid_arrays import holds_solid, load
+from .solid_arrays import VERSION, arrays_of, holds_solid, load
 from .tet_files import TET_FORMATS, read_tets, store_cells
 from .voxel_files import read_volume
 from .vtk_xml import read_vtp, write_vtp
@@ -168,3 +172,33 @@ def save(shape: Shape | ForeignShape, path: PathLike) -> None:
         shape = shape.squares
     with replacing(path) as temporary:
         temporary.write_bytes(write(elements(shape), path))
+
+
+SOLID_FORMATS = SAMPLE_FORMATS = frozenset({".npz"})
+
+
+def save_solid(solid: Solid, path: PathLike) -> None:
+    """Write a solid; to formats of shapes its surface."""
+    ensure_writable(path, SOLID_FORMATS | SHAPE_FORMATS, "a solid")
+    if extension(path) not in SOLID_FORMATS:
+        return save(solid.surface(keep_faces=True), path)
+    write_npz(path, solid_version=VERSION, **arrays_of(solid))
+
+
+def save_samples(samples: Samples, path: PathLike, layout: Layout) -> None:
+    """Write samples."""
+    format_for(path, dict.fromkeys(SAMPLE_FORMATS), "samples")
+    if layout == "deepsdf":  # (k, 4) in single precision: x, y, z and distance of the points outside and inside
+        rows = np.column_stack([samples.points, samples.distances]).astype(np.float32)
+        return write_npz(path, pos=rows[samples.distances >= 0], neg=rows[samples.distances < 0])
+    write_npz(
+        path,
+        points=samples.points,
+        distances=samples.distances,
+        gradients=samples.gradients,
+        near=samples.near,
+        completed=samples.completed,
+        center=samples.center,
+        radius=samples.radius,
+        convention=CONVENTION.partition(";")[0],
+    )

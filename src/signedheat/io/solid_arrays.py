@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cache import fingerprint
+from ..arrays import fingerprint
 from ..errors import FileFormatError, GeometryError
 from ..mesh.triangles import face_areas
 from ..solids.solid import Solid

@@ -26,8 +26,8 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from .components import connected_components
-from .edge_flips import flipped_along_creases
 from .self_intersections import self_intersections
+from .triangles import flipped_along_creases
 
 AROUND = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 """β and γ of an edge in the four cells around it, counter-clockwise as seen from the end of the edge."""

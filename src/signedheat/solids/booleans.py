@@ -12,10 +12,10 @@ import numpy as np
 from ..arrays import Floats
 from ..diagnostics import Diagnostics
 from ..errors import SourceError
-from ..joining import concatenated
 from ..mesh.arrangement import arranged
 from ..mesh.welding import indexed
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..transforms import concatenated
 from .regions import Regions
 from .solid import Solid
 from .winding import Windings

@@ -19,8 +19,7 @@ from ..mesh.unit_vectors import unit
 from ..search.winding_tree import WindingTree
 from .chain import Chain
 from .gauss import Dipoles, Matrix, Pieces, means, sampled, system_of, without_slender
-from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around
-from .part_levels import levels_of_pieces, levels_within
+from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, levels_of_pieces, levels_within
 from .rims import meeting_edges, open_edges
 
 COHERENT = 0.7

@@ -19,7 +19,6 @@ from ..diagnostics import Diagnostics, FacesRestored, Note, OrientedPoints
 from ..errors import SignedHeatError, SourceError
 from ..foreign import SurfaceShape
 from ..jobs import Progress, Stopwatch
-from ..joining import joined_shape
 from ..kinds import ShapeLike
 from ..memory import refuse_beyond_memory, within_memory
 from ..mesh.triangles import face_areas
@@ -27,6 +26,7 @@ from ..mesh.unit_vectors import axes_across
 from ..search.face_tree import FaceTree
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..transforms import joined_shape
 from ..validation import flag
 from .bounding import Bounding, bounding
 from .chain import Chain

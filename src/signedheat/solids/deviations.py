@@ -14,7 +14,6 @@ from ..arrays import Bools, Floats, Frozen, Ints
 from ..errors import SourceError
 from ..foreign import SurfaceShape, as_shape
 from ..jobs import Progress
-from ..joining import joined_shape
 from ..kinds import ShapeLike
 from ..memory import within_memory
 from ..mesh.triangles import face_areas
@@ -24,6 +23,7 @@ from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
+from ..transforms import joined_shape
 from .completion import complete
 from .mesh_orientation import agreeing_faces
 from .solid import Solid

@@ -19,10 +19,9 @@ from ..grids.grid import Grid
 from ..grids.marching import CLEARANCE
 from ..mesh.components import sums_of
 from ..mesh.dual_cells import DualCells
-from ..mesh.edge_flips import MOST
 from ..mesh.edges import edge_table
 from ..mesh.self_intersections import self_intersections
-from ..mesh.triangles import area_vectors, divided_at
+from ..mesh.triangles import MOST, area_vectors, divided_at
 from ..mesh.unit_vectors import unit
 
 FLAT = 0.05

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from ..arrays import Bools, Floats
 from ..packages import lazy_module
 
-files: Any = lazy_module("signedheat.io.solid_files", "files")
+files: Any = lazy_module("signedheat.io.shape_files", "files")
 
 Layout = Literal["arrays", "deepsdf"]
 """Layout of files of samples: an array for each attribute, or ``pos`` and ``neg`` with x, y, z and distance."""

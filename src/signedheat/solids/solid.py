@@ -35,12 +35,11 @@ from .kept_faces import given_surface, unjoined
 from .offsets import Offset, Reach
 from .sample_set import Samples
 from .simplification import simplified
-from .stores import Scheduler
-from .tiles import band_field, dense_field
+from .tiles import Scheduler, band_field, dense_field
 from .winding import Windings
 
 booleans: Any = lazy_module("signedheat.solids.booleans", "solids")
-files: Any = lazy_module("signedheat.io.solid_files", "files")
+files: Any = lazy_module("signedheat.io.shape_files", "files")
 morphology: Any = lazy_module("signedheat.morphology", "solids")
 sampling: Any = lazy_module("signedheat.solids.sampling", "solids")
 

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..arrays import Bools, Complexes, Floats, Ints, mask_of
-from ..cache import LastUsed, fingerprint
+from ..arrays import Bools, Complexes, Floats, Ints, LastUsed, fingerprint, mask_of
 from ..diagnostics import EdgesLengthened, LargeAngles, Note, PointsLeftOut, VerticesAdded
 from ..direct_integration import DirectIntegration, SpringIntegration, refuse_contradictions
 from ..discretization import Levels, SourceTerm, discretize

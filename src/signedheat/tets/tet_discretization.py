@@ -11,8 +11,7 @@ import numpy as np
 import scipy
 from scipy import sparse
 
-from ..arrays import Bools, Floats, Ints
-from ..cache import LastUsed
+from ..arrays import Bools, Floats, Ints, LastUsed
 from ..direct_integration import STIFFEST, SpringIntegration
 from ..discretization import DiffusesEach, Levels, SourceTerm, discretize
 from ..linear import Factor, factorize, upper_triangle

@@ -23,13 +23,13 @@ from ..errors import SourceError
 from ..foreign import SurfaceShape, as_shapes
 from ..geodesics.heap_kernels import Queue, pop, push
 from ..jobs import Progress, run_cancellable
-from ..joining import joined_triangles
 from ..kinds import Shapes
 from ..mesh.components import grouped
 from ..search.face_tree import FaceFeatures, FaceTree
 from ..search.nearest_triangles import TriangleTree, foot_on_triangle
 from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_field, sharpened
 from ..surfaces.point_cloud import PointCloud
+from ..transforms import joined_triangles
 from .tet_clipping import GRAZING, Planes, barycentric, beyond, stays_inside
 from .tet_discretization import TetDiscretization, lowered_tets
 from .tet_field import TetField, level_triangles
