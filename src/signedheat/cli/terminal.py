@@ -191,18 +191,10 @@ INPUTS = ("shape", "mesh", "field", "file")
 
 @dataclass(frozen=True)
 class StandardFiles:
-    """Replacements for ``-`` among the arguments.
+    """Replacements for ``-`` among the arguments."""
 
-    Attributes
-    ----------
-    takes_output : bool
-        Whether the result goes to standard output.
-    names : dict
-        Names to print in place of the paths of temporary files.
-    """
-
-    takes_output: bool = False
-    names: Mapping[str, str] = field(default_factory=dict)
+    takes_output: bool = False  # whether the result goes to standard output
+    names: Mapping[str, str] = field(default_factory=dict)  # names to print in place of the paths of temporary files
 
     def named(self, text: str) -> str:
         """Return a text with the paths of temporary files replaced."""

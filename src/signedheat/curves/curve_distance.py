@@ -47,28 +47,14 @@ class MeshRepaired(Note):
 
 @dataclass(frozen=True, eq=False)
 class RepairedMesh:
-    """A mesh on which vertices of rims at one place are one, and faces agree with their neighbours where they can.
+    """A mesh on which vertices of rims at one place are one, and faces agree with their neighbours where they can."""
 
-    Attributes
-    ----------
-    given, mesh : TriangleMesh or PolygonMesh
-        Before and after. Polygons are as they were.
-    vertices : (n,) int
-        Vertex of the repaired mesh at each one of the given mesh.
-    faces : (m,) int
-        Triangle of the repaired mesh for each one of the given mesh, on the same vertices.
-    corners : (m, 3) int
-        Corner of that triangle at each corner of the given one.
-    note : MeshRepaired
-        What was done.
-    """
-
-    given: Any
+    given: Any  # before and after. Polygons are as they were
     mesh: Any
-    vertices: Ints
-    faces: Ints
-    corners: Ints
-    note: MeshRepaired
+    vertices: Ints  # (n,) vertex of the repaired mesh at each one of the given mesh
+    faces: Ints  # (m,) triangle of the repaired mesh for each one of the given mesh, on the same vertices
+    corners: Ints  # (m, 3) corner of that triangle at each corner of the given one
+    note: MeshRepaired  # what was done
 
     @classmethod
     def of(cls, given: object) -> RepairedMesh | None:

@@ -179,20 +179,12 @@ def _segments(lines: Sequence[Polyline]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Drawing(Frozen):
-    """What distance in the plane is measured to, exactly, at any points.
+    """What distance in the plane is measured to, exactly, at any points."""
 
-    Attributes
-    ----------
-    lines : (m, 2, 2) float
-        Ends of the segments that were given. Distance is positive to their left.
-    completion : (k, 2, 2) float
-        Segments where lines are missing.
-    phi : GridField, optional
-        Decides the sides of the completion, and away from lines. Without it lines bound what they go around.
-    """
-
-    lines: Floats
+    lines: Floats  # (m, 2, 2) ends of the segments that were given. Distance is positive to their left
+    # (k, 2, 2) segments where lines are missing
     completion: Floats = field(default_factory=lambda: np.empty((0, 2, 2)))
+    # decides the sides of the completion, and away from lines. Without it lines bound what they go around
     phi: GridField[Literal[2]] | None = None
 
     @classmethod

@@ -35,28 +35,16 @@ _GROWTH, _PATIENCE = 2.0, 250  # factor by which it may grow, at most every so m
 
 @dataclass(frozen=True, eq=False)
 class JumpProblem:
-    """Minimise ``floor + Σ 2w dist(c_f − c_g, [a, b])`` over one constant c per face.
+    """Minimise ``floor + Σ 2w dist(c_f − c_g, [a, b])`` over one constant c per face."""
 
-    Attributes
-    ----------
-    faces : (p, 2) int
-        The faces f and g of each pair.
-    low, high : (p,) float
-        a and b: the differences that make φ continuous at one end of the edge, and at the other, the smaller first.
-    weights : (p,) float
-        w, positive.
-    n_faces : int
-        Number of constants.
-    floor : float
-        The cost that does not depend on the constants.
-    """
-
-    faces: Ints
+    faces: Ints  # (p, 2) the faces f and g of each pair
+    # (p,) a and b: the differences that make φ continuous at one end of the edge, and at the other, the smaller
+    # first
     low: Floats
     high: Floats
-    weights: Floats
-    n_faces: int
-    floor: float = 0.0
+    weights: Floats  # (p,) w, positive
+    n_faces: int  # number of constants
+    floor: float = 0.0  # the cost that does not depend on the constants
 
     def differences(self, constants: Floats) -> Floats:
         """x = K c: (p,) constants of the first faces minus those of the second."""
@@ -86,24 +74,12 @@ class JumpProblem:
 
 @dataclass(frozen=True, eq=False)
 class JumpSolution:
-    """Constants, with a certificate of their quality.
+    """Constants, with a certificate of their quality."""
 
-    Attributes
-    ----------
-    constants : (n_faces,) float
-        c; on each connected component of the surface up to a constant.
-    objective : float
-        The objective at these constants.
-    bound : float
-        A lower bound of the objective.
-    rounds : int
-        Number of iterations.
-    """
-
-    constants: Floats
-    objective: float
-    bound: float
-    rounds: int
+    constants: Floats  # (n_faces,) c; on each connected component of the surface up to a constant
+    objective: float  # the objective at these constants
+    bound: float  # a lower bound of the objective
+    rounds: int  # number of iterations
 
     @property
     def gap(self) -> float:

@@ -64,23 +64,12 @@ class Pieces:
 
     Curves that go on in each other, head to tail, are one stroke: a line may be given in as many bits as one likes, and
     as often. The order of strokes is that of their places, so that nothing depends on how curves are numbered.
-
-    Attributes
-    ----------
-    numbers : (j,) int
-        Which of the curves given are oriented, ordered by place.
-    stroke : (j,) int
-        The stroke that each of these is part of.
-    movable : (k,) bool
-        Whether each stroke is a piece: open, and not from boundary to boundary of the surface.
-    strokes : Strokes
-        The energy of the sets that they may bound.
     """
 
-    numbers: Ints
-    stroke: Ints
-    movable: Bools
-    strokes: Strokes
+    numbers: Ints  # (j,) which of the curves given are oriented, ordered by place
+    stroke: Ints  # (j,) the stroke that each of these is part of
+    movable: Bools  # (k,) whether each stroke is a piece: open, and not from boundary to boundary of the surface
+    strokes: Strokes  # the energy of the sets that they may bound
 
     @classmethod
     def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> Pieces | None:
@@ -112,24 +101,13 @@ class Pieces:
 
 @dataclass(frozen=True, eq=False)
 class Decision:
-    """The directions of the pieces of curves.
+    """The directions of the pieces of curves."""
 
-    Attributes
-    ----------
-    pieces : Pieces
-        The curves.
-    best : Inside
-        The best directions that were found, and what is inside then.
-    bounds_nothing : bool
-        Whether most of the length bounds nothing in the least energy, so that sides were taken to be smooth.
-    tied : bool
-        Whether something else is inside in another answer that costs the same.
-    """
-
-    pieces: Pieces
-    best: Inside
+    pieces: Pieces  # the curves
+    best: Inside  # the best directions that were found, and what is inside then
+    # whether most of the length bounds nothing in the least energy, so that sides were taken to be smooth
     bounds_nothing: bool = False
-    tied: bool = False
+    tied: bool = False  # whether something else is inside in another answer that costs the same
 
     def turned(self, n: int) -> Bools:
         """(n,) which of all curves given are turned."""

@@ -25,24 +25,12 @@ UNITS = 2.0**40
 
 @dataclass(frozen=True, eq=False)
 class CutGraph:
-    """A graph that is cut again and again, with other costs.
+    """A graph that is cut again and again, with other costs."""
 
-    Attributes
-    ----------
-    starts : (n + 1,) int
-        Where the arcs of each node begin.
-    heads : (2 e,) int
-        Where each arc leads.
-    reverse : (2 e,) int
-        The arc back.
-    order : (2 e,) int
-        Edge of each arc, plus e if it runs backwards.
-    """
-
-    starts: Ints
-    heads: Ints
-    reverse: Ints
-    order: Ints
+    starts: Ints  # (n + 1,) where the arcs of each node begin
+    heads: Ints  # (2 e,) where each arc leads
+    reverse: Ints  # (2 e,) the arc back
+    order: Ints  # (2 e,) edge of each arc, plus e if it runs backwards
 
     @classmethod
     def of(cls, edges: Ints, n: int) -> CutGraph:
@@ -240,59 +228,31 @@ BLOCK = 64
 
 @dataclass(frozen=True, eq=False)
 class Inside:
-    """The best sides for strokes that run in given directions.
+    """The best sides for strokes that run in given directions."""
 
-    Attributes
-    ----------
-    signs : (k,) float
-        The directions ±1, relative to those that the strokes were given with.
-    sides : (n,) float
-        1 or −1 at every vertex.
-    explained : (k,) float
-        How far each stroke bounds the inside: 1 all along, 0 nowhere, −1 all along but the wrong way round.
-    energy : float
-        The length of the boundary of the inside where no stroke is, less `REWARD` times the strokes' lengths that are
-        explained.
-    """
-
-    signs: Floats
-    sides: Floats
+    signs: Floats  # (k,) the directions ±1, relative to those that the strokes were given with
+    sides: Floats  # (n,) 1 or −1 at every vertex
+    # (k,) how far each stroke bounds the inside: 1 all along, 0 nowhere, −1 all along but the wrong way round
     explained: Floats
+    # the length of the boundary of the inside where no stroke is, less `REWARD` times the strokes' lengths that are
+    # explained
     energy: float
 
 
 @dataclass(frozen=True, eq=False)
 class Strokes:
-    """Oriented curves on a surface, and the energy of sets of vertices that they may bound.
+    """Oriented curves on a surface, and the energy of sets of vertices that they may bound."""
 
-    Attributes
-    ----------
-    surface : SurfaceDiscretization
-        That they lie on.
-    lengths : (k,) float
-        Of the strokes.
-    means : (k, n) sparse
-        Half the mean over the vertices left of a stroke, less that over those right of it.
-    crossed : (k, e) sparse
-        1 where the first vertex of an edge is left of a stroke that crosses it, −1 where the second is.
-    fluxes : (k, n) sparse
-        Integrals along each stroke of the slopes of hat functions towards its left.
-    width : float
-        Distance up to which strokes next to each other count as one.
-    group : (k,) int
-        Strokes whose ends are nearest to each other, which are likely to be one curve.
-    is_loop : (g,) bool
-        Whether that is likely to be closed: its gaps are shorter than half of its strokes.
-    """
-
-    surface: SurfaceDiscretization
-    lengths: Floats
+    surface: SurfaceDiscretization  # that they lie on
+    lengths: Floats  # (k,) of the strokes
+    # (k, n) half the mean over the vertices left of a stroke, less that over those right of it
     means: sparse.csr_matrix
+    # (k, e) 1 where the first vertex of an edge is left of a stroke that crosses it, −1 where the second is
     crossed: sparse.csr_matrix
-    fluxes: sparse.csr_matrix
-    width: float
-    group: Ints
-    is_loop: Bools
+    fluxes: sparse.csr_matrix  # (k, n) integrals along each stroke of the slopes of hat functions towards its left
+    width: float  # distance up to which strokes next to each other count as one
+    group: Ints  # (k,) strokes whose ends are nearest to each other, which are likely to be one curve
+    is_loop: Bools  # (g,) whether that is likely to be closed: its gaps are shorter than half of its strokes
     _found: dict[bytes, Inside] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod

@@ -33,13 +33,6 @@ def read_bodies(path: PathLike) -> list[Body]:
     """Read vertices and triangles of all primitives of the default scene, placed by their nodes.
 
     Buffers that the file names must lie in the same folder or below it. Materials, skins and morph targets are ignored.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, or needs an extension that is not supported.
-    MemoryLimitError
-        If the scene does not fit in memory, since a mesh may occur in many places.
     """
     scene = _opened(path)
     missing = [name for name in scene.tree.get("extensionsRequired", []) if not name.startswith(SUPPORTED)]

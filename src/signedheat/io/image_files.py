@@ -68,27 +68,13 @@ _CODES = {
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """Values on a lattice of d axes in space.
+    """Values on a lattice of d axes in space."""
 
-    Attributes
-    ----------
-    values : (n₁, …, n_d) number
-        One value for each place, indexed [x, y, z].
-    axes : (d, d) float
-        Steps between places along each axis of the image, in columns.
-    origin : (d,) float
-        The first place.
-    space : str, optional
-        Meaning of the axes of the world, as in NRRD files: ``"left-posterior-superior"``.
-    confidence : (n₁, …, n_d), optional
-        Confidence of a field in its values.
-    """
-
-    values: NDArray[Any]
-    axes: Floats
-    origin: Floats
-    space: str | None = None
-    confidence: NDArray[Any] | None = None
+    values: NDArray[Any]  # (n₁, …, n_d) one value for each place, indexed [x, y, z]
+    axes: Floats  # (d, d) steps between places along each axis of the image, in columns
+    origin: Floats  # (d,) the first place
+    space: str | None = None  # meaning of the axes of the world, as in NRRD files: ``"left-posterior-superior"``
+    confidence: NDArray[Any] | None = None  # (n₁, …, n_d) confidence of a field in its values
 
     @property
     def spacing(self) -> Floats:

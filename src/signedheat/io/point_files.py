@@ -36,11 +36,6 @@ def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
 
     They are separated by commas, semicolons, tabs or spaces; where all commas stand between digits, and something else
     separates the numbers, they are decimal commas. What follows ``#`` and a header line are skipped.
-
-    Raises
-    ------
-    FileFormatError
-        If a line has other numbers, or there is no line of numbers.
     """
     blocks: list[list[list[float]]] = [[]]
     columns = 0
@@ -171,25 +166,13 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
 
 
 def read_las(path: PathLike) -> PointCloud:
-    """Points of a LAS or LAZ file, with its scale and offset; it has no normals.
-
-    Raises
-    ------
-    MissingPackageError
-        If laspy is not installed, or for LAZ no package that it decompresses with.
-    """
+    """Points of a LAS or LAZ file, with its scale and offset; it has no normals."""
     found = parsed("las", path, "laspy", f"{extension(path)} files", bytes_per_byte=PACKED)
     return _cloud(found["points"], path)
 
 
 def read_e57(path: PathLike) -> PointCloud:
-    """Points of all scans of an E57 file, in its own place for each; those that are marked invalid are left out.
-
-    Raises
-    ------
-    FileFormatError
-        If its description defines entities or names schemas: pye57 would open what these refer to, here or elsewhere.
-    """
+    """Points of all scans of an E57 file, in its own place for each; those that are marked invalid are left out."""
     ensure_installed("pye57", ".e57 files")
     with reading(path):
         _refuse_references(_e57_description(contents(path)))

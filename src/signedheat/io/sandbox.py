@@ -74,15 +74,6 @@ def parsed(
     -------
     dict
         Arrays and other values by name.
-
-    Raises
-    ------
-    FileFormatError
-        If the package cannot read the file, crashes, or takes too long.
-    MemoryLimitError
-        If it exceeds its memory limit.
-    MissingPackageError
-        If the package is not installed.
     """
     size = size_of(path)
     ensure_installed(package, purpose)

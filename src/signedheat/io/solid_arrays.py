@@ -39,13 +39,7 @@ def arrays_of(solid: Solid) -> dict[str, NDArray[Any]]:
 
 
 def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
-    """Return the solid that `arrays_of` gave these of; without notes.
-
-    Raises
-    ------
-    FileFormatError
-        If sizes, indices, numbers or the surface that they make are not those of a solid, or arrays were changed.
-    """
+    """Return the solid that `arrays_of` gave these of; without notes."""
     triangles, closing, origins = arrays["triangles"], arrays["closing"], arrays["origins"]
     confidence, bounding, n = arrays["confidence"], arrays["bounding"], len(triangles) if triangles.ndim else 0
     kinds = (triangles, "f", (n, 3, 3)), (closing, "f", (len(closing) if closing.ndim else 0, 3, 3))

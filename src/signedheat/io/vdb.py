@@ -39,25 +39,13 @@ Outside = Callable[[Ints, int], NDArray[np.float32]]
 
 @dataclass(frozen=True, eq=False)
 class _Tree:
-    """A float grid as the file has it.
+    """A float grid as the file has it."""
 
-    Attributes
-    ----------
-    background : float32
-        Value of voxels that are nowhere.
-    places : (n, 3) int
-        First voxels of the blocks, in the order of the file.
-    values, active : (n, 8, 8, 8)
-        Values of their voxels, and which of these are active.
-    outside : callable
-        Values where there are no blocks.
-    """
-
-    background: np.float32
-    places: Ints
-    values: NDArray[np.floating]
+    background: np.float32  # value of voxels that are nowhere
+    places: Ints  # (n, 3) first voxels of the blocks, in the order of the file
+    values: NDArray[np.floating]  # (n, 8, 8, 8) each: values of their voxels, and which of these are active
     active: Bools
-    outside: Outside
+    outside: Outside  # values where there are no blocks
 
 
 def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:

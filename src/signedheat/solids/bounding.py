@@ -43,45 +43,21 @@ PROBES = 16
 
 @dataclass(frozen=True, eq=False)
 class Bounding(Frozen):
-    """What was decided of a chain.
+    """What was decided of a chain."""
 
-    Attributes
-    ----------
-    pieces : (m,) int
-        Piece that each triangle is of.
-    turned : (m,) bool
-        Which must turn from the direction in which they were given first.
-    counts : (m,) int
-        How often each bounds, negative if reversed; 0 of sheets, walls between cells, and what cancels.
-    closed : (m,) bool
-        Which are of pieces that close.
-    loose : (m,) int
-        Cluster of pieces most of which are sheets by themselves and bound together only; −1 of all others.
-    levels : (m,) float
-        Mean level of these pieces of a cluster: half of the share of the body that is left. ½ of all others.
-    as_given : (m,) bool
-        Which are of complexes that close as they were given, copies and all.
-    inner : (m,) bool
-        Walls between closed cells.
-    orientable : (p,) bool
-        Which pieces can agree.
-    disagreeing : int
-        Edges across which two faces disagreed.
-    bodies, cavities : int
-        Closed pieces within others, those that face outwards and those that face inwards.
-    """
-
-    pieces: Ints
-    turned: Bools
-    counts: Ints
-    closed: Bools
+    pieces: Ints  # (m,) piece that each triangle is of
+    turned: Bools  # (m,) which must turn from the direction in which they were given first
+    counts: Ints  # (m,) how often each bounds, negative if reversed; 0 of sheets, walls between cells, and what cancels
+    closed: Bools  # (m,) which are of pieces that close
+    # (m,) cluster of pieces most of which are sheets by themselves and bound together only; −1 of all others
     loose: Ints
+    # (m,) mean level of these pieces of a cluster: half of the share of the body that is left. ½ of all others
     levels: Floats
-    as_given: Bools
-    inner: Bools
-    orientable: Bools
-    disagreeing: int
-    bodies: int
+    as_given: Bools  # (m,) which are of complexes that close as they were given, copies and all
+    inner: Bools  # (m,) walls between closed cells
+    orientable: Bools  # (p,) which pieces can agree
+    disagreeing: int  # edges across which two faces disagreed
+    bodies: int  # closed pieces within others, those that face outwards and those that face inwards
     cavities: int
 
     def to_turn(self, chain: Chain) -> Bools:
@@ -153,8 +129,7 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
 def whole_complexes(chain: Chain) -> tuple[Ints, Bools]:
     """(m,) how often triangles are there, and which are of complexes that close as they were given.
 
-    All pieces of such a complex have a positive level in it, or all a negative one. Where it closes once each triangle
-    is counted once, copies are left out.
+    All pieces of such a complex have a positive level in it, or all a negative one.
     """
     counts, complexes = chain.multiplicities, chain.complexes
     once = np.sign(counts)
@@ -179,11 +154,7 @@ def whole_complexes(chain: Chain) -> tuple[Ints, Bools]:
 def _nested(
     chain: Chain, pieces: Ints, counts: Ints, closed: Bools, flips: Floats, nested: Nesting
 ) -> tuple[Floats, int, int]:
-    """(p,) signs by which pieces turn, those of open ones given; bodies and cavities among closed ones within others.
-
-    What is closed faces outwards. Within others it stays to the outermost as it was given, if that is clear, and else
-    bounds a cavity, or a body in one.
-    """
+    """(p,) signs by which closed pieces turn: outwards; within others they stay as given, if that is clear."""
     n = len(closed)
     some = np.flatnonzero(counts != 0)
     triangles, owners = chain.triangles[some], pieces[some]
@@ -229,10 +200,6 @@ def open_bounding(
     """Decide for open pieces, (p,) each: signs, what bounds something, clusters of what is loose, and their levels.
 
     A piece is loose if neither it nor its group is a body by itself. Clusters of other pieces are −1, their levels ½.
-
-    Pieces of one group share edges or rims, which is no coincidence. `given` is the area of each that faces as it was
-    given, less what does not; `closed` are triangles of closed bodies. With `as_oriented` all signs stay 1.
-
     Until every piece has the level that it needs, those that fail and leave at least half as much unexplained as the
     worst are left out, and the system is solved again. A body by itself needs `SHEET`; what is loose needs a cluster
     that passes `CHANCE` and `COHERENT`, and among few pieces a level in proportion to its cluster's.
@@ -292,10 +259,7 @@ def _counted(areas: Floats, groups: Ints, clusters: Ints) -> Floats:
 
 
 def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owners: Ints) -> Ints:
-    """(p,) what pieces of some triangles hang together with, by edges that they share or rims along each other.
-
-    Edges are those where they end. Those of single triangles are none, lest noise around a surface hang together.
-    """
+    """(p,) what pieces of some triangles hang together with, by edges that they share or rims along each other."""
     n = int(labels.max()) + 1
     first = np.full(n, -1)
     first[labels[::-1]] = faces[::-1]
@@ -326,11 +290,7 @@ def _along(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | Ints) ->
 
 
 def clusters_of(pieces: Pieces) -> Ints:
-    """(p,) connected components of pieces that are near each other.
-
-    Two are joined where a sampled face of one is nearer than `REACH` times the size of the smaller piece, the diagonal
-    of its box, to one of the other. Only the `NEAREST` samples around each are compared.
-    """
+    """(p,) components of pieces that are nearer to each other than `REACH` times the size of the smaller one."""
     n = len(pieces.areas)
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     np.minimum.at(low, pieces.labels, pieces.triangles.min(axis=1))

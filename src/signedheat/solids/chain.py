@@ -47,9 +47,6 @@ def inner_walls(
     cell on both sides are not inner: if along each edge of the complex as many faces run one way as the other, since it
     is then the boundary of a solid as it is; and if the outside of the complex faces outwards and the walls of one of
     the two cells face into it, since that cell is then a cavity.
-
-    Halfedges have tails, heads and owners, faces unit normals (zero without area), areas, and signed volumes of cones
-    to one point.
     """
     # halfedges in order of angle around their edges, and the next one after each
     n = len(normals)
@@ -106,27 +103,14 @@ def _cavities(shells: Ints, inside: Bools, areas: Floats) -> Bools:
 
 @dataclass(frozen=True, eq=False)
 class Chain(Frozen):
-    """Distinct triangles between welded vertices.
+    """Distinct triangles between welded vertices."""
 
-    Attributes
-    ----------
-    positions : (n, 3) float
-        Of the vertices, about the middle of the shape and scaled so that no product leaves the range of numbers.
-    faces : (m, 3) int
-        Vertices of each distinct triangle, in the direction in which it was given first.
-    firsts : (m,) int
-        Triangle of the mesh that each was given by first.
-    numbers : (k,) int
-        Distinct triangle of each that was given; −1 of those on fewer than three places.
-    reversed : (k,) bool
-        Which of them run the other way.
-    """
-
+    # (n, 3) of the vertices, about the middle of the shape and scaled so that no product leaves the range of numbers
     positions: Floats
-    faces: Ints
-    firsts: Ints
-    numbers: Ints
-    reversed: Bools
+    faces: Ints  # (m, 3) vertices of each distinct triangle, in the direction in which it was given first
+    firsts: Ints  # (m,) triangle of the mesh that each was given by first
+    numbers: Ints  # (k,) distinct triangle of each that was given; −1 of those on fewer than three places
+    reversed: Bools  # (k,) which of them run the other way
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Chain:
@@ -196,10 +180,7 @@ class Chain(Frozen):
         return inner_walls(self.positions, pairs, tails, heads, owners, normals, self.areas, volumes)
 
     def pieces(self, used: Bools) -> FaceOrientation:
-        """Triangles that hang together across edges that two of those used have, and how they agree.
-
-        Most of the area of each piece stays as it was given.
-        """
+        """Triangles that hang together across edges of two that are used; most of each piece's area stays as given."""
         tails, heads = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
         owners = np.repeat(np.arange(len(self.faces)), 3)
         pairs = pair_halfedges(tails, heads, len(self.positions), used[owners])

@@ -104,20 +104,11 @@ def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spa
 
 
 def continuation(lid: Lid, samples: Samples, patches: Ints, width: float) -> tuple[Floats, Floats, Floats]:
-    """Return normals and curvatures with which the surface would continue over its rim, and how much that counts.
+    """(n, 3) normals and (n,) curvatures with which the surface goes on over its rim, and (n,) how much that counts.
 
     Across an opening of width W a surface that meets the flat lid at angle β must turn by 2 sin β, the chord of a
     circle; if its curvature towards the rim is k, it would turn by k W. On a ball both are the same, on a box k is 0.
     The samples are of the surface behind the flat lid; at each place of the rim the smooth patch `patches` ends.
-
-    Returns
-    -------
-    normals : (n, 3) float
-        Unit normals of the surface at the rim.
-    curvatures : (n,) float
-        Sums of its principal curvatures there, positive on a ball.
-    held : (n,) float
-        1 where the surface bends as it must, 0 where it does not.
     """
     n, loop = lid.n_rim, lid.vertices[: lid.n_rim]
     reach = REACH * width
@@ -175,18 +166,8 @@ a tube it is 90°."""
 def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints, most: float) -> list[Ints]:
     """(n − 2, 3) triangles on the vertices of each loop of n; none where they do not continue the surface around it.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float
-        Positions.
-    loops : list of (n,) int
-        Vertices around each hole, counterclockwise as seen from outside.
-    normals : (k, 3) float
-        Unit normals of the faces behind the edges that begin at them, loop after loop.
-    taken : (e,) int
-        Sorted `edge_keys` of edges that may not be made, since they are there already.
-    most : float
-        Root mean square of the angles at the rim up to which they continue it.
+    Loops run counterclockwise as seen from outside; `normals` are those of the faces behind their edges, loop after
+    loop; `taken` are sorted `edge_keys` that may not be made; `most` is the root mean square of the angles at the rim.
     """
     starts = np.concatenate([[0], np.cumsum([len(loop) for loop in loops], dtype=np.int64)])
     if not len(loops):
@@ -206,9 +187,8 @@ def _least_bent(
 ) -> tuple[Ints, Bools]:
     """Triangles, by places in their loops, and whether each loop's bend at its rim at most by an angle.
 
-    `cost[i, j]` is how much the best lid between the i-th and the j-th corner bends, but for the edge that joins the
-    two; `rims[i, j]` the sum of lengths times squared angles at the rim, `across[i, j]` the normal of its triangle
-    there.
+    `cost[i, j]` is the bend of the best lid between corners i and j, without the edge between them; `rims[i, j]` sums
+    lengths times squared angles at the rim; `across[i, j]` is the normal of its triangle there.
     """
     n_loops = len(starts) - 1
     faces, closed = np.empty((len(corners) - 2 * n_loops, 3), dtype=np.int64), np.zeros(n_loops, dtype=np.bool_)
@@ -301,31 +281,12 @@ NONE = np.empty((0, 2), dtype=np.int64)
 
 
 def closed_by(vertices: Floats, faces: Ints, *, bent: bool = True, outlines: Ints = NONE) -> tuple[Floats, Ints]:
-    """Close the boundary of a chain of directed triangles, whatever the parts that they belong to.
+    """Close the boundary of (m, 3) triangles: (n + k, 3) vertices, and (p, 3) triangles that balance each edge.
 
     Small holes are closed by the triangles between their corners that bend least, where these continue the surface;
-    rims that run along each other by strips; and each loop that is left by a lid: a thin plate that continues how the
-    surface bends, flat faces that meet in creases, or a film.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float
-        Positions, no two of which are the same place.
-    faces : (m, 3) int
-        Chain of triangles; those that are there several times count several times.
-    bent : bool
-        Whether lids bend as the surface does towards their rims. The less the surface there bends as it must to come
-        round, the flatter they are.
-    outlines : (k, 2) int
-        Edges of the boundary, in whole loops, that stay open.
-
-    Returns
-    -------
-    vertices : (n + k, 3) float
-        The positions, followed by new ones.
-    added : (p, 3) int
-        Triangles such that with them each edge has as many triangles in one direction as in the other. Where lids have
-        more points along an edge than faces have, triangles without area lie between.
+    rims that run along each other by strips; and each other loop by a lid: with `bent`, a thin plate that continues how
+    the surface bends, or else flat faces that meet in creases, or a film. Whole loops of `outlines`, (k, 2), stay open.
+    Where lids have more points along an edge than faces have, triangles without area lie between.
 
     Examples
     --------
@@ -416,10 +377,7 @@ class _Surface(Frozen):
         return keys[order], order
 
     def behind(self, loop: Ints) -> tuple[Ints, Ints]:
-        """(n,) the face behind each edge of a loop, and its third vertex.
-
-        Of several it is one of a piece that does not close by itself, and of these the largest.
-        """
+        """(n,) the face behind each edge of a loop, preferably of a piece that is open; and its third vertex."""
         keys, order = self._sides
         face, side = np.divmod(order[np.searchsorted(keys, np.roll(loop, -1) * len(self.vertices) + loop)], 3)
         return face, self.faces[face, (side + 2) % 3]

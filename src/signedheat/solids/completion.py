@@ -44,10 +44,7 @@ SIDES = 16
 
 
 def seams(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Floats, Ints]:
-    """Points on the rims of faces, (k, 3), and triangles, (m, 3), from there to the borders of patches.
-
-    Rims get points at most `step` apart, by triangles without area. Each vertex of a border is joined to the nearest of
-    them, so that no edge of a patch is open any more, and what is runs along the rims.
+    """Points on the rims of faces, (k, 3), at most a step apart, and triangles, (m, 3), to the borders of patches.
 
     Examples
     --------

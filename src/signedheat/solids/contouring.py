@@ -72,13 +72,7 @@ def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
 
 
 def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) -> TriangleMesh:
-    """Return a surface at a distance from a solid, closed and manifold, with its edges and corners.
-
-    Raises
-    ------
-    OutsideError
-        If no node of the grid lies on one of the two sides.
-    """
+    """Return a surface at a distance from a solid, closed and manifold, with its edges and corners."""
     report = progress or (lambda fraction, step: None)
     values, crossings, cells = _crossed(offset, grid)
     vertices, faces = traced(offset, grid, values, crossings, cells, report)
@@ -118,10 +112,7 @@ def announce_lost(offset: Offset, grid: Grid, vertices: Floats) -> None:
 
 
 def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
-    """Parts of a solid that places on a surface belong to, and which places have no vertex of its contour nearby.
-
-    Places are taken on the faces of the solid, and moved along their normals, either way, if that leads to the surface.
-    """
+    """Parts of a solid that places on a surface belong to, and which places have no vertex of its contour nearby."""
     features = offset.solid.tree.features
     moved = callable(offset.reach) or offset.reach != 0
     faces = np.arange(len(features.faces)) if moved else np.flatnonzero(offset.solid.bounding[features.ids])
@@ -145,10 +136,7 @@ def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
 
 
 def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCells]:
-    """Heights near a surface, the edges that it crosses, and its pieces in cells.
-
-    Where the surface goes on into blocks that are not there, they are added.
-    """
+    """Heights near a surface, the edges that it crosses, and its pieces in cells; blocks it goes on into are added."""
     places = blocks_at(offset, grid)
     done = BlockValues(Blocks.of(places[:0], grid.shape), np.empty((0, SIDE, SIDE, SIDE), dtype=np.float32))
     while True:
@@ -173,13 +161,6 @@ def blocks_at(offset: Offset, grid: Grid) -> Ints:
     """(n, 3) places of the blocks of a grid with nodes near a surface, found from coarse to fine.
 
     Heights change by no more than one goes, so that the one at the middle of a block says how near the surface is.
-
-    Raises
-    ------
-    OutsideError
-        If there are none.
-    MemoryLimitError
-        If there are more than fit in memory.
     """
     diagonal = (1.0 if offset.level is not None else STEEPEST) * float(np.linalg.norm(grid.spacing))
     halves = []
@@ -206,13 +187,7 @@ def blocks_at(offset: Offset, grid: Grid) -> Ints:
 
 
 def crossed_edges(band: BlockValues) -> Crossings:
-    """Edges whose ends lie on both sides of a surface, and where, by linear interpolation.
-
-    Raises
-    ------
-    OutsideError
-        If there are none.
-    """
+    """Edges whose ends lie on both sides of a surface, and where, by linear interpolation."""
     parts = []
     for window in np.unique(band.blocks.places // WINDOW, axis=0).astype(np.int64):
         first, size = window * WINDOW * SIDE, WINDOW * SIDE
@@ -233,13 +208,7 @@ def crossings_in(heights: Floats, first: Ints) -> list[Crossings]:
 
 
 def joined_crossings(parts: Sequence[Crossings]) -> Crossings:
-    """Those of several windows and axes.
-
-    Raises
-    ------
-    OutsideError
-        If there are none.
-    """
+    """Those of several windows and axes."""
     if not any(len(part.axes) for part in parts):
         raise OutsideError(
             "the distance takes the level nowhere between the nodes of the grid",

@@ -31,18 +31,10 @@ most; .2 loses creases of 20°, and .01 makes facets of smooth surfaces creases.
 
 @dataclass(frozen=True, eq=False)
 class Quadrics:
-    """Sums over planes, for each of n points.
+    """Sums over planes, for each of n points."""
 
-    Attributes
-    ----------
-    products : (n, 3, 3) float
-        A.
-    sides : (n, 3) float
-        b.
-    """
-
-    products: Floats
-    sides: Floats
+    products: Floats  # (n, 3, 3) A
+    sides: Floats  # (n, 3) b
 
     @classmethod
     def of(cls, owners: Ints, places: Floats, normals: Floats, count: int) -> Quadrics:
@@ -59,19 +51,11 @@ class Quadrics:
 
 
 def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats, Ints, Floats]:
-    """Return the points of least error of n quadrics within boxes, whose (n, 3) corners are relative to the centres.
+    """(n, 3) points of least error of quadrics in boxes, how many directions planes fix, and the one fixed least.
 
     A minimum outside of its box moves along the direction in which the error grows the least, that of a crease, until
     it is in the box; or else it is looked for again on the wall that it is beyond the farthest, up to three times.
-
-    Returns
-    -------
-    points : (n, 3) float
-        Relative to the centres.
-    ranks : (n,) int
-        Directions that the planes fix: 1 on flat surface, 2 on creases, 3 at corners.
-    along : (n, 3) float
-        The direction that they fix the least: that of a crease.
+    The corners of boxes, and the points, are relative to the centres.
 
     Examples
     --------
@@ -156,10 +140,7 @@ class ImplicitSurface(Protocol):
 
 
 def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats) -> Floats:
-    """(3, v, 3) candidates for the vertex of each piece of a level, in cells: the best, in its cell, in its middle.
-
-    The best is on a crease or corner, even outside the cell. `points` are the (e, 3) crossings of edges of the grid.
-    """
+    """(3, v, 3) candidates for the vertex of each piece of a level: the best anywhere, in its cell, in its middle."""
     count = len(cells.owners)
     vertices, middles, wider = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
     rows, sides = np.nonzero(cells.edges >= 0)

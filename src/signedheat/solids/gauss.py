@@ -62,18 +62,10 @@ ELEMENTS = 200_000
 
 @dataclass(frozen=True, eq=False)
 class Pieces(Frozen):
-    """Oriented triangles in pieces, each of which faces one way as a whole.
+    """Oriented triangles in pieces, each of which faces one way as a whole."""
 
-    Attributes
-    ----------
-    triangles : (m, 3, 3) float
-        Corners.
-    labels : (m,) int
-        Piece of each, from 0 on.
-    """
-
-    triangles: Floats
-    labels: Ints
+    triangles: Floats  # (m, 3, 3) corners
+    labels: Ints  # (m,) piece of each, from 0 on
 
     @cached_property
     def face_areas(self) -> Floats:
@@ -213,10 +205,7 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
 def _small_pieces(
     corners: Floats, starts: Ints, vectors: Floats, balls: Floats, places: Floats, own: Ints, matrix: Floats
 ) -> None:
-    """Winding numbers of pieces of few faces at places, each of which lies on a face of its own.
-
-    Pieces have area vectors, (k, 3), and lie in balls, (k, 4), beyond `FAR` times whose radius they are dipoles.
-    """
+    """Winding numbers of pieces of few faces at places on faces; beyond `FAR` times their radius they are dipoles."""
     for piece in range(len(starts) - 1):
         begin, end = starts[piece], starts[piece + 1]
         if end - begin > LARGE:
@@ -238,28 +227,14 @@ def _small_pieces(
 
 @dataclass(frozen=True, eq=False)
 class Dipoles:
-    """W of many small faces, or points: each is a dipole, softened at the scale of the distance to its neighbours.
+    """W of many small faces, or points: each is a dipole, softened at the scale of the distance to its neighbours."""
 
-    Attributes
-    ----------
-    places, normals : (n, 3) float
-        Where they are, and unit normals.
-    areas : (n,) float
-        Of each.
-    owners : (n,) int
-        Pieces that they are of.
-    softening : (n,) float
-        Distance below which the field of a dipole levels off.
-    within : (n,) float
-        Winding numbers of the bodies that do not matter at each place.
-    """
-
-    places: Floats
+    places: Floats  # (n, 3) each: where they are, and unit normals
     normals: Floats
-    areas: Floats
-    owners: Ints
-    softening: Floats
-    within: Floats
+    areas: Floats  # (n,) of each
+    owners: Ints  # (n,) pieces that they are of
+    softening: Floats  # (n,) distance below which the field of a dipole levels off
+    within: Floats  # (n,) winding numbers of the bodies that do not matter at each place
 
     @classmethod
     def of_triangles(cls, pieces: Pieces) -> Dipoles:
@@ -366,8 +341,7 @@ class Dipoles:
 def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> sparse.csr_array:
     """(k, k) Laplacian with signs, times μ, of pieces of which neighbours lie in one plane, more or less.
 
-    Places have normals, and a share of the area; those off each other's plane count less, and so do those of two
-    pieces that have many: these know for themselves.
+    Places count less off each other's plane, and where two pieces have many: these know for themselves.
     """
     n, k = len(places), min(NEIGHBORS, len(places) - 1)
     near = scipy.spatial.cKDTree(places).query(places, k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]

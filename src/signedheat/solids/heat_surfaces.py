@@ -194,8 +194,7 @@ class Heat:
 def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0.0) -> tuple[Floats, Ints] | None:
     """Vertices and faces of the zero set of φ around a shape, closed; None where the shape bounds nothing.
 
-    Cells are as large as noise is wide, or a share of the gaps between points, within bounds; 0 means the smallest.
-    Where winding numbers, over what they would be inside of a shape as complete as this one, are clear, they decide.
+    Cells are as large as noise is wide, or a share of the gaps between points; 0 means the smallest.
     """
     bounds = shape.bounds
     side = float(np.ptp(bounds, axis=0).max())

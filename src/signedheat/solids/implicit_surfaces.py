@@ -42,19 +42,11 @@ CORNERS = np.array(list(np.ndindex(2, 2, 2)))
 
 @dataclass(frozen=True, eq=False)
 class Implicit:
-    """The level set of a function within a box, the walls of which close it.
+    """The level set of a function within a box, the walls of which close it."""
 
-    Attributes
-    ----------
-    function, gradient : callable
-        Of (n, 3) points in the box: values, (n,), and their gradients, (n, 3).
-    box : (2, 3) float
-        Lower and upper corner.
-    """
-
-    function: Callable[[Floats], Floats]
+    function: Callable[[Floats], Floats]  # of (n, 3) points in the box: values, (n,), and their gradients, (n, 3)
     gradient: Callable[[Floats], Floats]
-    box: Floats
+    box: Floats  # (2, 3) lower and upper corner
 
     def distance(self, points: Floats) -> Floats:
         """(n,) values, or distances from the walls where these are greater."""
@@ -86,8 +78,8 @@ class Implicit:
 class NodePlanes:
     """Values between the nodes of a grid, by the planes through values and slopes at nodes.
 
-    Around each point planes are mixed linearly. Where they differ as at an edge, their maximum counts if it gives back
-    the values at the nodes, as it does of what is convex; or their minimum, which does so of what is concave.
+    Planes are mixed linearly; where they differ as at an edge, their maximum or minimum counts if it gives back the
+    values at the nodes, as it does of what is convex or concave.
     """
 
     origin: Floats
@@ -308,8 +300,7 @@ def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, 
 def _slopes(values: Floats, axis: int) -> tuple[Floats, Floats]:
     """Differences from node to node along an axis, of the second order, and by how much these change.
 
-    Of the three parabolas through a node and its neighbours that bends least counts (Harten et al. 1987), so that
-    slopes on one side of an edge know nothing of the other side.
+    Of three parabolas the one that bends least counts (Harten et al. 1987): slopes do not reach across edges.
     """
     v = np.moveaxis(values, axis, 0)
     if len(v) < 3:

@@ -36,59 +36,30 @@ PLANE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Lid:
-    """Triangles that close a rim.
+    """Triangles that close a rim."""
 
-    Attributes
-    ----------
-    vertices : (n, 3) float
-        The points of the rim first, in order.
-    faces : (m, 3) int
-        Counterclockwise from outside.
-    n_rim : int
-        How many points the rim has.
-    """
-
-    vertices: Floats
-    faces: Ints
-    n_rim: int
+    vertices: Floats  # (n, 3) the points of the rim first, in order
+    faces: Ints  # (m, 3) counterclockwise from outside
+    n_rim: int  # how many points the rim has
 
 
 @dataclass(frozen=True, eq=False)
 class Film(Lid):
-    """A lid that was triangulated in a plane, or over a disc.
+    """A lid that was triangulated in a plane, or over a disc."""
 
-    Attributes
-    ----------
-    plane : (n, 2) float
-        Its vertices there.
-    places : (n_rim,) float
-        Share of the loop's length at which each point of its rim comes.
-    """
-
-    plane: Floats
-    places: Floats
+    plane: Floats  # (n, 2) its vertices there
+    places: Floats  # (n_rim,) share of the loop's length at which each point of its rim comes
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothRim:
-    """A closed loop without its zigzags, which does not depend on how many corners there are on straight parts.
+    """A closed loop without its zigzags, which does not depend on how many corners there are on straight parts."""
 
-    Attributes
-    ----------
-    length : float
-        That of the loop.
-    starts : (n + 1,) float
-        Share of it at which each corner of the loop comes; the last is 1.
-    points : (k, 3) float
-        Means over parts of the loop of `SMOOTH` of its length.
-    places : (k + 1,) float
-        Share of its length at which the middle of each part comes, from the corner that is farthest from the loop's
-        centre on, once around.
-    """
-
-    length: float
-    starts: Floats
-    points: Floats
+    length: float  # that of the loop
+    starts: Floats  # (n + 1,) share of it at which each corner of the loop comes; the last is 1
+    points: Floats  # (k, 3) means over parts of the loop of `SMOOTH` of its length
+    # (k + 1,) share of its length at which the middle of each part comes, from the corner that is farthest from the
+    # loop's centre on, once around
     places: Floats
 
     @classmethod
@@ -119,13 +90,7 @@ class SmoothRim:
 
 
 def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
-    """Places around a closed loop, none farther from the next than its length over `PIECES`: its vertices, and more.
-
-    Returns
-    -------
-    edges, shares : (k,) int, (k,) float
-        The edge on which each lies, and the share of its length before it.
-    """
+    """Edges and shares of places around a loop: its vertices, and more, none farther than 1 / `PIECES` apart."""
     lengths = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
     counts = np.maximum(np.ceil(lengths * PIECES / lengths.sum() - 1e-9), 1).astype(np.int64)
     edges = np.repeat(np.arange(len(loop)), counts)
@@ -133,10 +98,7 @@ def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
 
 
 def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:
-    """Return a film before it is solved for; None if the loop's shadow in the plane crosses itself.
-
-    It is flat inside its rim, or without a plane triangulated in a disc.
-    """
+    """Return a film before it is solved for, in a plane or a disc; None if its loop crosses itself in the plane."""
     if frame is None:
         flat = _around_disc(rim.places[:-1])
         inner = spanning.points_in_disc(len(flat))
@@ -162,8 +124,7 @@ def _around_disc(shares: Floats) -> Floats:
 def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tuple[Floats, Ints] | None:
     """Return a lid that spans a loop and follows another: the points that it adds to the loop's, and triangles.
 
-    It is triangulated in the same plane, or the same disc, around which the vertices of the loop come after these
-    shares of its length. None if the loop's shadow in the plane crosses itself.
+    It is triangulated in the same plane, or the same disc; None if the loop's shadow in the plane crosses itself.
     """
     n, ways = over.n_rim, np.roll(loop, -1, axis=0) - loop
     edges, shares = cut_to_pieces(loop)
@@ -188,10 +149,9 @@ def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tup
 
 
 def film(pattern: Film) -> Film:
-    """Return the lid of least area, near enough.
+    """Return the lid of least area, near enough: each shape's lengths give the next (Pinkall & Polthier 1993).
 
-    The first shape is harmonic in the plane, and the lengths of each shape give the next (Pinkall & Polthier 1993). No
-    weight is negative, so that the lid stays within the hull of its rim.
+    No weight is negative, so that the lid stays within the hull of its rim.
     """
     n, vertices, faces, plane = pattern.n_rim, pattern.vertices, pattern.faces, pattern.plane
     if n == len(vertices):
@@ -371,8 +331,7 @@ def creased(loop: Floats, normals: Floats) -> tuple[Floats, Ints] | None:
 
     Consecutive sides in a plane are closed in that plane by a straight crease, if the sides before and after them lie
     in a plane with their ends; three such runs, by creases to the point where their planes meet. This restores edges
-    and corners of boxes. No face is folded back over the surface. `normals` are the (n, 3) unit normals of the surface
-    at the edges that begin at each point, or 0 if unknown.
+    and corners of boxes. No face is folded back over the surface, whose (n, 3) `normals` are 0 where unknown.
     """
     points, sides = loop, _straight_sides(loop, normals)
     polygons: list[Ints] = []
@@ -406,10 +365,7 @@ def _straight_sides(loop: Floats, normals: Floats) -> list[_Side]:
 
 
 def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
-    """Return the longest runs of two or more sides in a plane, the largest first; none if there are too many.
-
-    Those whose lid would be folded back over the surface are left out.
-    """
+    """Return the longest runs of two or more sides in a plane whose lid is not folded back, the largest first."""
     n = len(sides)
     starts = points[[side.points[0] for side in sides]]
     ways = unit(np.roll(starts, -1, axis=0) - starts)

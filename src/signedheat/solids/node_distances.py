@@ -35,7 +35,7 @@ ALONG_A_CURVE = np.stack(
 def distances_in(
     tree: FaceTree, windings: Windings, grid: Grid, first: Ints, places: Ints
 ) -> tuple[Floats, NDArray[np.float32]]:
-    """Compute (a, b, c) signed distances at the nodes of blocks of a grid, NaN between these; and confidence.
+    """Compute (a, b, c) signed distances at the nodes of blocks, NaN between these; and confidence.
 
     `first` is the first node of the box around them; `places` are the first nodes of the blocks, divided by `SIDE`.
     """
@@ -123,8 +123,7 @@ def _fill(
 ) -> Bools:
     """Write the nearest faces of all nodes of blocks, and squared distances; return which blocks are too crowded.
 
-    `start` has the nearest face to the centre of each block, and `window` the first node of the results. `eighths` is
-    `EIGHTHS`, an argument because its length must be unknown to the compiler.
+    `eighths` is `EIGHTHS`, an argument because its length must be unknown to the compiler.
     """
     leaves, parts = len(bounds) // 2, eighths.shape[1]
     most = LEAF * min(CROWDED, leaves) + 1
@@ -201,10 +200,9 @@ def _divide(
     out: NDArray[np.int32],
     counts: Ints,
 ) -> None:
-    """Return the faces that can be nearest to a node of each of eight boxes, by a bound on squared distance.
+    """Return the faces that can be nearest to a node of each of eight boxes.
 
-    Squared distance is convex, so it lies above its tangent plane at the centre, whose slope is twice the way from the
-    foot.
+    Squared distance is convex, so it lies above its tangent plane at the centre: twice the way from the foot.
     """
     ways, can = np.empty((4, len(best))), np.empty(len(best), dtype=np.int64)
     for e in range(len(best)):

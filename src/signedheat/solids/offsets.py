@@ -37,21 +37,12 @@ ALONG_AXES = np.concatenate([np.eye(3), -np.eye(3)])
 
 @dataclass(frozen=True, eq=False)
 class Offset:
-    """The surface at a distance from a solid, as the zero set of a function that grows outwards.
+    """The surface at a distance from a solid, as the zero set of a function that grows outwards."""
 
-    Attributes
-    ----------
-    solid : Solid
-        What distance is to.
-    reach : float or callable
-        The distance, negative inside; or one for each nearest place.
-    limit : float
-        Around edges and corners the surface follows the planes of the faces there up to this many distances; where
-        these meet farther out it is cut off by a ball. With 1 it is round: the level of the distance itself.
-    """
-
-    solid: Evaluated
-    reach: float | Reach
+    solid: Evaluated  # what distance is to
+    reach: float | Reach  # the distance, negative inside; or one for each nearest place
+    # around edges and corners the surface follows the planes of the faces there up to this many distances; where these
+    # meet farther out it is cut off by a ball. With 1 it is round: the level of the distance itself
     limit: float = 1.0
 
     @property
@@ -158,10 +149,7 @@ def checked_reach(reach: Reach) -> Reach:
 def _steepest(
     rows: Floats, bounds: Floats, items: Ints, normals: Floats, places: Floats, slack: float
 ) -> tuple[Floats, Ints]:
-    """Of the triangles at each place the one above which a point is the highest, and this height; −1 if there is none.
-
-    Places are given with the ways from them to the points, (n, 6).
-    """
+    """Return the triangle at each place above which its point is the highest, or −1, and this height."""
     heights, faces = np.full(len(places), -np.inf), np.full(len(places), -1, dtype=np.int64)
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
     for p in range(len(places)):
@@ -200,8 +188,7 @@ ASIDE = 1e-7
 class SheetWall:
     """A solid around a surface: its faces, moved to an origin, and the rim where it ends.
 
-    Beyond a rim, what stands upright on it counts: places in the plane of a side of the rim and the normal there. Over
-    the inside of the surface, the distance along it to the rim does, so that both are one function without a jump.
+    Beyond a rim, only what stands upright on it counts; over the inside of the surface, distance along it to the rim.
     """
 
     tree: FaceTree

@@ -33,9 +33,7 @@ FEW = 16
 
 
 def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) -> Floats:
-    """(n,) levels at the centres of some triangles, each in its own group.
-
-    Triangles, (m, 3, 3), are there as often as `counts` says, (m,), reversed if that is negative.
+    """(n,) levels at the centres of some triangles, each in its own group, where each is there as often as it counts.
 
     Examples
     --------
@@ -109,21 +107,11 @@ class Rims(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """Pieces, and groups of others, that are bodies by themselves.
+    """Pieces, and groups of others, that are bodies by themselves."""
 
-    Attributes
-    ----------
-    numbers : (p,) int
-        The body that each piece is of, or −1.
-    levels : (b,) float
-        Their levels by the signs of their pieces, negative of those that face inwards.
-    as_given : (b,) bool
-        Which were clearly given as bodies that face outwards.
-    """
-
-    numbers: Ints
-    levels: Floats
-    as_given: Bools
+    numbers: Ints  # (p,) the body that each piece is of, or −1
+    levels: Floats  # (b,) their levels by the signs of their pieces, negative of those that face inwards
+    as_given: Bools  # (b,) which were clearly given as bodies that face outwards
 
     @classmethod
     def of(cls, pieces: Pieces, directed: Floats, groups: Ints, alone: Floats, given: Floats) -> Bodies:
@@ -154,10 +142,7 @@ def bodies_around(
 
     It sees its own body, the body in which this is a cavity, and the cavities in it; bodies beside it, and those that
     overlap or contain it as bodies, it ignores. A piece of no body belongs to the nearest one. `nested` decides which
-    bodies within others are cavities; as given, all but those whose faces clearly faced outwards (`HINT`). The system
-    lacks what is closed, (k, 3, 3): its winding numbers are negative at places of cavities in it.
-
-    Pieces have levels by themselves, first signs, and areas that face as given, less the rest, (p,) each.
+    bodies within others are cavities; as given, all but those whose faces clearly faced outwards (`HINT`).
     """
     directed = np.where((signs < 0)[pieces.labels, None, None], pieces.triangles[:, ::-1], pieces.triangles)
     bodies = Bodies.of(pieces, directed, groups, alone, signs * given)

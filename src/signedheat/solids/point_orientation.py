@@ -14,54 +14,23 @@ from ..surfaces.point_cloud import PointCloud, outward_normals
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PointOrientation(ShortRepr):
-    """What orienting a point cloud did.
+    """What orienting a point cloud did."""
 
-    Attributes
-    ----------
-    cloud : PointCloud
-        The points, with outward unit normals.
-    n_fitted : int
-        Normals that were fitted: all of them, or none.
-    n_turned : int
-        Normals given that were turned round.
-    n_neighbors : int
-        Neighbours from which planes were fitted.
-    noisy : bool
-        Whether noise called for neighbourhoods larger than the smallest.
-    sided : bool
-        Whether anything decided which side is out; for points in a plane, say, nothing does.
-    coherence : float
-        How far points confirm each other: 1 where all do. A low value is a warning; a high one is no proof, since thin
-        sheets of noisy points can agree on a wrong side.
-    """
-
-    cloud: PointCloud
-    n_fitted: int
-    n_turned: int
-    n_neighbors: int
-    noisy: bool
-    sided: bool
+    cloud: PointCloud  # the points, with outward unit normals
+    n_fitted: int  # normals that were fitted: all of them, or none
+    n_turned: int  # normals given that were turned round
+    n_neighbors: int  # neighbours from which planes were fitted
+    noisy: bool  # whether noise called for neighbourhoods larger than the smallest
+    sided: bool  # whether anything decided which side is out; for points in a plane, say, nothing does
+    # how far points confirm each other: 1 where all do. A low value is a warning; a high one is no proof, since thin
+    # sheets of noisy points can agree on a wrong side
     coherence: float
 
 
 def orient_points(cloud: PointCloud) -> PointOrientation:
     """Turn the normals of a point cloud outwards, all together; fit them first where there are none.
 
-    Normals given are weak evidence for which side is out, and relative: if most are inverted, that is found out.
-
-    Parameters
-    ----------
-    cloud : PointCloud
-        Points in space, with or without normals.
-
-    Raises
-    ------
-    GeometryError
-        If the points are not in space, or fewer than four are distinct.
-
-    Notes
-    -----
-    Growth is n log n; the sides are decided with at most 100,000 of the points.
+    Normals given are weak evidence for which side is out: if most are inverted, that is found out. Growth is n log n.
 
     Examples
     --------
@@ -118,7 +87,7 @@ def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats
     Near the zero set φ becomes the weighted mean of ``½ (n_i + n) · (x − p_i)`` over the nearest points, n the weighted
     mean of their normals. The plane of a point lies on one side of a curved surface, and the plane through it with the
     normal at x on the other: half the sum of both has no error of second order. Points that face against ∇φ do not
-    count, so that the two sides of a thin wall stay apart. Positions are from the first node on.
+    count, so that the two sides of a thin wall stay apart.
 
     Examples
     --------

@@ -29,19 +29,11 @@ NEAR = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """What is known of each face from the regions beside it.
+    """What is known of each face from the regions beside it."""
 
-    Attributes
-    ----------
-    behind, ahead : (m,) bool
-        Whether it is inside behind the face, and in front of it.
-    doubled : (m,) bool
-        Whether another face on the same corners stands for it.
-    """
-
-    behind: Bools
+    behind: Bools  # (m,) each: whether it is inside behind the face, and in front of it
     ahead: Bools
-    doubled: Bools
+    doubled: Bools  # (m,) whether another face on the same corners stands for it
 
     @classmethod
     def of(cls, pieces: Arrangement, windings: Windings) -> Regions:
@@ -89,11 +81,10 @@ def _windings(points: Floats, faces: Ints, normals: Floats, times: Ints, winding
 
 
 def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> tuple[Ints, Ints]:
-    """Pairs of sides, 2 f behind face f and 2 f + 1 in front of it, that face each other around edges.
+    """Pairs of sides, 2 f behind face f and 2 f + 1 in front of it, that face each other around edges, clearest first.
 
-    First those around edges of two faces, then the others, the clearer the order of their faces is the earlier. Where
-    faces do not balance at an edge, rims of what is open are, and nothing is known. Directions across edges come from
-    the planes that faces are pieces of, so that slivers have them, too.
+    Where faces do not balance at an edge, rims of what is open are, and nothing is known. Directions across edges come
+    from the planes that faces are pieces of, so that slivers have them, too.
     """
     table = edge_table(faces)
     halfedges = table.pairs[(_ways(table, table.pairs) * times[table.pairs // 3]).sum(axis=1) == 0]
@@ -127,10 +118,7 @@ def _ways(table: EdgeTable, halfedges: Ints) -> Ints:
 
 
 def _facing(table: EdgeTable, turning: Ints, reached: Ints) -> tuple[Ints, Ints]:
-    """Sides that face each other from halfedges to those that follow counterclockwise around their edge.
-
-    Faces that run along the edge are left at their front, and reached at their back.
-    """
+    """Sides that face each other from halfedges to those that follow counterclockwise around their edge."""
     forward = table.forward.ravel()
     return 2 * (turning // 3) + forward[turning], 2 * (reached // 3) + ~forward[reached]
 
@@ -139,8 +127,7 @@ def _facing(table: EdgeTable, turning: Ints, reached: Ints) -> tuple[Ints, Ints]
 def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints]:
     """Levels of the sides of faces, alike in pairs of sides that face each other; and what hangs together.
 
-    In front of a face it is less than behind it by how often the face is there. A pair that contradicts those before
-    it does not count. Trees have their least node as root.
+    In front of a face it is less than behind it by how often the face is there; later contradictions do not count.
     """
     n = 2 * len(times)
     parents, rises = np.arange(n), np.zeros(n, dtype=np.int64)  # from the parent of each

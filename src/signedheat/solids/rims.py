@@ -26,17 +26,10 @@ STRAIGHT = 1e-5
 
 
 def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:
-    """Edges that the faces of each part lack, directed as the missing faces would run along them.
+    """(k, 2) directed edges that the faces of each part lack, and (k,) ascending, the parts that lack them.
 
-    Two faces that run along an edge in opposite directions cancel. If k more faces run along it in one direction than
-    in the other, the edge is listed k times. As many of these edges begin at each vertex as end there.
-
-    Returns
-    -------
-    edges : (k, 2) int
-        Tail and head.
-    owners : (k,) int
-        The part that lacks it; ascending.
+    If k more faces run along an edge in one direction than in the other, it is listed k times, as missing faces would
+    run along it. As many of these edges begin at each vertex as end there.
 
     Examples
     --------
@@ -57,9 +50,7 @@ def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:
 
 
 def boundary(faces: Ints) -> Ints:
-    """(k, 2) tails and heads of the directed edges that faces lack: with them, each edge is balanced by opposite ones.
-
-    An edge that k more faces run along in one direction than in the other is listed k times.
+    """(k, 2) directed edges that faces lack, as often as they do: with them, each edge is balanced by opposite ones.
 
     Examples
     --------
@@ -122,7 +113,7 @@ def _normals(vertices: Floats, faces: Ints) -> Floats:
 def _across_gaps(starts: Ints, names: Ints) -> Ints:
     """Find the edge that follows each one, by the edges that leave each vertex and, as −1 − e, arrive, in order.
 
-    Gaps are nested as parentheses are: each begins at an edge that leaves, and ends at one that arrives.
+    Gaps are nested as parentheses are.
     """
     following, waiting = np.full(len(names) // 2, -1), np.empty(len(names) // 2, dtype=np.int64)
     for v in range(len(starts) - 1):
@@ -180,9 +171,7 @@ def corners_of(points: Floats) -> Ints:
 
 
 def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
-    """Pairs of edges that run along each other in opposite directions, as where patches with other vertices meet.
-
-    Edges with the same ends are no pairs: if there are three or more faces, it is unclear which belong together.
+    """Pairs of edges, without common ends, that run along each other in opposite directions: where patches meet.
 
     Examples
     --------

@@ -124,17 +124,9 @@ def training_points(
 ) -> tuple[dict[str, NDArray[np.float32]], dict[str, NDArray[np.float32]]]:
     """Sample n points of each kind in single precision: on a closed surface, and around it with signed distances.
 
-    With `normalize`, the shape is first moved and scaled into the unit sphere.
-
-    Returns
-    -------
-    on : dict
-        ``random_surface``, uniform in area, and ``sharp_surface``, uniform along sharp edges: (n, 6) positions and
-        normals, which are means of both sides along edges. (0, 6) if no edge is sharp.
-    around : dict
-        (n, 3) ``vol_points``, uniform in the cube around the bounding sphere, ``random_near_points`` and
-        ``sharp_near_points``, which are those on the surface moved by normal noise. Their (n,) signed distances,
-        negative inside, are ``vol_label``, ``random_near_label`` and ``sharp_near_label``.
+    On it: (n, 6) positions and normals, uniform in area, and along sharp edges, if there are any. Around it: (n, 3)
+    points in the cube around the bounding sphere, and those on the surface moved by normal noise; their (n,) distances
+    are ``…_label``. With `normalize`, the shape is first moved and scaled into the unit sphere.
     """
     random = np.random.default_rng(0)
     lower, upper = surface.bounds

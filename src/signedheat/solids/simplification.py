@@ -32,14 +32,8 @@ LARGE = 3.0
 def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
     """Simplify a surface, so that no point of either surface is farther than a tolerance from the other.
 
-    manifold3d collapses edges. Its result is accepted if both distances are proven to be within the tolerance and it
-    does not intersect itself; otherwise fewer edges are collapsed. If no result is accepted, the surface is returned
-    unchanged, with an `InexactWarning`.
-
-    Raises
-    ------
-    GeometryError
-        If the surface is not closed and manifold.
+    manifold3d collapses edges, fewer until both distances are proven and nothing intersects itself; if that never
+    succeeds, the surface is returned unchanged, with an `InexactWarning`.
     """
     given = manifold3d.Manifold(
         manifold3d.Mesh64(np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.uint64))
@@ -68,8 +62,7 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
     """Whether all of a surface lies within a distance of another one; False if it is too close to call.
 
     Distance to one triangle is convex, so that no point of a piece is farther from it than a corner. Pieces not all of
-    which is near the triangle nearest to their middle are cut by planes upright on its sides: what lies over it is near
-    it, and what does not is near others.
+    which is near the triangle nearest to their middle are cut by planes upright on its sides.
 
     Examples
     --------
@@ -95,10 +88,9 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
 
 
 def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
-    """(k, 3, 3) parts of (n, 3, 3) pieces, each of which is cut by a plane upright on one side of a triangle.
+    """(k, 3, 3) parts of (n, 3, 3) pieces, each cut upright on that side of a triangle that leaves most on both sides.
 
-    It is the side that leaves most on both of its sides. Pieces much larger than their triangle, and those that no side
-    cuts, are divided at the middle of their longest side.
+    Pieces much larger than their triangle, and those that no side cuts, are halved along their longest side.
     """
     sides = np.linalg.norm(np.roll(pieces, -1, axis=1) - pieces, axis=2)
     relative = pieces - rows[:, None, :3]

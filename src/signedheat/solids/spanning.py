@@ -25,23 +25,14 @@ Frame = tuple[Floats, Floats]
 
 @dataclass(frozen=True, eq=False)
 class Spanned:
-    """Triangles within a closed loop in the plane, whose edges were halved until all of them were edges of triangles.
+    """Triangles in a closed loop in the plane, whose edges were halved until all of them were edges of triangles."""
 
-    Attributes
-    ----------
-    edges, shares : (r,) int, (r,) float
-        Each point of the rim, in order: the edge of the loop that it lies on, and the share of its length before it; 0
-        at the vertices of the loop.
-    inner : (k,) int
-        Which of the points inside are used.
-    faces : (m, 3) int
-        Counterclockwise; the points of the rim come first.
-    """
-
+    # (r,) of each point of the rim, in order: the edge of the loop that it lies on, and the share of its length
+    # before it; 0 at the vertices of the loop
     edges: Ints
     shares: Floats
-    inner: Ints
-    faces: Ints
+    inner: Ints  # (k,) which of the points inside are used
+    faces: Ints  # (m, 3) counterclockwise; the points of the rim come first
 
     def rim(self, loop: Floats) -> Floats:
         """(r, d) positions of the points of the rim on a loop of that many vertices."""
@@ -50,10 +41,7 @@ class Spanned:
         return points
 
     def balanced(self) -> Ints:
-        """(p, 3) faces whose boundary is the loop: triangles without area close the seams along edges that were halved.
-
-        The vertices of the loop come first, then the other points of the rim, then those inside.
-        """
+        """(p, 3) faces whose boundary is the loop, with triangles without area along edges that were halved."""
         whole = self.shares == 0
         n, r = int(whole.sum()), len(self.edges)
         number = np.empty(r + len(self.inner), dtype=np.int64)
@@ -82,10 +70,7 @@ def frame_of(rim: Floats) -> Frame | None:
 
 
 def farthest(loop: Floats, away: Floats) -> int:
-    """Find the point of a closed loop that is farthest away; of several, where the loop then stays away longest.
-
-    So loops that are symmetric begin at the same point, or at its image, whichever point comes first.
-    """
+    """Find the point of a closed loop that is farthest away; of several, where the loop then stays away longest."""
     ties = np.flatnonzero(away > (1 - 1e-9) * away.max())[:TIES]
     if len(ties) == 1:
         return int(ties[0])
@@ -110,9 +95,7 @@ def area_vector(loop: Floats) -> Floats:
 
 
 def spanned(loop: Floats, inner: Floats) -> Spanned | None:
-    """Delaunay triangles of a polygon in the plane with points inside; None if it crosses itself.
-
-    Points that are not inside are left out.
+    """Delaunay triangles of a polygon in the plane, with those points that are inside; None if it crosses itself.
 
     Examples
     --------

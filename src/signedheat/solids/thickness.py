@@ -59,26 +59,15 @@ STEPS = 60
 
 @dataclass(frozen=True)
 class Widths:
-    """Walls and gaps of a shape, at places spread evenly over it.
+    """Walls and gaps of a shape, at places spread evenly over it."""
 
-    Attributes
-    ----------
-    wall, gap : float or None
-        First percentile of the thickness of walls and of the width of gaps; None if no faces are opposite each other.
-    typical_wall, typical_gap : float or None
-        Medians.
-    thinnest : float or None
-        Least thickness of all.
-    thinnest_place : (3,) tuple of float, or None
-        Where it is.
-    """
-
+    # first percentile of the thickness of walls and of the width of gaps; None if no faces are opposite each other
     wall: float | None
     gap: float | None
-    typical_wall: float | None
+    typical_wall: float | None  # medians
     typical_gap: float | None
-    thinnest: float | None
-    thinnest_place: tuple[float, ...] | None
+    thinnest: float | None  # least thickness of all
+    thinnest_place: tuple[float, ...] | None  # (3,) where it is
 
     @property
     def spacing(self) -> float | None:
@@ -246,12 +235,7 @@ def thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
 def widths(shape: Mesh) -> Widths:
     """Measure walls and gaps between faces opposite each other, at places spread evenly over a shape.
 
-    Faces that share a vertex are a fold, and have no width between them.
-
-    Parameters
-    ----------
-    shape : TriangleMesh or PolygonMesh
-        A shape whose faces point outwards; see `orient`.
+    Its faces point outwards. Faces that share a vertex are a fold, and have no width between them.
 
     Examples
     --------
@@ -288,9 +272,7 @@ def widths(shape: Mesh) -> Widths:
 
 
 def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) -> tuple[Floats, Ints]:
-    """(n,) diameters of the largest balls behind (n, 3) places on a surface, away from their unit normals.
-
-    And the face of the tree that each touches.
+    """(n,) diameters of the largest balls behind places on a surface, and the face of the tree that each touches.
 
     `facing` are unit normals of the faces of the tree, zero of those that are no walls. They and `normals` all point
     out of a solid, or all into it. NaN and face 0 where nothing is opposite.

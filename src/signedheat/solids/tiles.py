@@ -84,13 +84,7 @@ class Evaluated(SolidQueries, Protocol):
 
 
 def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> GridField[Literal[3]]:
-    """Compute the signed distance to a solid at all nodes of a grid.
-
-    Raises
-    ------
-    MemoryLimitError
-        If it cannot fit in memory; nothing has been allocated then.
-    """
+    """Compute the signed distance to a solid at all nodes of a grid."""
     refuse_walls(grid)
     refuse_large_grid(grid, BYTES_PER_NODE, BYTES_AT_WORK)
     values, confidence = np.empty(grid.shape), np.empty(grid.shape, dtype=np.float32)
@@ -120,13 +114,7 @@ def band_field(
     scheduler: Scheduler,
     progress: Progress | None,
 ) -> GridField[Literal[3]]:
-    """Compute the signed distance to a solid in blocks near its surface, and on a coarse grid everywhere.
-
-    Raises
-    ------
-    MemoryLimitError
-        If it cannot fit in memory, or into the store; nothing has been allocated then.
-    """
+    """Compute the signed distance to a solid in blocks near its surface, and on a coarse grid everywhere."""
     refuse_walls(grid)
     width = positive_number(width, "band")
     tree, windings = prepared(solid)
@@ -187,10 +175,7 @@ def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> Ints | 
 
 
 def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: float = math.inf) -> Ints:
-    """(n, 3) places of blocks, found from coarse to fine; no further once there are more than a limit.
-
-    `near` says of cubes of nodes, by their centres and half the nodes along their edges, which may be wanted.
-    """
+    """(n, 3) places of blocks whose cubes of nodes may be `near`, from coarse to fine; no further beyond a limit."""
     n_blocks = -(-np.array(grid.shape) // SIDE)
     side = 1 << max(0, int(np.ceil(np.log2(n_blocks.max()))))
     places, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))
@@ -290,13 +275,7 @@ def in_store(
     scheduler: Scheduler,
     progress: Progress | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float16], TilesComputed]:
-    """Values and confidence of blocks, mapped from files of a folder; rows of `tiles` that are done stay.
-
-    Raises
-    ------
-    FileFormatError
-        If the folder holds tiles of something else.
-    """
+    """Values and confidence of blocks, mapped from files of a folder; rows of `tiles` that are done stay."""
     folder = folder.absolute()
     plan: dict[str, NDArray[Any]] = {
         "corners": tree.features.vertices[tree.features.faces],

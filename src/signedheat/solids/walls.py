@@ -26,29 +26,15 @@ opening: holes two fifths as wide as a hollow ball have .04, a cup .2, a bowl .5
 
 @dataclass(frozen=True, eq=False)
 class Rim:
-    """A closed loop where faces end.
+    """A closed loop where faces end."""
 
-    Attributes
-    ----------
-    ids, corners : (n,) int, (n, 3) float
-        Its vertices.
-    onward : (n, 3) float
-        Unit vectors at its edges, along the surface and away from it.
-    parts : (n,) int
-        What ends at each edge: faces that hang together.
-    centre, radius : (3,) float, float
-        A ball around it.
-    opening : (3,) float
-        Area vector of a lid.
-    """
-
-    ids: Ints
+    ids: Ints  # (n,) and (n, 3) its vertices
     corners: Floats
-    onward: Floats
-    parts: Ints
-    centre: Floats
+    onward: Floats  # (n, 3) unit vectors at its edges, along the surface and away from it
+    parts: Ints  # (n,) what ends at each edge: faces that hang together
+    centre: Floats  # (3,) a ball around it
     radius: float
-    opening: Floats
+    opening: Floats  # (3,) area vector of a lid
 
     @classmethod
     def of(cls, ids: Ints, corners: Floats, behind: Floats, parts: Ints) -> Rim:
@@ -157,10 +143,7 @@ def _places(rim: Rim, corners: Ints, sides: Ints) -> Ints:
 
 
 def wall_ends(rims: list[Rim], areas: Floats) -> list[Ints]:
-    """(k, 3) vertices of the triangles of strips between whole rims that are near each other all around.
-
-    Such as those of a bowl's outside and inside without its lip. `areas` are those of the parts.
-    """
+    """(k, 3) triangles of strips between whole rims near each other all around, as of a bowl without its lip."""
     return [strip(rims[i], rims[j]) for i, j in facing(rims, areas)]
 
 

@@ -31,13 +31,7 @@ def closed_surface(
     resolution: int = 256,
     spacing: float | None = None,
 ) -> tuple[TriangleMesh, str]:
-    """Make a closed surface of a solid, and say how; the options are those of `signedheat.batches.Watertight`.
-
-    Raises
-    ------
-    SourceError
-        If the shape is a sheet and there is no thickness.
-    """
+    """Make a closed surface of a solid, and say how; the options are those of `signedheat.batches.Watertight`."""
 
     def contour(level: float) -> TriangleMesh:
         return solid.surface(level, tolerance=tolerance, resolution=resolution, spacing=spacing)
@@ -62,7 +56,6 @@ def closed_surface(
 def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[str, object]:
     """Return counts and sizes of a closed surface, and its distances from the faces of a solid and back.
 
-    `bad_edges` are those that not exactly two faces share.
     `to_faces` is the largest distance from the surface, but where it lies on the completion, to its level around the
     faces that were given; `from_faces` that from faces that bound the solid to the surface, less the level.
     """

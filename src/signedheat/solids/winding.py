@@ -28,18 +28,13 @@ class Windings(Frozen):
 
     Therefore they are integers away from the triangles, and change only across them.
 
-    Attributes
-    ----------
-    triangles : (m, 3, 3) float
-        Corners; equal places have equal numbers.
-
     Raises
     ------
     GeometryError
         If an edge is not balanced.
     """
 
-    triangles: Floats
+    triangles: Floats  # (m, 3, 3) corners; equal places have equal numbers
 
     def __post_init__(self) -> None:
         ends = open_edges_of(self.triangles)
