@@ -23,22 +23,22 @@ from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, levels_of_piece
 from .rims import meeting_edges, open_edges
 
 COHERENT = 0.7
-"""Coherence of the levels of loose pieces from which on they are what is left of a body: .81 to 1 of bodies, however
-little is left of them, .3 to .6 of leaves, cards and strips, however many there are."""
+"""Least coherence of the levels of loose pieces that are the remains of a body. Bodies have .81 to 1, however little is
+left of them; leaves, cards and strips have .3 to .6, however many there are."""
 CHANCE = 0.42
-"""Level times √(n + 1) up to which n loose pieces bound nothing: the choice of their signs explains as much. Two sheets
-a quarter of their width apart have .38, three sides of a box .2, one that four others lack .47, a ball of which 85 % is
-gone .95."""
+"""n loose pieces bound nothing if their level times √(n + 1) is at most this: choosing their signs explains as much.
+Two sheets a quarter of their width apart have .38, three sides of a box .2, a side that four others lack .47, and a
+ball that has lost 85 % of its faces .95."""
 ALONG = 0.25
-"""Share of loose pieces inside closed ones, less whole numbers, from which on they lie along their surface."""
+"""Loose pieces lie along the surface of closed ones if the share of them inside differs from a whole number by more."""
 REACH = 1.5
-"""Distance of faces of two pieces, over the size of the smaller, up to which these belong together."""
+"""Largest distance between faces of two pieces that belong together, relative to the size of the smaller piece."""
 NEAREST = 9
-"""Nearest sampled faces that each one is compared with, itself included."""
+"""Number of nearest sampled faces that each face is compared with, itself included."""
 PLACES = 100_000
-"""Sampled faces, evenly spread, besides one of each piece."""
+"""Number of sampled faces, spread evenly, besides one for each piece."""
 PROBES = 16
-"""Triangles of a closed piece, spread evenly, at all of which it must lie within others to be nested."""
+"""Number of triangles of a closed piece, spread evenly, all of which lie within other pieces if it is nested."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,10 +25,10 @@ from ..mesh.welding import coincident_faces, welded_vertices
 from ..surfaces.triangle_mesh import TriangleMesh
 
 SAME_ANGLE = 1e-6
-"""Radians between faces around an edge up to which their order is unknown: they lie on each other, but for rounding."""
+"""Faces around an edge coincide, to rounding, if the angle between them is at most this, in radians."""
 MOSTLY = 0.9
-"""Share of its area that must face into a cell to make it a cavity, if as much of the outside faces outwards: chance
-turns all six walls of a cell inwards, and so all of that, once in 64 times."""
+"""Least share of its area that faces into a cell that is a cavity, and of the outside that faces outwards. By chance
+all six walls of a cell face inwards once in 64 times."""
 
 
 def inner_walls(

@@ -28,25 +28,25 @@ from .rims import boundary, corners_of, loops, open_edges
 from .spanning import Frame, frame_of
 
 REACH = 0.25
-"""Share of an opening's width in which the surface behind its rim is looked at."""
+"""Width of the strip of surface around an opening that is sampled, relative to the opening's width."""
 SHARP = 0.7
-"""Cosine between the normals of two faces below which the edge between them is sharp."""
+"""Edges are sharp if the cosine between the normals of their faces is below this."""
 SAMPLES = 16
-"""Samples across that strip."""
+"""Number of samples across that strip."""
 MOST = 32768
-"""Samples around a rim at most, or nearly."""
+"""Largest number of samples around a rim, roughly."""
 DIVIDED = 1 << 20
-"""Triangles behind a rim that are made by division at most, of which `MOST` are taken: those of a flat side behind
-slots .0012 to .1 as wide as they are long are 430,000 to 140,000."""
+"""Largest number of triangles that division makes behind a rim, before `MOST` of them are taken. A flat side behind
+slots .0012 to .1 as wide as they are long has 140,000 to 430,000."""
 STIFF = 0.03
-"""Depth of a wall, over that strip's, whose bending counts by half."""
+"""Walls of this depth, relative to the strip's, count half."""
 AGREEMENT = 0.35
-"""Ratio of how far a surface bends and how far it would have to, or of the latter and the former, up to which its lid
-does not bend; from twice that on it is clamped. 1 on a ball."""
+"""Ratio between how far a surface bends and how far it would have to bend. A lid does not bend below this ratio, and is
+clamped above twice this ratio. On a ball the ratio is 1."""
 NARROWEST = 1e-9
-"""Least width of an opening, over the length of its rim: about what rounding leaves of one."""
+"""Least width of an opening, relative to the length of its rim: narrower ones are rounding error."""
 UNBENT = 1e-6
-"""Turn of a surface, in radians, that rounding makes of none."""
+"""Angles below this, in radians, are rounding error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,10 +157,10 @@ def _within(samples: Samples, loop: Floats, patches: Ints, reach: float) -> tupl
 
 
 MOST_SIDES = 16
-"""Sides of a hole from which on vertices, too, may be lost."""
+"""Holes with more sides may have lost vertices as well as faces."""
 BENT = np.deg2rad(70.0)
-"""Root mean square of the angles at the rim from which on a lid does not continue the surface around it: at the end of
-a tube it is 90°."""
+"""A lid continues the surface if the root mean square of the angles at the rim is below this. At the end of a tube it
+is 90°."""
 
 
 def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints, most: float) -> list[Ints]:

@@ -40,7 +40,7 @@ from .solid import Solid
 from .union import Surface, united
 
 SIDES = 16
-"""Sides of a gap between rim and border up to which triangles without other vertices close it."""
+"""Gaps between a rim and a border with up to this many sides are closed by triangles between their vertices."""
 
 
 def seams(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Floats, Ints]:
@@ -89,17 +89,17 @@ STEPS = 2
 BYTES_PER_FACE = 1400
 """Peak memory per face, measured on meshes of 330,000 faces; points take less."""
 BYTES_IF_LOOSE, BYTES_OF_HEAT = 3400, 150_000_000
-"""The same for loose triangles; and memory of the grid on which they and points are completed."""
+"""Peak memory per loose triangle; and memory of the grid on which loose triangles and points are completed."""
 CELLS = 2.0
-"""Cells between neighbouring points of a cloud."""
+"""Number of cells between neighbouring points of a cloud."""
 MATCH = (1e-6, 0.75)
-"""Range of distances, relative to the size of pieces, between corners that noise has separated."""
+"""Distances between corners that noise has separated lie in this range, relative to the size of pieces."""
 TORN = 0.2
-"""Level of loose pieces up to which heat completes what they are left of, a fifth to two fifths of it; else lids do,
-which keep to the faces. Of balls, tori and a cow without 45 % of their triangles lids enclose .1 % too little and heat
-.3 % too much; without 65 %, 1 to 12 % and 1 %."""
+"""Heat completes loose pieces up to this level, which a fifth to two fifths of a body have; beyond, lids do, which keep
+to the faces. For balls, tori and a cow without 45 % of their triangles, lids enclose .1 % too little and heat .3 % too
+much; without 65 %, lids miss 1 to 12 % and heat 1 %."""
 SEAM = 0.75
-"""Distance in cells within which the zero set of φ stands for the faces."""
+"""The zero set of φ stands for the faces within this distance of them, in cells."""
 
 Completing = Literal["lids", "heat"]
 Lids = Literal["bent", "flat"]

@@ -33,20 +33,19 @@ from .tiles import blocks_where, in_threads, prepared, tiles_of
 BYTES_PER_BLOCK = 170_000
 """Measured peak memory of a contour, for each block of the grid near it."""
 WINDOW = 8
-"""Blocks along each edge of a window in which crossed edges are looked for together."""
+"""Number of blocks along each edge of a window whose crossed edges are found together."""
 AROUND = np.array(list(np.ndindex(3, 3, 3))) - 1
-"""(27, 3) a cell and those that touch it."""
+"""(27, 3) offsets of a cell and of those that touch it."""
 IN_BLOCK = np.array(list(np.ndindex(SIDE, SIDE, SIDE)))
-"""(512, 3) nodes of a block."""
+"""(512, 3) offsets of the nodes of a block."""
 SAMPLED = 4096
-"""Places on a surface at which its contour is looked for, besides one for each part."""
+"""Number of places on a surface at which its contour is looked for, besides one for each part."""
 LOST = 0.01
-"""Share of the surface without its contour nearby above which that is announced: edges and tips are thinner than a cell
-somewhere on most parts, walls are not."""
+"""Contours that miss a larger share of the surface are announced. Edges and tips thinner than a cell occur on most
+parts, walls do not."""
 STEEPEST = 2.0
-"""Change of the height above a surface, over how far one goes, up to which blocks near it are found from coarse to
-fine: distance changes by 1 at most, and where one that varies does so by more, blocks are found as its surface goes on.
-"""
+"""Largest slope of the height above a surface at which blocks near it are found from coarse to fine. Distance has slope
+1; where a varying distance is steeper, blocks are found by following the surface."""
 
 
 def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:

@@ -25,8 +25,8 @@ from ..mesh.triangles import MOST, area_vectors, divided_at
 from ..mesh.unit_vectors import unit
 
 FLAT = 0.05
-"""Tangent of half the angle below which planes count as one. This cuts creases of 5.7° off by a hundredth of a cell at
-most; .2 loses creases of 20°, and .01 makes facets of smooth surfaces creases."""
+"""Planes count as one if the tangent of half the angle between them is below this. Creases of 5.7° are cut off by a
+hundredth of a cell at most. With .2 creases of 20° are lost; with .01 facets of smooth surfaces become creases."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,32 +32,32 @@ from ..parallel import in_chunks
 from ..search.winding_tree import WindingTree, mean_angle
 
 HELD = 0.01
-"""λ, which keeps weights small that nothing asks for."""
+"""λ: keeps weights small where no level is asked for."""
 EMPTY = 1e-12
-"""Share of the area below which a piece counts as this small: of pieces without area weights are not asked for."""
+"""Least area that a piece counts with, relative to the whole area; no level is asked for on pieces without area."""
 AGREEMENT = 1.0
-"""μ, the weight of neighbours in one plane."""
+"""μ: weight of neighbours that lie in one plane."""
 NEIGHBORS = 12
-"""Neighbours that an element is compared with."""
+"""Number of neighbours that an element is compared with."""
 DENSE = 3000
-"""Pieces up to which W is a matrix; of more, each face is a dipole, and W is applied through a tree."""
+"""Up to this many pieces W is a matrix; with more, each face is a dipole, and W is applied through a tree."""
 ENTRIES = 5_000_000
-"""Of W: the level is asked for at as many places on all pieces, beyond one for each, as this leaves."""
+"""Largest number of entries of W. It limits at how many places the level is asked for, besides one for each piece."""
 SAMPLES = 10_000
-"""Such places at most."""
+"""Largest number of such places."""
 MANY = 64
-"""Loose triangles, if all were alike, from which on they are dipoles: exact solid angles tell noise for what it is."""
+"""This many loose triangles or more become dipoles; fewer get exact solid angles, which tell noise for what it is."""
 STEPS = 10
-"""Steps of conjugate gradients, which give the signs of the direct solution."""
+"""Number of steps of conjugate gradients. They give the signs of the direct solution."""
 LARGE = 256
-"""Faces of a piece from which on a tree of its own sums their solid angles."""
+"""A piece of this many faces or more has a tree of its own, which sums their solid angles."""
 FAR, OPENING = 4.0, 2.0
-"""Distance from a piece, and from a node of the tree, over its radius, from which on it is a dipole."""
+"""Pieces, and nodes of the tree, are dipoles beyond this distance, relative to their radius."""
 SLENDER, HALVINGS = 12.0, 6
-"""Square of the longest side over the area from which on a triangle is halved there, lest one dipole stand for a strip;
-and times at most. An equilateral triangle has 2.3, a strip six times as long as wide 12."""
+"""Triangles are halved, so many times at most, if the square of their longest side over their area exceeds this: one
+dipole must not stand for a strip. An equilateral triangle has 2.3, a strip six times as long as wide 12."""
 ELEMENTS = 200_000
-"""Dipoles at most; of more faces as many are drawn, evenly."""
+"""Largest number of dipoles; of more faces, this many are drawn evenly."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,11 +33,11 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from .point_orientation import fitted_to_points
 
 BLOCK = 4
-"""Edge of the blocks, in cells, whose area vectors are one dipole as seen from the walls."""
+"""Edge, in cells, of the blocks whose area vectors are one dipole for the walls."""
 CORE = 2.0
-"""Distance in cells within which a dipole's field is that of a ball."""
+"""Within this distance, in cells, the field of a dipole is that of a ball."""
 CLEARANCE = 10
-"""Cells that the far field needs between the shape and the walls; missing ones are added."""
+"""Number of cells that the far field needs between the shape and the walls."""
 
 
 def winding_numbers(nodes: NodeSources, shape: tuple[int, ...], positions: Floats, vectors: Floats) -> Floats:
@@ -172,14 +172,14 @@ def _far_field(places: Floats, dipoles: Floats, strengths: Floats, axis: int, co
 
 
 ROOM = 0.15
-"""Room around the shape, over its longest side: the surface stays within it, whatever the room of later grids."""
+"""Room around the shape, relative to its longest side. The surface stays within it, however large later grids are."""
 NODES = (32, 144)
 """Least and most nodes along the longest side."""
 SURE = 0.4
-"""How far from 0 and 1 the winding number, over what it is inside, may be where it decides instead of φ, which bulges
-towards the corners of the box: of half a cow as points 11 % are wrong (20 with .25, 32 without it)."""
+"""The winding number, relative to that inside, decides instead of φ where it is nearer to 0 or 1 than this. φ bulges
+towards the corners of the box: of half a cow as points 11 % are wrong (20 % with .25, 32 % without the rule)."""
 FRAGMENTS = 0.06
-"""Level of a whole shape up to which it bounds nothing: an eighth of the faces of a ball has .0625, 400 leaves anywhere
+"""A whole shape of at most this level bounds nothing. An eighth of the faces of a ball has .0625, 400 leaves anywhere
 up to .034, 40 on a stem .043."""
 
 

@@ -23,19 +23,19 @@ from ..validation import array_of, finite_number, flag, positive_steps, whole_nu
 from .contouring import crossings_in, joined_crossings, traced
 
 Function: TypeAlias = Callable[[Floats], ArrayLike]
-"""One number for each of (n, 3) points; of gradients, three."""
+"""Returns one number for each of (n, 3) points; gradients are three."""
 TOGETHER = 1 << 17
-"""Points at which a function is asked for at once."""
+"""Batch size for calls of the function."""
 BYTES_PER_NODE = 40.0
 """Measured memory per node."""
 APART = 1e-9
-"""Least weight of a node with which it counts for a point: on an edge of the grid only its ends do."""
+"""Nodes with a smaller weight do not count for a point: on an edge of the grid only its ends do."""
 EDGE = np.cos(np.deg2rad(15.0))
-"""Cosine between the slope at a node and the mean of those around it below which there is an edge between nodes."""
+"""An edge passes between nodes if the cosine between the slope at a node and the mean around it is below this."""
 ROUND = 0.1
-"""Change of the slope from node to node, over the slope, above which this is not known well."""
+"""Slopes that change by a larger share from node to node are not known well."""
 CLEAR = 0.25
-"""Ratio of the errors at nodes of the maximum and the minimum of planes from which one of them counts."""
+"""The maximum or the minimum of planes counts if the ratio of their errors at nodes is below this."""
 CORNERS = np.array(list(np.ndindex(2, 2, 2)))
 """Corners of a cell."""
 

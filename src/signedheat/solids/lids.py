@@ -20,18 +20,18 @@ from .rims import corners_of
 from .spanning import Frame, Spanned, area_vector, frame_of, points_inside, spanned
 
 PIECES = 128
-"""Points of the loop that a lid spans. Half or twice as many change the volume under a lid by less than 1 %."""
+"""Number of points of the loop that a lid spans. Half or twice as many change the volume by less than 1 %."""
 SMOOTH = 1 / 48
-"""Part of a rim over which its zigzags are averaged."""
+"""Zigzags of a rim are averaged over this share of its length."""
 ROUNDS = 3
-"""How often a film is solved for, each time with the lengths of the last."""
+"""Number of times that a film is solved for, each time with the lengths of the last."""
 AT_REST, MOVES = 1e-3, 64
-"""Share of the diagonal of its rim that a plate has still to move, by how its moves shrink, when it has come to rest,
-and how often it moves at most. Nearly all do in 5 to 40 moves."""
+"""A plate is at rest once it will move by at most this share of the diagonal of its rim, and after so many moves at the
+most. Nearly all plates rest after 5 to 40 moves."""
 CLOSE = 0.5
-"""Distance from the rim, over that of its points on average, up to which points of the smooth lid are left out."""
+"""Points of the smooth lid nearer to the rim than this are left out, relative to the mean distance of its points."""
 PLANE = 1e-12
-"""How far a film moves, over its size, when it is at rest: rounding. One in a plane is from the first."""
+"""A film is at rest when it moves by less, relative to its size. One in a plane is at rest from the start."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from .winding import Windings
 SLACK = 1e-12
 """Relative rounding error of squares."""
 EIGHTHS = np.stack([np.arange(8) >> 2, np.arange(8) >> 1 & 1, np.arange(8) & 1])
-"""(3, 8) the eighths of a cube."""
+"""(3, 8) offsets of the eighths of a cube."""
 CROWDED = 1500
 """Number of candidate leaves above which the nodes of a block are searched one by one."""
 ALONG_A_CURVE = np.stack(

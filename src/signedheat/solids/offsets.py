@@ -29,9 +29,9 @@ from .tiles import Evaluated
 Reach: TypeAlias = Callable[[Floats], Floats]
 """Signed distance of the surface from each of (n, 3) places of the solid."""
 TOGETHER = 1e-7
-"""Distance, over the size of a solid, up to which triangles meet at a place: `keeping.TOGETHER`."""
+"""Triangles meet at a place if their distances from it differ by at most this, relative to the size of the solid."""
 STEP = 1e-6
-"""Step, over the size of a solid, of the differences that say how a distance varies."""
+"""Step of the differences that say how a distance varies, relative to the size of the solid."""
 ALONG_AXES = np.concatenate([np.eye(3), -np.eye(3)])
 
 
@@ -179,9 +179,9 @@ def _steepest(
 
 
 SMOOTH = np.cos(np.deg2rad(40.0))
-"""Cosine between the directions away from two sides of a rim above which it is smooth where they meet."""
+"""A rim is smooth between two sides if the cosine between the directions away from them is above this."""
 ASIDE = 1e-7
-"""By how much of a cell places are moved from planes of symmetry before they are measured."""
+"""Places are moved off planes of symmetry by this share of a cell before they are measured."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,8 @@ from .gauss import Dipoles, Matrix, Pieces, sampled
 from .winding import INSIDE
 
 FEW = 16
-"""Triangles of a group whose level is wanted up to which all of the group are summed one by one."""
+"""If the level of at most this many triangles of a group is wanted, the triangles of the group are summed one by
+one."""
 
 
 def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) -> Floats:
@@ -88,13 +89,13 @@ def _among_few(corners: Floats, starts: Ints, counts: Ints, faces: Ints, groups:
 
 Nesting = Literal["given", "cavities", "bodies"]
 SHEET = 0.146
-"""Level up to which a piece bounds nothing: it explains less than half of what is to be explained, (½ − .146)² = ½ · ¼.
-Flat and wavy sheets have 0, a seventh of a ball .16, half of one .31, all of it ½."""
+"""Largest level of a piece that bounds nothing: it explains less than half of what is to be explained, (½ − .146)² = ½
+· ¼. Flat and wavy sheets have 0, a seventh of a ball .16, half of one .31, all of it ½."""
 HINT = 0.5
-"""Share of the area of a piece that faces one way, less the rest, from which on it was given that way."""
+"""A piece was given as facing one way if the area that does so exceeds the rest by this share."""
 APART = 0.05
-"""Share of a body's area outside of another one from which on they overlap, and of its rims up to which it lies within.
-The rims of a bowl's or a vase's inside lie half outside its outside."""
+"""Two bodies overlap if a larger share of the area of one lies outside the other; a body lies within if at most this
+share of its rims is outside. Half of the rims of a bowl's or a vase's inside lie outside its outside."""
 
 
 class Rims(NamedTuple):

@@ -68,15 +68,15 @@ def orient_points(cloud: PointCloud) -> PointOrientation:
 
 
 NEIGHBOURS = 30
-"""Number of nearest points of each node."""
+"""Number of nearest points for each node."""
 FITTED = 12
-"""Number of those with weight, among those that face along ∇φ."""
+"""Number of those that get a weight, among those that face along ∇φ."""
 ALIKE = 0.3
 """Cosine between normal and ∇φ above which a point faces along ∇φ."""
 WIDTH = 2.0
 """Width of the fit on both sides of the zero set, in cells, as a cubic interpolant needs."""
 REACH = 1.5
-"""Distance from points, in mean gaps, within which the fit has full weight, which vanishes one gap farther."""
+"""The fit has full weight within this distance of points, in mean gaps; one gap farther it has none."""
 CHUNK = 50_000
 """Batch size for nodes."""
 

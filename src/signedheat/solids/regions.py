@@ -22,9 +22,9 @@ from ..mesh.welding import coincident_faces
 from .winding import DEPTH, INSIDE, Windings
 
 SAMPLES = 3
-"""Faces of what hangs together on both sides of which winding numbers are computed; their median counts."""
+"""Number of faces of each component on both sides of which winding numbers are computed; their median counts."""
 NEAR = 4.0
-"""Distance from a face at which its sides are looked at, over that up to which faces that coincide may be apart."""
+"""Distance from a face at which its sides are probed, relative to the tolerance for coinciding faces."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,16 +13,16 @@ from ..mesh.triangles import area_vectors
 from ..mesh.unit_vectors import axes_across, unit
 
 PLACES = 8
-"""Places on an edge from which edges that run along it are searched for: nearer to each other than `ALONG`."""
+"""Number of places on an edge from which edges that run along it are searched for, nearer together than `ALONG`."""
 ALONG = 0.1
-"""Distance over the length of the longer edge up to which two edges run along each other: chords of the same arc are
-less than .05 apart where it has 16 or more."""
+"""Two edges run along each other within this distance, relative to the longer one. Chords of the same arc are less than
+.05 apart if it has 16 or more."""
 SHARED = 3
-"""Places of one of two edges that lie along the other: edges that only meet at a corner share fewer, beyond 20°."""
+"""Number of places of one of two edges that lie along the other. Edges that only meet at a corner share fewer."""
 OPPOSITE = -0.7
-"""Cosine of their directions up to which they run in opposite directions; with 0, leaves that cross are one part."""
+"""Edges run in opposite directions if their cosine is at most this; with 0, leaves that cross are one part."""
 STRAIGHT = 1e-5
-"""Angles between consecutive edges up to which the vertex between them is no corner, in radians."""
+"""A vertex is no corner if the angle between its two edges is at most this, in radians."""
 
 
 def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:

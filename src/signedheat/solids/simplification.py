@@ -19,10 +19,10 @@ from ..surfaces.triangle_mesh import TriangleMesh
 manifold3d: Any = lazy_module("manifold3d", "simplified surfaces")
 
 ATTEMPTS = 8
-"""Attempts, each with half the tolerance for manifold3d, until its result is one that can be taken: of 51 surfaces at
-.02 to .5 cell 48 took seven or fewer. In the others manifold3d removed a spike or a body larger than the tolerance."""
+"""Number of attempts, each with half the tolerance for manifold3d, until its result is acceptable. Of 51 surfaces at
+.02 to .5 cells 48 took seven or fewer. In the others manifold3d removed a spike or a body larger than the tolerance."""
 ROUNDS = 60
-"""Times that pieces are divided; what is not proven then is barely so, or not. Parts of 14,000 faces took 17."""
+"""Number of times that pieces are divided; more would prove hardly anything. Parts of 14,000 faces took 17."""
 LEAST = 1e-3
 """Least width on both sides of a cut, relative to the tolerance."""
 LARGE = 3.0

@@ -12,13 +12,13 @@ from ..mesh.components import connected_components
 from ..mesh.edges import edge_keys, edge_table
 
 GROWTH = 0.35
-"""How fast triangles grow with their distance from the rim, over that distance."""
+"""Growth of triangles with their distance from the rim, relative to that distance."""
 TIES = 128
-"""Points of a loop at most that are compared where they are equally far away, and places at which they are."""
+"""Largest number of equally distant points of a loop that are compared, and of places where they are."""
 SPLITS = 8
-"""How often edges of a rim are halved at most until all are edges of its triangulation."""
+"""Number of times that edges of a rim are halved until all of them are edges of the triangulation."""
 MOVED = 1e-9
-"""Over the size of a loop, how far points are moved to choose among equal triangles: rounding moves them by 1e-15."""
+"""Points are moved by this, relative to the size of the loop, to choose among equal triangles; rounding is 1e-15."""
 Frame = tuple[Floats, Floats]
 """Origin and (3, 2) axes of a plane."""
 

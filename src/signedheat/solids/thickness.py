@@ -44,17 +44,17 @@ SHARE = 0.01
 OPPOSITE = -0.5
 """Cosine between the normals of faces below which they are opposite sides of a wall."""
 COINCIDENT = 1e-6
-"""Width, over the largest coordinate, up to which faces coincide but for the rounding of single precision."""
+"""Faces at this distance or less coincide, to single precision, relative to the largest coordinate."""
 SMOOTH = np.cos(np.deg2rad(25.0))
 """Cosine between the normals of two faces above which the surface is smooth across their edge."""
 SLACK = 4e-3
-"""Share of the square of its radius by which a round wall may reach into a ball."""
+"""A round wall may reach into a ball by this share of the square of its radius."""
 FINER = 1e-2
-"""By how much less it may around the place that the ball touches, again and again."""
+"""Around the place that the ball touches the share becomes smaller by this factor, again and again."""
 SETTLED = 1e-12
-"""The same share for flat walls."""
+"""That share for flat walls."""
 STEPS = 60
-"""Most steps towards a diameter."""
+"""Largest number of steps towards a diameter."""
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ EDGE = 8
 BYTES_PER_NODE = 12.0
 """Memory per node for a value and a confidence."""
 BYTES_AT_WORK = 40e6
-"""Measured memory of tiles that are computed at once, and of compiled kernels."""
+"""Measured memory of tiles computed at once, and of compiled kernels."""
 BYTES_IN_BAND = 6.5
 """Memory per node of a band, including its share of the tables of blocks."""
 COARSE = 65

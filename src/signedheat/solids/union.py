@@ -19,7 +19,7 @@ from .solid import Solid
 from .winding import Windings
 
 TRUST = 0.05
-"""Distance from what was given, over its diagonal, at which confidence in the completion has fallen to a half."""
+"""Confidence in the completion is ½ at this distance from given faces, relative to the shape's diagonal."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,13 +15,13 @@ from .rims import corners_of, meeting_edges
 from .spanning import area_vector
 
 NARROW = 0.3
-"""Area of a strip at right angles to the surface at both rims, over that of flat lids on both, up to which it closes
-them; where the surface goes straight on, the lesser area does. A bowl of half a ball whose wall is a quarter of its
-radius has .28, a box without its lid, a tenth as thick as it is wide, .32, two square sheets a quarter of their width
-apart .5."""
+"""A strip closes two rims if its area, relative to that of flat lids on both, is at most this where it is at right
+angles to the surface; where the surface goes straight on, it closes them if its area is the lesser one. A bowl of half
+a ball whose wall is a quarter of its radius has .28, a box without its lid, a tenth as thick as it is wide, .32, two
+square sheets a quarter of their width apart .5."""
 LARGE = 0.1
-"""Area of those lids over that of their parts, from which on the wall ends there. Below, each side goes on over its own
-opening: holes two fifths as wide as a hollow ball have .04, a cup .2, a bowl .5."""
+"""A wall ends where the area of those lids exceeds this share of their parts' area. Otherwise each side goes on over
+its own opening: holes two fifths as wide as a hollow ball have .04, a cup .2, a bowl .5."""
 
 
 @dataclass(frozen=True, eq=False)

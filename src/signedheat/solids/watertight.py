@@ -18,9 +18,9 @@ from .simplification import simplified
 from .solid import Solid
 
 BOUNDS = 1e-3
-"""Share of the area of a shape that is on the boundary of its solid, below which it is a sheet."""
+"""A shape is a sheet if a smaller share of its area is on the boundary of its solid."""
 PARTS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [1 / 3, 1 / 3, 1 / 3]])
-"""Where on a triangle distances are measured: corners, middles of sides, and centre."""
+"""Barycentric coordinates at which distances of a triangle are measured: corners, middles of sides, and centre."""
 
 
 def closed_surface(

@@ -17,9 +17,9 @@ from ..search.winding_tree import WindingTree, winding_sums
 INSIDE = 0.5
 """Winding number above which a point is inside; exact winding numbers are integers."""
 FEW = 16
-"""Points for which a sum over all triangles takes less time and memory than a tree."""
+"""For this many points or fewer a sum over all triangles takes less time and memory than a tree."""
 DEPTH = 1e-6
-"""Offset of places in front of a face and behind it, relative to its size."""
+"""Offset in front of a face and behind it, relative to its size."""
 
 
 @dataclass(frozen=True, eq=False)
