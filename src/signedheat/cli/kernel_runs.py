@@ -124,4 +124,4 @@ JOBS: dict[str, Callable[[], None]] = {
     "reports": reports,
     "lines in the plane": plane,
 }
-"""The longest first, and as many as have few kernels in common: of 100 s of a processor solids take 36, refining 27."""
+"""Jobs, the longest first, which share few kernels. Of 100 s of processor time solids take 36, and refining 27."""

@@ -55,11 +55,11 @@ from .terminal import ProgressBar, say
 
 TET_RESOLUTION = 32
 COMPLETED = 0.3
-"""Share of the progress of a band that completing the shape is."""
+"""Share of the progress of a band that is spent on completing the shape."""
 CANCELLED = 0.9
 """Fraction of the area that may cancel without a warning."""
 LISTED = 40
-"""Different whole numbers up to which an image is one of labels."""
+"""Images with at most this many different whole numbers are images of labels."""
 
 
 @contextmanager

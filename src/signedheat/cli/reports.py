@@ -40,7 +40,7 @@ from .options import Summary, is_planar
 
 NAMES = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
 WHOLE = 0.9999
-"""Share of the area that counts as all of it: the rest is rounding."""
+"""A share of the area above this is all of it: the rest is rounding error."""
 
 
 def report(file: str, arguments: Namespace) -> Summary:

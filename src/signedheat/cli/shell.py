@@ -20,7 +20,7 @@ from .terminal import ProgressBar, say
 from .view_commands import demo, deviation, info, thickness, view
 
 TICK = 0.5
-"""Seconds after which the progress of compiling is drawn again."""
+"""Seconds between updates of the progress of compiling."""
 
 
 @command(

@@ -53,7 +53,7 @@ DISTANCES = {
     "shell": (2, 2),
     "thicken": (1, 2),
 }
-"""Operations of `morph`, functions of the package, with the least and the greatest number of distances of each."""
+"""Operations of `morph`, which are functions of the package, with the least and the greatest number of distances."""
 
 
 def check_volume(arguments: Namespace) -> None:

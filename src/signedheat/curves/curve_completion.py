@@ -29,10 +29,10 @@ from .curve_distance import distance_to_pieces
 from .resolution import flattened, on_resolving_triangles
 
 ZERO = 1e-7
-"""Value, in mean edge lengths, up to which φ is zero at a vertex of the rim."""
+"""φ is zero at a vertex of the rim if its size is at most this, in mean edge lengths."""
 WHOLE = 0.5
-"""Length of a loop, and how near it comes to the curves given, relative to the shortest of them: shorter ones complete
-nothing, nor do those that are farther away, which are where φ has the wrong sign."""
+"""Loops that are shorter than this, or farther from the curves, relative to the shortest curve, complete nothing: there
+φ has the wrong sign."""
 
 
 @within_memory

@@ -125,9 +125,9 @@ def _pairs(faces: Ints, n_vertices: int) -> Any:
 
 
 APART = 0.1
-"""Share of the area on whose side the shortest completion and that by heat differ where neither can be trusted. Halved,
-no more of 259 drawings are announced; two of 30 curves in twelve pieces, half gone, are so by it alone,
-both of them wrong."""
+"""The shortest completion and that by heat are announced as untrustworthy if they differ on this share of the area.
+Half as much announces no more of 259 drawings; two of 30 curves in twelve pieces, half gone, are announced for this
+reason alone, and both are wrong."""
 
 Surface = TypeVar("Surface", bound=SurfaceDomain)
 

@@ -35,15 +35,15 @@ from .curve_distance import CurvesTaken, distance_to_pieces
 from .resolution import on_resolving_triangles
 
 FINEST = 1024
-"""Most cells along a drawing on which it is completed, however fine the grid is on which distance is asked. Three
-broken drawings differ by .010 of their radius between 128 and 512 cells, by .007 between 128 and 256."""
+"""Largest number of cells along a drawing with which it is completed, however fine the grid is. Three broken drawings
+differ by .010 of their radius between 128 and 512 cells, by .007 between 128 and 256."""
 STROKE_NODES = 96
-"""Nodes along the longest side of the triangles on which strokes are compared. Of 150 drawings none is wrong in silence
-and 7 are right with a warning; halved 0 and 5, doubled 0 and 6."""
+"""Number of nodes along the longest side of the triangles on which strokes are compared. Of 150 drawings none is wrong
+in silence and 7 are right with a warning; halved 0 and 5, doubled 0 and 6."""
 CROSSINGS = 10**6
-"""Points times segments that are looked at at a time."""
+"""Batch size, as points times segments."""
 NEAR = 1.5
-"""Cells from a line within which it decides the side itself: φ is smooth over about a cell."""
+"""Within this distance, in cells, a line decides the side itself: φ is smooth over about a cell."""
 
 
 def distance_to_lines(

@@ -37,12 +37,12 @@ from .jumps import JumpProblem, JumpSolution, high_jumps, integration_error, is_
 from .piecewise_field import IntrinsicPiecewiseField, PiecewiseField
 
 ROUGH = 1.0
-"""Integration error, as large as slopes themselves, from which there is a warning."""
+"""Integration error above which there is a warning: as large as the slopes themselves."""
 
 SOURCE_WEIGHT = 100.0
 """Factor by which a cut along or across the source is more expensive than elsewhere."""
 BYTES = {"pardiso": (2600, 0), "superlu": (525, 182)}
-"""Peak for each triangle, and what every doubling of their number adds, by back end; measured."""
+"""Measured peak memory per triangle, and what each doubling of their number adds, by back end."""
 
 
 @within_memory

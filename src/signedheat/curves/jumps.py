@@ -27,7 +27,8 @@ from ..surfaces.cotan import cotan_matrix, divergence
 from .piecewise_field import PiecewiseField
 
 LOOSE = 0.15
-"""Gap from which on it is checked whether constants leave a cut. Without one, what is left is below the triangles."""
+"""Below this gap it is checked whether constants leave a cut: if not, the remaining jumps are smaller than
+triangles."""
 _LOOK = 25  # rounds between two evaluations of the gap
 _THRESHOLD = 4.0  # initial threshold of the proximal step, relative to a typical difference
 _GROWTH, _PATIENCE = 2.0, 250  # factor by which it may grow, at most every so many rounds; tuned on tori and spheres
@@ -185,14 +186,15 @@ def _grounded_laplacian(incidence: sparse.csr_matrix, spring: Floats) -> sparse.
 
 
 FAR = 3.0
-"""Somewhere on a cut the jump is at least this many times the longest side of a typical triangle."""
+"""The largest jump on a cut is at least this many times the longest side of a typical triangle."""
 
 TWIG = 5.0
-"""A branch of a cut needs a jump of this many times that side, or half of the highest: where directions turn within
-several triangles, there are lower ones."""
+"""The largest jump on a branch of a cut is at least this many times that side, or half of the highest. Where directions
+turn within several triangles, there are lower jumps."""
 
 WIDTH = 10.0
-"""Width of `smoothed`, over the root of the area of a part: step 3 to a thousandth. By more M is rounded away."""
+"""Width of `smoothed`, relative to the root of the area of a part: that of step 3 to a thousandth. With more, M would
+be rounded away."""
 
 
 def typical_size(triangles: IntrinsicMesh) -> float:

@@ -21,7 +21,7 @@ from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.triangle_mesh import TriangleMesh
 
 SHORT = 16.0
-"""Length of a curve, or of all its pieces, in h, below which triangles are made for them."""
+"""Curves shorter than this, in h, all pieces included, get triangles of their own."""
 
 Surface = TypeVar("Surface", bound=SurfaceDomain)
 Found = TypeVar("Found")

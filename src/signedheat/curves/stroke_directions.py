@@ -30,31 +30,30 @@ from .resolution import on_resolving_triangles, surface_of, triangulated_once
 from .strokes import EXPLAINED, TIE, Inside, Strokes
 
 AS_GIVEN = 0.5
-"""What turning a stroke costs, relative to its length. Halved or doubled, one of 46 drawings changes, that is, on more
-than 2 % of the area."""
+"""Cost of turning a stroke, relative to its length. Halved or doubled, one of 46 drawings changes on more than 2 % of
+the area."""
 TOGETHER = 0.5
-"""The same for all strokes of a curve, relative to that."""
+"""Cost of turning all strokes of a curve, relative to that of turning one by one."""
 WEAKLY = 0.02
-"""The same if sides are smooth, for a stroke of mean length. Of two that follow each other, with a gap of half of their
+"""Cost of turning a stroke of mean length if sides are smooth. If two follow each other, with a gap of half of their
 length, the energy is less by 0.05. Halved and doubled, none of 46 drawings changes."""
 MOST = 0.5
-"""Share of the length of all strokes that bounds nothing where none is left out: the greater part. Halved and doubled,
-none of 46 drawings changes."""
+"""If more than this share of the length of all strokes bounds nothing, none is left out. Halved and doubled, none of 46
+drawings changes."""
 ROUNDS = 20
-"""Most cuts until the directions agree with the sides."""
+"""Largest number of cuts until the directions agree with the sides."""
 SINGLY = 16
-"""Strokes, the longest first, that are turned one by one where they explain nothing, or left out one by one: for speed.
-Halved and doubled, none of 46 drawings changes by what is turned."""
+"""Number of strokes, the longest first, that are turned or left out one by one where they explain nothing; limited for
+speed. Halved and doubled, none of 46 drawings changes."""
 TURNED = 0.399
-"""Share of the length of a loop, and of all strokes, from which turning it is a guess: less for two of five pieces. Of
-515 drawings (`benchmarks/strokes.py`, seeds 0 to 51) none is wrong in silence and 12 are right with a warning; at .36
-0 and 17, at .45 1 and 9, at .5 3 and 8."""
+"""Turning a loop of more than this share of its length, and of all strokes, is a guess: less than two of five pieces.
+Of 515 drawings (`benchmarks/strokes.py`, seeds 0 to 51) none is wrong in silence and 12 are right with a warning; at
+.36 0 and 17, at .45 1 and 9, at .5 3 and 8."""
 WORTH = 0.5
-"""What a stroke on which the inside hangs is worth, relative to its length, below which that is a guess. Of 350
-drawings, 140 of them with long strays, 9 are wrong in silence and 10 right with a warning; halved 15 and 5, doubled 4
-and 56."""
+"""The inside is a guess if it depends on a stroke worth less than this, relative to its length. Of 350 drawings, 140 of
+them with long strays, 9 are wrong in silence and 10 right with a warning; halved 15 and 5, doubled 4 and 56."""
 OTHERWISE = 0.05
-"""Share of the area that is on the other side without a stroke on which the inside hangs. Halved, 5 and 20 of the same
+"""The inside depends on a stroke if this share of the area changes sides without it. Halved, 5 and 20 of the same
 drawings; doubled, 15 and 6."""
 
 

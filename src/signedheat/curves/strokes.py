@@ -20,7 +20,7 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..surfaces.surface_discretization import SurfaceDiscretization
 
 UNITS = 2.0**40
-"""What all pulls to one side count together, as integers, so that a flow that ends ends exactly."""
+"""Sum of all pulls to one side, as integers: a flow in integers ends exactly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class CutGraph:
 Ids = Ints
 
 FREE, TERMINAL, ORPHAN = -1, -2, -3
-"""What a node has for an arc to its parent that lies in no tree, next to a terminal, or cut off from its parent."""
+"""Arc to the parent of a node that lies in no tree, next to a terminal, or cut off from its parent."""
 
 
 @compiled
@@ -207,23 +207,23 @@ def _adopted(
 
 
 REWARD = 1.0
-"""What explaining a stroke is worth, relative to its length: at most 1, since a line round a stroke is as long again.
-From 0.8 to 1.0 the table of damaged curves stays as it is."""
+"""Reward for explaining a stroke, relative to its length: at most 1, since a line around a stroke is as long again.
+From 0.8 to 1.0 the table of damaged curves does not change."""
 EDGES, OF_ALL = 2.0, 0.01
-"""How far from a stroke sides count for whether it is explained, so that strokes drawn again next to it are one: in
-edges of the mesh, but no more of the length of all strokes. Of 46 drawings none changes if they are halved, nor if the
-first is doubled; if the second is, one."""
+"""Distance from a stroke up to which sides count for whether it is explained, in edges of the mesh, but at most this
+share of the length of all strokes. So strokes drawn again next to it are one. Of 46 drawings none changes if both are
+halved or the first is doubled; one does if the second is."""
 STAIRS = 0.92
-"""Length of a line relative to that of the edges' duals that it cuts."""
+"""Length of a line relative to the length of the dual edges that it cuts."""
 LEVEL = 1e-6
-"""Height above a segment, relative to its face, up to which a corner is on it."""
+"""A corner is on a segment up to this height above it, relative to its face."""
 TIE = 1e-6
-"""Difference of what two answers cost, relative to the length of all strokes, below which rounding would choose."""
+"""Two answers cost the same if they differ by less, relative to the length of all strokes: rounding would choose."""
 EXPLAINED = 0.5
-"""How far a stroke is explained that bounds the inside: the greater part. Halved, none of 46 drawings changes, doubled
-two, and eleven more are announced."""
+"""A stroke bounds the inside if it is explained to this share. Halved, none of 46 drawings changes; doubled, two
+change, and eleven more are announced."""
 BLOCK = 64
-"""Strokes whose jumps are solved for at a time."""
+"""Batch size for the jumps of strokes."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,10 +32,10 @@ _TYPES = {
     for name in names.split()
 }
 _INTEGERS = {name: code for name, code in _TYPES.items() if code[0] != "f"}
-"""What lists can be counted by."""
+"""Types that may count the entries of a list."""
 _FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
 _ROOM = 12
-"""Digits kept free for the number of vertices, and of faces, of a mesh that is written part by part."""
+"""Number of digits kept free for the counts of a mesh that is written part by part."""
 
 
 @dataclass

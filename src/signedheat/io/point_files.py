@@ -19,12 +19,12 @@ from .files import PathLike, contents, damaged, extension, reading, refuse_kind,
 from .sandbox import parsed
 
 SEPARATORS, DECIMAL_COMMAS = str.maketrans(",;", "  "), str.maketrans(",;", ". ")
-"""What commas and semicolons mean in a table."""
+"""Meanings of commas and semicolons in a table."""
 WITH_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 NUMBERS = {"F": "f", "I": "i", "U": "u"}
-"""Types of fields, and their letters for NumPy."""
+"""Types of fields, with their letters in NumPy."""
 PACKED = 1000
-"""Memory that a LAZ file may take for each of its bytes."""
+"""Memory limit for a LAZ file per byte."""
 CHECKSUM = 4
 """Bytes at the end of each page of an E57 file."""
 SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance "

@@ -36,7 +36,7 @@ LEAST_SECONDS, BYTES_PER_SECOND = 10, 20_000
 """Limit of processor time: a constant, and the bytes of a file for each further second."""
 NUMBERS = re.compile(r"[<>|][biuf][1248]")
 MOST_SAID = 1 << 24
-"""Upper bound of the bytes of an answer without its arrays."""
+"""Upper bound of the bytes of an answer, without its arrays."""
 ALONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 """Environment variables that limit threads to one, since idle threads take memory."""
 

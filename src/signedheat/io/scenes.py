@@ -22,7 +22,7 @@ from .files import PathLike, contents, damaged, ensure_fits, extension, reading
 from .sandbox import parsed
 
 TRIANGLE_BYTES = 100
-"""Memory that a triangle of a 3MF package takes, with its vertices."""
+"""Memory per triangle of a 3MF package, with its vertices."""
 METRES = {
     "micron": 1e-6,
     "mm": 1e-3,
@@ -34,24 +34,24 @@ METRES = {
     "m": 1.0,
     "meter": 1.0,
 }
-"""Units of length, those of 3MF among them, in metres."""
+"""Units of length, including those of 3MF, in metres."""
 ROOT = "3D/3dmodel.model"
 PATH = "{http://schemas.microsoft.com/3dmanufacturing/production/2015/06}path"
 DEPTH = 32
-"""Components within components."""
+"""Largest depth of nested components."""
 
 Key = tuple[str, str]
-"""Part of the package, and id of an object in it."""
+"""A part of the package, and the id of an object in it."""
 STEP_BYTES = 10_000
-"""Memory that a STEP file may take for each of its bytes: a sphere is a line, and any number of triangles."""
+"""Memory limit for a STEP file per byte: one line may describe a sphere, of any number of triangles."""
 STEP_SECONDS = 300
-"""Processor time that any STEP file may take: what a line says may be hard to make triangles of."""
+"""Limit of processor time for any STEP file: a single line may be slow to triangulate."""
 FINENESS = 1e-3
-"""Distance of triangles from the surface, over the diagonal of the box around it, if nothing else is said."""
+"""Default distance of triangles from the surface, relative to the diagonal of the box around it."""
 ANGLE = 0.3
-"""Radians between neighbouring triangles of curved faces, about: 20 of them around a cylinder."""
+"""Approximate angle between neighbouring triangles of curved faces, in radians: 20 of them around a cylinder."""
 SEAM = 1e-6
-"""Distance over the diagonal within which corners of neighbouring faces are one: Open CASCADE's own precision."""
+"""Corners of neighbouring faces within this distance, relative to the diagonal, are one: Open CASCADE's precision."""
 
 
 def _joined(bodies: Sequence[Body]) -> TriangleMesh:

@@ -79,7 +79,7 @@ WRITERS: dict[str, Callable[[Elements, PathLike], bytes]] = {
 SHAPE_FORMATS = frozenset(WRITERS)
 
 MANY, BYTES_PER_FACE = 100_000, 250
-"""Faces from which on their memory is looked at; and measured: what each takes at least, whatever is done with it."""
+"""Memory is checked for this many faces or more; and a lower bound of what each face takes."""
 
 
 def read(path: PathLike) -> Shape | Solid:

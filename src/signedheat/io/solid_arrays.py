@@ -21,7 +21,7 @@ from .numpy_files import names_in_npz, read_npz
 NEEDED = ("triangles", "origins", "confidence", "bounding", "closing", "key")
 SOURCE = ("source_vertices", "source_faces")
 VERSION = 2
-"""Of the archive: what another one has written is refused."""
+"""Version of the archive. Other versions are refused."""
 
 
 def arrays_of(solid: Solid) -> dict[str, NDArray[Any]]:

@@ -27,14 +27,14 @@ from .files import PathLike, format_for, replacing
 MAGIC, FILE_VERSION, LIBRARY = 0x56444220, 224, (10, 0)
 """Magic number, version of the format, and version of a library that writes it."""
 ZIP, ALL_VALUES = 1, 6
-"""The flag of values packed by zlib; the byte before values that says that all are there."""
+"""Flag of values packed by zlib; byte before values that says that all of them are there."""
 SIDES, SIZES = (32, 16), (128, SIDE)
-"""Of the nodes above the blocks, from the top: children along each edge, and voxels along each edge of a child."""
+"""Nodes above the blocks, from the top: children along each edge, and voxels along each edge of a child."""
 CONVENTION = (
     "signed distance, negative inside, in the units of the shape; voxel (i, j, k) at origin + (i, j, k) * spacing"
 )
 Outside = Callable[[Ints, int], NDArray[np.float32]]
-"""Values of cubes of some number of voxels along each edge in which there are no blocks, from their first voxels."""
+"""Returns values of cubes outside the blocks, given their first voxels and the number of voxels along each edge."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,7 @@ Mesh = TypeVar("Mesh", TriangleMesh, PolygonMesh)
 VOLUME_FORMATS = (".npy", ".nrrd", ".vti")
 LABEL_FORMATS = (*VOLUME_FORMATS, *NIFTI)
 SQUARE = 1e-4
-"""Cosine between axes up to which they are at right angles: NIfTI files keep them in single precision."""
+"""Axes are at right angles if their cosine is at most this. NIfTI files hold them in single precision."""
 SPACES = {
     "right-anterior-superior": (1, 1, 1),
     "left-posterior-superior": (-1, -1, 1),

@@ -39,7 +39,7 @@ KINDS = {
     14: "pyramid",
     24: "tetra10",
 }
-"""Names of VTK's types of cells in meshio."""
+"""Names in meshio of VTK's types of cells."""
 
 
 def write_vti(origin: Floats, spacing: Floats, values: Mapping[str, NDArray[Any]], convention: str) -> bytes:
