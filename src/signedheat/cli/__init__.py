@@ -17,7 +17,7 @@ from pathlib import Path
 from .. import __version__
 from ..errors import SignedHeatError, printable
 from .options import parser_of, refuse_output_over_input, without_exponents
-from .terminal import Signals, open_standard_streams, say, write_out
+from .terminal import Signals, open_standard_streams, say, standard_files, write_out
 
 FAILED, BUG = 1, 70
 
@@ -56,7 +56,7 @@ def _run(argv: Sequence[str] | None) -> int:
     if arguments.preview is not None:
         public.view.ensure_picture_writable(arguments.preview)
     import_module("signedheat.jobs").Announcement.are_wanted = not (arguments.quiet or arguments.json)
-    with import_module(f"{__name__}.standard").standard_files(arguments) as standard:
+    with standard_files(arguments) as standard:
         summary, text = arguments.run(arguments)
     if arguments.json and not standard.takes_output:
         write_out(standard.named(json.dumps(summary)))
