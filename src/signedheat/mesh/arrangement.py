@@ -398,11 +398,11 @@ def _closest(points: Floats, a: int, b: int, c: int, d: int, place: Floats) -> f
 
 
 @compiled
-def _normal(points: Floats, face: Ints) -> Floats:
+def _normal(points: Floats, face: Ints) -> tuple[float, float, float]:
     u, v = points[face[1]] - points[face[0]], points[face[2]] - points[face[0]]
-    n = np.empty(3)
-    n[0], n[1], n[2] = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
-    return n / np.sqrt((n * n).sum())
+    x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+    length = np.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
 
 
 @compiled
@@ -432,7 +432,7 @@ def _meet(points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Int
     for r in range(len(pairs)):
         touch[:], on[:], hit[:], heights[:] = False, False, False, 0.0
         for s in range(2):
-            normals[s] = _normal(points, faces[pairs[r, s]])
+            normals[s, 0], normals[s, 1], normals[s, 2] = _normal(points, faces[pairs[r, s]])
         for s in range(2):
             corners, g = faces[pairs[r, s]], pairs[r, 1 - s]
             for i in range(3):

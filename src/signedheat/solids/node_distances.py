@@ -147,7 +147,9 @@ def _fill(
                 if items[item] >= 0:
                     faces[0, 0, counts[0, 0]] = items[item]
                     counts[0, 0] += 1
-        cubes[0, :3], cubes[0, 3:] = firsts[b], 0
+        for d in range(3):
+            cubes[0, d] = firsts[b, d]
+        cubes[0, 3], cubes[0, 4] = 0, 0
         depth = 1
         while depth > 0:
             depth -= 1
