@@ -55,7 +55,7 @@ FEATURES: dict[str, tuple[str, ...]] = {
         "curves.curve_completion",
         "curves.strokes",
     ),
-    "surfaces of solids": ("solids.contouring", "solids.offsets", "solids.watertight", "solids.kept_faces"),
+    "surfaces of solids": ("solids.contouring", "solids.offsets", "solids.kept_faces"),
     "completion of solids by lids": ("solids.completion", "solids.lids", "solids.closing", "solids.walls"),
     "orientation of faces and points": (
         "solids.mesh_orientation",

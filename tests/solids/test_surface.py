@@ -12,8 +12,7 @@ from signedheat import samples
 from signedheat.errors import InexactWarning, OutsideError
 from signedheat.mesh.edges import edge_table
 from signedheat.mesh.self_intersections import self_intersections
-from signedheat.solids import dual_vertices as features
-from signedheat.solids import simplification
+from signedheat.solids import contouring, simplification
 from signedheat.solids.completion import complete
 from signedheat.solids.simplification import is_within
 
@@ -114,8 +113,8 @@ def test_edges_that_cut_creases_off_are_divided(monkeypatch):
     faces = np.where(backwards[:, None], hull.simplices[:, ::-1], hull.simplices)
     solids = [complete(turned(sh.TriangleMesh(points, faces), seed)) for seed in range(12)]
     largest = []
-    for divisions in (features.DIVISIONS, 0):
-        monkeypatch.setattr(features, "DIVISIONS", divisions)
+    for divisions in (contouring.DIVISIONS, 0):
+        monkeypatch.setattr(contouring, "DIVISIONS", divisions)
         largest.append(0.0)
         for solid in solids:
             surface = solid.surface(spacing=0.1)

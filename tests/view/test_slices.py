@@ -7,8 +7,8 @@ import signedheat as sh
 from refusals import refused
 from signedheat import samples, view
 from signedheat.view.figures import isolines_between, legible
-from signedheat.view.rasterizer import looking
 from signedheat.view.slice_pictures import cross_section, level_pieces, rounded
+from signedheat.view.surface_pictures import looking
 
 
 def test_cross_section_of_a_sphere_is_a_circle():
