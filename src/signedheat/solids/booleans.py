@@ -45,7 +45,7 @@ def intersection(a: Solid, b: Solid) -> Solid:
 
 
 def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None) -> Solid:
-    """Make the solid whose winding number is the sum of those of `a`, `b`, turned or not, and triangles `around`."""
+    """Make the solid of `a`, and `b`, turned or not; its winding number is the sum of theirs and that of `around`."""
     (first, of_first), (second, of_second) = ((x.triangles[x.bounding], np.flatnonzero(x.bounding)) for x in (a, b))
     triangles = np.concatenate([first, second[:, ::-1] if turned else second])
     if not len(triangles):

@@ -43,7 +43,7 @@ PROBES = 16
 
 @dataclass(frozen=True, eq=False)
 class Bounding(Frozen):
-    """What was decided of a chain."""
+    """Decision which triangles of a chain bound something, and which way they face."""
 
     pieces: Ints  # (m,) piece that each triangle is of
     turned: Bools  # (m,) which must turn from the direction in which they were given first
@@ -61,13 +61,13 @@ class Bounding(Frozen):
     cavities: int
 
     def to_turn(self, chain: Chain) -> Bools:
-        """(k,) which of the triangles that were given must turn; those on fewer than three places need not."""
+        """(k,) whether each given triangle must turn; triangles on fewer than three places need not."""
         as_given, turned = (np.append(values, False)[chain.numbers] for values in (self.as_given, self.turned))
         return np.asarray((chain.numbers >= 0) & ((~as_given & chain.reversed) != turned))
 
 
 def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False) -> Bounding:
-    """Decide what bounds and which way it faces; as given, if that is asked for."""
+    """Decide which triangles bound something and which way they face, or take them as oriented."""
     counts, whole = whole_complexes(chain)
     inner = chain.walls() & ~whole
     agreed = chain.pieces_as_given() if as_oriented else chain.pieces(~inner)
@@ -127,7 +127,7 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
 
 
 def whole_complexes(chain: Chain) -> tuple[Ints, Bools]:
-    """(m,) how often triangles are there, and which are of complexes that close as they were given.
+    """(m,) how often triangles count, and whether they belong to complexes that close as given.
 
     All pieces of such a complex have a positive level in it, or all a negative one.
     """
@@ -154,7 +154,7 @@ def whole_complexes(chain: Chain) -> tuple[Ints, Bools]:
 def _nested(
     chain: Chain, pieces: Ints, counts: Ints, closed: Bools, flips: Floats, nested: Nesting
 ) -> tuple[Floats, int, int]:
-    """(p,) signs by which closed pieces turn: outwards; within others they stay as given, if that is clear."""
+    """(p,) signs that turn closed pieces outwards; pieces within others stay as given, if that is clear."""
     n = len(closed)
     some = np.flatnonzero(counts != 0)
     triangles, owners = chain.triangles[some], pieces[some]
@@ -197,7 +197,7 @@ def open_bounding(
     nested: Nesting = "given",
     as_oriented: bool = False,
 ) -> tuple[Floats, Bools, Ints, Floats]:
-    """Decide for open pieces, (p,) each: signs, what bounds something, clusters of what is loose, and their levels.
+    """Decide for open pieces, (p,) each: signs, whether they bound something, clusters of loose ones, and levels.
 
     A piece is loose if neither it nor its group is a body by itself. Clusters of other pieces are −1, their levels ½.
     Until every piece has the level that it needs, those that fail and leave at least half as much unexplained as the
@@ -250,7 +250,7 @@ def signs_of(system: Matrix | Dipoles) -> Floats:
 
 
 def _counted(areas: Floats, groups: Ints, clusters: Ints) -> Floats:
-    """(p,) groups of each cluster of pieces, as if all were alike."""
+    """(p,) number of groups in each piece's cluster, as if all groups were alike."""
     n = len(areas)
     keys, inverse = np.unique(clusters * n + groups, return_inverse=True)
     sums, owners = np.bincount(inverse, areas), keys // n
@@ -259,7 +259,7 @@ def _counted(areas: Floats, groups: Ints, clusters: Ints) -> Floats:
 
 
 def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owners: Ints) -> Ints:
-    """(p,) what pieces of some triangles hang together with, by edges that they share or rims along each other."""
+    """(p,) component of each piece; pieces are joined by shared edges or by rims that run along each other."""
     n = int(labels.max()) + 1
     first = np.full(n, -1)
     first[labels[::-1]] = faces[::-1]
@@ -274,14 +274,14 @@ def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owner
 
 
 def _directed(chain: Chain, counts: Floats | Ints) -> Floats:
-    """(k, 3, 3) the triangles of a chain as often as they are there, reversed where that is negative."""
+    """(k, 3, 3) triangles of a chain, repeated by their counts, and reversed where counts are negative."""
     there = np.repeat(np.arange(len(counts)), np.abs(counts).astype(np.int64))
     triangles = chain.triangles[there]
     return np.where((counts[there] < 0)[:, None, None], triangles[:, ::-1], triangles)
 
 
 def _along(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | Ints) -> Bools:
-    """(p,) clusters of loose pieces that lie along closed ones, as noisy copies do: half inside, half outside."""
+    """(p,) whether pieces are in loose clusters along closed pieces, as noisy copies are: half inside, half outside."""
     chosen = np.flatnonzero(clusters[pieces] >= 0)
     around = WindingTree.of(_directed(chain, counts)).numbers(chain.triangles[chosen].mean(axis=1))
     owners = clusters[pieces[chosen]]
@@ -290,7 +290,7 @@ def _along(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | Ints) ->
 
 
 def clusters_of(pieces: Pieces) -> Ints:
-    """(p,) components of pieces that are nearer to each other than `REACH` times the size of the smaller one."""
+    """(p,) cluster of each piece. Pieces are joined if they are within `REACH` times the size of the smaller one."""
     n = len(pieces.areas)
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     np.minimum.at(low, pieces.labels, pieces.triangles.min(axis=1))

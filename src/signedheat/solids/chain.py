@@ -41,7 +41,7 @@ def inner_walls(
     areas: Floats,
     volumes: Floats,
 ) -> Bools:
-    """(p,) which faces have a closed cell on both sides, in complexes where some edges have three or more faces.
+    """(p,) whether a closed cell lies on both sides of each face, where some edges have three or more faces.
 
     A complex is what is connected by edges; a cell that lacks a wall is part of the outside. In two cases faces with a
     cell on both sides are not inner: if along each edge of the complex as many faces run one way as the other, since it
@@ -92,7 +92,7 @@ def _angles(positions: Floats, tails: Ints, heads: Ints, forward: Bools, normals
 
 
 def _cavities(shells: Ints, inside: Bools, areas: Floats) -> Bools:
-    """Which shells are those of cavities: faces face into them, where the whole complex was given facing outwards."""
+    """Find the shells that are cavities: faces face into them, and the whole complex was given facing outwards."""
     front, back = shells.T
     outer = inside[front] != inside[back]
     if areas[outer & inside[back]].sum() < MOSTLY * areas[outer].sum():
@@ -114,7 +114,7 @@ class Chain(Frozen):
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Chain:
-        """Return that of a mesh."""
+        """Make the chain of a mesh."""
         tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
         ids = welded_vertices(mesh.vertices, tails, heads)[mesh.faces]
         first, backwards = coincident_faces(ids.ravel(), np.arange(0, 3 * len(ids) + 1, 3))
@@ -141,23 +141,23 @@ class Chain(Frozen):
 
     @cached_property
     def multiplicities(self) -> Ints:
-        """(m,) how often each triangle is there as it is, less how often reversed."""
+        """(m,) number of times that each triangle is given as it is, minus the number of times reversed."""
         there = self.numbers >= 0
         ways = np.where(self.reversed[there], -1, 1)
         return np.bincount(self.numbers[there], ways, len(self.faces)).astype(np.int64)
 
     @cached_property
     def edges(self) -> EdgeTable:
-        """Of the triangles."""
+        """Edges of the triangles."""
         return edge_table(self.faces)
 
     @cached_property
     def complexes(self) -> Ints:
-        """(m,) what hangs together by edges, however many faces these have."""
+        """(m,) component of each triangle; edges connect any number of triangles."""
         return element_components(self.edges.face_edges) if len(self.faces) else np.zeros(0, dtype=np.int64)
 
     def unbalanced(self, weights: NDArray[np.integer], groups: Ints) -> Bools:
-        """(g,) which groups of triangles, each there so often, have directed edges that do not cancel."""
+        """(g,) whether the directed edges of each group of triangles, counted with multiplicity, fail to cancel."""
         n = len(self.edges.vertices)
         keys = (groups[:, None] * n + self.edges.face_edges).ravel()
         sides, inverse = np.unique(keys, return_inverse=True)
@@ -168,7 +168,7 @@ class Chain(Frozen):
         return result
 
     def walls(self) -> Bools:
-        """(m,) walls between closed cells, which bound nothing: those of several shells."""
+        """(m,) whether each triangle is a wall between closed cells, which bounds nothing."""
         if not len(self.faces) or not (self.edges.face_counts > 2).any():
             return np.zeros(len(self.faces), dtype=bool)
         tails, heads = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
@@ -180,14 +180,14 @@ class Chain(Frozen):
         return inner_walls(self.positions, pairs, tails, heads, owners, normals, self.areas, volumes)
 
     def pieces(self, used: Bools) -> FaceOrientation:
-        """Triangles that hang together across edges of two that are used; most of each piece's area stays as given."""
+        """Join triangles across edges that two used triangles share; most of the area of each piece stays as given."""
         tails, heads = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
         owners = np.repeat(np.arange(len(self.faces)), 3)
         pairs = pair_halfedges(tails, heads, len(self.positions), used[owners])
         return orient_faces(pairs, tails, owners, self.areas * np.sign(self.multiplicities))
 
     def pieces_as_given(self) -> FaceOrientation:
-        """Triangles that hang together across edges of two that run along them in opposite directions."""
+        """Join triangles across edges along which two of them run in opposite directions."""
         table = edge_table(np.where((self.multiplicities < 0)[:, None], self.faces[:, ::-1], self.faces))
         joins = (table.face_counts == 2) & (table.balance == 0)
         alone = len(table.vertices) + np.arange(self.faces.size).reshape(-1, 3)

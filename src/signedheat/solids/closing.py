@@ -51,7 +51,7 @@ UNBENT = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Places on faces near a rim: (k, 3) positions, (k, 3) unit normals, (k,) areas and smooth patches they are of."""
+    """Samples of faces near a rim: (k, 3) positions, (k, 3) unit normals, (k,) areas and (k,) smooth patches."""
 
     positions: Floats
     normals: Floats
@@ -60,14 +60,14 @@ class Samples:
 
 
 def width_of(lid: Lid) -> float:
-    """Four areas over the length of the rim, the diameter of a circle; of slits without area not nothing."""
+    """Width of an opening: four areas over the length of its rim, the diameter of a circle; never zero."""
     rim = lid.vertices[: lid.n_rim]
     length = float(np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1).sum())
     return max(4.0 * float(face_areas(lid.vertices[lid.faces]).sum()) / length, NARROWEST * length)
 
 
 def smooth_patches(triangles: Floats, ids: Ints) -> Ints:
-    """(m,) which faces hang together across edges that are not sharp."""
+    """(m,) component of each face; edges that are not sharp connect faces."""
     table = edge_table(ids)
     normals, (one, other) = unit(area_vectors(triangles)), table.pairs.T // 3
     smooth = (normals[one] * normals[other]).sum(axis=1) > SHARP
@@ -75,7 +75,7 @@ def smooth_patches(triangles: Floats, ids: Ints) -> Ints:
 
 
 def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spatial.cKDTree, reach: float) -> Samples:
-    """Sample triangles in a tree within reach of a rim, at most reach / `SAMPLES` apart, unless too many are."""
+    """Sample the triangles within reach of a rim, at most reach / `SAMPLES` apart unless that makes too many."""
     size = reach / SAMPLES
     some = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
     triangles, patches = triangles[some], patches[some]
@@ -104,7 +104,7 @@ def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spa
 
 
 def continuation(lid: Lid, samples: Samples, patches: Ints, width: float) -> tuple[Floats, Floats, Floats]:
-    """(n, 3) normals and (n,) curvatures with which the surface goes on over its rim, and (n,) how much that counts.
+    """(n, 3) normals and (n,) curvatures with which a surface continues beyond its rim, and (n,) their weights.
 
     Across an opening of width W a surface that meets the flat lid at angle β must turn by 2 sin β, the chord of a
     circle; if its curvature towards the rim is k, it would turn by k W. On a ball both are the same, on a box k is 0.
@@ -146,7 +146,7 @@ def continuation(lid: Lid, samples: Samples, patches: Ints, width: float) -> tup
 
 
 def _within(samples: Samples, loop: Floats, patches: Ints, reach: float) -> tuple[Ints, Ints]:
-    """Pairs of a place of a rim and a sample within reach of it, of the patch that ends there."""
+    """Pair each place of a rim with the samples within reach that belong to the patch ending there."""
     if not len(samples.positions):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     found = scipy.spatial.cKDTree(samples.positions).query_ball_point(loop, reach, return_sorted=True)
@@ -164,7 +164,7 @@ is 90°."""
 
 
 def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints, most: float) -> list[Ints]:
-    """(n − 2, 3) triangles on the vertices of each loop of n; none where they do not continue the surface around it.
+    """(n − 2, 3) triangles that fill each loop of n vertices; none if they do not continue the surface.
 
     Loops run counterclockwise as seen from outside; `normals` are those of the faces behind their edges, loop after
     loop; `taken` are sorted `edge_keys` that may not be made; `most` is the root mean square of the angles at the rim.
@@ -185,7 +185,7 @@ def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints
 def _least_bent(
     corners: Floats, ids: Ints, normals: Floats, starts: Ints, taken: Ints, most: float
 ) -> tuple[Ints, Bools]:
-    """Triangles, by places in their loops, and whether each loop's bend at its rim at most by an angle.
+    """Triangles, as places in their loops, and whether each loop's bend at the rim is within an angle.
 
     `cost[i, j]` is the bend of the best lid between corners i and j, without the edge between them; `rims[i, j]` sums
     lengths times squared angles at the rim; `across[i, j]` is the normal of its triangle there.
@@ -320,7 +320,7 @@ def closed_by(vertices: Floats, faces: Ints, *, bent: bool = True, outlines: Int
 
 @dataclass(frozen=True, eq=False)
 class _Surface(Frozen):
-    """A chain of triangles, and what is asked of it where it ends."""
+    """A chain of triangles, with cached properties for closing its boundary."""
 
     vertices: Floats
     faces: Ints
@@ -328,7 +328,7 @@ class _Surface(Frozen):
 
     @cached_property
     def loops(self) -> list[Ints]:
-        """Closed loops around the gaps that are to be closed."""
+        """Closed loops around the gaps to close."""
         edges, n = boundary(self.faces), len(self.vertices)
         keys, left = edges @ [n, 1], np.sort(self.outlines @ [n, 1])
         order, copies = np.argsort(keys, kind="stable"), np.arange(len(left)) - np.searchsorted(left, left)
@@ -352,22 +352,22 @@ class _Surface(Frozen):
 
     @cached_property
     def parts(self) -> Ints:
-        """(m,) faces that share edges hang together."""
+        """(m,) component of each face; shared edges connect faces."""
         return element_components(edge_table(self.faces).face_edges)
 
     @cached_property
     def patches(self) -> Ints:
-        """(m,) faces that hang together across edges that are not sharp."""
+        """(m,) component of each face; edges that are not sharp connect faces."""
         return smooth_patches(self.triangles, self.faces)
 
     @cached_property
     def tree(self) -> BoxTree:
-        """Their boxes."""
+        """Tree of the faces' boxes."""
         return BoxTree.of(self.triangles.min(axis=1), self.triangles.max(axis=1))
 
     @cached_property
     def _sides(self) -> tuple[Ints, Ints]:
-        """Sorted keys of the directed sides of faces, and the sides: of several, that which `behind` takes first."""
+        """Sorted keys of directed sides, and the sides; among equal keys the one that `behind` prefers comes first."""
         keys = (self.faces * len(self.vertices) + np.roll(self.faces, -1, axis=1)).ravel()
         table = edge_table(self.faces)
         alone = len(table.vertices) + np.arange(self.faces.size).reshape(-1, 3)
@@ -384,7 +384,7 @@ class _Surface(Frozen):
 
 
 def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
-    """(k, 3) triangles that close the small holes of a surface, and its gaps without area, between their vertices."""
+    """(k, 3) triangles between the vertices of small holes and of gaps without area."""
     surface = _Surface(vertices, faces, outlines)
     triangles, chosen, corners = [np.empty((0, 3), dtype=np.int64)], [], []
     for loop in surface.loops:
@@ -415,7 +415,7 @@ def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
 
 
 def _with_sides(loop: Ints, places: Ints, lid: Ints) -> Ints:
-    """Triangles between the corners of a loop, at these places, divided at the points of its straight sides."""
+    """Divide triangles between the corners of a loop at the points of the loop's straight sides."""
     for begin, end in zip(places, [*places[1:], places[0] + len(loop)], strict=True):
         side = loop[np.arange(begin, end + 1) % len(loop)]
         if len(side) > 2:
@@ -426,12 +426,12 @@ def _with_sides(loop: Ints, places: Ints, lid: Ints) -> Ints:
 
 
 def _fan(points: Ints) -> Ints:
-    """(k − 2, 3) triangles from the first of some points to the others."""
+    """(k − 2, 3) triangles from the first of k points to the others."""
     return np.stack([np.full(len(points) - 2, points[0]), points[1:-1], points[2:]], axis=1)
 
 
 def strips(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
-    """(k, 3) triangles between vertices of rims that run along each other, along stretches or all around."""
+    """(k, 3) triangles between rims that run along each other, in part or all around."""
     surface = _Surface(vertices, faces, outlines)
     chain = np.concatenate([faces, *walls.seams(_rims(surface))])
     surface = _Surface(vertices, chain, outlines)
@@ -441,7 +441,7 @@ def strips(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
 
 
 def _rims(surface: _Surface) -> list[walls.Rim]:
-    """Rims of what is more than a single face."""
+    """Rims of parts with more than one face."""
     if not surface.loops:
         return []
     counts = np.bincount(surface.parts)
@@ -455,7 +455,7 @@ def _rims(surface: _Surface) -> list[walls.Rim]:
 
 
 def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
-    """Return the lid of a loop: the points that it adds to the loop's, and triangles."""
+    """Make the lid of a loop: the points added to those of the loop, and triangles."""
     corners = surface.vertices[loop]
     if len(loop) == 3:
         return np.empty((0, 3)), np.array([[0, 1, 2]])
@@ -468,7 +468,7 @@ def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
 
 
 def _spanned(surface: _Surface, loop: Ints, frame: Frame | None, bent: bool) -> tuple[Floats, Ints] | None:
-    """Close a loop by a lid, triangulated in a plane or without one in a disc; None if it crosses itself there."""
+    """Make the lid of a loop, triangulated in a plane or in a disc; None if the loop crosses itself there."""
     corners, behind = surface.vertices[loop], surface.behind(loop)[0]
     rim = lids.SmoothRim.of(corners)
     smooth = lids.pattern(rim, frame)

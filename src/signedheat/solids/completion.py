@@ -44,7 +44,7 @@ SIDES = 16
 
 
 def seams(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Floats, Ints]:
-    """Points on the rims of faces, (k, 3), at most a step apart, and triangles, (m, 3), to the borders of patches.
+    """(k, 3) points on rims, at most a step apart, and (m, 3) triangles from them to the borders of patches.
 
     Examples
     --------
@@ -78,7 +78,7 @@ def seams(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Fl
 
 
 def small_gaps(vertices: Floats, faces: Ints) -> Ints:
-    """(k, 3) triangles that close the gaps of few sides that seams leave."""
+    """(k, 3) triangles that fill the small gaps that seams leave."""
     around = [loop for loop in loops(vertices, faces, boundary(faces)) if len(loop) <= SIDES]
     fans = [np.stack([np.full(len(loop) - 2, loop[0]), loop[1:-1], loop[2:]], axis=1) for loop in around]
     return np.concatenate([np.empty((0, 3), dtype=np.int64), *fans])
@@ -196,7 +196,7 @@ def complete(
 def completed(
     shape: ShapeLike | Sequence[ShapeLike], options: Completion, method: Heat, progress: Progress | None = None
 ) -> Solid:
-    """Return the solid of a shape, or a solid as it is: see `complete`."""
+    """Complete a shape, see `complete`; a solid is returned as it is."""
     if isinstance(shape, Solid):
         return shape
     joined = joined_shape(shape)
@@ -247,7 +247,7 @@ def oriented_points(cloud: PointCloud) -> tuple[PointCloud, tuple[Note, ...]]:
 
 
 def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
-    """Return the solid of a mesh, from the decision which of its faces bound it; origins are triangles of the mesh."""
+    """Make the solid of a mesh whose bounding faces are known. Its origins are triangles of the mesh."""
     vertices = mesh.vertices
     counts = np.abs(decided.counts)
     faces = np.where((decided.counts < 0)[:, None], chain.faces[:, ::-1], chain.faces)
@@ -276,13 +276,13 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
 
 
 def _made_from(places: Floats, faces: Ints, added: Ints, origins: Ints) -> Surface:
-    """Return a closed surface of faces and those added to them; only the first faces have origins."""
+    """Make a closed surface of given and added faces. Only given faces have origins."""
     whole = np.concatenate([faces, added])
     return Surface(places[whole], whole, np.append(origins, np.full(len(whole) - len(origins), -1)), True)
 
 
 def _torn(vertices: Floats, faces: Ints, origins: Ints, scatter: float, method: Heat) -> list[Surface]:
-    """Complete a torn body by the zero set of φ; return that alone if the faces scatter around it."""
+    """Complete a torn body by the zero set of φ, which replaces faces that scatter around it."""
     triangles = vertices[faces]
     given = Surface(triangles, faces, origins, False)
     names, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
@@ -307,7 +307,7 @@ def _torn(vertices: Floats, faces: Ints, origins: Ints, scatter: float, method: 
 
 
 def scatter_of(triangles: Floats, labels: Ints) -> float:
-    """Return the distance of corners that noise has separated, if it has separated most of them; otherwise 0."""
+    """Distance between corners that noise has separated; 0 if it has not separated most of them."""
     points = triangles.reshape(-1, 3)
     owners = np.repeat(labels, 3)
     near, which = scipy.spatial.cKDTree(points).query(points, min(8, len(points)), workers=-1)
@@ -319,7 +319,7 @@ def scatter_of(triangles: Floats, labels: Ints) -> float:
 
 
 def _from_points(cloud: PointCloud, method: Heat) -> Solid:
-    """Return the solid that oriented points sample; if they bound nothing, a small triangle for each."""
+    """Make the solid that oriented points sample; points that bound nothing become small triangles."""
     if cloud.normals is None:
         raise SourceError("the point cloud has no normals, which say what is inside", remedy="give it normals")
     gap = mean_gap(np.asarray(cloud.points))

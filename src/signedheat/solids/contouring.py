@@ -53,7 +53,7 @@ class Quadrics:
 
     @classmethod
     def of(cls, owners: Ints, places: Floats, normals: Floats, count: int) -> Quadrics:
-        """Sum planes, each through a place, relative to the centre of its owner, with a normal of length 1."""
+        """Sum planes, given by places relative to the centres of their owners and by unit normals."""
         along = (normals * places).sum(axis=1)[:, None]
         products = sums_of(normals[:, :, None] * normals[:, None, :], owners, count)
         return cls(products, sums_of(normals * along, owners, count))
@@ -66,7 +66,7 @@ class Quadrics:
 
 
 def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats, Ints, Floats]:
-    """(n, 3) points of least error of quadrics in boxes, how many directions planes fix, and the one fixed least.
+    """(n, 3) points of least error of quadrics in boxes, (n,) ranks of the planes, (n, 3) least fixed directions.
 
     A minimum outside of its box moves along the direction in which the error grows the least, that of a crease, until
     it is in the box; or else it is looked for again on the wall that it is beyond the farthest, up to three times.
@@ -103,7 +103,7 @@ def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats
 
 
 def _way_into(points: Floats, along: Floats, lower: Floats, upper: Floats) -> Floats:
-    """Return the shortest moves along directions into boxes; 0 where a line misses its box."""
+    """Return the shortest moves along given directions into boxes; 0 where a line misses its box."""
     slow = np.where(np.abs(along) > 1e-12, along, 1e-12)
     first, second = (lower - points) / slow, (upper - points) / slow
     enter, leave = np.minimum(first, second).max(axis=1), np.maximum(first, second).min(axis=1)
@@ -112,7 +112,7 @@ def _way_into(points: Floats, along: Floats, lower: Floats, upper: Floats) -> Fl
 
 
 def _solved(values: Floats, vectors: Floats, sides: Floats, least: Floats) -> Floats:
-    """A⁻¹ b without eigenvalues below `least`."""
+    """Solve A x = b without eigenvalues below `least`."""
     inverse = np.where(values > least[:, None], 1.0 / np.where(values > least[:, None], values, 1.0), 0.0)
     return np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, sides, optimize=True)
 
@@ -155,7 +155,7 @@ class ImplicitSurface(Protocol):
 
 
 def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats) -> Floats:
-    """(3, v, 3) candidates for the vertex of each piece of a level: the best anywhere, in its cell, in its middle."""
+    """(3, v, 3) candidates for the vertex of each piece of a level: best overall, best in its cell, middle."""
     count = len(cells.owners)
     vertices, middles, wider = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
     rows, sides = np.nonzero(cells.edges >= 0)
@@ -181,7 +181,7 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats
 
 
 def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
-    """(v,) whether to take the wider candidate: of those near each other, the one that moves the least."""
+    """(v,) whether to take the wider candidate; among vertices near each other, the one that moves least may."""
     away = np.where(np.isnan(wider[:, 0]), np.inf, np.linalg.norm(wider - vertices, axis=1))
     taken: Bools = (np.floor(wider) == cells.places[cells.owners]).all(axis=1)
     rows = np.flatnonzero(np.isfinite(away) & ~taken)
@@ -198,7 +198,7 @@ def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
 def _vertices(
     offset: ImplicitSurface, grid: Grid, places: Ints, alone: Bools, owners: Ints, points: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Vertices of some pieces in their cells, their middles, and wider candidates up to `BEYOND` outside, or NaN."""
+    """Vertices of pieces in their cells, their middles, and candidates up to `BEYOND` outside, or NaN."""
     count = len(places)
     step = float(grid.spacing.max())
     corners = grid.origin + places * grid.spacing
@@ -267,7 +267,7 @@ def divided_along_creases(
 
 
 def _creases_off(offset: ImplicitSurface, spacing: Floats, vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:
-    """(k, 2) halfedges of bent edges off the level, one per face, and (k, 3) places on creases or the level."""
+    """(k, 2) halfedges of bent edges off the level, at most one per face, and (k, 3) points on the crease or level."""
     step = float(spacing.max())
     normals, edges = unit(area_vectors(vertices[faces])), edge_table(faces).pairs
     edges = edges[normals[edges // 3].prod(axis=1).sum(axis=1) < np.cos(BENT)]
@@ -318,7 +318,7 @@ STEEPEST = 2.0
 
 
 def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
-    """Heights above a surface at the nodes of blocks, which are found together if it is a level of distance."""
+    """Heights above a surface at the nodes of blocks; a level of distance is computed for all blocks at once."""
     tree, windings = prepared(offset.solid)
     values = np.empty((len(blocks), SIDE, SIDE, SIDE), dtype=np.float32)
     level = offset.level
@@ -352,7 +352,7 @@ def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) 
 def traced(
     offset: ImplicitSurface, grid: Grid, values: NodeValues, crossings: Crossings, cells: DualCells, report: Progress
 ) -> tuple[Floats, Ints]:
-    """Vertices and faces of a surface, from the edges of a grid that it crosses and its pieces in cells."""
+    """Vertices and faces of a surface, given the crossed edges of a grid and the pieces in its cells."""
     report(0.4, "edges")
     nodes, axes = crossings.nodes, crossings.axes
     guesses = nodes.astype(np.float64)
@@ -368,7 +368,7 @@ def traced(
 
 
 def announce_lost(offset: Offset, grid: Grid, vertices: Floats) -> None:
-    """Warn where the contour of a surface, with (n, 3) vertices, misses whole parts of it or a share of its area."""
+    """Warn if the contour of a surface misses whole parts of it or much of its area."""
     parts, lost = _lost(offset, grid, vertices)
     n_parts = len(np.unique(parts))
     gone = n_parts - len(np.unique(parts[~lost]))
@@ -380,7 +380,7 @@ def announce_lost(offset: Offset, grid: Grid, vertices: Floats) -> None:
 
 
 def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
-    """Parts of a solid that places on a surface belong to, and which places have no vertex of its contour nearby."""
+    """Sample a surface: the part of the solid for each place, and whether the contour has no vertex nearby."""
     features = offset.solid.tree.features
     moved = callable(offset.reach) or offset.reach != 0
     faces = np.arange(len(features.faces)) if moved else np.flatnonzero(offset.solid.bounding[features.ids])
@@ -404,7 +404,7 @@ def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
 
 
 def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCells]:
-    """Heights near a surface, the edges that it crosses, and its pieces in cells; blocks it goes on into are added."""
+    """Heights near a surface, the edges that it crosses, and its pieces in cells; blocks are added as needed."""
     places = blocks_at(offset, grid)
     done = BlockValues(Blocks.of(places[:0], grid.shape), np.empty((0, SIDE, SIDE, SIDE), dtype=np.float32))
     while True:
@@ -455,7 +455,7 @@ def blocks_at(offset: Offset, grid: Grid) -> Ints:
 
 
 def crossed_edges(band: BlockValues) -> Crossings:
-    """Edges whose ends lie on both sides of a surface, and where, by linear interpolation."""
+    """Edges whose ends lie on both sides of a surface, with crossings by linear interpolation."""
     parts = []
     for window in np.unique(band.blocks.places // WINDOW, axis=0).astype(np.int64):
         first, size = window * WINDOW * SIDE, WINDOW * SIDE
@@ -464,7 +464,7 @@ def crossed_edges(band: BlockValues) -> Crossings:
 
 
 def crossings_in(heights: Floats, first: Ints) -> list[Crossings]:
-    """Crossed edges between the nodes of a window of a grid that begins at a node, along each axis."""
+    """Crossed edges between the nodes of a window of a grid, along each axis."""
     below, held, found = heights < 0, ~np.isnan(heights), []
     for axis in range(3):
         ahead = tuple(slice(1, None) if k == axis else slice(0, -1) for k in range(3))
@@ -476,7 +476,7 @@ def crossings_in(heights: Floats, first: Ints) -> list[Crossings]:
 
 
 def joined_crossings(parts: Sequence[Crossings]) -> Crossings:
-    """Those of several windows and axes."""
+    """Join the crossings of several windows and axes."""
     if not any(len(part.axes) for part in parts):
         raise OutsideError(
             "the distance takes the level nowhere between the nodes of the grid",

@@ -339,7 +339,7 @@ def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, Face
 
 
 def _beyond_rim(surface: FaceFeatures, front: NearestFaces) -> Bools:
-    """(n,) whether the nearest place of a point is on the rim, and the point not straight above or below it."""
+    """(n,) whether a point's nearest place is on the rim and the point is not straight above or below it."""
     rim_edges = np.bincount(surface.edges.ravel()) == 1
     rim_vertices = np.zeros(len(surface.vertices), dtype=bool)
     on_rim = rim_edges[surface.edges]

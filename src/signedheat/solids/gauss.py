@@ -79,7 +79,7 @@ class Pieces(Frozen):
 
 
 def system_of(pieces: Pieces) -> Matrix | Dipoles:
-    """Return the system of some pieces: many loose triangles are dipoles, all else has exact solid angles."""
+    """Make the system of some pieces: dipoles for many loose triangles, exact solid angles for the rest."""
     sizes, areas = np.bincount(pieces.labels), pieces.areas
     many = areas.sum() ** 2 > MANY * (areas**2).sum() and areas[sizes == 1].sum() > 0.5 * areas.sum()
     return Dipoles.of_triangles(pieces) if many or len(areas) > DENSE else Matrix.of(pieces)
@@ -93,7 +93,7 @@ def means(values: Floats, groups: Ints, weights: Floats, n: int) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Matrix:
-    """W of few pieces, by exact solid angles."""
+    """Matrix W of few pieces, by exact solid angles."""
 
     matrix: Floats
     places: Floats
@@ -130,14 +130,14 @@ class Matrix:
         return cls(matrix, places, normals, owners, pieces.areas[owners] / counts[owners], np.zeros(len(owners)))
 
     def chosen(self, kept: Bools) -> Matrix:
-        """Return the system of some of the pieces, numbered anew."""
+        """Restrict the system to some of the pieces, which are numbered anew."""
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
         matrix = self.matrix[rows][:, kept]
         return Matrix(matrix, self.places[rows], self.normals[rows], owners, self.areas[rows], self.within[rows])
 
     def weights(self) -> Floats:
-        """(k,) weights of least squares, the signs of which orient."""
+        """(k,) least-squares weights, whose signs orient the pieces."""
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
         weighted = self.matrix * shares[:, None]
         normal = weighted.T @ self.matrix
@@ -147,11 +147,11 @@ class Matrix:
         return np.asarray(scipy.linalg.solve(normal, weighted.T @ (0.5 + self.within), assume_a="pos"))
 
     def levels(self, signs: Floats) -> Floats:
-        """(n,) levels at the samples, less the bodies that do not matter there."""
+        """(n,) levels at the samples, without the bodies ignored there."""
         return np.asarray(self.matrix @ signs - self.within)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
-        """(n,) levels at the samples that the pieces of the same group, (k,), make."""
+        """(n,) levels at the samples, due to the pieces of the same group, (k,)."""
         result = np.empty(len(self.owners))
         for group in np.unique(groups):
             members, rows = groups == group, groups[self.owners] == group
@@ -160,7 +160,7 @@ class Matrix:
 
 
 def without_slender(pieces: Pieces) -> Pieces:
-    """Return the pieces with slender triangles halved."""
+    """Halve slender triangles."""
     triangles, labels = pieces.triangles, pieces.labels
     for _ in range(HALVINGS):
         lengths = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
@@ -177,7 +177,7 @@ def without_slender(pieces: Pieces) -> Pieces:
 
 
 def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
-    """Faces and (n, 3) places on them: one for each piece and `count` more, half by area, half alike for all."""
+    """Sample faces, and (n, 3) places on them: one for each piece and `count` more, half by area, half by number."""
     areas, k = pieces.face_areas, len(pieces.areas)
     order = np.lexsort((morton_codes(pieces.triangles.mean(axis=1)), pieces.labels))
     shares = pieces.areas / max(pieces.areas.sum(), np.finfo(float).tiny)
@@ -205,7 +205,7 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
 def _small_pieces(
     corners: Floats, starts: Ints, vectors: Floats, balls: Floats, places: Floats, own: Ints, matrix: Floats
 ) -> None:
-    """Winding numbers of pieces of few faces at places on faces; beyond `FAR` times their radius they are dipoles."""
+    """Winding numbers of small pieces at places on faces; beyond `FAR` radii they are dipoles."""
     for piece in range(len(starts) - 1):
         begin, end = starts[piece], starts[piece + 1]
         if end - begin > LARGE:
@@ -227,7 +227,7 @@ def _small_pieces(
 
 @dataclass(frozen=True, eq=False)
 class Dipoles:
-    """W of many small faces, or points: each is a dipole, softened at the scale of the distance to its neighbours."""
+    """W of many small faces, or points, as dipoles softened at the scale of the distance to neighbours."""
 
     places: Floats  # (n, 3) each: where they are, and unit normals
     normals: Floats
@@ -238,7 +238,7 @@ class Dipoles:
 
     @classmethod
     def of_triangles(cls, pieces: Pieces) -> Dipoles:
-        """One for each triangle, for parts of slender ones, or for as many as there is room for."""
+        """Make a dipole for each triangle or part of a slender one, or for as many as fit."""
         pieces = without_slender(pieces)
         faces, areas = np.arange(len(pieces.triangles)), pieces.face_areas
         if len(faces) > ELEMENTS:
@@ -252,12 +252,12 @@ class Dipoles:
 
     @cached_property
     def tree(self) -> BoxTree:
-        """Over the places."""
+        """Tree over the places."""
         return BoxTree.of(self.places, self.places)
 
     @cached_property
     def balls(self) -> Floats:
-        """(2 · leaves, 4) middle of the box of each node, and the squared distance from which on it is one dipole."""
+        """(2 · leaves, 4) middle of each node's box, and the squared distance beyond which the node is one dipole."""
         low, high = self.tree.bounds[:, :3], self.tree.bounds[:, 3:]
         with np.errstate(invalid="ignore"):  # of nothing
             radii = 0.5 * np.linalg.norm(high - low, axis=1) + float(np.median(self.softening))
@@ -265,7 +265,7 @@ class Dipoles:
         return np.where(np.isfinite(balls), balls, 0.0)
 
     def chosen(self, kept: Bools) -> Dipoles:
-        """Return the system of some of the pieces, numbered anew."""
+        """Restrict the system to some of the pieces, which are numbered anew."""
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
         values = (self.places, self.normals, self.areas, self.softening, self.within)
@@ -273,7 +273,7 @@ class Dipoles:
         return Dipoles(places, normals, areas, owners, softening, within)
 
     def weights(self) -> Floats:
-        """(k,) weights after some steps of conjugate gradients."""
+        """(k,) weights after a fixed number of steps of conjugate gradients."""
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
         smooth = agreement(self.places, self.normals, shares, self.owners)
         held = HELD * np.bincount(self.owners, shares)
@@ -296,11 +296,11 @@ class Dipoles:
         return weights
 
     def levels(self, signs: Floats) -> Floats:
-        """(n,) levels at the places, less the bodies that do not matter there."""
+        """(n,) levels at the places, without the bodies ignored there."""
         return self._numbers(signs) - self.within
 
     def _numbers(self, signs: Floats) -> Floats:
-        """(n,) winding numbers at the places, of all other dipoles."""
+        """(n,) winding numbers at the places, due to all other dipoles."""
         vectors = self.normals * (self.areas * signs[self.owners])[:, None]
         nodes = self._sums(vectors)
         (sums,) = in_chunks(
@@ -310,11 +310,11 @@ class Dipoles:
         return sums / (4.0 * np.pi)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
-        """(n,) levels at the places that the pieces of the same group, (k,), make: of loose triangles none."""
+        """(n,) levels at the places, due to pieces of the same group, (k,); loose triangles have none."""
         return np.zeros(len(self.owners))
 
     def _adjoint(self, charges: Floats) -> Floats:
-        """(k,) what the transpose of W makes of values at the places: the field of charges there, at each dipole."""
+        """(k,) product of the transpose of W with values at the places: the field of charges there, at each dipole."""
         away = self.places - self.balls[1, :3]
         nodes = self._sums(np.c_[charges, charges[:, None] * away])
         nodes[:, 1:] -= nodes[:, :1] * (self.balls[:, :3] - self.balls[1, :3])  # moments about the middles of nodes
@@ -326,7 +326,7 @@ class Dipoles:
         return np.bincount(self.owners, flux).astype(np.float64)
 
     def _sums(self, values: Floats) -> Floats:
-        """(2 · leaves, d) sums of (n, d) values over what is below each node."""
+        """(2 · leaves, d) sums of (n, d) values below each node."""
         leaves = len(self.tree.items) // LEAF
         sums = np.zeros((2 * leaves, values.shape[1]))
         there = self.tree.items >= 0
@@ -339,7 +339,7 @@ class Dipoles:
 
 
 def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> sparse.csr_array:
-    """(k, k) Laplacian with signs, times μ, of pieces of which neighbours lie in one plane, more or less.
+    """(k, k) signed Laplacian, times μ, of pieces whose neighbours lie roughly in one plane.
 
     Places count less off each other's plane, and where two pieces have many: these know for themselves.
     """
@@ -374,7 +374,7 @@ def spacing(places: Floats) -> Floats:
 def _potentials(
     places: Floats, softening: Floats, vectors: Floats, items: Ints, balls: Floats, nodes: Floats, at: Ints
 ) -> Floats:
-    """Sum ``v · d / (|d|² + ε²)^(3/2)`` at some places over all others, d the way there."""
+    """Sum ``v · d / (|d|² + ε²)^(3/2)`` at places over all others, d pointing to these."""
     leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.zeros(len(at))
     for row in range(len(at)):
         p = at[row]
@@ -408,7 +408,7 @@ def _potentials(
 def _fields(
     places: Floats, softening: Floats, charges: Floats, items: Ints, balls: Floats, nodes: Floats, at: Ints
 ) -> Floats:
-    """Sum ``c d / (|d|² + ε²)^(3/2)`` at places over all others, d the way from there; ε is the place's own."""
+    """Sum ``c d / (|d|² + ε²)^(3/2)`` at places over all others, d pointing from these, with the place's own ε."""
     leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.zeros((len(at), 3))
     for row in range(len(at)):
         p = at[row]

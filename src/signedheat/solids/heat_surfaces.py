@@ -41,7 +41,7 @@ CLEARANCE = 10
 
 
 def winding_numbers(nodes: NodeSources, shape: tuple[int, ...], positions: Floats, vectors: Floats) -> Floats:
-    """Return winding numbers around the nodes of a grid of a shape with area vectors (s, d), smooth over two cells."""
+    """Winding numbers around the nodes of a grid, of a shape with area vectors (s, d), smoothed over two cells."""
     dimension = len(shape)
     spacing = nodes.steps[4 - dimension :]
     room = _room(nodes, dimension)
@@ -73,7 +73,7 @@ def winding_numbers(nodes: NodeSources, shape: tuple[int, ...], positions: Float
 
 
 def _room(nodes: NodeSources, dimension: int) -> list[tuple[int, int]]:
-    """Return layers of nodes to add before and behind along each axis, so that no vectors are close to the walls."""
+    """Layers of nodes to add before and behind along each axis, so that no vectors are near the walls."""
     taken = nodes.nonzero()[0][:, 4 - dimension :]
     before, behind = taken.min(axis=0), np.array(nodes.shape[4 - dimension :]) - 1 - taken.max(axis=0)
     rooms = np.maximum(0, CLEARANCE - np.stack([before, behind], axis=1))
@@ -81,7 +81,7 @@ def _room(nodes: NodeSources, dimension: int) -> list[tuple[int, int]]:
 
 
 def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Floats]:
-    """Return mean positions and sums of the area vectors in each block of `BLOCK` cells."""
+    """Mean positions and sums of the area vectors in blocks of `BLOCK` cells."""
     blocks = np.floor(positions / BLOCK).astype(np.int64)
     blocks -= blocks.min(axis=0)
     which = blocks[:, 0]
@@ -97,7 +97,7 @@ def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Float
 
 
 def _sources(nodes: NodeSources, shape: tuple[int, ...], below: list[int], spacing: Floats) -> Floats:
-    """Return ∇·(n δ) on a grid with these layers of nodes before its own; there are no vectors at its walls."""
+    """∇·(n δ) on a grid with added layers of nodes; there are no vectors at its walls."""
     dimension = len(shape)
     right = np.zeros((1,) * (4 - dimension) + shape)
     first, scales = np.zeros(4, dtype=np.int64), np.zeros(4)
@@ -112,7 +112,7 @@ def _sources(nodes: NodeSources, shape: tuple[int, ...], below: list[int], spaci
 def _add_divergence(
     stretches: Ints, places: NDArray[np.int32], sums: NDArray[np.float32], first: Ints, scales: Floats, right: Floats
 ) -> None:
-    """Add differences of the vectors in some stretches, between the nodes before and behind."""
+    """Add differences of the vectors of some stretches between the nodes before and behind."""
     skipped = 0
     while scales[skipped] == 0.0:
         skipped += 1
@@ -129,7 +129,7 @@ def _add_divergence(
 
 
 def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, Floats]:
-    """Return a lattice of places, in cells, on a wall of the box, half a cell beyond its last nodes, 8 cells apart."""
+    """Lattice of places, in cells, 8 cells apart, on a wall half a cell beyond the last nodes of the box."""
     lines = [
         np.array([shape[d] - 0.5 if end else -0.5])
         if d == axis
@@ -152,7 +152,7 @@ def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
 
 @compiled
 def _far_field(places: Floats, dipoles: Floats, strengths: Floats, axis: int, core: float) -> tuple[Floats, Floats]:
-    """Return the winding number at places, and its derivative along an axis."""
+    """Winding number at places, and its derivative along an axis."""
     dimension = places.shape[1]
     sphere = 2.0 * np.pi if dimension == 2 else 4.0 * np.pi
     value, slope = np.zeros(len(places)), np.zeros(len(places))
@@ -185,14 +185,14 @@ up to .034, 40 on a stem .043."""
 
 @dataclass(frozen=True)
 class Heat:
-    """How the signed heat method is run: what is imposed on φ, `ZeroSet` if None, and τ in ``t = τ h²``."""
+    """Options of the signed heat method: constraint on φ (None for `ZeroSet`), and τ in ``t = τ h²``."""
 
     constraint: Constraint | None = None
     diffusion: float = 1.0
 
 
 def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0.0) -> tuple[Floats, Ints] | None:
-    """Vertices and faces of the zero set of φ around a shape, closed; None where the shape bounds nothing.
+    """Extract the closed zero set of φ around a shape, as vertices and faces; None if the shape bounds nothing.
 
     Cells are as large as noise is wide, or a share of the gaps between points; 0 means the smallest.
     """

@@ -161,7 +161,7 @@ def _length(corners: Floats) -> float:
 
 
 def _holes(around: Rims, lengths: Floats, faces: Ints, decided: Bounding, used: Ints) -> Bools:
-    """(l,) which loops are holes: along what bounds, scraps of it included; of sheets, all of one but its longest."""
+    """(l,) whether loops are holes: those along bounding faces, and all of a sheet but its longest."""
     n = int(faces.max(initial=-1)) + 1
     keys = (faces * n + np.roll(faces, -1, axis=1)).ravel()
     order = np.argsort(keys, kind="stable")
@@ -183,7 +183,7 @@ def _holes(around: Rims, lengths: Floats, faces: Ints, decided: Bounding, used: 
 
 
 def _through(around: Rims, vertices: Floats, named: Ints) -> Bools:
-    """(l,) which loops pass through a vertex of those named, or another one at its place."""
+    """(l,) whether loops pass through one of the named vertices, or through another vertex at its place."""
     places = same_positions(vertices)
     there = [np.isin(places[named], places[loop]) for loop in around]
     missed = ~np.any(np.array(there, dtype=bool).reshape(-1, len(named)), axis=0)

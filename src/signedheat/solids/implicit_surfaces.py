@@ -53,7 +53,7 @@ class Implicit:
         return np.maximum(self.function(np.clip(points, *self.box)), self._beyond(points).max(axis=1))
 
     def slopes(self, points: Floats) -> tuple[Floats, Floats]:
-        """(n,) distances from the surface, by the slope of the function, and (n, 3) unit vectors of its growth."""
+        """(n,) distances from the surface, estimated by the slope of the function, and (n, 3) unit gradients."""
         places = np.clip(points, *self.box)
         gradients = self.gradient(places)
         steepness = np.maximum(np.linalg.norm(gradients, axis=1), np.finfo(float).tiny)
@@ -70,7 +70,7 @@ class Implicit:
         return points - away[:, None] * ways, ways
 
     def _beyond(self, points: Floats) -> Floats:
-        """(n, 6) how far points lie beyond each wall."""
+        """(n, 6) distances of points beyond each wall."""
         return np.concatenate([self.box[0] - points, points - self.box[1]], axis=1)
 
 
@@ -225,7 +225,7 @@ def contour(
 
 
 def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats, grid: Grid, level: float) -> Implicit:
-    """Return the level set of a function; of its differences, steps balance rounding and curvature."""
+    """Make the level set of a function; steps of differences balance rounding and curvature."""
 
     def values(points: Floats) -> Floats:
         return _called(f, points, ())[..., 0] - level
@@ -248,7 +248,7 @@ def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats
 
 
 def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
-    """(n, 1) or (n, 3) finite numbers that a function returns for points."""
+    """Call a function on points, and check its (n, 1) or (n, 3) finite numbers."""
     parts = [np.empty((0, *(shape or (1,))))]
     for begin in range(0, len(points), TOGETHER):
         asked = points[begin : begin + TOGETHER]
@@ -269,7 +269,7 @@ def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
 
 
 def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, level: float) -> tuple[Implicit, Grid]:
-    """Return the level set of values at nodes, and the grid with one more node on each side."""
+    """Make the level set of values at nodes, and the grid with one more node on each side."""
     values = array_of(f, "f").astype(np.float64)
     if values.ndim != 3 or min(values.shape) < 2 or not np.isfinite(values).all():
         raise GeometryError(
@@ -298,7 +298,7 @@ def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, 
 
 
 def _slopes(values: Floats, axis: int) -> tuple[Floats, Floats]:
-    """Differences from node to node along an axis, of the second order, and by how much these change.
+    """Second-order differences from node to node along an axis, and how much they change.
 
     Of three parabolas the one that bends least counts (Harten et al. 1987): slopes do not reach across edges.
     """

@@ -53,7 +53,7 @@ class Film(Lid):
 
 @dataclass(frozen=True, eq=False)
 class SmoothRim:
-    """A closed loop without its zigzags, which does not depend on how many corners there are on straight parts."""
+    """A closed loop without zigzags, whatever the number of corners on its straight parts."""
 
     length: float  # that of the loop
     starts: Floats  # (n + 1,) share of it at which each corner of the loop comes; the last is 1
@@ -64,7 +64,7 @@ class SmoothRim:
 
     @classmethod
     def of(cls, corners: Floats) -> SmoothRim:
-        """Return that of a loop."""
+        """Smooth a loop."""
         sides = np.roll(corners, -1, axis=0) - corners
         starts, length = spanning.shares_of(corners)
         steps = np.diff(starts)[:, None]
@@ -85,12 +85,12 @@ class SmoothRim:
         return cls(length, starts, (ends[0] - ends[1]) / SMOOTH, places)
 
     def edges_at(self, places: Floats) -> Ints:
-        """(m,) corner that comes last before each of these places."""
+        """(m,) the last corner before each place."""
         return np.minimum(np.searchsorted(self.starts, places % 1.0, side="right") - 1, len(self.starts) - 2)
 
 
 def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
-    """Edges and shares of places around a loop: its vertices, and more, none farther than 1 / `PIECES` apart."""
+    """Edges and shares of points along a loop: its vertices, and more, at most 1 / `PIECES` of its length apart."""
     lengths = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
     counts = np.maximum(np.ceil(lengths * PIECES / lengths.sum() - 1e-9), 1).astype(np.int64)
     edges = np.repeat(np.arange(len(loop)), counts)
@@ -98,7 +98,7 @@ def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
 
 
 def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:
-    """Return a film before it is solved for, in a plane or a disc; None if its loop crosses itself in the plane."""
+    """Triangulate a film, in a plane or in a disc, before it is solved for; None if its loop crosses itself."""
     if frame is None:
         flat = _around_disc(rim.places[:-1])
         inner = spanning.points_in_disc(len(flat))
@@ -122,7 +122,7 @@ def _around_disc(shares: Floats) -> Floats:
 
 
 def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tuple[Floats, Ints] | None:
-    """Return a lid that spans a loop and follows another: the points that it adds to the loop's, and triangles.
+    """Make a lid that spans a loop and follows another lid: the points added to the loop's, and triangles.
 
     It is triangulated in the same plane, or the same disc; None if the loop's shadow in the plane crosses itself.
     """
@@ -149,7 +149,7 @@ def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tup
 
 
 def film(pattern: Film) -> Film:
-    """Return the lid of least area, near enough: each shape's lengths give the next (Pinkall & Polthier 1993).
+    """Make the lid of nearly least area: each shape's lengths give the next one (Pinkall & Polthier 1993).
 
     No weight is negative, so that the lid stays within the hull of its rim.
     """
@@ -169,7 +169,7 @@ def film(pattern: Film) -> Film:
 
 
 def _membrane(vertices: Floats, n: int, ends: Ints, weights: Floats) -> Floats:
-    """Vertices of which all but the first n are the weighted means of those that edges join them to."""
+    """Solve for vertices of which all but the first n are weighted means of their neighbours."""
     here, there = np.concatenate([ends, ends[::-1]], axis=1)
     both = np.concatenate([weights, weights])
     inner, fixed = (here >= n) & (there >= n), (here >= n) & (there < n)
@@ -183,7 +183,7 @@ def _membrane(vertices: Floats, n: int, ends: Ints, weights: Floats) -> Floats:
 
 
 def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: float) -> Film | None:
-    """Return a lid bent as a thin plate whose shape at rest is as curved as the surface behind its rim (Helfrich 1973).
+    """Bend a lid as a thin plate whose rest shape is as curved as the surface behind its rim (Helfrich 1973).
 
     ``min Σ |(L x)_v − m_v κ_v n_v − Σ_e ½ |e| g_e|² / (m_v + s_v)``. L is the cotangent Laplacian, m the areas of
     vertices, κ twice the mean curvature at the rim and harmonic inside, and g_e = e × n / |e × n| the direction across
@@ -228,7 +228,7 @@ def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: f
 
 
 def _load(rim: Floats, normals: Floats) -> Floats:
-    """(n, 3) the sum over both edges at each point of a rim of half their length along −g, see `plate`."""
+    """(n, 3) sum over both edges at each rim point of half their length along −g, see `plate`."""
     sides = np.roll(rim, -1, axis=0) - rim
     lengths = np.linalg.norm(sides, axis=1)
     load = np.zeros((len(rim), 3))
@@ -238,14 +238,14 @@ def _load(rim: Floats, normals: Floats) -> Floats:
 
 
 def _harmonic(lid: Lid, values: Floats) -> Floats:
-    """Values at the rim, one or several for each point, and between them harmonic on the lid."""
+    """Extend values at the rim, one or several per point, harmonically over the lid."""
     n, matrix = lid.n_rim, stiffness(lid)
     inner = sparse.linalg.splu(matrix[n:, n:].tocsc()).solve(-(matrix[n:, :n] @ values))
     return np.concatenate([values, inner])
 
 
 def _sides(faces: Ints, n: int) -> Ints:
-    """(m, 3) numbers of the edges across from the corners of triangles."""
+    """(m, 3) edge opposite each corner of the triangles."""
     one, other = np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)
     return np.minimum(one, other) * n + np.maximum(one, other)
 
@@ -269,13 +269,13 @@ def stiffness(lid: Lid) -> sparse.csr_array:
 
 
 def vertex_normals(lid: Lid) -> Floats:
-    """(n, 3) unit normals, means by area of those of the triangles around each vertex."""
+    """(n, 3) unit normals at vertices: area-weighted means over the triangles around them."""
     vectors = np.repeat(area_vectors(lid.vertices[lid.faces]), 3, axis=0)
     return unit(sums_of(vectors, lid.faces.ravel(), len(lid.vertices)))
 
 
 def running_mean(values: Floats, reach: int) -> Floats:
-    """(n,) values along a loop, each the mean of those up to so many places away."""
+    """(n,) means along a loop over values up to so many places away."""
     window = np.ones(2 * reach + 1) / (2 * reach + 1)
     return np.convolve(np.concatenate([values[len(values) - reach :], values, values[:reach]]), window, mode="valid")
 
@@ -322,12 +322,12 @@ def is_flat(points: Floats) -> bool:
 
 
 def flat_lid(loop: Floats) -> tuple[Floats, Ints] | None:
-    """Return the lid of a planar loop, as added points and triangles; None if it crosses itself."""
+    """Make the lid of a planar loop, as added points and triangles; None if the loop crosses itself."""
     return _filled(loop, len(loop), [np.arange(len(loop))])
 
 
 def creased(loop: Floats, normals: Floats) -> tuple[Floats, Ints] | None:
-    """Return the lid of flat faces that closes a rim, as added points and triangles; None if there is none.
+    """Make the lid of flat faces that closes a rim, as added points and triangles; None if there is none.
 
     Consecutive sides in a plane are closed in that plane by a straight crease, if the sides before and after them lie
     in a plane with their ends; three such runs, by creases to the point where their planes meet. This restores edges
@@ -365,7 +365,7 @@ def _straight_sides(loop: Floats, normals: Floats) -> list[_Side]:
 
 
 def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
-    """Return the longest runs of two or more sides in a plane whose lid is not folded back, the largest first."""
+    """Find the longest runs of two or more sides in a plane whose lid is not folded back, the largest first."""
     n = len(sides)
     starts = points[[side.points[0] for side in sides]]
     ways = unit(np.roll(starts, -1, axis=0) - starts)
@@ -388,7 +388,7 @@ def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
 
 
 def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple[_Run, _Run, _Run]] | None:
-    """Return the point near a loop of three runs where their planes meet, and the runs."""
+    """Find the point near a loop of three runs where their planes meet, and the runs."""
     following = {run.first: run for run in runs}
     for one in runs:
         two = following.get((one.first + one.count) % n_sides)
@@ -408,7 +408,7 @@ def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple
 
 
 def _closed_by_a_crease(points: Floats, sides: list[_Side], runs: list[_Run]) -> _Run | None:
-    """Return the first run whose ends lie in a plane with the sides before and after it."""
+    """Find the first run whose ends lie in a plane with the sides before and after it."""
     n = len(sides)
     for run in runs:
         if n - run.count < 2:
@@ -422,7 +422,7 @@ def _closed_by_a_crease(points: Floats, sides: list[_Side], runs: list[_Run]) ->
 
 
 def _filled(points: Floats, n_rim: int, polygons: list[Ints]) -> tuple[Floats, Ints] | None:
-    """Points after those of a rim, and triangles of planar polygons; None if one crosses itself."""
+    """Triangulate planar polygons: the points added to those of a rim, and triangles; None if one crosses itself."""
     vertices, faces, count = [points], [], len(points)
     for polygon in polygons:
         corners = points[polygon]

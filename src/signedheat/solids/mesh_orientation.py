@@ -151,7 +151,7 @@ def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Ori
 
 
 def oriented_as(shape: Mesh, chain: Chain, decided: Bounding) -> Orientation:
-    """Return what a decision about the chain of a mesh makes of the mesh."""
+    """Apply a decision about the chain of a mesh to the mesh."""
     owners = owners_of(shape)
     n = int(owners.max()) + 1
     there = chain.numbers >= 0
@@ -209,12 +209,12 @@ def oriented_as(shape: Mesh, chain: Chain, decided: Bounding) -> Orientation:
 
 
 def owners_of(shape: Mesh) -> Ints:
-    """(m,) face that each triangle of a mesh is part of."""
+    """(m,) face of the mesh that each triangle is part of."""
     return shape.refinement.face_polygons if isinstance(shape, PolygonMesh) else np.arange(shape.n_faces)
 
 
 def _turned_mesh(shape: Mesh, kept: Ints, flipped: Bools) -> Mesh:
-    """Return some faces of a mesh, some of them turned; the mesh itself where nothing changes."""
+    """Take some faces of a mesh, some of them turned; return the mesh itself if nothing changes."""
     if not flipped.any() and len(kept) == (shape.n_faces if isinstance(shape, TriangleMesh) else shape.n_polygons):
         return shape
     if isinstance(shape, TriangleMesh):
@@ -276,7 +276,7 @@ def orient(
 
 
 def agreeing_faces(mesh: TriangleMesh) -> Ints:
-    """(m, 3) faces, turned where most of the area of their component faces the other way."""
+    """(m, 3) faces that agree, oriented as most of the area of their component."""
     heads = np.roll(mesh.faces, -1, axis=1).ravel()
     ids = welded_vertices(mesh.vertices, mesh.faces.ravel(), heads)
     tails, owners = ids[mesh.faces.ravel()], np.repeat(np.arange(mesh.n_faces), 3)

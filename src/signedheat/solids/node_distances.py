@@ -60,7 +60,7 @@ def distances_in(
 def solved(
     tree: FaceTree, windings: Windings, grid: Grid, places: Ints
 ) -> tuple[NDArray[np.float32], NDArray[np.float16]]:
-    """(n, 8, 8, 8) signed distances at the nodes of blocks near each other, and confidence; NaN beyond the grid."""
+    """(n, 8, 8, 8) signed distances at the nodes of nearby blocks, NaN beyond the grid; and confidence."""
     first = places.min(axis=0)
     distances, trusted = distances_in(tree, windings, grid, SIDE * first, places)
     values = np.full((len(places), SIDE, SIDE, SIDE), np.nan, dtype=np.float32)
@@ -73,7 +73,7 @@ def solved(
 
 
 def _inside(windings: Windings, grid: Grid, first: Ints, values: Floats) -> Bools:
-    """Which nodes are inside, computed once for nodes that no surface separates: those farther than half a step."""
+    """Find the nodes inside; connected nodes farther than half a step from any surface share one test."""
     origin, steps = grid.origin + first * grid.spacing, grid.spacing
     inside = np.zeros(values.shape, dtype=bool)
     far = values > 0.5 * (1.0 + SLACK) * float(steps.max())
@@ -91,7 +91,7 @@ def _inside(windings: Windings, grid: Grid, first: Ints, values: Floats) -> Bool
 
 @compiled
 def _farthest(values: Floats, groups: NDArray[np.int32], count: int) -> Ints:
-    """(count,) flat index of the node of each group from 1 on with the greatest value."""
+    """(count,) flat index of the node with the greatest value in each group from 1 on."""
     result = np.full(count, -1, dtype=np.int64)
     most = np.zeros(count)
     n0, n1, n2 = values.shape
@@ -180,7 +180,7 @@ def _fill(
 def _nearest(
     rows: Floats, faces: NDArray[np.int32], count: int, places: Floats, away: Floats, best: Floats, which: Ints
 ) -> None:
-    """Find the nearest of some faces to each place: write the ways to all faces, the least squares, and their faces."""
+    """Find the nearest of some faces to each place, and write the ways, least squares and faces."""
     for e in range(len(best)):
         best[e], which[e] = np.inf, 0
     for c in range(count):
@@ -202,7 +202,7 @@ def _divide(
     out: NDArray[np.int32],
     counts: Ints,
 ) -> None:
-    """Return the faces that can be nearest to a node of each of eight boxes.
+    """Find the faces that can be nearest to a node of each of eight boxes.
 
     Squared distance is convex, so it lies above its tangent plane at the centre: twice the way from the foot.
     """
@@ -228,7 +228,7 @@ def _divide(
 
 @compiled
 def _leaves_of_tree(bounds: Floats, discs: Floats, box: Floats, stack: Ints, out: Ints) -> int:
-    """Write the leaves that can be nearest to a node of a box; returns how many, or one more than there is room for."""
+    """Write the leaves that can be nearest to a node of a box; return their number, one more if there is no room."""
     leaves = len(bounds) // 2
     kept, depth = 0, 1
     stack[0] = 1

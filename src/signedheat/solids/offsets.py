@@ -47,16 +47,16 @@ class Offset:
 
     @property
     def level(self) -> float | None:
-        """The level of the distance that this is, if it is one."""
+        """The level of distance, if the distance is constant and round."""
         return None if callable(self.reach) or (self.limit > 1 and self.reach != 0) else self.reach
 
     @property
     def named(self) -> str:
-        """What it is, for messages."""
+        """Name of the surface in messages."""
         return "the distance that varies" if callable(self.reach) else f"level {self.reach:g}"
 
     def distance(self, points: Floats) -> Floats:
-        """(n,) heights of (n, 3) points above the surface, negative inside; distances, unless these vary."""
+        """(n,) heights of (n, 3) points above the surface, negative inside; these are distances if constant."""
         if self.level is not None:
             heights: Floats = self.solid.distance(points) - self.level
             return heights
@@ -72,7 +72,7 @@ class Offset:
         return heights, gradients
 
     def _heights(self, points: Floats) -> tuple[Floats, Floats]:
-        """(n,) heights, and their (n, 3) gradients as if the distance did not vary."""
+        """(n,) heights, and (n, 3) gradients that ignore how the distance varies."""
         closest = self.solid.closest(points)
         heights, gradients = closest.distances, closest.gradients
         reach = self.reach(closest.points) if callable(self.reach) else np.full(len(points), self.reach)
@@ -92,7 +92,7 @@ class Offset:
     def _mitred(
         self, away: Floats, places: Floats, heights: Floats, gradients: Floats, reach: Floats
     ) -> tuple[Floats, Floats]:
-        """Distance from the planes around the nearest places in place of that from these, and its gradients."""
+        """Distance from the planes around the nearest places, and its gradients."""
         far = np.abs(heights)
         near = np.flatnonzero((heights * reach > 0) & (far >= np.abs(reach)) & (far < 2 * self.limit * np.abs(reach)))
         if not len(near):
@@ -115,7 +115,7 @@ class Offset:
 
     @cached_property
     def _normals(self) -> Floats:
-        """Of the triangles of the tree; 0 where they do not have the inside behind them only."""
+        """Normals of the triangles; 0 where they do not have the inside behind them only."""
         features = self.solid.tree.features
         return np.where(self.solid.bounding[features.ids][:, None], features.face_normals, 0.0)
 
@@ -130,7 +130,7 @@ class Offset:
 
 
 def checked_reach(reach: Reach) -> Reach:
-    """Return the function, refused where it does not give a finite number for each place."""
+    """Wrap a function of places so that anything but finite numbers is refused."""
 
     def called(places: Floats) -> Floats:
         values = np.asarray(reach(places), dtype=np.float64)
@@ -149,7 +149,7 @@ def checked_reach(reach: Reach) -> Reach:
 def _steepest(
     rows: Floats, bounds: Floats, items: Ints, normals: Floats, places: Floats, slack: float
 ) -> tuple[Floats, Ints]:
-    """Return the triangle at each place above which its point is the highest, or −1, and this height."""
+    """Find the triangle at each place above which its point is highest, or −1, and this height."""
     heights, faces = np.full(len(places), -np.inf), np.full(len(places), -1, dtype=np.int64)
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
     for p in range(len(places)):
@@ -204,7 +204,7 @@ class SheetWall:
 
     @classmethod
     def around(cls, sheet: Shapes, grid: Grid[Literal[3]], above: float, below: float) -> SheetWall:
-        """Return the wall around meshes of triangles or polygons."""
+        """Make the wall around meshes of triangles or polygons."""
         for part in as_list(sheet):
             if area_elements(part).corners.shape[1:] != (3, grid.dimension):
                 raise SourceError(
@@ -237,7 +237,7 @@ class SheetWall:
         return cls(FaceTree.of(features), grid.origin, step, above, below, rim, places, sides, around, outward)
 
     def depths(self, points: Floats) -> Floats:
-        """(n,) how far (n, 3) points are outside of the wall, negative inside."""
+        """(n,) distances of (n, 3) points outside the wall, negative inside."""
         points = points - self.origin + self.step
         found = self.tree.search(points)
         if self.above == self.below:
@@ -248,7 +248,7 @@ class SheetWall:
         return depths if self.rim is None else np.maximum(depths, self._beyond(points, found))
 
     def _beyond(self, points: Floats, found: NearestFaces) -> Floats:
-        """(n,) how far points are beyond the rim, negative over the surface."""
+        """(n,) distances beyond the rim, negative over the surface."""
         faces, features = found.faces, found.features
         at = np.full((len(points), 2), -1)
         edges, vertices = (features > 0) & (features < 4), features > 3

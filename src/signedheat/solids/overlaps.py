@@ -34,7 +34,7 @@ one."""
 
 
 def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) -> Floats:
-    """(n,) levels at the centres of some triangles, each in its own group, where each is there as often as it counts.
+    """(n,) levels at the centres of some triangles, each due to its own group, with counts as multiplicities.
 
     Examples
     --------
@@ -116,7 +116,7 @@ class Bodies:
 
     @classmethod
     def of(cls, pieces: Pieces, directed: Floats, groups: Ints, alone: Floats, given: Floats) -> Bodies:
-        """Those of directed pieces, of whose area so much faces as it was given."""
+        """Find the bodies among directed pieces, given how much of their area faces as it was given."""
         n = len(groups)
         itself = np.abs(alone) >= SHEET
         names, owners = np.unique(np.where(itself, n + np.arange(n), groups), return_inverse=True)
@@ -187,13 +187,13 @@ def bodies_around(
 
 
 def parts_of(triangles: Floats, numbers: Ints, count: int, closed: Floats) -> list[Floats]:
-    """Triangles of each body, from ascending numbers of bodies of all; what is closed, if anything is, is one more."""
+    """Split triangles into bodies, by ascending body numbers; closed triangles, if any, are one more body."""
     parts = np.split(triangles, np.searchsorted(numbers, np.arange(count + 1)))[1:]
     return [*parts[:count], closed] if len(closed) else parts[:count]
 
 
 def _windings(places: Floats, normals: Floats, sizes: Floats, parts: list[Floats]) -> tuple[Ints, Ints, Floats]:
-    """Places, bodies whose box they lie in, and their winding numbers there: means of both sides of faces."""
+    """Places, the bodies whose boxes contain them, and their winding numbers there, as means of both sides."""
     boxes = np.array([(corners.min(axis=(0, 1)), corners.max(axis=(0, 1))) for corners in parts])
     starts, others = BoxTree.of(boxes[:, 0], boxes[:, 1]).meeting(np.repeat(places[:, None], 3, axis=1))
     rows = np.repeat(np.arange(len(places)), np.diff(starts))

@@ -82,7 +82,7 @@ CHUNK = 50_000
 
 
 def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats) -> Floats:
-    """φ, with its zero set moved onto a smooth surface through oriented points where there are any.
+    """Move the zero set of φ onto a smooth surface through oriented points, where there are any.
 
     Near the zero set φ becomes the weighted mean of ``½ (n_i + n) · (x − p_i)`` over the nearest points, n the weighted
     mean of their normals. The plane of a point lies on one side of a curved surface, and the plane through it with the
@@ -128,7 +128,7 @@ def _slopes(phi: Floats, nodes: Ints, steps: Floats) -> Floats:
 
 
 def mean_gap(points: Floats) -> float:
-    """Side of a square that each of (n, 3) points would have on a plane, from the disks that hold their six nearest."""
+    """Side of the square per point, if (n, 3) points were spread over a plane as over their six nearest."""
     reach = scipy.spatial.cKDTree(points).query(points, k=[min(7, len(points))])[0]
     return float(np.median(reach) * np.sqrt(np.pi / 7.0))
 
@@ -136,7 +136,7 @@ def mean_gap(points: Floats) -> float:
 def _fit(
     places: Floats, ahead: Floats, reach: Floats, points: Floats, normals: Floats, gap: float
 ) -> tuple[Floats, Floats]:
-    """Height of each place above the surface through the (k, n, 3) points around it, and how far it counts."""
+    """Height of each place above the surface through the (k, n, 3) points around it, and its weight."""
     cosines = np.einsum("pki,pi->pk", normals, ahead)
     facing = cosines > ALIKE
     ranked = np.sort(np.where(facing, reach, np.inf), axis=1)

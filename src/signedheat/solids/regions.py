@@ -29,7 +29,7 @@ NEAR = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """What is known of each face from the regions beside it."""
+    """Whether the inside lies behind and in front of each face."""
 
     behind: Bools  # (m,) each: whether it is inside behind the face, and in front of it
     ahead: Bools
@@ -37,7 +37,7 @@ class Regions:
 
     @classmethod
     def of(cls, pieces: Arrangement, windings: Windings) -> Regions:
-        """Of pieces that meet in whole edges, among them all of the cycle that has these winding numbers."""
+        """Find the regions of pieces that meet in whole edges and contain the cycle with these winding numbers."""
         first, reverse = coincident_faces(pieces.faces.ravel(), np.arange(0, pieces.faces.size + 1, 3))
         first = np.where(first < 0, np.arange(len(first)), first)  # triangles on fewer than three points
         distinct, which = np.unique(first, return_inverse=True)
@@ -58,7 +58,7 @@ class Regions:
 
 
 def _windings(points: Floats, faces: Ints, normals: Floats, times: Ints, windings: Windings) -> Floats:
-    """(m, 2) winding numbers behind each face and in front of it; faces of different corners, each there so often."""
+    """(m, 2) winding numbers behind and in front of each distinct face, given its multiplicity."""
     n = len(faces)
     one, other = _around_edges(points, faces, normals, times)
     levels, labels = (values.reshape(-1, 2) for values in _levels(times, one, other))
@@ -81,7 +81,7 @@ def _windings(points: Floats, faces: Ints, normals: Floats, times: Ints, winding
 
 
 def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> tuple[Ints, Ints]:
-    """Pairs of sides, 2 f behind face f and 2 f + 1 in front of it, that face each other around edges, clearest first.
+    """Pairs of sides that face each other around edges, clearest first; 2 f is behind face f, 2 f + 1 in front.
 
     Where faces do not balance at an edge, rims of what is open are, and nothing is known. Directions across edges come
     from the planes that faces are pieces of, so that slivers have them, too.
@@ -118,14 +118,14 @@ def _ways(table: EdgeTable, halfedges: Ints) -> Ints:
 
 
 def _facing(table: EdgeTable, turning: Ints, reached: Ints) -> tuple[Ints, Ints]:
-    """Sides that face each other from halfedges to those that follow counterclockwise around their edge."""
+    """Pair sides that face each other, from each halfedge to the next one counterclockwise around its edge."""
     forward = table.forward.ravel()
     return 2 * (turning // 3) + forward[turning], 2 * (reached // 3) + ~forward[reached]
 
 
 @compiled
 def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints]:
-    """Levels of the sides of faces, alike in pairs of sides that face each other; and what hangs together.
+    """Levels of the sides of faces, equal for sides that face each other; and their components.
 
     In front of a face it is less than behind it by how often the face is there; later contradictions do not count.
     """
@@ -161,12 +161,12 @@ def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints]:
 
 
 def _slack(points: Floats) -> float:
-    """Distance from faces at which their sides are looked at, at least."""
+    """Least distance from faces at which their sides are probed."""
     return NEAR * TOUCHING * float(np.ptp(points, axis=0).max())
 
 
 def widest(pieces: Arrangement) -> Floats:
-    """(p, 3) for each piece the middle of the widest one in its cell."""
+    """(p, 3) middle of the widest face of each piece."""
     order = np.lexsort((-_widths(pieces.points, pieces.faces), pieces.cells))
     first = order[np.searchsorted(pieces.cells[order], np.arange(int(pieces.cells.max()) + 1))]
     middles: Floats = pieces.points[pieces.faces[first]].mean(axis=1)[pieces.cells]
@@ -174,7 +174,7 @@ def widest(pieces: Arrangement) -> Floats:
 
 
 def _widths(points: Floats, faces: Ints) -> Floats:
-    """(m,) areas of triangles over their longest sides."""
+    """(m,) widths of triangles: area over longest side."""
     a, b, c = (points[corners] for corners in faces.T)
     b, c, longest = b - a, c - a, np.linalg.norm(c - b, axis=1)
     for side in (b, c):

@@ -26,7 +26,7 @@ STRAIGHT = 1e-5
 
 
 def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:
-    """(k, 2) directed edges that the faces of each part lack, and (k,) ascending, the parts that lack them.
+    """(k, 2) directed edges that the faces of each part lack, and (k,) these parts, ascending.
 
     If k more faces run along an edge in one direction than in the other, it is listed k times, as missing faces would
     run along it. As many of these edges begin at each vertex as end there.
@@ -50,7 +50,7 @@ def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:
 
 
 def boundary(faces: Ints) -> Ints:
-    """(k, 2) directed edges that faces lack, as often as they do: with them, each edge is balanced by opposite ones.
+    """(k, 2) directed edges that faces lack, with multiplicity: together with them, all edges are balanced.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def boundary(faces: Ints) -> Ints:
 
 
 def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
-    """Return closed loops around the gaps of faces, along all of their boundary edges; none passes a vertex twice.
+    """Find closed loops around the gaps of faces, along all boundary edges; no loop passes a vertex twice.
 
     Where several loops meet at a vertex, each edge that arrives there goes on along the edge at the other side of the
     gap beside it. Where gaps hang together at vertices, loops come apart there, beginning far from the middle of all.
@@ -101,7 +101,7 @@ def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
 
 
 def _normals(vertices: Floats, faces: Ints) -> Floats:
-    """(n, 3) unit normals at vertices: means over the faces there, by their angles."""
+    """(n, 3) unit normals at vertices, as angle-weighted means over faces."""
     corners = vertices[faces]
     ahead, back = unit(np.roll(corners, -1, axis=1) - corners), unit(np.roll(corners, 1, axis=1) - corners)
     angles = np.arccos(np.clip((ahead * back).sum(axis=2), -1.0, 1.0))
@@ -111,7 +111,7 @@ def _normals(vertices: Floats, faces: Ints) -> Floats:
 
 @compiled
 def _across_gaps(starts: Ints, names: Ints) -> Ints:
-    """Find the edge that follows each one, by the edges that leave each vertex and, as −1 − e, arrive, in order.
+    """Find the edge that follows each one, given the edges at each vertex in order; −1 − e if e arrives.
 
     Gaps are nested as parentheses are.
     """
@@ -132,7 +132,7 @@ def _across_gaps(starts: Ints, names: Ints) -> Ints:
 
 @compiled
 def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) -> tuple[Ints, Ints]:
-    """Edges loop by loop, and where each loop stops; walks begin at the edges that come first in an order."""
+    """Edges loop by loop, and the end of each loop; walks begin at the edges that come first in an order."""
     n = len(tails)
     place, walk, passed = np.full(n_vertices, -1), np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
     edges, stops, count, n_loops = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), 0, 0
@@ -159,7 +159,7 @@ def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) ->
 
 
 def corners_of(points: Floats) -> Ints:
-    """(k,) which points of a closed loop are corners: the loop does not go straight on there.
+    """(k,) corners of a closed loop: points where it does not go straight on.
 
     Examples
     --------
@@ -171,7 +171,7 @@ def corners_of(points: Floats) -> Ints:
 
 
 def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
-    """Pairs of edges, without common ends, that run along each other in opposite directions: where patches meet.
+    """Pairs of edges, without common ends, that run along each other in opposite directions, as patches do.
 
     Examples
     --------

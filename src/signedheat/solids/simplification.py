@@ -88,7 +88,7 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
 
 
 def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
-    """(k, 3, 3) parts of (n, 3, 3) pieces, each cut upright on that side of a triangle that leaves most on both sides.
+    """(k, 3, 3) parts of (n, 3, 3) pieces, cut upright on the side of a triangle that leaves most on both sides.
 
     Pieces much larger than their triangle, and those that no side cuts, are halved along their longest side.
     """
@@ -107,7 +107,7 @@ def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
 
 
 def _cut(pieces: Floats, heights: Floats) -> Floats:
-    """(3 n, 3, 3) parts of pieces whose corners have (n, 3) heights of both signs, none of which has both."""
+    """(3 n, 3, 3) parts of pieces cut where the (n, 3) heights of their corners change sign."""
     above = heights > 0
     alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), above.argmin(axis=1))
     turn = (alone[:, None] + np.arange(3)) % 3
@@ -119,7 +119,7 @@ def _cut(pieces: Floats, heights: Floats) -> Floats:
 
 
 def _halved(pieces: Floats, sides: Floats) -> Floats:
-    """(2 n, 3, 3) halves of pieces whose sides are that long, divided at the middle of the longest."""
+    """(2 n, 3, 3) halves of pieces, divided at the middle of their longest side."""
     turn = (np.argmax(sides, axis=1)[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(pieces, turn[:, :, None], axis=1).swapaxes(0, 1)
     middle = 0.5 * (a + b)
@@ -129,7 +129,7 @@ def _halved(pieces: Floats, sides: Floats) -> Floats:
 
 @compiled
 def _bounds(rows: Floats, pieces: Floats, faces: NDArray[np.int32]) -> Floats:
-    """(n,) square of the distance of the farthest corner of each of (n, 3, 3) pieces from a face of its own."""
+    """(n,) squared distance of the farthest corner of each of (n, 3, 3) pieces from its own face."""
     result = np.zeros(len(pieces))
     for p in range(len(pieces)):
         for c in range(3):
