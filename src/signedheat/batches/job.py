@@ -382,7 +382,7 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
 
 
 def faults_of(surface: TriangleMesh) -> dict[str, object]:
-    """Pairs of faces that cross, and edges that not exactly two faces share."""
+    """Count pairs of faces that cross, and edges that not exactly two faces share."""
     return {
         "self_intersections": len(self_intersections(surface.vertices, surface.faces)),
         "bad_edges": int((edge_table(surface.faces).face_counts != 2).sum()),
@@ -395,7 +395,7 @@ def _places(triangles: Floats) -> Floats:
 
 
 def _openings(completion: Floats) -> int:
-    """Return connected parts of what completes."""
+    """Count the connected parts of a completion."""
     if not len(completion):
         return 0
     _, faces = np.unique(completion.reshape(-1, 3), axis=0, return_inverse=True)

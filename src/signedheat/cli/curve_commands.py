@@ -30,7 +30,7 @@ from .terminal import ProgressBar
 
 
 def about_curves(written: str) -> tuple[Option, ...]:
-    """Return the arguments of a distance to curves on a surface, and of what is written."""
+    """Return the arguments of commands that measure distance to curves on a surface."""
     return (
         option(
             "mesh",
@@ -218,7 +218,7 @@ def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -
 
 
 def _with_pieces(field: sh.VertexField, summary: dict[str, Any], text: str) -> str:
-    """Add which curves were turned and which left out, to a summary and to the text that is returned."""
+    """Add the curves that were turned or left out to a summary and its text."""
     note = field.diagnostics.note(distance.CurvesTaken)
     if note is None:
         return text

@@ -32,7 +32,7 @@ from ..view import draw_shape, new_figure
 
 
 def solids() -> None:
-    """Solids on grids: faces, points without normals, surfaces, sharpening, samples."""
+    """Run solids on grids: faces, points without normals, surfaces, sharpening, samples."""
     ball = samples.sphere(2)
     broken = samples.with_flipped_faces(samples.without_faces(samples.union(ball, samples.sphere(2, center=(1, 0, 0))),
                                                               0.1), 0.1)  # fmt: skip
@@ -50,7 +50,7 @@ def solids() -> None:
 
 
 def reports() -> None:
-    """Return what `info` and pictures take."""
+    """Run what `info` and pictures need."""
     ball = samples.sphere(2)
     inspect(ball)
     widths(orientation(ball).shape)
@@ -58,13 +58,13 @@ def reports() -> None:
 
 
 def plane() -> None:
-    """Lines in the plane."""
+    """Run distance to lines in the plane."""
     line = Polyline([[0.5, 0.2], [0.2, 7.5]])
     signed_distance(line, Grid((0, 0), 1.0, (9, 9))).contour(0.0)
 
 
 def curves() -> None:
-    """Curves on triangles: exact distance, completion, jumps."""
+    """Run exact distance, completion and jumps of curves on triangles."""
     ball = samples.sphere(2)
     curve = _curve(ball)
     signed_distance(curve, ball)
@@ -73,7 +73,7 @@ def curves() -> None:
 
 
 def surfaces() -> None:
-    """Curves on triangles: the method, contours, sharpening."""
+    """Run the method, contours and sharpening for curves on triangles."""
     ball = samples.sphere(2)
     field = SignedHeatSolver(ball).distance([_curve(ball), ball.points_at(3)])
     field.contour(0.1)
@@ -83,7 +83,7 @@ def surfaces() -> None:
 
 
 def other_surfaces() -> None:
-    """Points, polygons, voxels."""
+    """Run points, polygons and voxels."""
     ball = samples.sphere(2)
     cloud = PointCloud(ball.vertices)
     SignedHeatSolver(cloud).distance(cloud.points_at(3))
@@ -93,7 +93,7 @@ def other_surfaces() -> None:
 
 
 def intrinsic() -> None:
-    """Intrinsic triangulations."""
+    """Run intrinsic triangulations."""
     ball = samples.sphere(1)
     field = SignedHeatSolver(ball, intrinsic=True).distance(_curve(ball))
     field.restrict().contour(0.1)
@@ -101,7 +101,7 @@ def intrinsic() -> None:
 
 
 def tets() -> None:
-    """Distance on tets, few and many: their systems are factorised or iterated."""
+    """Run distance on few tets and on many: systems are factorised or iterated."""
     ball = samples.sphere(1)
     SignedHeatSolver(tetrahedralize(ball, resolution=7, grading=np.inf)).distance(ball)
     field = SignedHeatSolver(tetrahedralize(ball, resolution=5)).distance(ball)

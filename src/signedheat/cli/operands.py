@@ -90,7 +90,7 @@ def read_source(arguments: Namespace, path: str | None = None) -> Any:
 
 
 def unit_in_use(arguments: Namespace, *paths: str) -> str | None:
-    """Find the unit of the lengths that a command prints and writes, of ``--units`` or its files; None if nobody says.
+    """Find the unit of printed and written lengths, from ``--units`` or the files; None if it is unknown.
 
     Where only some files state one, or they state different ones, the first counts for all.
     """
@@ -103,17 +103,17 @@ def unit_in_use(arguments: Namespace, *paths: str) -> str | None:
 
 
 def named(unit: str | None, power: str = "") -> str:
-    """Return a unit after a length, or ``power="³"`` after a volume; nothing if it is unknown."""
+    """Return a unit to print after a length, or with ``power="³"`` after a volume; empty if it is unknown."""
     return "" if unit is None else f" {unit}{power}"
 
 
 def place(coordinates: Iterable[float]) -> str:
-    """Return a place, in a line."""
+    """Write a place in one line."""
     return f"({', '.join(f'{x:.4g}' for x in coordinates)})"
 
 
 def solid_of(arguments: Namespace, path: str) -> Any:
-    """Return the shape in a file, completed as the options say; what matters about it goes to standard error."""
+    """Complete the shape in a file as the options say, and print important notes on standard error."""
     repair = {name: getattr(arguments, name) for name in ("as_oriented", "keep_overlaps", "lids", "nested")}
     with prefix_errors(path), ProgressBar(is_quiet(arguments)) as progress:
         solid = complete(read_source(arguments, path), **repair, progress=progress)
@@ -122,7 +122,7 @@ def solid_of(arguments: Namespace, path: str) -> Any:
 
 
 def placement(arguments: Namespace, path: str) -> Floats | None:
-    """Return the map of ``--units`` and ``--transform``, units first; None if neither is given."""
+    """Return the map for ``--units``, then ``--transform``; None if neither is given."""
     if arguments.units is None and arguments.transform is None:
         return None
     matrix = np.eye(4)
@@ -134,7 +134,7 @@ def placement(arguments: Namespace, path: str) -> Floats | None:
 
 
 def unit_scale(arguments: Namespace, path: str) -> float:
-    """Return the factor of ``--units``: 1 where neither it nor the file names the units that the file is in."""
+    """Return the factor for ``--units``; 1 if neither the option nor the file names the unit of the file."""
     assumed, _, wanted = arguments.units.rpartition(":")
     if not assumed and unit_of(path) is None and not is_quiet(arguments):
         cause = f"{printable(path)} does not say its units"
@@ -143,7 +143,7 @@ def unit_scale(arguments: Namespace, path: str) -> float:
 
 
 def matrix_of(words: list[str]) -> Floats:
-    """(4, 4) from 16 or 12 numbers, row by row, or from a text file that has them."""
+    """(4, 4) matrix from 16 or 12 numbers, row by row, or from a text file of them."""
     if len(words) == 1:
         words = contents(words[0])[:10_000].decode("utf-8", "replace").replace(",", " ").split()
     try:
@@ -160,7 +160,7 @@ def matrix_of(words: list[str]) -> Floats:
 
 
 def grid_for(shape: Any, arguments: Namespace, reach: float | None = None, image: LabelImage | None = None) -> Grid:
-    """Return the grid of the options; by default that of the image, or one around the shape with room for offsets."""
+    """Make the grid of the options; by default the grid of the image, or one around the shape with room for offsets."""
     spacing = arguments.spacing
     if spacing is not None and len(spacing) == 1:
         spacing = spacing[0]
@@ -198,7 +198,7 @@ def constraint_of(word: str) -> Constraint:
 def measured(
     arguments: Namespace, image: LabelImage | None = None, reach: float | None = None
 ) -> tuple[Any, GridField]:
-    """Return the shape of a command, from its file or an image, and the distance to it, with room for offsets."""
+    """Return the shape of a command, from a file or an image, and the distance to it, with room for offsets."""
     with prefix_errors(arguments.shape):
         shape = read_source(arguments) if image is None else image.surface(arguments.label)
         return shape, compute(shape, grid_for(shape, arguments, reach, image), arguments)
@@ -231,13 +231,13 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
 
 
 def say_important(arguments: Namespace, diagnostics: Diagnostics, path: str | None = None) -> None:
-    """Say on standard error what must be known of a result, and of which file if there are several."""
+    """Print the important notes of a result on standard error, with the file's name if there are several files."""
     for note in () if arguments.quiet else diagnostics.important:
         say(printable(f"signedheat: {note}" if path is None else f"signedheat: {path}: {note}"))
 
 
 def in_band(solid: Any, grid: Grid, arguments: Namespace, progress: Progress | None) -> GridField:
-    """Distance in a band: all of it in memory, or tile by tile."""
+    """Compute distance in a band, in memory or tile by tile."""
     options = {"grid": grid, "band": arguments.band, "store": arguments.tiles, "progress": progress}
     if arguments.tiles is None or arguments.workers is None:
         return solid.field(scheduler=arguments.scheduler, **options)
@@ -247,7 +247,7 @@ def in_band(solid: Any, grid: Grid, arguments: Namespace, progress: Progress | N
 
 
 def hint(field: GridField) -> str:
-    """Return a further line of output about sources that may have been given twice, or nothing."""
+    """Return another line of output about sources that may have been given twice, or nothing."""
     note = field.diagnostics.note(SampledSource)
     cancelled = note.area_cancelled if note else 0.0
     if cancelled < CANCELLED:
@@ -259,12 +259,12 @@ def hint(field: GridField) -> str:
 
 
 def range_in_words(summary: dict[str, Any], unit: str | None) -> str:
-    """Return the least and the greatest value of a field that `describe` described."""
+    """Write the least and the greatest value of a field, taken from the figures of `describe`."""
     return f"φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}{named(unit)}"
 
 
 def on_tets(arguments: Namespace) -> tuple[Any, TetField]:
-    """Return the shape of a command, and the distance to it on tets: of a file, or around the shape."""
+    """Return the shape of a command, and the distance to it on tets from a file or around the shape."""
     shape, mesh = read_source(arguments), read(arguments.tets) if arguments.tets else None
     if mesh is not None and not isinstance(mesh, TetMesh):
         raise GeometryError(
@@ -307,7 +307,7 @@ def field_or_image(path: str) -> Any:
 
 
 def image_of(arguments: Namespace) -> LabelImage | None:
-    """Return the image of labels that the command is about, if it is about one."""
+    """Return the image of labels of a command, if there is one."""
     if extension(arguments.shape) not in IMAGES:
         return None
     image = read_labels(arguments.shape)
@@ -338,7 +338,7 @@ def thing_of(image: LabelImage) -> GridField | PolygonMesh:
 
 
 def place_of(image: LabelImage | None) -> dict[str, Any]:
-    """Where an image is, for ``--json``."""
+    """Describe the place of an image, for ``--json``."""
     if image is None:
         return {}
     return {"image": {"axes": image.axes.tolist(), "origin": image.origin.tolist(), "space": image.space}}
@@ -353,7 +353,7 @@ def ensure_surface_writable(path: str, planar: bool = False) -> None:
 
 
 def save_level(what: Any, path: str, image: LabelImage | None = None, field: GridField | None = None) -> None:
-    """Write a surface, or polylines in the plane: a surface in the place of the image that it is from.
+    """Write a surface, or polylines in the plane; a surface from an image gets the image's place.
 
     Where the field has a confidence, and the format has room for it, that is written at each vertex.
     """
@@ -367,7 +367,7 @@ def save_level(what: Any, path: str, image: LabelImage | None = None, field: Gri
 
 
 def counts(what: Any) -> dict[str, Any]:
-    """Key figures of a surface, or of polylines in the plane."""
+    """Return key figures of a surface, or of polylines in the plane."""
     if isinstance(what, list):
         closed = sum(line.closed for line in what)
         return {"lines": len(what), "closed": closed, "length": float(sum(line.length for line in what))}
@@ -375,7 +375,7 @@ def counts(what: Any) -> dict[str, Any]:
 
 
 def output_names(output: str, distances: list[float]) -> list[str]:
-    """Return the given name for one distance; a name with the distance in it for each of several."""
+    """Return the given name for one distance, or names with the distances in them for several."""
     path = Path(output)
     if len(distances) == 1 or not path.name:  # a name that is none is refused as it is
         return [output]

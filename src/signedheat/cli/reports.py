@@ -111,7 +111,7 @@ def lines_report(file: str) -> Summary:
 
 
 def image_report(file: str, image: LabelImage) -> dict[str, Any]:
-    """Return the image: where it is, and its labels or the range of its values."""
+    """Report the place of an image, and its labels or the range of its values."""
     values, labels = image.labels, labels_of(image)
     found: dict[str, Any] = {
         "file": file,
@@ -129,7 +129,7 @@ def image_report(file: str, image: LabelImage) -> dict[str, Any]:
 
 
 def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation | None) -> str:
-    """Return what to expect of a shape, in a line: whether it is whole, and if not, what is mended on the way.
+    """Say in one line whether a shape is whole, and if not, what completion will mend.
 
     Examples
     --------
@@ -167,7 +167,7 @@ def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation 
 
 
 def verdict_of_solid(solid: Solid) -> str:
-    """Return what a solid is, in a line: it is complete, and nothing of it is mended on the way.
+    """Say in one line that a solid is complete.
 
     Examples
     --------
@@ -184,7 +184,7 @@ def verdict_of_solid(solid: Solid) -> str:
 
 
 def orientation_text(found: Orientation) -> str:
-    """Which way a mesh faces, in a line.
+    """Say in one line which way a mesh faces.
 
     Examples
     --------
@@ -217,7 +217,7 @@ def orientation_text(found: Orientation) -> str:
 
 
 def curve_reports(surface: Any, sources: Sequence[Any]) -> list[dict[str, Any]]:
-    """One row per source: elements that its points lie on, kinds of segments, length, open ends."""
+    """Make a row for each source: elements with its points, kinds of segments, length, open ends."""
     mesh = surface.triangulation
     lengths = mesh.edge_lengths[mesh.edges.face_edges]
     triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
@@ -225,7 +225,7 @@ def curve_reports(surface: Any, sources: Sequence[Any]) -> list[dict[str, Any]]:
 
 
 def curve_report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str, Any]:
-    """Return the row of one source."""
+    """Make the row of one source."""
     places = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
     kinds = np.bincount(places.kinds, minlength=3)
     row: dict[str, Any] = {
@@ -260,7 +260,7 @@ def curve_report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str
 
 
 def curves_text(rows: Sequence[dict[str, Any]]) -> str:
-    """Return the rows as text, one line each."""
+    """Write the rows as text, one line each."""
     lines = []
     for number, row in enumerate(rows):
         points = f"{row['at_vertices']} at vertices, {row['on_edges']} on edges, {row['in_faces']} in faces"
@@ -279,7 +279,7 @@ def curves_text(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def _shortened(items: Sequence[Any], most: int = 6) -> str:
-    """Return the first few items of a list, as text."""
+    """Write the first few items of a list."""
     return ", ".join(map(str, items[:most])) + (", …" if len(items) > most else "")
 
 
@@ -304,7 +304,7 @@ def _widths_text(widths: Widths) -> dict[str, str]:
 
 
 def _least_spacing(shape: Any) -> float | None:
-    """Spacing of the finest grid around the shape that fits into the memory that is free; None if there is none."""
+    """Spacing of the finest grid around the shape that fits into free memory; None if there is none."""
     available = available_memory()
     if available is None or not (shape.bounds[1] > shape.bounds[0]).any():
         return None
@@ -314,7 +314,7 @@ def _least_spacing(shape: Any) -> float | None:
 
 
 def _memory(shape: Any, resolution: int) -> int | None:
-    """Estimate for a grid around the shape; nothing where the shape is a single place."""
+    """Estimate memory for a grid around the shape; None if the shape is a single place."""
     if not (shape.bounds[1] > shape.bounds[0]).any():
         return None
     return memory_estimate(Grid.around(shape.bounds, resolution), BYTES_PER_NODE, BYTES_AT_WORK)

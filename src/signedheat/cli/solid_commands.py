@@ -108,7 +108,7 @@ def volume(arguments: Namespace) -> Summary:
 
 
 def _on_tets(arguments: Namespace) -> Summary:
-    """Return the same on tets instead of a grid."""
+    """Compute the volume command's result on tets instead of a grid."""
     sh.io.ensure_writable(arguments.output, sh.io.TET_FIELD_FORMATS, "a field on tets")
     require("meshio", "fields on tets")
     shape, field = shapes.on_tets(arguments)

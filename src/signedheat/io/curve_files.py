@@ -156,7 +156,7 @@ def surface_in_space(domain: EmbeddedSurface | ForeignShape) -> EmbeddedSurface:
 
 
 def placed(group: Group, domain: EmbeddedSurface) -> CurveOrPoints:
-    """Return the curve or the points of a group."""
+    """Place the curve or the points of a group on the surface."""
     faces, weights = on_faces(group.nodes, domain)
     if group.kind == POINTS:
         return SurfacePoints(faces, weights)
@@ -166,7 +166,7 @@ def placed(group: Group, domain: EmbeddedSurface) -> CurveOrPoints:
 
 
 def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[Ints, Floats]:
-    """Face and barycentric coordinates of nodes."""
+    """Return the face and barycentric coordinates of nodes."""
     mesh = domain.triangulation
     count = np.array([len(node.vertices) for node in nodes])
     faces, weights = np.zeros(len(nodes), dtype=np.int64), np.zeros((len(nodes), 3))
@@ -240,7 +240,7 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
 
 
 def groups_of(content: dict[str, Any]) -> list[Group]:
-    """Curves with vertex ids and weights."""
+    """Parse curves with vertex ids and weights."""
     base, groups = int(content.get("index_base", 0)), []
     for group in content["groups"]:
         nodes = [
@@ -259,12 +259,12 @@ def groups_of(content: dict[str, Any]) -> list[Group]:
 
 
 def read_csv(path: PathLike, domain: EmbeddedSurface) -> list[Curve]:
-    """Polylines in space from tables of points, projected on the domain."""
+    """Read polylines in space from tables of points, and project them on the domain."""
     return [domain.polyline(points, closed=closed) for points, closed in read_point_lists(path, 3)]
 
 
 def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]:
-    """Line and point elements of an OBJ file."""
+    """Read line and point elements of an OBJ file."""
     positions, lines, points = read_obj_elements(path)
     bad = [i for ids in lines + points for i in ids if not 0 <= i < len(positions)]
     if bad:
@@ -289,7 +289,7 @@ def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]
 
 
 def nodes_of(faces: Ints, weights: Floats, domain: EmbeddedSurface) -> list[Node]:
-    """Points on faces, as nodes."""
+    """Express points on faces as nodes."""
     corners = domain.triangulation.faces[faces]
     return [
         Node(tuple(v for v, w in zip(c, b, strict=True) if w > 0), tuple(w for w in b if w > 0))
@@ -298,7 +298,7 @@ def nodes_of(faces: Ints, weights: Floats, domain: EmbeddedSurface) -> list[Node
 
 
 def _groups_to_write(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> list[Group]:
-    """Curves and points as groups of a file; closed curves end with their first point."""
+    """Express curves and points as groups of a file; closed curves end with their first point."""
     groups = []
     for number, curve in enumerate(curves):
         if not isinstance(curve, (Curve, SurfacePoints)):
@@ -316,7 +316,7 @@ def _groups_to_write(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -
 
 
 def write_json(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
-    """JSON with vertex ids and weights."""
+    """Write JSON with vertex ids and weights."""
     groups = []
     for group in _groups_to_write(curves, domain):
         nodes = [{"v": list(node.vertices), "w": list(node.weights)} for node in group.nodes]
@@ -326,7 +326,7 @@ def write_json(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
 
 
 def write_obj(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
-    """Polylines in space."""
+    """Write polylines in space."""
     vertices: list[str] = []
     elements: list[str] = []
     for curve in curves:

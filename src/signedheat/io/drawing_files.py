@@ -41,7 +41,7 @@ TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)
 
 
 def read_svg(path: PathLike) -> list[tuple[Floats, bool]]:
-    """Points of each subpath in drawing order, with y upwards, and whether it is closed."""
+    """Read the points of each subpath, in drawing order with y upwards, and whether it is closed."""
     data = contents(path)
     try:
         root = ElementTree.fromstring(data)
@@ -180,7 +180,7 @@ def _transform(text: str) -> Floats:
 
 
 def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
-    """Commands of a path with their arguments; repeated commands are expanded."""
+    """Split a path into commands with arguments; repeated commands are expanded."""
     at, command = 0, ""
     end = len(data.rstrip())
     while at < end:
@@ -202,7 +202,7 @@ def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
 
 
 def _subpaths(data: str) -> Iterator[tuple[Floats, bool]]:
-    """Points of each subpath with a length, and whether it is closed."""
+    """Return the points of each subpath that has a length, and whether it is closed."""
     points: list[Complexes] = []
     place = start = control = 0j
     before, closed = "", False
@@ -238,7 +238,7 @@ def _subpaths(data: str) -> Iterator[tuple[Floats, bool]]:
 
 
 def _whole(parts: list[Complexes], closed: bool) -> Iterator[tuple[Floats, bool]]:
-    """Return a subpath, if it has a length; it is closed if it ends where it begins, too."""
+    """Return a subpath if it has a length; it is closed also if it ends where it begins."""
     points = np.concatenate([np.zeros(0, dtype=np.complex128), *parts])
     if len(points) == 0 or (points == points[0]).all():
         return
@@ -248,7 +248,7 @@ def _whole(parts: list[Complexes], closed: bool) -> Iterator[tuple[Floats, bool]
 
 
 def _bezier(corners: list[complex]) -> Complexes:
-    """Points of a Bézier curve of any degree, by de Casteljau, without the first."""
+    """Points of a Bézier curve of any degree, by de Casteljau's algorithm, without the first."""
     t = np.arange(1, CURVE_PIECES + 1) / CURVE_PIECES
     rows = [np.full(CURVE_PIECES, corner) for corner in corners]
     while len(rows) > 1:

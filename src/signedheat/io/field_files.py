@@ -156,7 +156,7 @@ def load_field(path: PathLike) -> Field:
 
 
 def _made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
-    """Construct a grid or field from a file, and convert errors to errors of the file."""
+    """Construct a grid or field from a file; errors become errors of the file."""
     try:
         return kind(*parts, **options)
     except GeometryError as error:
@@ -213,7 +213,7 @@ def _load_band(path: PathLike) -> GridField:
 
 
 def _write_npz(field: GridField, path: Path) -> None:
-    """Of a band its blocks, and the coarse field around them."""
+    """Write an archive; of a band its blocks and the coarse field around them."""
     arrays: dict[str, Any] = {"values": field.values, "origin": field.grid.origin, "spacing": field.grid.spacing}
     arrays |= {CONFIDENCE: field.confidence, "convention": CONVENTION}
     if field.blocks is not None:
@@ -228,7 +228,7 @@ def _write_npz(field: GridField, path: Path) -> None:
 
 
 def _held_solid(path: PathLike) -> SolidQueries | None:
-    """Return the solid that a field in an archive is the distance to, if it holds one."""
+    """Return the solid of a field in an archive, if the archive holds one."""
     if "solid_factor" not in names_in_npz(path):
         return None
     found = read_npz(path, [PREFIX + name for name in SOURCE], ["solid_factor", *(PREFIX + name for name in NEEDED)])
@@ -244,7 +244,7 @@ def _write_npy(field: GridField, path: Path) -> None:
 
 
 def _write_for_vtk(field: GridField, path: Path) -> None:
-    """Of a band all nodes of its grid, for ParaView and solvers."""
+    """Write all nodes, also of a band, for ParaView and solvers."""
     grid, convention = field.grid, CONVENTION
     values: dict[str, NDArray[np.floating]] = {NAME: field.values}
     if field.blocks is not None:
@@ -261,7 +261,7 @@ def _write_nrrd(field: GridField, path: Path) -> None:
 
 
 def whole_values(field: GridField) -> NDArray[np.float32]:
-    """Values of a band at all nodes of its grid; beyond it, plus or minus its half width."""
+    """Fill in a band's values at all nodes; beyond the band they are plus or minus its half width."""
     assert field.blocks is not None
     grid, width = field.grid, np.float32(field.width)
     counts = -(-np.array(grid.shape) // SIDE)

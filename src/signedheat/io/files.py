@@ -116,7 +116,7 @@ def contents(path: PathLike) -> bytes:
 
 
 def size_of(path: PathLike) -> int:
-    """Size in bytes of a file that another package reads; refuses the same files as `contents`."""
+    """Return the size of a file that another package reads; refuse the same files as `contents`."""
     with _opened(path) as (_, size):
         return size
 
@@ -231,7 +231,7 @@ def move_into_place(source: Path, path: PathLike) -> None:
 
 
 def replaceable(path: PathLike) -> os.stat_result | None:
-    """Status of the file that would be replaced, or None; raises if it cannot be replaced."""
+    """Return the status of the file that would be replaced, or None; raise if it cannot be replaced."""
     real = Path(os.path.realpath(path))
     status = os.stat(real) if real.exists() else None
     if status is not None and not stat.S_ISREG(status.st_mode):

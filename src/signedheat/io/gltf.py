@@ -60,7 +60,7 @@ class _Scene:
     buffers: list[bytes]
 
     def body(self, primitive: dict[str, Any]) -> Body:
-        """Vertices and triangles of a primitive, without unused vertices."""
+        """Return the vertices and triangles of a primitive, without unused vertices."""
         mode = primitive.get("mode", TRIANGLES)
         if mode not in range(FAN + 1):
             raise damaged(f"primitives have the mode {mode}, which is not defined in glTF")

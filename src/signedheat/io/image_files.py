@@ -86,7 +86,7 @@ class Image:
 
 
 def read_image(path: PathLike, formats: Collection[str], purpose: str) -> Image:
-    """Read an image of real numbers in one of some formats."""
+    """Read an image of real numbers."""
     read = format_for(path, {ending: READERS[ending] for ending in formats}, purpose)
     with reading(path):
         image = read(path)
@@ -96,7 +96,7 @@ def read_image(path: PathLike, formats: Collection[str], purpose: str) -> Image:
 
 
 def _aligned(values: NDArray[Any], origin: Any, spacing: Any, **others: Any) -> Image:
-    """Return an image along x, y, z."""
+    """Make an image along x, y, z."""
     steps = np.asarray(spacing, dtype=np.float64)
     steps = np.full(values.ndim, steps) if steps.ndim == 0 else steps
     return Image(values, np.diag(steps), np.asarray(origin, dtype=np.float64), **others)
@@ -124,7 +124,7 @@ def _read_vti(path: PathLike) -> Image:
 
 
 def _read_nrrd(path: PathLike) -> Image:
-    """Return a file that the header names must lie in the same folder or below it."""
+    """Read an image; a data file that the header names must lie in the same folder or below it."""
     header, rest = _nrrd_header(contents(path))
     companion = header.get("data file")
     if companion is not None:
@@ -149,7 +149,7 @@ def _read_nrrd(path: PathLike) -> Image:
 
 
 def _nrrd_header(data: bytes) -> tuple[dict[str, str], bytes]:
-    """Fields by name in lower case, of which some may be written without a space, and what follows the header."""
+    """Split off the header: fields by lower-case name, some of which may lack a space; and the rest."""
     if not data.startswith(b"NRRD"):
         raise damaged("it does not begin with NRRD")
     fields: dict[str, str] = {}
@@ -164,7 +164,7 @@ def _nrrd_header(data: bytes) -> tuple[dict[str, str], bytes]:
 
 
 def _nrrd_vectors(text: str) -> Floats:
-    """(n, d) vectors like ``(1,0,0) (0,1,0)``; those of axes outside of space, ``none``, are NaN."""
+    """(n, d) vectors like ``(1,0,0) (0,1,0)``; the word ``none``, for axes outside of space, gives NaN."""
     words = re.findall(r"\([^)]*\)|none", text)
     rows = [[math.nan] if word == "none" else word.strip("()").split(",") for word in words]
     width = max(map(len, rows))
@@ -172,7 +172,7 @@ def _nrrd_vectors(text: str) -> Floats:
 
 
 def _nrrd_values(data: bytes, header: dict[str, str], count: int, dtype: np.dtype[Any], path: PathLike) -> NDArray[Any]:
-    """Return the values in a row; they are `count`."""
+    """Read the `count` values."""
     encoding, size = header["encoding"].lower(), count * dtype.itemsize
     skip = int(header.get("byte skip", 0))
     if encoding in ("ascii", "text", "txt"):

@@ -20,7 +20,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 
 
 def describe(field: Any) -> dict[str, Any]:
-    """Key figures of a field, for ``--json``."""
+    """Return key figures of a field, for ``--json``."""
     if isinstance(field, GridField):
         note = field.diagnostics.note(SampledSource)
         where = {
@@ -45,7 +45,7 @@ def describe(field: Any) -> dict[str, Any]:
 
 
 def snake(name: str) -> str:
-    """Return a class name as a key of JSON.
+    """Convert a class name to a key of JSON.
 
     Examples
     --------

@@ -118,7 +118,7 @@ def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:
 
 
 def _rows_of_words(words: list[str], counts: Ints) -> Iterator[str]:
-    """As many words on each line as it counts."""
+    """Split lines into words, as many as each line announces."""
     return (" ".join(islice(left, count)) for left in [iter(words)] for count in counts.tolist())
 
 
@@ -138,7 +138,7 @@ def read_obj(path: PathLike) -> Elements:
 
 
 def read_obj_elements(path: PathLike) -> tuple[Floats, list[list[int]], list[list[int]]]:
-    """All vertices of an OBJ file, and the vertex ids, from 0, of each of its lines, and of its sets of points."""
+    """Read all vertices of an OBJ file, and the vertex ids, from 0, of its lines and sets of points."""
     with reading(path):
         lines = _lines_by_keyword(path)
         found: dict[str, list[list[int]]] = {}
@@ -150,7 +150,7 @@ def read_obj_elements(path: PathLike) -> tuple[Floats, list[list[int]], list[lis
 
 
 def write_obj(shape: Elements, path: PathLike) -> bytes:
-    """OBJ text: ``v`` lines, with ``vn`` lines if points have normals; the first value is a texture coordinate."""
+    """Write OBJ text: ``v`` lines, and ``vn`` lines for normals of points; the first value is a texture coordinate."""
     rows = ["v {!r} {!r} {!r}".format(*p) for p in shape.points.tolist()]
     if shape.normals is not None:
         rows += ["vn {!r} {!r} {!r}".format(*n) for n in shape.normals.tolist()]
@@ -164,14 +164,14 @@ def write_obj(shape: Elements, path: PathLike) -> bytes:
 
 
 def write_pc(shape: Elements, path: PathLike) -> bytes:
-    """Oriented points, as OBJ text."""
+    """Write oriented points as OBJ text."""
     if shape.kind != "PointCloud":
         raise refuse_kind(shape.kind, path, "points", ".obj or .ply")
     return write_obj(shape, path)
 
 
 def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
-    """Words of the lines of each keyword; the keyword is replaced by the number of vertices so far."""
+    """Split lines by keyword; each keyword is replaced by the number of vertices so far."""
     lines: dict[str, list[list[Any]]] = {"v": [], "vn": [], "f": [], "l": [], "p": []}
     content = text(path)
     ensure_fits(BYTES * sum(content.count(f"\n{keyword} ") for keyword in lines), path)
@@ -201,7 +201,7 @@ def _coordinates(rows: list[list[Any]], what: str) -> Floats:
 
 
 def _elements(words: list[list[Any]]) -> tuple[Ints, Ints]:
-    """Vertex ids, from 0, of all elements, and their number in each; −1 is the vertex before."""
+    """Vertex ids, from 0, of all elements, and their number in each; −1 refers to the vertex before."""
     counts = np.array([len(element) - 1 for element in words], dtype=np.int64)
     flat = [word for element in words for word in element[1:]]
     if any("/" in word for word in flat):
@@ -263,7 +263,7 @@ def _corner_count(word: str) -> int:
 
 
 def write_off(shape: Elements, path: PathLike) -> bytes:
-    """OFF text; oriented points as NOFF."""
+    """Write OFF text; oriented points as NOFF."""
     columns = shape.points if shape.normals is None else np.hstack([shape.points, shape.normals])
     rows = ["OFF" if shape.normals is None else "NOFF", f"{len(columns)} {len(shape.counts)} 0"]
     rows += [" ".join(map(repr, row)) for row in columns.tolist()]

@@ -19,14 +19,14 @@ _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0
 
 
 def read_npy(path: PathLike) -> NDArray[Any]:
-    """Return the array of a ``.npy`` file."""
+    """Read the array of a ``.npy`` file."""
     data = contents(path)
     with reading(path):
         return _array(io.BytesIO(data), len(data), path)
 
 
 def read_npz(path: PathLike, wanted: Collection[str], needed: Collection[str] = ()) -> dict[str, NDArray[Any]]:
-    """Those of the wanted arrays of a ``.npz`` file that are there, and all that are needed."""
+    """Read those wanted arrays of a ``.npz`` file that exist, and all needed ones."""
     data = contents(path)
     with reading(path), ZipFile(io.BytesIO(data)) as archive:
         members = {info.filename: info for info in archive.infolist()}
@@ -48,14 +48,14 @@ def write_npz(path: PathLike, **arrays: Any) -> None:
 
 
 def names_in_npz(path: PathLike) -> set[str]:
-    """Names of the arrays in a ``.npz`` file."""
+    """List the names of the arrays in a ``.npz`` file."""
     data = contents(path)
     with reading(path), ZipFile(io.BytesIO(data)) as archive:
         return {name.removesuffix(".npy") for name in archive.namelist()}
 
 
 def _array(file: IO[bytes], size: int, path: PathLike) -> NDArray[Any]:
-    """Return an array of numbers, from a file of `size` bytes."""
+    """Read an array of numbers from a file of `size` bytes."""
     version = npy.read_magic(file)
     if version not in _HEADERS:
         raise FileFormatError(f"its version {version} of NumPy's format is unknown")

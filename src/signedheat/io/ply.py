@@ -79,7 +79,7 @@ def read_ply(path: PathLike, names: Sequence[str] = ()) -> Elements:
 
 
 def write_ply(shape: Elements, path: PathLike, colors: NDArray[np.uint8] | None = None) -> bytes:
-    """Binary PLY in double precision; normals, areas, values and colours are properties of the vertices."""
+    """Write binary PLY in double precision; normals, areas, values and colours are properties of the vertices."""
     given: list[tuple[list[str], NDArray[Any] | None]] = [
         (["x", "y", "z"], shape.points),
         (["nx", "ny", "nz"], shape.normals),
@@ -106,7 +106,7 @@ def _header_of(
     count_type: str = "int",
     comment: str | None = None,
 ) -> bytes:
-    """Return the header of binary PLY with doubles and colours at the vertices, and faces if there are some."""
+    """Return the header of binary PLY with doubles and colours at the vertices, and with faces if there are any."""
     lines = ["ply", "format binary_little_endian 1.0", *([] if comment is None else [f"comment {comment}"])]
     lines += [f"element vertex {n_vertices}", *(f"property double {name}" for name in names)]
     lines += [f"property uchar {channel}" for channel in channels]
@@ -217,7 +217,7 @@ class _BinaryReader:
         self.order = "<" if self.form == "binary_little_endian" else ">"
 
     def read(self, element: _Element) -> dict[str, Any]:
-        """Columns by name; of lists, all entries in a row and their numbers."""
+        """Read columns by name; lists become all entries in a row and their numbers."""
         if not element.properties:
             return {}
         lists = {name: kind for name, kind in element.properties.items() if isinstance(kind, tuple)}
@@ -230,7 +230,7 @@ class _BinaryReader:
         return self._row_by_row(element) if table is None else table
 
     def _all_alike(self, element: _Element, lists: dict[str, tuple[str, str]]) -> dict[str, Any] | None:
-        """Return the table if all lists have the length of the first, which is quick; otherwise nothing."""
+        """Return the table if all lists have the length of the first, which is quick; otherwise None."""
         lengths = self._first_lengths(element)
         entries: list[Any] = []
         for number, (name, kind) in enumerate(element.properties.items()):
@@ -289,7 +289,7 @@ class _BinaryReader:
         }
 
     def _one(self, code: str, length: int, element: _Element) -> NDArray[Any]:
-        """Return the next numbers."""
+        """Read the next numbers."""
         size = length * int(code[1])
         if length < 0 or self.at + size > len(self.body):
             raise _truncated(element)

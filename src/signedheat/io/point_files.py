@@ -32,7 +32,7 @@ SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance "
 
 
 def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
-    """Numbers of each block of lines, between empty lines: all lines have as many, one of `widths`.
+    """Read blocks of lines separated by empty lines; all lines have the same number of numbers, one of `widths`.
 
     They are separated by commas, semicolons, tabs or spaces; where all commas stand between digits, and something else
     separates the numbers, they are decimal commas. What follows ``#`` and a header line are skipped.
@@ -67,7 +67,7 @@ def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
 
 
 def _has_decimal_commas(content: str) -> bool:
-    """Whether each line of numbers has several, apart from one another by other characters than their commas."""
+    """Whether each line has several numbers, separated by other characters than commas."""
     if "," not in content:
         return False
     lines = (line.partition("#")[0].replace(";", " ").split() for line in content.split("\n"))
@@ -76,7 +76,7 @@ def _has_decimal_commas(content: str) -> bool:
 
 
 def read_point_lists(path: PathLike, dimension: int) -> list[tuple[Floats, bool]]:
-    """Points (n, dimension) of each polyline, and whether it is closed (its last point equals its first)."""
+    """Read the points (n, dimension) of each polyline, which is closed if its last point equals its first."""
     lists = read_rows(path, (dimension,))
     closed = [len(points) > 3 and bool((points[0] == points[-1]).all()) for points in lists]
     return [(points[:-1] if end else points, end) for points, end in zip(lists, closed, strict=True)]
@@ -92,13 +92,13 @@ def write_point_lists(lists: Sequence[tuple[Floats, bool]]) -> str:
 
 
 def read_xyz(path: PathLike) -> Elements:
-    """Lines of 3 numbers (positions) or 6 (positions and normals)."""
+    """Read lines of 3 numbers (positions) or 6 (positions and normals)."""
     table = np.concatenate(read_rows(path, (3, 6)))
     return Elements(table[:, :3], normals=table[:, 3:] if table.shape[1] == 6 else None)
 
 
 def write_xyz(shape: Elements, path: PathLike) -> bytes:
-    """One line per point."""
+    """Write one line per point."""
     if shape.kind != "PointCloud":
         raise refuse_kind(shape.kind, path, "points", ".obj or .ply")
     table = shape.points if shape.normals is None else np.hstack([shape.points, shape.normals])
@@ -106,7 +106,7 @@ def write_xyz(shape: Elements, path: PathLike) -> bytes:
 
 
 def read_pcd(path: PathLike) -> Elements:
-    """Points whose DATA are ascii, binary or binary_compressed; those without a position (NaN) are left out."""
+    """Read points with ascii, binary or binary_compressed data; points without a position (NaN) are left out."""
     content = contents(path).removeprefix(codecs.BOM_UTF8)
     header: dict[str, list[str]] = {}
     at = 0
@@ -130,7 +130,7 @@ def read_pcd(path: PathLike) -> Elements:
 
 
 def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
-    """Columns of numbers by name of the field."""
+    """Read columns of numbers by the names of the fields."""
     try:
         names, kind = header["FIELDS"], header["DATA"][0].lower()
         counts = [int(word) for word in header.get("COUNT", ["1"] * len(names))]
@@ -166,13 +166,13 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
 
 
 def read_las(path: PathLike) -> PointCloud:
-    """Points of a LAS or LAZ file, with its scale and offset; it has no normals."""
+    """Read the points of a LAS or LAZ file, with its scale and offset; it has no normals."""
     found = parsed("las", path, "laspy", f"{extension(path)} files", bytes_per_byte=PACKED)
     return _cloud(found["points"], path)
 
 
 def read_e57(path: PathLike) -> PointCloud:
-    """Points of all scans of an E57 file, in its own place for each; those that are marked invalid are left out."""
+    """Read the points of all scans of an E57 file, each in its place; points marked invalid are left out."""
     ensure_installed("pye57", ".e57 files")
     with reading(path):
         _refuse_references(_e57_description(contents(path)))
@@ -194,7 +194,7 @@ def _e57_description(data: bytes) -> bytes:
 
 
 def _refuse_references(description: bytes) -> None:
-    """Raise `FileFormatError` if XML refers to anything outside itself, or is not in UTF-8, as E57 wants it."""
+    """Raise `FileFormatError` if XML refers to anything outside itself, or is not in UTF-8 as E57 requires."""
 
     def refuse(*_: object) -> None:
         raise FileFormatError("its description defines entities or names a schema", remedy="export the scan again")
@@ -223,7 +223,7 @@ def _cloud(points: Floats, path: PathLike) -> PointCloud:
 
 
 def _unpacked(body: bytes, size: int) -> bytes:
-    """Return what LZF has packed, behind two numbers of four bytes: how long it is packed, and unpacked.
+    """Unpack LZF data, which follow two four-byte numbers: their packed and unpacked lengths.
 
     A byte below 32 is followed by one more byte than it says. Others have the length of a part that comes again, less
     two, in three bits (seven: the next byte is added), and in the other five and a byte how far back it is, less one.

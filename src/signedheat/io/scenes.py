@@ -55,19 +55,19 @@ SEAM = 1e-6
 
 
 def _joined(bodies: Sequence[Body]) -> TriangleMesh:
-    """One mesh of all bodies, one after another."""
+    """Join bodies to one mesh, one after another."""
     if not bodies:
         raise FileFormatError("it holds no triangles", remedy="export the shape as a mesh")
     return TriangleMesh(*concatenated(bodies))
 
 
 def read_glb(path: PathLike) -> TriangleMesh:
-    """All triangles of a glTF scene, transformed by their nodes, one body after another."""
+    """Read all triangles of a glTF scene, transformed by their nodes, body after body."""
     return _joined(gltf.read_bodies(path))
 
 
 def read_dae(path: PathLike) -> TriangleMesh:
-    """All triangles of a COLLADA scene, transformed by their nodes, in the units of the file, with its axes."""
+    """Read all triangles of a COLLADA scene, transformed by their nodes, in the units of the file and with its axes."""
     ensure_installed("collada", ".dae files")
     found = parsed("dae", path, "trimesh", ".dae files")
     return _joined([(found["points"], found["triangles"])] if len(found["triangles"]) else [])
@@ -83,7 +83,7 @@ class _Object:
 
 
 def read_3mf(path: PathLike) -> TriangleMesh:
-    """All that a package builds, placed, one object after another, in the units of the file (`unit_of`)."""
+    """Read all that a package builds, placed, object after object, in the units of the file (`unit_of`)."""
     with reading(path):
         package = _Package(path)
         root = package.model(package.root)
@@ -96,7 +96,7 @@ def read_3mf(path: PathLike) -> TriangleMesh:
 
 
 def unit_of(path: PathLike) -> str | None:
-    """Return the unit of length of a file: what a 3MF file says, metres in glTF; None where formats do not say.
+    """Return the unit of length of a file: that of a 3MF file, metres for glTF, None for formats without units.
 
     Of STEP millimetres, since it is read so whatever it says.
     """
@@ -113,7 +113,7 @@ def unit_of(path: PathLike) -> str | None:
 
 
 def scale_to(path: PathLike, units: str) -> float:
-    """Return what multiplies the lengths of a file, so that they are in TO of the units ``TO`` or ``FROM:TO``.
+    """Return the factor from the lengths of a file to TO, given units ``TO`` or ``FROM:TO``.
 
     Files that do not state their unit are in FROM, or in TO already.
     """
@@ -133,7 +133,7 @@ class _Package:
 
     @property
     def root(self) -> str:
-        """The name of the part with the build, as the relations of the package say."""
+        """The name of the part with the build, according to the relations of the package."""
         if "_rels/.rels" in self._zip.namelist():
             for relation in ElementTree.fromstring(self._bytes("_rels/.rels")):
                 if relation.get("Type", "").endswith("/3dmodel"):
@@ -157,7 +157,7 @@ class _Package:
         return self._objects[key]
 
     def count(self, key: Key, depth: int = 0) -> tuple[int, int]:
-        """Count the triangles of an object with all its components, and how deep these lie, without placing them."""
+        """Count the triangles of an object with all its components, and their depth, without placing them."""
         if key not in self._counts:
             if depth > DEPTH:
                 raise damaged("its components contain themselves, or too many others")
