@@ -80,25 +80,28 @@ class BoxTree(NamedTuple):
         corners = np.ascontiguousarray(triangles).reshape(-1, 9)
         return tree._replace(slabs=_slabs(triangles, tree.items), triangles=corners)
 
-    def meeting(self, triangles: Floats, slack: float | Floats = 0.0, groups: Ints | None = None) -> tuple[Ints, Ints]:
+    def meeting(
+        self, triangles: Floats, slack: float | Floats = 0.0, groups: Ints | None = None, leaves: Ints | None = None
+    ) -> tuple[Ints, Ints]:
         """Return where the boxes near each of (n, 3, 3) triangles begin, and these: all in leaves that they may meet.
 
         A triangle may meet a node if its box, its plane and the prism over it do, with some slack along each axis,
-        unless all of the node belongs to the triangle's own group.
+        unless all of the node belongs to the triangle's own group, or lies before one of the (n,) leaves.
         """
         corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(3, slack)
         own = np.full(len(corners), -1) if groups is None else np.ascontiguousarray(groups, dtype=np.int64)
+        first = np.zeros(len(corners), dtype=np.int64) if leaves is None else leaves
         starts, room = np.zeros(len(corners) + 1, dtype=np.int64), 64 * len(corners)  # faces of a mesh have about 40
         while True:
             near = np.empty(room, dtype=np.int64)
-            _meeting(self, corners, slacks, own, starts, near)
+            _meeting(self, corners, slacks, own, first, starts, near)
             if starts[-1] <= room:
                 return starts, near[: starts[-1]]
             room = int(starts[-1])
 
 
 @compiled
-def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, starts: Ints, out: Ints) -> None:
+def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, first: Ints, starts: Ints, out: Ints) -> None:
     """Write the boxes near each triangle, as far as there is room, and where they begin."""
     bounds, items, groups, slabs, triangles = tree
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
@@ -126,6 +129,14 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, starts: 
                 give += abs(ways[k, d]) * slacks[d]
             ends[k, 0], ends[k, 1] = ends[k, 0] - give, ends[k, 1] + give
         stack[0], depth, count = 1, 1, starts[t]
+        if first[t] > 0:
+            node = leaves + first[t]
+            stack[0] = node
+            while node > 1:  # what lies to the right of its way up to the root
+                if node % 2 == 0:
+                    stack[depth] = node + 1
+                    depth += 1
+                node //= 2
         while depth > 0:
             depth -= 1
             node = stack[depth]

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from itertools import product
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..parallel import CHUNK, n_threads
-from .box_tree import BoxTree, morton_codes
+from .box_tree import LEAF, BoxTree, morton_codes
 from .unit_vectors import unit
 from .welding import same_positions
 
@@ -36,25 +35,23 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float)
     if not len(faces):
         return np.zeros((0, 2), dtype=np.int64)
     centred = np.ascontiguousarray(vertices - vertices.mean(axis=0), dtype=np.float64)
-    ids = np.ascontiguousarray(faces, dtype=np.int64)
+    hubs = _hubs(faces, len(vertices))
+    order = _order(centred[faces], centred, hubs)
+    ids, hubs = np.ascontiguousarray(faces[order], dtype=np.int64), hubs[order]
     corners = centred[ids]
     flat = corners.reshape(-1, 9)
-    hubs = _hubs(ids, len(vertices))
     fans = np.flatnonzero(hubs >= 0)
-    tree = BoxTree.over(corners, _order(corners, centred, hubs), hubs)
+    places = np.arange(len(ids))
+    tree = BoxTree.over(corners, places, hubs)
     arcs = _arcs(centred, ids[fans], hubs[fans]) if len(fans) else corners[:0]
     around = BoxTree.of(arcs.min(axis=1), arcs.max(axis=1)) if len(fans) else tree
 
     def overlapping(first: Ints, second: Ints) -> Ints:
-        shared = sum((i == j).astype(np.int8) for i, j in product(ids[first].T.copy(), ids[second].T.copy()))
-        meet, few, many = np.empty(len(first), dtype=bool), np.flatnonzero(shared < 2), np.flatnonzero(shared > 1)
-        meet[many] = _folded(corners, ids, first[many], second[many])
-        meet[few] = _overlapping(flat, first[few], second[few], slack, np.where(shared[few] > 0, slack, depth))
-        return np.stack([first, second], axis=1)[meet]
+        return np.stack([first, second], axis=1)[_overlapping(flat, ids, first, second, slack, depth)]
 
     def of_tree(start: int) -> Ints:
-        own = hubs[start : start + CHUNK]
-        starts, near = tree.meeting(corners[start : start + CHUNK], slack, own)
+        some = slice(start, start + CHUNK)
+        starts, near = tree.meeting(corners[some], slack, hubs[some], places[some] // LEAF)
         owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         asked = (near > owners) & ((hubs[owners] < 0) | (hubs[owners] != hubs[near]))
         return overlapping(owners[asked], near[asked])
@@ -68,6 +65,7 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float)
     with ThreadPoolExecutor(n_threads()) as pool:
         parts = list(pool.map(of_tree, range(0, len(ids), CHUNK)))
         pairs = np.concatenate(parts + list(pool.map(of_fans, range(0, len(fans), CHUNK))))
+    pairs = np.sort(order[pairs], axis=1)
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
 
@@ -102,26 +100,41 @@ def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:
     return arcs
 
 
-def _folded(corners: Floats, ids: Ints, face: Ints, neighbor: Ints) -> Bools:
-    """Return (k,) whether faces with a common edge lie on the same side of it, or have all corners in common."""
-    same = ids[face][:, :, None] == ids[neighbor][:, None, :]
-    apex = np.argmin(same.any(axis=2), axis=1)
-    beyond = np.argmin(same.any(axis=1), axis=1)
-    start, end = corners[face, (apex + 1) % 3], corners[face, (apex + 2) % 3]
-    along = unit(end - start)
-    away = [place - start for place in (corners[face, apex], corners[neighbor, beyond])]
-    first, second = (unit(way - (way * along).sum(axis=1)[:, None] * along) for way in away)
-    folded: Bools = ((first * second).sum(axis=1) > 1.0 - FOLDED) | same.any(axis=2).all(axis=1)
-    return folded
+@compiled
+def _overlapping(corners: Floats, ids: Ints, first: Ints, second: Ints, slack: float, depth: float) -> Bools:
+    """Return (k,) whether triangles overlap, those with a common edge whether they are folded along it."""
+    result, ways = np.empty(len(first), dtype=np.bool_), np.empty((10, 3))
+    for k in range(len(first)):
+        f, g = first[k], second[k]
+        shared, apex, beyond = 0, 3, 3  # the corners, less those in common, of which two leave one
+        for i in range(3):
+            for j in range(3):
+                if ids[f, i] == ids[g, j]:
+                    shared, apex, beyond = shared + 1, apex - i, beyond - j
+        if shared == 2:
+            result[k] = _is_folded(corners[f], corners[g], apex, beyond)
+        else:
+            result[k] = shared > 2 or overlap(corners[f], corners[g], slack, slack if shared else depth, ways)
+    return result
 
 
 @compiled
-def _overlapping(corners: Floats, first: Ints, second: Ints, slack: float, depths: Floats) -> Bools:
-    """Return (k,) whether triangles overlap, each pair by more than its depth."""
-    result, ways = np.empty(len(first), dtype=np.bool_), np.empty((10, 3))
-    for k in range(len(first)):
-        result[k] = overlap(corners[first[k]], corners[second[k]], slack, depths[k], ways)
-    return result
+def _is_folded(p: Floats, q: Floats, apex: int, beyond: int) -> bool:
+    """Return whether two triangles, (9,) each, lie on the same side of the edge opposite to a corner of each."""
+    start, end = 3 * ((apex + 1) % 3), 3 * ((apex + 2) % 3)
+    square, height, other = 0.0, 0.0, 0.0
+    for d in range(3):
+        along = p[end + d] - p[start + d]
+        square += along * along
+        height += along * (p[3 * apex + d] - p[start + d])
+        other += along * (q[3 * beyond + d] - p[start + d])
+    first, second, product = 0.0, 0.0, 0.0
+    for d in range(3):
+        along = (p[end + d] - p[start + d]) / square
+        x = p[3 * apex + d] - p[start + d] - height * along
+        y = q[3 * beyond + d] - p[start + d] - other * along
+        first, second, product = first + x * x, second + y * y, product + x * y
+    return product > (1.0 - FOLDED) * np.sqrt(first * second)
 
 
 @compiled
