@@ -159,21 +159,21 @@ def close(arguments: Namespace) -> Summary:
                 arguments.as_oriented,
                 arguments.every_piece,
             )
-        found = closing.zero_set(field, sources)
-    sh.io.write_curves(arguments.output, found, domain)
+        completed = closing.zero_set(field, sources)
+    sh.io.write_curves(arguments.output, completed, domain)
     if arguments.preview:
-        sh.view.save_surface(field, arguments.preview, found, up="xyz".index(arguments.up))
-    closed = sum(curve.closed for curve in found)
+        sh.view.save_surface(field, arguments.preview, completed, up="xyz".index(arguments.up))
+    closed = sum(curve.closed for curve in completed)
     summary = {
         "mesh": arguments.mesh,
         "curves": arguments.curves,
         "output": arguments.output,
-        "n_curves": len(found),
+        "n_curves": len(completed),
         "n_closed": closed,
     }
-    curve = "curve" if len(found) == 1 else "curves"
+    curve = "curve" if len(completed) == 1 else "curves"
     return summary, _with_pieces(
-        field, summary, f"{printable(arguments.output)}: {len(found)} {curve}, {closed} of them closed"
+        field, summary, f"{printable(arguments.output)}: {len(completed)} {curve}, {closed} of them closed"
     )
 
 

@@ -319,10 +319,10 @@ def image_of(arguments: Namespace) -> LabelImage | None:
 def labels_of(image: LabelImage) -> list[int] | None:
     """Return the labels, if these are few whole numbers; otherwise the image holds a field."""
     values = image.labels.astype(np.int8) if image.labels.dtype == bool else image.labels
-    found = np.unique(values[np.isfinite(values)])
-    if len(found) > LISTED or (found != np.round(found)).any():
+    distinct = np.unique(values[np.isfinite(values)])
+    if len(distinct) > LISTED or (distinct != np.round(distinct)).any():
         return None
-    return [int(label) for label in found]
+    return [int(label) for label in distinct]
 
 
 def field_of(image: LabelImage) -> GridField:

@@ -113,7 +113,7 @@ def lines_report(file: str) -> Summary:
 def image_report(file: str, image: LabelImage) -> dict[str, Any]:
     """Report the place of an image, and its labels or the range of its values."""
     values, labels = image.labels, labels_of(image)
-    found: dict[str, Any] = {
+    figures: dict[str, Any] = {
         "file": file,
         "kind": "image of labels" if labels is not None else "image of a field",
         "shape": [int(n) for n in values.shape],
@@ -122,10 +122,10 @@ def image_report(file: str, image: LabelImage) -> dict[str, Any]:
         "axes": image.axes.T.ravel().tolist(),
     }
     if image.space is not None:
-        found["space"] = image.space
+        figures["space"] = image.space
     if labels is None:
-        return found | {"lowest": float(np.nanmin(values)), "highest": float(np.nanmax(values))}
-    return found | {"labels": labels, "voxels": [int((values == label).sum()) for label in labels]}
+        return figures | {"lowest": float(np.nanmin(values)), "highest": float(np.nanmax(values))}
+    return figures | {"labels": labels, "voxels": [int((values == label).sum()) for label in labels]}
 
 
 def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation | None) -> str:

@@ -102,8 +102,8 @@ def volume(arguments: Namespace) -> Summary:
     summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), **shapes.place_of(image)}
     summary["units"] = unit
     nodes = " × ".join(map(str, field.grid.shape))
-    there = "" if arguments.band is None else f" ({summary['nodes']:,} of them there)"
-    text = f"{printable(arguments.output)}: {nodes} nodes{there}, {shapes.range_in_words(summary, unit)}"
+    within = "" if arguments.band is None else f" ({summary['nodes']:,} of them there)"
+    text = f"{printable(arguments.output)}: {nodes} nodes{within}, {shapes.range_in_words(summary, unit)}"
     return summary, text + shapes.hint(field)
 
 
@@ -158,14 +158,14 @@ def offset(arguments: Namespace) -> Summary:
     image = shapes.image_of(arguments)
     shape, field = shapes.measured(arguments, image, max(map(abs, arguments.distances)))
     with shapes.prefix_errors(arguments.shape):
-        found = [field.offset(distance) for distance in arguments.distances]
-    for what, path in zip(found, outputs, strict=True):
+        surfaces = [field.offset(distance) for distance in arguments.distances]
+    for what, path in zip(surfaces, outputs, strict=True):
         shapes.save_level(what, path, image, field)
     if arguments.preview:
         sh.view.save_slices(field, arguments.preview, shape, arguments.distances)
     written = [
         {"distance": distance, "output": path, **shapes.counts(what)}
-        for distance, path, what in zip(arguments.distances, outputs, found, strict=True)
+        for distance, path, what in zip(arguments.distances, outputs, surfaces, strict=True)
     ]
     unit = shapes.unit_in_use(arguments, arguments.shape)
     kind = f"{{lines}} lines ({{closed}} closed), length {{length:.6g}}{shapes.named(unit)}"
@@ -346,12 +346,12 @@ def sample(arguments: Namespace) -> Summary:
     sh.io.ensure_writable(arguments.output, sh.io.SAMPLE_FORMATS, "samples")
     _, field = shapes.measured(arguments)
     with shapes.prefix_errors(arguments.shape):
-        taken = sh.sample(field, arguments.samples, near=arguments.near, widths=arguments.widths, seed=arguments.seed)
-    (taken.normalized() if arguments.normalize else taken).save(arguments.output, arguments.layout)
-    figures = taken.figures
+        samples = sh.sample(field, arguments.samples, near=arguments.near, widths=arguments.widths, seed=arguments.seed)
+    (samples.normalized() if arguments.normalize else samples).save(arguments.output, arguments.layout)
+    figures = samples.figures
     summary = {"input": arguments.shape, "output": arguments.output, **figures, "field": shapes.describe(field)}
     inside = figures["inside_share"]
-    counts = f"{len(taken.points)} points, {figures['near']} near the surface, {inside:.1%} inside"
+    counts = f"{len(samples.points)} points, {figures['near']} near the surface, {inside:.1%} inside"
     return summary, f"{printable(arguments.output)}: {counts}"
 
 
@@ -382,13 +382,13 @@ def contour(arguments: Namespace) -> Summary:
     else:
         shapes.ensure_surface_writable(path, isinstance(field, sh.GridField) and field.grid.dimension == 2)
     with shapes.prefix_errors(arguments.field):
-        found = field.contour(arguments.level)
+        surface = field.contour(arguments.level)
     if on_surface:
-        sh.io.write_curves(path, found, field.domain)
-        numbers = {"curves": len(found)}
+        sh.io.write_curves(path, surface, field.domain)
+        numbers = {"curves": len(surface)}
     else:
-        shapes.save_level(found, path, image)
-        numbers = shapes.counts(found)
+        shapes.save_level(surface, path, image)
+        numbers = shapes.counts(surface)
     kind = next(name for name in ("curves", "lines", "faces") if name in numbers)
     summary = {"input": arguments.field, "level": arguments.level, "output": path, **numbers}
     return summary, f"{printable(path)}: {numbers[kind]} {kind}"

@@ -207,24 +207,25 @@ def deviation(arguments: Namespace) -> Summary:
     unit = shapes.unit_in_use(arguments, arguments.scan, arguments.nominal)
     scan, nominal = (shapes.read_source(arguments, path) for path in (arguments.scan, arguments.nominal))
     with shapes.prefix_errors(arguments.nominal), ProgressBar(is_quiet(arguments)) as progress:
-        found = sh.deviation(scan, nominal, progress)
-    low, median, high = found.percentiles((1, 50, 99))
+        deviations = sh.deviation(scan, nominal, progress)
+    low, median, high = deviations.percentiles((1, 50, 99))
     worst = [
-        {"deviation": float(found.distances[k]), "at": found.points[k].tolist()} for k in found.worst(arguments.worst)
+        {"deviation": float(deviations.distances[k]), "at": deviations.points[k].tolist()}
+        for k in deviations.worst(arguments.worst)
     ]
-    summary: dict[str, Any] = {"scan": arguments.scan, "nominal": arguments.nominal, **found.figures}
-    summary |= {"units": unit, "within": {f"{t:g}": found.within(t) for t in arguments.tolerance}, "worst": worst}
+    summary: dict[str, Any] = {"scan": arguments.scan, "nominal": arguments.nominal, **deviations.figures}
+    summary |= {"units": unit, "within": {f"{t:g}": deviations.within(t) for t in arguments.tolerance}, "worst": worst}
     lines = [
-        f"{printable(arguments.scan)}: {len(found.of_surface)} points, 98 % of them {low:.4g} to {high:.4g}"
+        f"{printable(arguments.scan)}: {len(deviations.of_surface)} points, 98 % of them {low:.4g} to {high:.4g}"
         f"{shapes.named(unit)} off {printable(arguments.nominal)}, median {median:.4g}, "
-        f"root mean square {found.rms:.4g}"
+        f"root mean square {deviations.rms:.4g}"
     ]
-    if found.beyond_rim.any():
+    if deviations.beyond_rim.any():
         lines[0] += f"; {summary['beyond_rim']:.2%} beyond its rim"
     lines += [f"within ±{t}{shapes.named(unit)}: {share:.2%}" for t, share in summary["within"].items()]
     lines += [f"{row['deviation']:+.4g}{shapes.named(unit)} at {shapes.place(row['at'])}" for row in worst]
     for output in arguments.output:
-        found.save(output)
+        deviations.save(output)
     lines += [printable(output) for output in arguments.output]
     return summary | {"output": arguments.output}, "\n".join(lines)
 
@@ -249,18 +250,18 @@ def thickness(arguments: Namespace) -> Summary:
         sh.io.ensure_writable(output, sh.view.THICKNESS_FORMATS, "thickness")
     solid, unit = shapes.solid_of(arguments, arguments.shape), shapes.unit_in_use(arguments, arguments.shape)
     with shapes.prefix_errors(arguments.shape):
-        found = sh.thickness(solid, resolution=arguments.resolution or 64)
-        least, place = found.thinnest
-    low, median, high = found.percentiles([5.0, 50.0, 95.0]).tolist()
+        thicknesses = sh.thickness(solid, resolution=arguments.resolution or 64)
+        least, place = thicknesses.thinnest
+    low, median, high = thicknesses.percentiles([5.0, 50.0, 95.0]).tolist()
     summary: dict[str, Any] = {"input": arguments.shape, "output": arguments.output, "units": unit}
     summary |= {"thinnest": least, "at": place.tolist(), "percentiles": {"5": low, "50": median, "95": high}}
     text = f"{printable(arguments.shape)}: thinnest {least:.4g}{shapes.named(unit)} at {shapes.place(place)}; "
     text += f"90 % of the area {low:.4g} to {high:.4g}, median {median:.4g}"
     if arguments.least is not None:
-        summary["below"] = found.below(arguments.least)
+        summary["below"] = thicknesses.below(arguments.least)
         text += f"; {summary['below']:.2%} thinner than {arguments.least:g}"
     for output in arguments.output:
-        found.save(output)
+        thicknesses.save(output)
     return summary, "\n".join([text, *map(printable, arguments.output)])
 
 

@@ -82,8 +82,8 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
     read_groups = format_for(path, READERS, "curves")
     domain = surface_in_space(domain)
     with reading(path):
-        found = read_groups(path, domain)
-        sources = [source if isinstance(source, Curve) else placed(source, domain) for source in found]
+        groups = read_groups(path, domain)
+        sources = [source if isinstance(source, Curve) else placed(source, domain) for source in groups]
         if strict:
             refuse_gaps(sources, domain.triangulation)
     if not sources:
@@ -278,14 +278,14 @@ def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]
     if len(positions) <= len(corners) and n and np.abs(positions - corners[:n]).max() <= scale:
         groups = [Group(SIGNED, [Node((i,), (1.0,)) for i in ids]) for ids in lines]
         return groups + [Group(POINTS, [Node((i,), (1.0,)) for i in ids]) for ids in points]
-    found: list[Group | Curve] = []
+    curves: list[Group | Curve] = []
     for ids in lines:
         closed = len(ids) > 2 and ids[0] == ids[-1]
-        found.append(domain.polyline(positions[ids[:-1] if closed else ids], closed=closed))
+        curves.append(domain.polyline(positions[ids[:-1] if closed else ids], closed=closed))
     for ids in points:
         faces, weights, _ = closest_points(domain.triangulation, positions[ids])
-        found.append(Group(POINTS, nodes_of(faces, weights, domain)))
-    return found
+        curves.append(Group(POINTS, nodes_of(faces, weights, domain)))
+    return curves
 
 
 def nodes_of(faces: Ints, weights: Floats, domain: EmbeddedSurface) -> list[Node]:

@@ -47,7 +47,7 @@ def read_svg(path: PathLike) -> list[tuple[Floats, bool]]:
         root = ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
         raise damaged(f"it is no XML ({error})") from error
-    drawing = _Drawing({key: each for each in root.iter() if (key := each.get("id")) is not None}, _size(root))
+    drawing = _Drawing({key: element for element in root.iter() if (key := element.get("id")) is not None}, _size(root))
     lines = [line for part in drawing.drawn(root, np.eye(3)) for line in part]
     if not lines:
         raise FileFormatError("there is no line in the drawing", remedy="convert text and images to paths first")
@@ -181,21 +181,23 @@ def _transform(text: str) -> Floats:
 
 def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
     """Split a path into commands with arguments; repeated commands are expanded."""
-    at, command = 0, ""
+    position, command = 0, ""
     end = len(data.rstrip())
-    while at < end:
-        word = COMMAND.match(data, at)
+    while position < end:
+        word = COMMAND.match(data, position)
         if word:
-            at, command = word.end(), word[1]
+            position, command = word.end(), word[1]
         elif command in "Zz":  # valid even at the beginning
-            raise damaged(f"a path goes on with '{data[at : at + 20].strip()}', which is not a command")
+            raise damaged(f"a path goes on with '{data[position : position + 20].strip()}', which is not a command")
         numbers = []
         for place in range(ARGUMENTS[command.upper()]):
             pattern = FLAG if command in "Aa" and place in FLAGS else NUMBER
-            number = pattern.match(data, at)
+            number = pattern.match(data, position)
             if number is None:
-                raise damaged(f"a path has '{data[at : at + 20].strip()}' where a number of '{command}' must be")
-            at = number.end()
+                raise damaged(
+                    f"a path has '{data[position : position + 20].strip()}' where a number of '{command}' must be"
+                )
+            position = number.end()
             numbers.append(float(number[1]))
         yield command, numbers
         command = {"M": "L", "m": "l"}.get(command, command)

@@ -167,10 +167,10 @@ def load_vertex_field(path: PathLike) -> VertexField:
     """Return a surface with φ at its vertices: what `VertexField.save` wrote, except as ``.obj``."""
     with reading(path):
         if extension(path) in _VALUES:
-            found = _VALUES[extension(path)](path, (NAME,))
-            if NAME not in found.values:
+            shape = _VALUES[extension(path)](path, (NAME,))
+            if NAME not in shape.values:
                 raise FileFormatError(f"its vertices have no {NAME}: it holds a shape, not a field")
-            return VertexField(cast("SurfaceShape", shape_of(found)), np.asarray(found.values[NAME], np.float64))
+            return VertexField(cast("SurfaceShape", shape_of(shape)), np.asarray(shape.values[NAME], np.float64))
         arrays = read_npz(path, ("faces", "offsets", "normals"), needed=("vertices", "values"))
         vertices, values = arrays["vertices"], arrays["values"]
         if "offsets" in arrays:
@@ -196,11 +196,11 @@ def _load_tet_field(path: PathLike) -> TetField:
 def _load_band(path: PathLike) -> GridField:
     needed = ("places", "values", "origin", "spacing", "shape", "width", "coarse_values", "coarse_spacing")
     with reading(path):
-        found = read_npz(path, (CONFIDENCE,), needed)
-        grid = _made(Grid, found["origin"], found["spacing"], found["shape"])
-        far = found["coarse_values"]
-        coarse = _made(GridField, _made(Grid, found["origin"], found["coarse_spacing"], far.shape), far)
-        places = found["places"]
+        arrays = read_npz(path, (CONFIDENCE,), needed)
+        grid = _made(Grid, arrays["origin"], arrays["spacing"], arrays["shape"])
+        far = arrays["coarse_values"]
+        coarse = _made(GridField, _made(Grid, arrays["origin"], arrays["coarse_spacing"], far.shape), far)
+        places = arrays["places"]
         if places.ndim != 2 or places.dtype.kind not in "iu" or places.shape[1] != len(grid.shape):
             raise damaged("its blocks have no places", element="places")
         if len(places) and not ((places >= 0) & (places * SIDE < grid.shape)).all():
@@ -208,8 +208,8 @@ def _load_band(path: PathLike) -> GridField:
         blocks = Blocks.of(places, grid.shape)
         if not np.array_equal(blocks.places, places):
             raise damaged("its blocks are not in order", element="places")
-        options = {"blocks": blocks, "coarse": coarse, "width": float(found["width"]), "solid": _held_solid(path)}
-        return _made(GridField, grid, found["values"], confidence=found.get(CONFIDENCE), **options)
+        options = {"blocks": blocks, "coarse": coarse, "width": float(arrays["width"]), "solid": _held_solid(path)}
+        return _made(GridField, grid, arrays["values"], confidence=arrays.get(CONFIDENCE), **options)
 
 
 def _write_npz(field: GridField, path: Path) -> None:
@@ -231,11 +231,11 @@ def _held_solid(path: PathLike) -> SolidQueries | None:
     """Return the solid of a field in an archive, if the archive holds one."""
     if "solid_factor" not in names_in_npz(path):
         return None
-    found = read_npz(path, [PREFIX + name for name in SOURCE], ["solid_factor", *(PREFIX + name for name in NEEDED)])
-    factor = found.pop("solid_factor")
+    arrays = read_npz(path, [PREFIX + name for name in SOURCE], ["solid_factor", *(PREFIX + name for name in NEEDED)])
+    factor = arrays.pop("solid_factor")
     if factor.shape or not np.isfinite(factor) or not factor:
         raise damaged("its solid is scaled by no number", element="solid_factor")
-    return scaled(solid_of({name.removeprefix(PREFIX): array for name, array in found.items()}), float(factor))
+    return scaled(solid_of({name.removeprefix(PREFIX): array for name, array in arrays.items()}), float(factor))
 
 
 def _write_npy(field: GridField, path: Path) -> None:

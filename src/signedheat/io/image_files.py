@@ -114,8 +114,8 @@ def _read_npy(path: PathLike) -> Image:
 
 
 def _read_npz(path: PathLike) -> Image:
-    found = read_npz(path, (CONFIDENCE,), needed=("values", "origin", "spacing"))
-    return _aligned(found.pop("values"), found.pop("origin"), found.pop("spacing"), **found)
+    arrays = read_npz(path, (CONFIDENCE,), needed=("values", "origin", "spacing"))
+    return _aligned(arrays.pop("values"), arrays.pop("origin"), arrays.pop("spacing"), **arrays)
 
 
 def _read_vti(path: PathLike) -> Image:
@@ -225,8 +225,8 @@ def _nrrd_vector(numbers: list[float]) -> str:
 
 
 def _read_nifti(path: PathLike) -> Image:
-    found = parsed("nifti", path, *NIBABEL, bytes_per_byte=PACKED)
-    values, affine = found["values"], found["affine"]
+    parts = parsed("nifti", path, *NIBABEL, bytes_per_byte=PACKED)
+    values, affine = parts["values"], parts["affine"]
     while values.ndim > 3 and values.shape[-1] == 1:
         values = values[..., 0]
     return Image(values, affine[:3, :3], affine[:3, 3], "right-anterior-superior")

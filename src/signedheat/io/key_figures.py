@@ -60,8 +60,8 @@ def shape_figures(shape: Shape) -> dict[str, object]:
     counted = shape.squares if isinstance(shape, DigitalSurface) else shape
     figures: dict[str, object] = {"kind": type(shape).__name__, **asdict(inspect(counted))}
     if isinstance(shape, TriangleMesh | PolygonMesh):
-        found = orientation(shape)
-        found_widths = widths(found.shape)
-        figures["orientation"] = found.summary
+        oriented = orientation(shape)
+        found_widths = widths(oriented.shape)
+        figures["orientation"] = oriented.summary
         figures["thickness"] = {**asdict(found_widths), "spacing": found_widths.spacing}
     return figures

@@ -141,12 +141,12 @@ def read_obj_elements(path: PathLike) -> tuple[Floats, list[list[int]], list[lis
     """Read all vertices of an OBJ file, and the vertex ids, from 0, of its lines and sets of points."""
     with reading(path):
         lines = _lines_by_keyword(path)
-        found: dict[str, list[list[int]]] = {}
+        elements: dict[str, list[list[int]]] = {}
         for keyword in ("l", "p"):
             corners, counts = _elements(lines.get(keyword, []))
             ids = iter(corners.tolist())
-            found[keyword] = [list(islice(ids, count)) for count in counts.tolist()]
-        return _coordinates(lines["v"], "vertices"), found["l"], found["p"]
+            elements[keyword] = [list(islice(ids, count)) for count in counts.tolist()]
+        return _coordinates(lines["v"], "vertices"), elements["l"], elements["p"]
 
 
 def write_obj(shape: Elements, path: PathLike) -> bytes:

@@ -30,14 +30,14 @@ def read_npz(path: PathLike, wanted: Collection[str], needed: Collection[str] = 
     data = contents(path)
     with reading(path), ZipFile(io.BytesIO(data)) as archive:
         members = {info.filename: info for info in archive.infolist()}
-        found = {}
+        arrays = {}
         for name in (*needed, *wanted):
             if info := members.get(f"{name}.npy"):
                 with archive.open(info) as file:
-                    found[name] = _array(file, info.file_size, path)
+                    arrays[name] = _array(file, info.file_size, path)
             elif name in needed:
                 raise FileFormatError(f"it has no {name}", remedy="check that it is the right file", element=name)
-        return found
+        return arrays
 
 
 def write_npz(path: PathLike, **arrays: Any) -> None:
@@ -62,10 +62,10 @@ def _array(file: IO[bytes], size: int, path: PathLike) -> NDArray[Any]:
     shape, is_fortran, dtype = _HEADERS[version](file)
     if dtype.kind not in "biufc":
         raise FileFormatError(f"the values are not numbers but {dtype}", remedy="save numbers")
-    announced, there = math.prod(shape) * dtype.itemsize, size - file.tell()
-    if not 0 <= announced <= there or min(shape, default=0) < 0:
+    announced, available = math.prod(shape) * dtype.itemsize, size - file.tell()
+    if not 0 <= announced <= available or min(shape, default=0) < 0:
         raise damaged(
-            f"an array of shape {shape} needs {announced} bytes, of which {there} are there: the file is truncated"
+            f"an array of shape {shape} needs {announced} bytes, of which {available} are there: the file is truncated"
         )
     ensure_fits(announced, path)
     values = np.empty(shape, dtype, order="F" if is_fortran else "C")

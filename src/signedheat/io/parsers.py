@@ -110,9 +110,9 @@ def cells(path: str, module: str) -> dict[str, Any]:
     mesh = import_module(f"meshio.{module}").read(path)
     values = {name: np.asarray(column) for name, column in mesh.point_data.items()}
     values = {name: column for name, column in values.items() if column.dtype.kind in "biuf"}
-    found = {"points": np.asarray(mesh.points, dtype=np.float64), "kinds": [block.type for block in mesh.cells]}
-    found |= {f"cells {k}": np.asarray(block.data, dtype=np.int64) for k, block in enumerate(mesh.cells)}
-    return found | {"names": list(values)} | {f"values {k}": column for k, column in enumerate(values.values())}
+    result = {"points": np.asarray(mesh.points, dtype=np.float64), "kinds": [block.type for block in mesh.cells]}
+    result |= {f"cells {k}": np.asarray(block.data, dtype=np.int64) for k, block in enumerate(mesh.cells)}
+    return result | {"names": list(values)} | {f"values {k}": column for k, column in enumerate(values.values())}
 
 
 def nifti(path: str) -> dict[str, Any]:
@@ -154,8 +154,8 @@ def refuse(event: str, _: object) -> None:
 
 def answer(found: dict[str, Any], file: Any) -> None:
     """Write a line of JSON with all values that are not arrays, then the bytes of the arrays."""
-    arrays = {name: np.ascontiguousarray(each) for name, each in found.items() if isinstance(each, np.ndarray)}
-    values = {name: each for name, each in found.items() if name not in arrays}
+    arrays = {name: np.ascontiguousarray(value) for name, value in found.items() if isinstance(value, np.ndarray)}
+    values = {name: value for name, value in found.items() if name not in arrays}
     about = [[name, array.dtype.newbyteorder("=").str, array.shape] for name, array in arrays.items()]
     file.write(json.dumps({"values": values, "arrays": about}).encode() + b"\n")
     for array in arrays.values():
@@ -171,12 +171,12 @@ def main(function: str, path: str, options: str, memory: str, seconds: str) -> N
     confine(int(memory), int(seconds))
     try:
         with np.errstate(all="ignore"):
-            found = globals()[function](path, **json.loads(options))
+            result = globals()[function](path, **json.loads(options))
     except Refused as error:
-        found = {"refused": error.args}
+        result = {"refused": error.args}
     except BaseException as error:
-        found = {"error": type(error).__name__, "message": f"{error}"[:400], "package": getattr(error, "name", None)}
-    answer(found, file)
+        result = {"error": type(error).__name__, "message": f"{error}"[:400], "package": getattr(error, "name", None)}
+    answer(result, file)
     os._exit(0)  # skip exit handlers of packages
 
 

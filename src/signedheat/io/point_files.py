@@ -109,16 +109,16 @@ def read_pcd(path: PathLike) -> Elements:
     """Read points with ascii, binary or binary_compressed data; points without a position (NaN) are left out."""
     content = contents(path).removeprefix(codecs.BOM_UTF8)
     header: dict[str, list[str]] = {}
-    at = 0
+    position = 0
     while "DATA" not in header:
-        end = content.find(b"\n", at)
+        end = content.find(b"\n", position)
         if end < 0:
             raise FileFormatError("there is no line DATA: this is no PCD file, or it is truncated")
-        words = content[at:end].decode("ascii", "replace").partition("#")[0].split()
+        words = content[position:end].decode("ascii", "replace").partition("#")[0].split()
         if words:
             header[words[0].upper()] = words[1:]
-        at = end + 1
-    table = _table(header, content[at:])
+        position = end + 1
+    table = _table(header, content[position:])
     if not {"x", "y", "z"} <= table.keys():
         raise FileFormatError(f"the fields are {', '.join(table)}, without x, y and z")
     points = np.column_stack([table[axis] for axis in "xyz"])
@@ -148,11 +148,13 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
         rows = np.frombuffer(body, row, n)
         return {name: rows[f"{k}"][:, 0].astype(np.float64) for k, name in enumerate(names)}
     if kind == "binary_compressed":  # one field after another
-        body, at = _unpacked(body, n * row.itemsize), 0
+        body, position = _unpacked(body, n * row.itemsize), 0
         table = {}
         for name, code, count in zip(names, types, counts, strict=True):
-            table[name] = np.frombuffer(body, f"<{code}", n * count, at).reshape(n, count)[:, 0].astype(np.float64)
-            at += n * count * np.dtype(code).itemsize
+            table[name] = (
+                np.frombuffer(body, f"<{code}", n * count, position).reshape(n, count)[:, 0].astype(np.float64)
+            )
+            position += n * count * np.dtype(code).itemsize
         return table
     if kind != "ascii":
         raise FileFormatError(f"data are {kind}", remedy="write them as ascii, binary or binary_compressed")
@@ -167,8 +169,8 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
 
 def read_las(path: PathLike) -> PointCloud:
     """Read the points of a LAS or LAZ file, with its scale and offset; it has no normals."""
-    found = parsed("las", path, "laspy", f"{extension(path)} files", bytes_per_byte=PACKED)
-    return _cloud(found["points"], path)
+    parts = parsed("las", path, "laspy", f"{extension(path)} files", bytes_per_byte=PACKED)
+    return _cloud(parts["points"], path)
 
 
 def read_e57(path: PathLike) -> PointCloud:
@@ -231,21 +233,21 @@ def _unpacked(body: bytes, size: int) -> bytes:
     ends = struct.unpack_from("<II", body) if len(body) >= 8 else (0, -1)
     if ends[1] != size or len(body) < 8 + ends[0]:
         raise FileFormatError(f"{size} bytes were to be unpacked from {ends[0]}: it is damaged or truncated")
-    packed, result, at = body[8 : 8 + ends[0]], bytearray(), 0
+    packed, result, position = body[8 : 8 + ends[0]], bytearray(), 0
     try:
-        while at < len(packed) and len(result) <= size:
-            control = packed[at]
-            at += 1
+        while position < len(packed) and len(result) <= size:
+            control = packed[position]
+            position += 1
             if control < 32:
-                result += packed[at : at + control + 1]
-                at += control + 1
+                result += packed[position : position + control + 1]
+                position += control + 1
                 continue
             length = 2 + (control >> 5)
             if length == 9:
-                length += packed[at]
-                at += 1
-            back = ((control & 31) << 8) + packed[at] + 1
-            at += 1
+                length += packed[position]
+                position += 1
+            back = ((control & 31) << 8) + packed[position] + 1
+            position += 1
             if back > len(result):
                 raise IndexError
             part = bytes(result[len(result) - back : len(result) - back + length])

@@ -93,22 +93,22 @@ def parsed(
         )
         with process:
             try:
-                found = _answer(cast("BinaryIO", process.stdout), path)
+                values = _answer(cast("BinaryIO", process.stdout), path)
                 with suppress(subprocess.TimeoutExpired):
                     process.wait(1.0)
             finally:
                 process.kill()
-        if found is None:
+        if values is None:
             messages.seek(0)
             lines = messages.read().decode("utf-8", errors="replace").splitlines()
             said = [line for line in lines if line.strip() and not line.startswith("note:")]
             raise _died(package, process.returncode, said[-1] if said else "", seconds)
-    if "refused" in found:
-        cause, remedy = found["refused"]
+    if "refused" in values:
+        cause, remedy = values["refused"]
         raise FileFormatError(cause, remedy=remedy)
-    if "error" in found:
-        raise _failed(package, purpose, found, memory)
-    return found
+    if "error" in values:
+        raise _failed(package, purpose, values, memory)
+    return values
 
 
 def _answer(stream: BinaryIO, path: PathLike) -> dict[str, Any] | None:
@@ -117,7 +117,7 @@ def _answer(stream: BinaryIO, path: PathLike) -> dict[str, Any] | None:
         about = json.loads(stream.readline(MOST_SAID))
         if "values" not in about:
             return dict(about)
-        found = dict(about["values"])
+        values = dict(about["values"])
         shapes = [(str(name), str(code), [int(n) for n in shape]) for name, code, shape in about["arrays"]]
     except (ValueError, KeyError, TypeError):
         return None
@@ -125,14 +125,14 @@ def _answer(stream: BinaryIO, path: PathLike) -> dict[str, Any] | None:
         if not NUMBERS.fullmatch(code) or min(shape, default=0) < 0:
             return None
         ensure_fits(prod(shape) * np.dtype(code).itemsize, path)
-        found[name] = np.empty(shape, dtype=code)
-        rest = memoryview(found[name].reshape(-1).view(np.uint8))
+        values[name] = np.empty(shape, dtype=code)
+        rest = memoryview(values[name].reshape(-1).view(np.uint8))
         while rest:
             count = stream.readinto(rest)  # type: ignore[attr-defined]
             if not count:
                 return None
             rest = rest[count:]
-    return found
+    return values
 
 
 def _died(package: str, status: int, said: str, seconds: int) -> SignedHeatError:

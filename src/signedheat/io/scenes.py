@@ -69,8 +69,8 @@ def read_glb(path: PathLike) -> TriangleMesh:
 def read_dae(path: PathLike) -> TriangleMesh:
     """Read all triangles of a COLLADA scene, transformed by their nodes, in the units of the file and with its axes."""
     ensure_installed("collada", ".dae files")
-    found = parsed("dae", path, "trimesh", ".dae files")
-    return _joined([(found["points"], found["triangles"])] if len(found["triangles"]) else [])
+    parts = parsed("dae", path, "trimesh", ".dae files")
+    return _joined([(parts["points"], parts["triangles"])] if len(parts["triangles"]) else [])
 
 
 @dataclass
@@ -89,7 +89,7 @@ def read_3mf(path: PathLike) -> TriangleMesh:
         root = package.model(package.root)
         items = [(_key(item, package.root), _matrix(item)) for item in _all(root, "item")]
         if not items:  # nothing is said about what to build: everything that is a mesh
-            own = [_key(each, package.root, "id") for each in _all(root, "object")]
+            own = [_key(element, package.root, "id") for element in _all(root, "object")]
             items = [(key, np.eye(4, 3)) for key in own if len(package.object(key).faces)]
         ensure_fits(TRIANGLE_BYTES * sum(package.count(key)[0] for key, _ in items), path)
         return _joined([body for key, matrix in items for body in package.placed(key, matrix)])
@@ -201,8 +201,8 @@ def _part(target: str) -> str:
 
 def _key(element: ElementTree.Element, part: str, name: str = "objectid") -> Key:
     """Return the object that an element names; with the production extension it may lie in another part."""
-    other = element.get(PATH)
-    return part if other is None else _part(other), element.get(name, "")
+    path = element.get(PATH)
+    return part if path is None else _part(path), element.get(name, "")
 
 
 def _matrix(element: ElementTree.Element) -> Floats:
@@ -216,7 +216,7 @@ def _object(element: ElementTree.Element, part: str) -> _Object:
     """Return the object that an element of a part describes."""
     vertices = [[float(v.get(axis, "nan")) for axis in "xyz"] for v in _all(element, "vertex")]
     faces = [[int(t.get(corner, "-1")) for corner in ("v1", "v2", "v3")] for t in _all(element, "triangle")]
-    parts = [(_key(each, part), _matrix(each)) for each in _all(element, "component")]
+    parts = [(_key(component, part), _matrix(component)) for component in _all(element, "component")]
     ids = np.array(faces, dtype=np.int64).reshape(-1, 3)
     if len(ids) and (ids.min() < 0 or ids.max() >= len(vertices)):
         raise damaged(
@@ -257,16 +257,16 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
     >>> cad_faces[signedheat.complete(mesh).closest(points).faces]  # doctest: +SKIP
     """
     fineness = {"deflection": deflection, "fineness": FINENESS, "angle": ANGLE}
-    found = parsed(
+    parts = parsed(
         "step", path, "OCP", ".step files", bytes_per_byte=STEP_BYTES, least_seconds=STEP_SECONDS, **fineness
     )
-    counts = found["triangle_counts"]
+    counts = parts["triangle_counts"]
     if not counts.sum():
         raise FileFormatError("it has no surface", path=path)
-    starts = np.cumsum([0, *found["point_counts"][:-1]])
-    faces = found["triangles"] + np.repeat(starts, counts)[:, None]
-    kept, numbers = np.unique(welded(found["points"], SEAM * found["diagonal"]), return_inverse=True)
-    return TriangleMesh(found["points"][kept], numbers.ravel()[faces]), np.repeat(np.arange(len(counts)), counts)
+    starts = np.cumsum([0, *parts["point_counts"][:-1]])
+    faces = parts["triangles"] + np.repeat(starts, counts)[:, None]
+    kept, numbers = np.unique(welded(parts["points"], SEAM * parts["diagonal"]), return_inverse=True)
+    return TriangleMesh(parts["points"][kept], numbers.ravel()[faces]), np.repeat(np.arange(len(counts)), counts)
 
 
 def step_mesh(path: PathLike) -> TriangleMesh:

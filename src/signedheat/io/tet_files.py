@@ -56,8 +56,8 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
     if "tetra" in kinds:
         return TetMesh.from_meshio(mesh)
     if kinds & {"tetra10", "hexahedron", "wedge", "hierarchy"} or not kinds & {"triangle", "quad"}:
-        found = ", ".join(sorted(kinds)) or "no cells"
-        raise GeometryError(f"{path} holds no tets, but {found}", remedy="convert it to linear tetrahedra first")
+        present = ", ".join(sorted(kinds)) or "no cells"
+        raise GeometryError(f"{path} holds no tets, but {present}", remedy="convert it to linear tetrahedra first")
     return (TriangleMesh if "quad" not in kinds else PolygonMesh).from_meshio(mesh)
 
 
@@ -70,10 +70,10 @@ def load_cells(path: PathLike) -> Any:
             raise FileFormatError("the file is empty", remedy="write it again", path=file)
     if extension(path) == ".msh":
         _refuse_announcements(path)
-    found = parsed("cells", path, "meshio", "tet meshes", module=MODULES[extension(path)])
-    blocks = [Block(kind, found[f"cells {k}"]) for k, kind in enumerate(found["kinds"])]
-    values = {name: found[f"values {k}"] for k, name in enumerate(found["names"])}
-    return Cells(found["points"], blocks, values)
+    parts = parsed("cells", path, "meshio", "tet meshes", module=MODULES[extension(path)])
+    blocks = [Block(kind, parts[f"cells {k}"]) for k, kind in enumerate(parts["kinds"])]
+    values = {name: parts[f"values {k}"] for k, name in enumerate(parts["names"])}
+    return Cells(parts["points"], blocks, values)
 
 
 def store_cells(mesh: Any, path: PathLike) -> None:

@@ -118,11 +118,11 @@ class LabelImage(Represented, Frozen):
         True
         """
         if label is None:
-            found = np.unique(self.labels)
-            others = found[found != 0]
+            present = np.unique(self.labels)
+            others = present[present != 0]
             if len(others) != 1:
                 raise GeometryError(
-                    f"the image has {_listed(found)}", remedy="choose one with --label", element="labels"
+                    f"the image has {_listed(present)}", remedy="choose one with --label", element="labels"
                 )
             label = float(others[0])
         inside = self.labels == label

@@ -48,7 +48,7 @@ def write_vti(origin: Floats, spacing: Floats, values: Mapping[str, NDArray[Any]
     missing = 3 - first.ndim
     extent = " ".join(f"0 {n - 1}" for n in first.shape + (1,) * missing)
     writer = _Writer()
-    arrays = "".join(writer.array(key, at.ravel(order="F")) for key, at in values.items())
+    arrays = "".join(writer.array(key, numbers.ravel(order="F")) for key, numbers in values.items())
     attributes = (
         f'WholeExtent="{extent}" Origin="{_words([*origin, *[0.0] * missing])}" '
         f'Spacing="{_words([*spacing, *[1.0] * missing])}" Direction="1 0 0 0 1 0 0 0 1"'
@@ -86,11 +86,11 @@ def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Flo
     if extent[::2].any():
         origin = origin + spacing * extent[::2]
     nodes = piece.find("PointData")
-    found = [] if nodes is None else nodes.findall("DataArray")
-    if not found:
+    listed = [] if nodes is None else nodes.findall("DataArray")
+    if not listed:
         raise FileFormatError("there are no values at the nodes", remedy="save them as point data")
     images = []
-    for element in [found[0], *(each for each in found[1:] if each.get("Name") == other)][:2]:
+    for element in [listed[0], *(element_ for element_ in listed[1:] if element_.get("Name") == other)][:2]:
         if element.get("NumberOfComponents", "1") not in ("1", ""):
             raise FileFormatError(
                 f"'{element.get('Name')}' has {element.get('NumberOfComponents')} numbers at each node",

@@ -156,19 +156,19 @@ def _nested(
 ) -> tuple[Floats, int, int]:
     """(p,) signs that turn closed pieces outwards; pieces within others stay as given, if that is clear."""
     n = len(closed)
-    some = np.flatnonzero(counts != 0)
-    triangles, owners = chain.triangles[some], pieces[some]
+    counted = np.flatnonzero(counts != 0)
+    triangles, owners = chain.triangles[counted], pieces[counted]
     a, b, c = triangles.transpose(1, 0, 2)
-    cones = counts[some] * np.einsum("ij,ij->i", a, np.cross(b, c))
+    cones = counts[counted] * np.einsum("ij,ij->i", a, np.cross(b, c))
     outward = np.where(closed, np.where(np.bincount(owners, cones, n) >= 0, 1.0, -1.0), flips)
     if len(np.unique(owners)) == 1:
         return outward, 0, 0
     names, labels = np.unique(owners, return_inverse=True)
     faces, places = sampled(Pieces(triangles, labels), PROBES * len(names))
-    probes, own = owners[faces], np.abs(counts[some[faces]])
+    probes, own = owners[faces], np.abs(counts[counted[faces]])
     normals = unit(area_vectors(triangles[faces]))
     tree = WindingTree.of(_directed(chain, counts * outward[pieces]))
-    around = tree.levels(places, normals, chain.areas[some[faces]]) - 0.5 * own
+    around = tree.levels(places, normals, chain.areas[counted[faces]]) - 0.5 * own
     depth = np.full(n, np.inf)
     np.minimum.at(depth, probes, np.round(around))
     depth = np.where(closed & np.isfinite(depth), depth, 0.0)
@@ -178,9 +178,9 @@ def _nested(
     given = np.bincount(pieces, np.sign(counts) * np.sign(chain.multiplicities) * chain.areas, n)
     clear = np.abs(given) >= HINT * np.bincount(pieces, chain.areas, n)
     way = np.where(given >= 0, 1.0, -1.0)
-    at, outermost = np.flatnonzero(inner[probes]), np.zeros(n)
+    rows, outermost = np.flatnonzero(inner[probes]), np.zeros(n)
     roots = WindingTree.of(_directed(chain, counts * (way * (depth <= 0))[pieces]))
-    np.add.at(outermost, probes[at], roots.numbers(places[at]))
+    np.add.at(outermost, probes[rows], roots.numbers(places[rows]))
     by_depth = np.where(depth % 2 == 0, 1.0, -1.0)
     facing = np.where(clear, outward * way * np.where(outermost >= 0, 1.0, -1.0), by_depth)
     facing = {"given": facing, "cavities": by_depth, "bodies": np.ones(n)}[nested]
@@ -230,8 +230,8 @@ def open_bounding(
         square = means(values**2, clusters[rows], weights, n)
         amount = _counted(areas * loose, groups, clusters)
         body = (mean * np.sqrt(amount + 1) >= CHANCE) & (mean**2 >= COHERENT * square)
-        each = np.minimum(SHEET, 2 * SHEET * mean) if isinstance(system, Matrix) else -np.inf  # dipoles are noisy
-        least = np.where(body, each, np.inf)[clusters]
+        thresholds = np.minimum(SHEET, 2 * SHEET * mean) if isinstance(system, Matrix) else -np.inf  # dipoles are noisy
+        least = np.where(body, thresholds, np.inf)[clusters]
         wrong = alive & (levels < np.where(loose, least, SHEET * np.minimum(1.0, 2.0 * by_itself)))
         unexplained = np.where(wrong, areas * (0.5 - levels) ** 2, 0.0)
         if not wrong.any():
@@ -266,18 +266,18 @@ def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owner
     hubs = np.unique(chain.complexes[first], return_inverse=True)[1]
     several = np.bincount(labels)[owners] > 1
     ends, owners = chain.positions[edges[several]], np.tile(owners[several], 2)
-    one, other = meeting_edges(np.concatenate([ends, ends[:, ::-1]]))  # which way pieces face is not known yet
+    left, right = meeting_edges(np.concatenate([ends, ends[:, ::-1]]))  # which way pieces face is not known yet
     return connected_components(
         n + int(hubs.max()) + 1,
-        *(np.concatenate(ends) for ends in ((np.arange(n), owners[one]), (n + hubs, owners[other]))),
+        *(np.concatenate(ends) for ends in ((np.arange(n), owners[left]), (n + hubs, owners[right]))),
     )[:n]
 
 
 def _directed(chain: Chain, counts: Floats | Ints) -> Floats:
     """(k, 3, 3) triangles of a chain, repeated by their counts, and reversed where counts are negative."""
-    there = np.repeat(np.arange(len(counts)), np.abs(counts).astype(np.int64))
-    triangles = chain.triangles[there]
-    return np.where((counts[there] < 0)[:, None, None], triangles[:, ::-1], triangles)
+    copies = np.repeat(np.arange(len(counts)), np.abs(counts).astype(np.int64))
+    triangles = chain.triangles[copies]
+    return np.where((counts[copies] < 0)[:, None, None], triangles[:, ::-1], triangles)
 
 
 def _along(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | Ints) -> Bools:

@@ -142,9 +142,9 @@ class Chain(Frozen):
     @cached_property
     def multiplicities(self) -> Ints:
         """(m,) number of times that each triangle is given as it is, minus the number of times reversed."""
-        there = self.numbers >= 0
-        ways = np.where(self.reversed[there], -1, 1)
-        return np.bincount(self.numbers[there], ways, len(self.faces)).astype(np.int64)
+        proper = self.numbers >= 0
+        ways = np.where(self.reversed[proper], -1, 1)
+        return np.bincount(self.numbers[proper], ways, len(self.faces)).astype(np.int64)
 
     @cached_property
     def edges(self) -> EdgeTable:

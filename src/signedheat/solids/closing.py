@@ -69,22 +69,22 @@ def width_of(lid: Lid) -> float:
 def smooth_patches(triangles: Floats, ids: Ints) -> Ints:
     """(m,) component of each face; edges that are not sharp connect faces."""
     table = edge_table(ids)
-    normals, (one, other) = unit(area_vectors(triangles)), table.pairs.T // 3
-    smooth = (normals[one] * normals[other]).sum(axis=1) > SHARP
-    return connected_components(len(ids), one[smooth], other[smooth])
+    normals, (first, second) = unit(area_vectors(triangles)), table.pairs.T // 3
+    smooth = (normals[first] * normals[second]).sum(axis=1) > SHARP
+    return connected_components(len(ids), first[smooth], second[smooth])
 
 
 def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spatial.cKDTree, reach: float) -> Samples:
     """Sample the triangles within reach of a rim, at most reach / `SAMPLES` apart unless that makes too many."""
     size = reach / SAMPLES
-    some = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
-    triangles, patches = triangles[some], patches[some]
+    near_rim = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
+    triangles, patches = triangles[near_rim], patches[near_rim]
     near, labels, divided = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)], 0
     while len(triangles):
         centres = triangles.mean(axis=1)
         radii = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
         away = rim.query(centres)[0]
-        triangles, patches, radii, away = (each[away < reach + radii] for each in (triangles, patches, radii, away))
+        triangles, patches, radii, away = (values[away < reach + radii] for values in (triangles, patches, radii, away))
         fine = radii <= size
         divided += 4 * int((~fine).sum())
         fine |= divided > DIVIDED
@@ -95,12 +95,12 @@ def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spa
         d, e, f = (a + b) / 2, (b + c) / 2, (c + a) / 2
         triangles = np.concatenate([np.stack(t, axis=1) for t in ((a, d, f), (d, b, e), (f, e, c), (d, e, f))])
         patches = np.tile(patches[~fine], 4)
-    found = np.concatenate(near)
-    vectors, areas = area_vectors(found), face_areas(found)
+    pieces = np.concatenate(near)
+    vectors, areas = area_vectors(pieces), face_areas(pieces)
     proper = np.flatnonzero(areas > 0)
     proper = proper[:: max(1, len(proper) // MOST)]
     normals = vectors[proper] / areas[proper, None]
-    return Samples(found.mean(axis=1)[proper], normals, areas[proper], np.concatenate(labels)[proper])
+    return Samples(pieces.mean(axis=1)[proper], normals, areas[proper], np.concatenate(labels)[proper])
 
 
 def continuation(lid: Lid, samples: Samples, patches: Ints, width: float) -> tuple[Floats, Floats, Floats]:
@@ -129,11 +129,11 @@ def continuation(lid: Lid, samples: Samples, patches: Ints, width: float) -> tup
     enough = (np.bincount(rows, minlength=n) >= 3) & (np.linalg.norm(way, axis=1) > 1e-6)
     way = unit(way)
     frame = np.stack([way, unit(np.cross(middle, way))], axis=1)
-    at = np.einsum("kij,kj->ki", frame[rows], x)
-    mean = means(at)
-    at = at - mean[rows]
-    spread = means(at[:, :, None] * at[:, None, :]) + (STIFF * reach) ** 2 * np.eye(2)
-    slopes = np.linalg.solve(spread, means(at[:, :, None] * (normals - middle[rows])[:, None, :]))
+    coordinates = np.einsum("kij,kj->ki", frame[rows], x)
+    mean = means(coordinates)
+    coordinates = coordinates - mean[rows]
+    spread = means(coordinates[:, :, None] * coordinates[:, None, :]) + (STIFF * reach) ** 2 * np.eye(2)
+    slopes = np.linalg.solve(spread, means(coordinates[:, :, None] * (normals - middle[rows])[:, None, :]))
     at_rim = unit(middle - np.einsum("ni,nij->nj", mean, slopes)) * enough[:, None]
     outwards = unit(np.cross(at_rim, along))
     bends, must = width * (slopes[:, 0] * outwards).sum(axis=1), 2.0 * (outwards * vertex_normals(lid)[:n]).sum(axis=1)
@@ -149,9 +149,9 @@ def _within(samples: Samples, loop: Floats, patches: Ints, reach: float) -> tupl
     """Pair each place of a rim with the samples within reach that belong to the patch ending there."""
     if not len(samples.positions):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    found = scipy.spatial.cKDTree(samples.positions).query_ball_point(loop, reach, return_sorted=True)
-    rows = np.repeat(np.arange(len(loop)), [len(each) for each in found])
-    near = np.concatenate([np.asarray(each, dtype=np.int64) for each in found])
+    neighbours = scipy.spatial.cKDTree(samples.positions).query_ball_point(loop, reach, return_sorted=True)
+    rows = np.repeat(np.arange(len(loop)), [len(ids) for ids in neighbours])
+    near = np.concatenate([np.asarray(ids, dtype=np.int64) for ids in neighbours])
     own = samples.patches[near] == patches[rows]
     return rows[own], near[own]
 
@@ -218,17 +218,17 @@ def _least_bent(
                         continue
                     _normal(points[i], points[k], points[j], normal)
                     before, behind = _angle(normal, across[i, k]), _angle(normal, across[k, j])
-                    one, other = _length(points[i], points[k]), _length(points[k], points[j])
-                    total = cost[i, k] + cost[k, j] + one * before + other * behind
+                    length_before, length_behind = _length(points[i], points[k]), _length(points[k], points[j])
+                    total = cost[i, k] + cost[k, j] + length_before * before + length_behind * behind
                     if not normal.any():  # without area, which others have if there are any
-                        total += np.pi * (one + other)
+                        total += np.pi * (length_before + length_behind)
                     if total < cost[i, j]:
                         cost[i, j], split[i, j], across[i, j] = total, k, normal
                         rims[i, j] = rims[i, k] + rims[k, j]
                         if k == i + 1:
-                            rims[i, j] += one * before**2
+                            rims[i, j] += length_before * before**2
                         if k == j - 1:
-                            rims[i, j] += other * behind**2
+                            rims[i, j] += length_behind * behind**2
         last = _length(points[n - 1], points[0])
         bend = rims[0, n - 1] + last * _angle(across[0, n - 1], normals[begin + n - 1]) ** 2
         closed[h] = cost[0, n - 1] < np.inf and bend <= most**2 * around
@@ -272,8 +272,8 @@ def _angle(a: Floats, b: Floats) -> float:
 @compiled
 def _is_among(taken: Ints, i: int, j: int) -> bool:
     key = (min(i, j) << 32) | max(i, j)
-    at = np.searchsorted(taken, key)
-    return bool(at < len(taken) and taken[at] == key)
+    place = np.searchsorted(taken, key)
+    return bool(place < len(taken) and taken[place] == key)
 
 
 NONE = np.empty((0, 2), dtype=np.int64)
@@ -419,9 +419,9 @@ def _with_sides(loop: Ints, places: Ints, lid: Ints) -> Ints:
     for begin, end in zip(places, [*places[1:], places[0] + len(loop)], strict=True):
         side = loop[np.arange(begin, end + 1) % len(loop)]
         if len(side) > 2:
-            at, corner = np.argwhere((lid == side[0]) & (np.roll(lid, -1, axis=1) == side[-1]))[0]
-            apex = np.full(len(side) - 1, lid[at, corner - 1])
-            lid = np.concatenate([np.delete(lid, at, axis=0), np.stack([side[:-1], side[1:], apex], axis=1)])
+            row, corner = np.argwhere((lid == side[0]) & (np.roll(lid, -1, axis=1) == side[-1]))[0]
+            apex = np.full(len(side) - 1, lid[row, corner - 1])
+            lid = np.concatenate([np.delete(lid, row, axis=0), np.stack([side[:-1], side[1:], apex], axis=1)])
     return lid
 
 

@@ -310,8 +310,8 @@ def scatter_of(triangles: Floats, labels: Ints) -> float:
     """Distance between corners that noise has separated; 0 if it has not separated most of them."""
     points = triangles.reshape(-1, 3)
     owners = np.repeat(labels, 3)
-    near, which = scipy.spatial.cKDTree(points).query(points, min(8, len(points)), workers=-1)
-    others = owners[which] != owners[:, None]
+    near, neighbours = scipy.spatial.cKDTree(points).query(points, min(8, len(points)), workers=-1)
+    others = owners[neighbours] != owners[:, None]
     nearest = np.where(others, near, np.inf).min(axis=1)
     sizes = np.repeat(np.sqrt(face_areas(triangles)), 3)
     moved = (nearest > MATCH[0] * sizes) & (nearest < MATCH[1] * sizes)

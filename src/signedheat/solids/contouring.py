@@ -165,34 +165,34 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats
     alone = np.bincount(cells.owners)[cells.owners] == 1
     for begin in range(0, count, MANY):
         stop = min(begin + MANY, count)
-        here = slice(*np.searchsorted(pieces, [begin, stop]))
+        batch = slice(*np.searchsorted(pieces, [begin, stop]))
         parts = _vertices(
             offset,
             grid,
             cells.places[cells.owners[begin:stop]],
             alone[begin:stop],
-            pieces[here] - begin,
-            points[edges[here]],
+            pieces[batch] - begin,
+            points[edges[batch]],
         )
         for whole, part in zip((vertices, middles, wider), parts, strict=True):
             whole[begin:stop] = (part - grid.origin) / grid.spacing
-    taken = _apart(cells, vertices, wider)
-    return np.stack([np.where(taken[:, None], wider, vertices), vertices, middles])
+    chosen = _apart(cells, vertices, wider)
+    return np.stack([np.where(chosen[:, None], wider, vertices), vertices, middles])
 
 
 def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
     """(v,) whether to take the wider candidate; among vertices near each other, the one that moves least may."""
     away = np.where(np.isnan(wider[:, 0]), np.inf, np.linalg.norm(wider - vertices, axis=1))
-    taken: Bools = (np.floor(wider) == cells.places[cells.owners]).all(axis=1)
-    rows = np.flatnonzero(np.isfinite(away) & ~taken)
+    in_cell: Bools = (np.floor(wider) == cells.places[cells.owners]).all(axis=1)
+    rows = np.flatnonzero(np.isfinite(away) & ~in_cell)
     if len(rows):
         rows = rows[np.argsort(away[rows], kind="stable")]
-        settled = np.where(taken[:, None], wider, vertices)
+        settled = np.where(in_cell[:, None], wider, vertices)
         near = scipy.spatial.cKDTree(settled).query_ball_point(wider[rows], APART, workers=-1)
         rows = rows[[set(others) <= {row} for row, others in zip(rows, near, strict=True)]]
         first, second = scipy.spatial.cKDTree(wider[rows]).query_pairs(APART, output_type="ndarray").T
-        taken[np.delete(rows, np.maximum(first, second))] = True
-    return taken
+        in_cell[np.delete(rows, np.maximum(first, second))] = True
+    return in_cell
 
 
 def _vertices(
@@ -208,28 +208,28 @@ def _vertices(
     lower, upper = lower - middles, upper - middles
     on, normals = offset.planes(points)
     quadrics = Quadrics.of(owners, on - middles[owners], normals, count)
-    found, ranks, along = minimizers(quadrics, lower, upper)
-    off = offset.distance(middles + found)
+    minima, ranks, along = minimizers(quadrics, lower, upper)
+    off = offset.distance(middles + minima)
     wider = np.full((count, 3), np.nan)
     creased = np.flatnonzero((ranks > 1) & alone)
     if len(creased):
         # find planes in a cell with a crease that do not cross its edges
         low, high = lower[creased] - BEYOND * grid.spacing, upper[creased] + BEYOND * grid.spacing
-        probes = found[creased][:, None] + _probes(along[creased], quadrics.sides[creased], grid.spacing)
+        probes = minima[creased][:, None] + _probes(along[creased], quadrics.sides[creased], grid.spacing)
         on, normals = offset.planes((middles[creased][:, None] + probes).reshape(-1, 3))
-        which = np.repeat(np.arange(len(creased)), probes.shape[1])
-        on -= middles[creased][which]
-        within = ((on > low[which]) & (on < high[which])).all(axis=1)
-        more = Quadrics.of(which[within], on[within], normals[within], len(creased))
+        probed = np.repeat(np.arange(len(creased)), probes.shape[1])
+        on -= middles[creased][probed]
+        within = ((on > low[probed]) & (on < high[probed])).all(axis=1)
+        more = Quadrics.of(probed[within], on[within], normals[within], len(creased))
         farther, higher, _ = minimizers(quadrics[creased] + more, low, high)
         error = np.abs(offset.distance(middles[creased] + farther))
         wanted = (error < ON * step) & ((higher > ranks[creased]) | (higher == 3) | (np.abs(off[creased]) > ON * step))
         wider[creased[wanted]] = middles[creased[wanted]] + farther[wanted]
     for _ in range(2):
-        off, gradients = offset.slopes(middles + found)
-        onto = np.clip(found - off[:, None] * gradients, lower, upper)
-        found = np.where((np.abs(off) > ON * step)[:, None], onto, found)
-    return middles + found, middles, wider
+        off, gradients = offset.slopes(middles + minima)
+        onto = np.clip(minima - off[:, None] * gradients, lower, upper)
+        minima = np.where((np.abs(off) > ON * step)[:, None], onto, minima)
+    return middles + minima, middles, wider
 
 
 def _probes(along: Floats, across: Floats, spacing: Floats) -> Floats:
@@ -251,10 +251,10 @@ def divided_along_creases(
     for _ in range(DIVISIONS if len(faces) <= MOST else 0):
         edges, points = _creases_off(offset, spacing, vertices, faces)
         while len(edges):
-            found, made = _divided(vertices, faces, edges, points)
-            away, _ = scipy.spatial.cKDTree(points).query(found, distance_upper_bound=NEAR * float(spacing.max()))
+            divided, made = _divided(vertices, faces, edges, points)
+            away, _ = scipy.spatial.cKDTree(points).query(divided, distance_upper_bound=NEAR * float(spacing.max()))
             near = made[np.isfinite(away)[made].any(axis=1)]  # the other triangles are unchanged
-            meeting = near[self_intersections(found, near)]
+            meeting = near[self_intersections(divided, near)]
             if not len(meeting):
                 break
             wrong = np.unique(meeting[meeting >= len(vertices)]) - len(vertices)
@@ -262,7 +262,7 @@ def divided_along_creases(
             edges, points = edges[kept], points[kept]
         if not len(edges):
             break
-        vertices, faces = found, made
+        vertices, faces = divided, made
     return vertices, faces
 
 
@@ -421,8 +421,8 @@ def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCe
         places = places[both.rows(places) < 0]
         if not len(places):
             break
-    found = dual_cells(crossings, grid.shape, lambda at: offset.distance(grid.origin + at * grid.spacing) < 0)
-    return done, crossings, found
+    pieces = dual_cells(crossings, grid.shape, lambda nodes: offset.distance(grid.origin + nodes * grid.spacing) < 0)
+    return done, crossings, pieces
 
 
 def blocks_at(offset: Offset, grid: Grid) -> Ints:
@@ -439,8 +439,8 @@ def blocks_at(offset: Offset, grid: Grid) -> Ints:
 
     free = available_memory()
     limit = math.inf if free is None else max(free - libraries(), 0) / BYTES_PER_BLOCK
-    found = blocks_where(grid, near, limit)
-    if len(found) > limit:
+    places = blocks_where(grid, near, limit)
+    if len(places) > limit:
         cell, larger = (
             float(grid.spacing.max()),
             3 * (2 * halves[-1] + 1) / SIDE,
@@ -449,9 +449,9 @@ def blocks_at(offset: Offset, grid: Grid) -> Ints:
             f"a surface in cells of {cell:.3g} needs more than the {(free or 0) / 1e9:.2g} GB that are free",
             remedy=f"use cells of {larger * cell:.3g}",
         )
-    if not len(found):
+    if not len(places):
         raise OutsideError(f"the distance takes {offset.named} nowhere on the grid", remedy="choose another level")
-    return found
+    return places
 
 
 def crossed_edges(band: BlockValues) -> Crossings:
@@ -465,14 +465,14 @@ def crossed_edges(band: BlockValues) -> Crossings:
 
 def crossings_in(heights: Floats, first: Ints) -> list[Crossings]:
     """Crossed edges between the nodes of a window of a grid, along each axis."""
-    below, held, found = heights < 0, ~np.isnan(heights), []
+    below, held, parts = heights < 0, ~np.isnan(heights), []
     for axis in range(3):
         ahead = tuple(slice(1, None) if k == axis else slice(0, -1) for k in range(3))
-        here = (slice(0, -1),) * 3
-        nodes = np.argwhere((below[here] != below[ahead]) & held[here] & held[ahead])
-        low, high = heights[here][tuple(nodes.T)], heights[ahead][tuple(nodes.T)]
-        found.append(Crossings(first + nodes, np.full(len(nodes), axis), low < 0, low / (low - high)))
-    return found
+        inner = (slice(0, -1),) * 3
+        nodes = np.argwhere((below[inner] != below[ahead]) & held[inner] & held[ahead])
+        low, high = heights[inner][tuple(nodes.T)], heights[ahead][tuple(nodes.T)]
+        parts.append(Crossings(first + nodes, np.full(len(nodes), axis), low < 0, low / (low - high)))
+    return parts
 
 
 def joined_crossings(parts: Sequence[Crossings]) -> Crossings:

@@ -205,11 +205,11 @@ class Deviation(Frozen):
         """
         ids = self._ids[np.argsort(-np.abs(self.of_surface), kind="stable")]
         reach = APART * float(np.linalg.norm(np.ptp(self.points[ids], axis=0)))
-        found: list[int] = []
-        while len(ids) and len(found) < n:
-            found.append(int(ids[0]))
+        chosen: list[int] = []
+        while len(ids) and len(chosen) < n:
+            chosen.append(int(ids[0]))
             ids = ids[np.linalg.norm(self.points[ids] - self.points[ids[0]], axis=1) > reach]
-        return np.array(found, dtype=np.int64)
+        return np.array(chosen, dtype=np.int64)
 
     @property
     def figures(self) -> dict[str, object]:

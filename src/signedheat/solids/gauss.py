@@ -188,9 +188,9 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
     ends = np.cumsum(areas[order])
     lasts = np.cumsum(np.bincount(pieces.labels, minlength=k)) - 1
     begins = np.concatenate([[0.0], ends[lasts[:-1]]])
-    at = np.searchsorted(ends, begins[owners] + share * (ends[lasts] - begins)[owners])
+    rows = np.searchsorted(ends, begins[owners] + share * (ends[lasts] - begins)[owners])
     firsts = np.concatenate([[0], lasts[:-1] + 1])
-    faces = order[np.clip(at, firsts[owners], lasts[owners])]
+    faces = order[np.clip(rows, firsts[owners], lasts[owners])]
     # several on one face are spread over it; a single one is at its centre
     same = np.concatenate([[False], faces[1:] == faces[:-1]])
     run = np.arange(len(faces)) - np.maximum.accumulate(np.where(same, 0, np.arange(len(faces))))
@@ -329,8 +329,8 @@ class Dipoles:
         """(2 · leaves, d) sums of (n, d) values below each node."""
         leaves = len(self.tree.items) // LEAF
         sums = np.zeros((2 * leaves, values.shape[1]))
-        there = self.tree.items >= 0
-        np.add.at(sums, leaves + np.flatnonzero(there) // LEAF, values[self.tree.items[there]])
+        filled = self.tree.items >= 0
+        np.add.at(sums, leaves + np.flatnonzero(filled) // LEAF, values[self.tree.items[filled]])
         level = leaves
         while level > 1:
             sums[level // 2 : level] = sums[level : 2 * level].reshape(-1, 2, values.shape[1]).sum(axis=1)

@@ -74,8 +74,8 @@ def winding_numbers(nodes: NodeSources, shape: tuple[int, ...], positions: Float
 
 def _room(nodes: NodeSources, dimension: int) -> list[tuple[int, int]]:
     """Layers of nodes to add before and behind along each axis, so that no vectors are near the walls."""
-    taken = nodes.nonzero()[0][:, 4 - dimension :]
-    before, behind = taken.min(axis=0), np.array(nodes.shape[4 - dimension :]) - 1 - taken.max(axis=0)
+    occupied = nodes.nonzero()[0][:, 4 - dimension :]
+    before, behind = occupied.min(axis=0), np.array(nodes.shape[4 - dimension :]) - 1 - occupied.max(axis=0)
     rooms = np.maximum(0, CLEARANCE - np.stack([before, behind], axis=1))
     return [(int(below), int(above)) for below, above in rooms]
 
@@ -84,16 +84,16 @@ def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Float
     """Mean positions and sums of the area vectors in blocks of `BLOCK` cells."""
     blocks = np.floor(positions / BLOCK).astype(np.int64)
     blocks -= blocks.min(axis=0)
-    which = blocks[:, 0]
+    owners = blocks[:, 0]
     for column in blocks.T[1:]:
-        if float(which.max()) * float(column.max()) > 2.0**60:  # a shape far larger than the grid
-            which, column = (np.unique(part, return_inverse=True)[1] for part in (which, column))
-        which = which * (column.max() + 1) + column
-    _, which = np.unique(which, return_inverse=True)
+        if float(owners.max()) * float(column.max()) > 2.0**60:  # a shape far larger than the grid
+            owners, column = (np.unique(part, return_inverse=True)[1] for part in (owners, column))
+        owners = owners * (column.max() + 1) + column
+    _, owners = np.unique(owners, return_inverse=True)
     weights = np.linalg.norm(vectors, axis=1) + 1e-300
-    total = np.bincount(which, weights)
+    total = np.bincount(owners, weights)
     n = len(total)
-    return sums_of(weights[:, None] * positions, which, n) / total[:, None], sums_of(vectors, which, n)
+    return sums_of(weights[:, None] * positions, owners, n) / total[:, None], sums_of(vectors, owners, n)
 
 
 def _sources(nodes: NodeSources, shape: tuple[int, ...], below: list[int], spacing: Floats) -> Floats:

@@ -185,12 +185,12 @@ def _holes(around: Rims, lengths: Floats, faces: Ints, decided: Bounding, used: 
 def _through(around: Rims, vertices: Floats, named: Ints) -> Bools:
     """(l,) whether loops pass through one of the named vertices, or through another vertex at its place."""
     places = same_positions(vertices)
-    there = [np.isin(places[named], places[loop]) for loop in around]
-    missed = ~np.any(np.array(there, dtype=bool).reshape(-1, len(named)), axis=0)
+    hits_by_loop = [np.isin(places[named], places[loop]) for loop in around]
+    missed = ~np.any(np.array(hits_by_loop, dtype=bool).reshape(-1, len(named)), axis=0)
     if missed.any():
         vertex = f"vertex {named[np.argmax(missed)]}"
         raise SourceError(f"no rim passes through {vertex}", element=vertex, remedy="name vertices of open edges")
-    return np.array([hits.any() for hits in there], dtype=bool)
+    return np.array([hits.any() for hits in hits_by_loop], dtype=bool)
 
 
 def _as_neighbours(faces: Ints, turned: Bools, added: Ints) -> Ints:

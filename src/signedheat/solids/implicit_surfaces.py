@@ -59,10 +59,10 @@ class Implicit:
         steepness = np.maximum(np.linalg.norm(gradients, axis=1), np.finfo(float).tiny)
         away, ways = self.function(places) / steepness, gradients / steepness[:, None]
         walls = self._beyond(points)
-        at, nearest = np.arange(len(points)), walls.argmax(axis=1)
-        outside = walls[at, nearest] > away
+        rows, nearest = np.arange(len(points)), walls.argmax(axis=1)
+        outside = walls[rows, nearest] > away
         normals = np.concatenate([-np.eye(3), np.eye(3)])[nearest]
-        return np.where(outside, walls[at, nearest], away), np.where(outside[:, None], normals, ways)
+        return np.where(outside, walls[rows, nearest], away), np.where(outside[:, None], normals, ways)
 
     def planes(self, points: Floats) -> tuple[Floats, Floats]:
         """(n, 3) places on the surface near points, and its normals there."""
@@ -102,9 +102,9 @@ class NodePlanes:
         shares = (cells - base)[:, None]
         weights = np.where(CORNERS == 1, shares, 1 - shares).prod(axis=2)
         weights[weights < APART] = 0.0
-        at = tuple((base[:, None] + CORNERS).transpose(2, 0, 1))
-        values, slopes = self.values[at], self.gradients[at]
-        known = (weights > 0) & self.known[at]
+        nodes = tuple((base[:, None] + CORNERS).transpose(2, 0, 1))
+        values, slopes = self.values[nodes], self.gradients[nodes]
+        known = (weights > 0) & self.known[nodes]
         shared = np.where(known, weights, 0.0)
         total = shared.sum(axis=1, keepdims=True)
         middle = (shared[..., None] * slopes).sum(axis=1) / np.maximum(total, APART)
@@ -252,19 +252,19 @@ def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
     parts = [np.empty((0, *(shape or (1,))))]
     for begin in range(0, len(points), TOGETHER):
         asked = points[begin : begin + TOGETHER]
-        found = np.asarray(f(asked), dtype=np.float64)
-        if found.shape not in ((len(asked), *shape), (len(asked), *(shape or (1,)))):
+        numbers = np.asarray(f(asked), dtype=np.float64)
+        if numbers.shape not in ((len(asked), *shape), (len(asked), *(shape or (1,)))):
             raise SignedHeatError(
-                f"the function returns shape {found.shape} for {len(asked)} points",
+                f"the function returns shape {numbers.shape} for {len(asked)} points",
                 element="f",
                 remedy="return one number for each of (n, 3) points, or three of a gradient",
             )
-        found = found.reshape(len(asked), -1)
-        lost = ~np.isfinite(found).all(axis=1)
+        numbers = numbers.reshape(len(asked), -1)
+        lost = ~np.isfinite(numbers).all(axis=1)
         if lost.any():
             place = ", ".join(f"{x:.4g}" for x in asked[np.argmax(lost)])
             raise SignedHeatError(f"the function is not finite at ({place})", element="f")
-        parts.append(found)
+        parts.append(numbers)
     return np.concatenate(parts)
 
 

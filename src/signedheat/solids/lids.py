@@ -105,15 +105,19 @@ def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:
     else:
         flat = (rim.points - frame[0]) @ frame[1]
         inner = spanning.points_inside(flat)
-    found = spanning.spanned(flat, inner)
-    if found is None:
+    triangulation = spanning.spanned(flat, inner)
+    if triangulation is None:
         return None
-    inner = inner[found.inner]
-    points = found.rim(rim.points)
+    inner = inner[triangulation.inner]
+    points = triangulation.rim(rim.points)
     first = np.zeros((len(inner), 3)) if frame is None else frame[0] + inner @ frame[1].T
-    places = rim.places[found.edges] + found.shares / PIECES
+    places = rim.places[triangulation.edges] + triangulation.shares / PIECES
     return Film(
-        np.concatenate([points, first]), found.faces, len(points), np.concatenate([found.rim(flat), inner]), places
+        np.concatenate([points, first]),
+        triangulation.faces,
+        len(points),
+        np.concatenate([triangulation.rim(flat), inner]),
+        places,
     )
 
 
@@ -137,13 +141,18 @@ def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tup
         inner = n + np.flatnonzero(away > CLOSE * float(np.linalg.norm(ways, axis=1).sum()) / PIECES)
         edges, shares = np.arange(len(loop)), np.zeros(len(loop))
         flat = (loop - frame[0]) @ frame[1]
-    found = spanning.spanned(flat, over.plane[inner])
-    if found is None:
+    triangulation = spanning.spanned(flat, over.plane[inner])
+    if triangulation is None:
         return None
-    ends = np.append(shares[1:], 0.0)[found.edges]
+    ends = np.append(shares[1:], 0.0)[triangulation.edges]
     ends[ends == 0] = 1.0
-    begins = shares[found.edges]
-    whole = Spanned(edges[found.edges], begins + found.shares * (ends - begins), found.inner, found.faces)
+    begins = shares[triangulation.edges]
+    whole = Spanned(
+        edges[triangulation.edges],
+        begins + triangulation.shares * (ends - begins),
+        triangulation.inner,
+        triangulation.faces,
+    )
     added = whole.rim(loop)[whole.shares > 0]
     return np.concatenate([added, over.vertices[inner[whole.inner]]]), whole.balanced()
 
@@ -170,14 +179,14 @@ def film(pattern: Film) -> Film:
 
 def _membrane(vertices: Floats, n: int, ends: Ints, weights: Floats) -> Floats:
     """Solve for vertices of which all but the first n are weighted means of their neighbours."""
-    here, there = np.concatenate([ends, ends[::-1]], axis=1)
+    heads, tails = np.concatenate([ends, ends[::-1]], axis=1)
     both = np.concatenate([weights, weights])
-    inner, fixed = (here >= n) & (there >= n), (here >= n) & (there < n)
+    inner, fixed = (heads >= n) & (tails >= n), (heads >= n) & (tails < n)
     size = len(vertices) - n
-    rows = np.concatenate([np.arange(size), here[inner] - n])
-    columns = np.concatenate([np.arange(size), there[inner] - n])
-    entries = np.concatenate([np.bincount(here, both, len(vertices))[n:], -both[inner]])
-    sums = sums_of(both[fixed, None] * vertices[there[fixed]], here[fixed] - n, size)
+    rows = np.concatenate([np.arange(size), heads[inner] - n])
+    columns = np.concatenate([np.arange(size), tails[inner] - n])
+    entries = np.concatenate([np.bincount(heads, both, len(vertices))[n:], -both[inner]])
+    sums = sums_of(both[fixed, None] * vertices[tails[fixed]], heads[fixed] - n, size)
     matrix = sparse.csc_array((entries, (rows, columns)), shape=(size, size))
     return np.concatenate([vertices[:n], sparse.linalg.splu(matrix).solve(sums)])
 
@@ -246,8 +255,8 @@ def _harmonic(lid: Lid, values: Floats) -> Floats:
 
 def _sides(faces: Ints, n: int) -> Ints:
     """(m, 3) edge opposite each corner of the triangles."""
-    one, other = np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)
-    return np.minimum(one, other) * n + np.maximum(one, other)
+    tails, heads = np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)
+    return np.minimum(tails, heads) * n + np.maximum(tails, heads)
 
 
 def _cotangents(vertices: Floats, faces: Ints) -> Floats:
@@ -390,12 +399,12 @@ def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
 def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple[_Run, _Run, _Run]] | None:
     """Find the point near a loop of three runs where their planes meet, and the runs."""
     following = {run.first: run for run in runs}
-    for one in runs:
-        two = following.get((one.first + one.count) % n_sides)
-        three = following.get((two.first + two.count) % n_sides) if two else None
-        if two is None or three is None or one.count + two.count + three.count != n_sides:
+    for first in runs:
+        second = following.get((first.first + first.count) % n_sides)
+        third = following.get((second.first + second.count) % n_sides) if second else None
+        if second is None or third is None or first.count + second.count + third.count != n_sides:
             continue
-        around = (one, two, three)
+        around = (first, second, third)
         planes = unit(np.stack([run.opening for run in around]))
         if abs(np.linalg.det(planes)) < FLAT:
             continue

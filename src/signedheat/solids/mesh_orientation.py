@@ -154,7 +154,7 @@ def oriented_as(shape: Mesh, chain: Chain, decided: Bounding) -> Orientation:
     """Apply a decision about the chain of a mesh to the mesh."""
     owners = owners_of(shape)
     n = int(owners.max()) + 1
-    there = chain.numbers >= 0
+    proper = chain.numbers >= 0
 
     def given(values: NDArray[Any], without: float) -> NDArray[Any]:
         """(m,) values of the chain at the triangles that were given."""
@@ -170,11 +170,11 @@ def oriented_as(shape: Mesh, chain: Chain, decided: Bounding) -> Orientation:
     first[owners[::-1]] = np.arange(len(owners))[::-1]
     turned, whole = most(decided.to_turn(chain)), most(as_given)
     # of copies one that need not turn stays; all do of what is whole as it was given
-    group = np.where(there[first] & ~whole, chain.numbers[first], len(chain.faces) + np.arange(n))
+    group = np.where(proper[first] & ~whole, chain.numbers[first], len(chain.faces) + np.arange(n))
     order = np.lexsort((turned, group))
     kept = np.sort(order[np.append(True, np.diff(group[order]) != 0)])
     pieces = np.where(inside, -1, given(decided.pieces, -1))[first][kept]
-    sheet = most(there & (given(decided.counts, 0) == 0) & ~as_given)[kept]
+    sheet = most(proper & (given(decided.counts, 0) == 0) & ~as_given)[kept]
     turned, inner = turned[kept], most(inside)[kept]
     sheet &= ~inner & (pieces >= 0)
     weights = np.bincount(owners, areas, n)[kept]

@@ -161,8 +161,8 @@ def _fill(
                 places[2, e] = origin[2] + (k + side * eighths[2, e] + 0.5 * (side - 1)) * steps[2]
             _nearest(rows, faces[level, slot], counts[level, slot], places, away, best, which)
             if side > 1:
-                some, n = faces[level, slot], counts[level, slot]
-                _divide(some, n, away, best, which, 0.5 * (side - 1) * steps, faces[level + 1], counts[level + 1])
+                candidates, n = faces[level, slot], counts[level, slot]
+                _divide(candidates, n, away, best, which, 0.5 * (side - 1) * steps, faces[level + 1], counts[level + 1])
             for e in range(parts):
                 p, q, r = i + side * eighths[0, e], j + side * eighths[1, e], k + side * eighths[2, e]
                 if p < limits[0] and q < limits[1] and r < limits[2]:
@@ -214,13 +214,13 @@ def _divide(
         ways[0, e] = best[e] * (1.0 + SLACK) + half[0] * half[0] + half[1] * half[1] + half[2] * half[2]
     a, b, c = 2.0 * half[0], 2.0 * half[1], 2.0 * half[2]
     for at in range(count):
-        some = 0
+        total = 0
         for e in range(len(best)):
             low = away[at, 0, e] - a * abs(away[at, 1, e] - ways[1, e])
             low -= b * abs(away[at, 2, e] - ways[2, e]) + c * abs(away[at, 3, e] - ways[3, e])
             can[e] = 1 if low <= ways[0, e] else 0
-            some += can[e]
-        if some > 0:
+            total += can[e]
+        if total > 0:
             for e in range(len(best)):
                 out[e, counts[e]] = faces[at]
                 counts[e] += can[e]

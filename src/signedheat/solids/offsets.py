@@ -84,8 +84,8 @@ class Offset:
         """(n, 3) places on the surface near points, and its normals there; at level 0 those of nearest triangles."""
         if self.level == 0:
             tree = self.solid.tree
-            found = tree.search(points)
-            return found.places, tree.features.face_normals[found.faces]
+            nearest = tree.search(points)
+            return nearest.places, tree.features.face_normals[nearest.faces]
         heights, gradients = self.slopes(points)
         return points - heights[:, None] * gradients, gradients
 
@@ -102,8 +102,8 @@ class Offset:
         slack = TOGETHER * float(np.ptp(tree.bounds[1].reshape(2, 3), axis=0).max())
 
         def part(rows: Floats) -> tuple[Floats, Ints]:
-            found: tuple[Floats, Ints] = _steepest(features.rows, tree.bounds, tree.items, self._normals, rows, slack)
-            return found
+            result: tuple[Floats, Ints] = _steepest(features.rows, tree.bounds, tree.items, self._normals, rows, slack)
+            return result
 
         above, faces = in_chunks(part, np.concatenate([places[near], sides[:, None] * away[near]], axis=1))
         beyond = (1 - self.limit) * np.abs(reach[near]) + far[near]  # of the ball that cuts off
@@ -124,8 +124,8 @@ class Offset:
         assert callable(self.reach)
         step = STEP * float(np.ptp(self.solid.tree.tree.bounds[1].reshape(2, 3), axis=0).max())
         around = (points[:, None] + step * ALONG_AXES).reshape(-1, 3)
-        found = self.reach(self.solid.tree.search(around).places).reshape(-1, 2, 3)
-        result: Floats = (found[:, 0] - found[:, 1]) / (2 * step)
+        reaches = self.reach(self.solid.tree.search(around).places).reshape(-1, 2, 3)
+        result: Floats = (reaches[:, 0] - reaches[:, 1]) / (2 * step)
         return result
 
 
@@ -239,34 +239,34 @@ class SheetWall:
     def depths(self, points: Floats) -> Floats:
         """(n,) distances of (n, 3) points outside the wall, negative inside."""
         points = points - self.origin + self.step
-        found = self.tree.search(points)
+        nearest = self.tree.search(points)
         if self.above == self.below:
-            depths = found.distances - self.above
+            depths = nearest.distances - self.above
         else:
-            heights = np.where(found.cosines < 0, -found.distances, found.distances)
+            heights = np.where(nearest.cosines < 0, -nearest.distances, nearest.distances)
             depths = np.maximum(heights - self.above, -self.below - heights)
-        return depths if self.rim is None else np.maximum(depths, self._beyond(points, found))
+        return depths if self.rim is None else np.maximum(depths, self._beyond(points, nearest))
 
-    def _beyond(self, points: Floats, found: NearestFaces) -> Floats:
+    def _beyond(self, points: Floats, nearest_places: NearestFaces) -> Floats:
         """(n,) distances beyond the rim, negative over the surface."""
-        faces, features = found.faces, found.features
-        at = np.full((len(points), 2), -1)
+        faces, features = nearest_places.faces, nearest_places.features
+        rim_sides = np.full((len(points), 2), -1)
         edges, vertices = (features > 0) & (features < 4), features > 3
-        at[edges] = self.sides[faces[edges], features[edges] - 1][:, None]
-        at[vertices] = self.at_vertices[self.tree.features.faces[faces[vertices], features[vertices] - 4]]
+        rim_sides[edges] = self.sides[faces[edges], features[edges] - 1][:, None]
+        rim_sides[vertices] = self.at_vertices[self.tree.features.faces[faces[vertices], features[vertices] - 4]]
         shares = np.broadcast_to(
-            [1.0, 0.0], at.shape
+            [1.0, 0.0], rim_sides.shape
         ).copy()  # of what ends at a vertex, its end, and of the other its begin
-        sides = at[edges, 0]
+        sides = rim_sides[edges, 0]
         begin, end = self.corners[sides].swapaxes(0, 1)
-        along = np.linalg.norm(found.places[edges] - begin, axis=1) / np.linalg.norm(end - begin, axis=1)
+        along = np.linalg.norm(nearest_places.places[edges] - begin, axis=1) / np.linalg.norm(end - begin, axis=1)
         shares[edges] = along[:, None]
-        outward = self.outward[at]
+        outward = self.outward[rim_sides]
         outward = outward[:, :, 0] + shares[..., None] * (outward[:, :, 1] - outward[:, :, 0])
-        beyond = np.einsum("nki,ni->nk", outward, points - found.places).max(axis=1)
-        over = np.flatnonzero((at < 0).all(axis=1))
-        nearest, weights = cast("TriangleTree", self.rim).nearest(found.places[over])
+        beyond = np.einsum("nki,ni->nk", outward, points - nearest_places.places).max(axis=1)
+        over = np.flatnonzero((rim_sides < 0).all(axis=1))
+        nearest, weights = cast("TriangleTree", self.rim).nearest(nearest_places.places[over])
         ends = self.corners[nearest]
         on_rim = ends[:, 0] + (1 - weights[:, :1]) * (ends[:, 1] - ends[:, 0])
-        beyond[over] = -np.linalg.norm(found.places[over] - on_rim, axis=1)
+        beyond[over] = -np.linalg.norm(nearest_places.places[over] - on_rim, axis=1)
         return beyond

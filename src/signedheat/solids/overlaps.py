@@ -56,8 +56,8 @@ def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) ->
     for group in np.unique(labels[faces][wanted > FEW]):
         chosen = np.flatnonzero(labels[faces] == group)
         members = order[starts[group] : starts[group + 1]]
-        there = np.repeat(members, np.abs(counts[members]))
-        directed = np.where((counts[there] < 0)[:, None, None], triangles[there, ::-1], triangles[there])
+        copies = np.repeat(members, np.abs(counts[members]))
+        directed = np.where((counts[copies] < 0)[:, None, None], triangles[copies, ::-1], triangles[copies])
         tree, some = WindingTree.of(directed), triangles[faces[chosen]]
         levels[chosen] = tree.levels(some.mean(axis=1), unit(area_vectors(some)), face_areas(some))
     return levels
@@ -161,29 +161,31 @@ def bodies_around(
     normals = np.concatenate([system.normals, np.zeros(rims.middles.shape)])
     sizes = np.concatenate([system.areas, rims.lengths])
     parts = parts_of(directed[np.argsort(numbers, kind="stable")], np.sort(numbers), count, closed)
-    rows, others, there = _windings(places, normals, sizes, parts)
-    here = homes[rows]
+    rows, others, numbers_there = _windings(places, normals, sizes, parts)
+    homes_there = homes[rows]
     weights = np.where(own, sizes, 0.0)
     on_rim = np.arange(len(places)) >= n
 
     def mean(chosen: Bools, values: NDArray[Any], one: Ints, other: Ints) -> Floats:
         """Over the chosen places of one body, 0 where these are not in the box of the other, for each pair."""
         entries, shape = weights[rows] * chosen[rows] * values, (count + 1, count + 1)
-        sums = sparse.coo_array((entries, (here, others)), shape=shape).tocsr()
+        sums = sparse.coo_array((entries, (homes_there, others)), shape=shape).tocsr()
         total = np.bincount(homes, weights * chosen, count + 1)
         return np.asarray(sums[one, other]).ravel() / np.maximum(total[one], np.finfo(float).tiny)
 
     full = 2 * np.abs(np.append(bodies.levels, 0.5))[others]
-    share = np.clip(there / full, 0.0, 1.0)  # 1 as if nothing of the other body was gone
-    surface_within = np.maximum(*(mean(~on_rim, share > INSIDE, *pair) for pair in ((here, others), (others, here))))
-    not_nested, enclosed = surface_within < 1 - APART, mean(on_rim, share, here, others) >= 1 - APART
+    share = np.clip(numbers_there / full, 0.0, 1.0)  # 1 as if nothing of the other body was gone
+    surface_within = np.maximum(
+        *(mean(~on_rim, share > INSIDE, *pair) for pair in ((homes_there, others), (others, homes_there)))
+    )
+    not_nested, enclosed = surface_within < 1 - APART, mean(on_rim, share, homes_there, others) >= 1 - APART
     every = np.ones(count, dtype=bool)
-    stays = {"given": bodies.as_given, "cavities": ~every, "bodies": every}[nested][here]
-    ignored = (here != others) & (not_nested | (enclosed & stays))
+    stays = {"given": bodies.as_given, "cavities": ~every, "bodies": every}[nested][homes_there]
+    ignored = (homes_there != others) & (not_nested | (enclosed & stays))
     subtracted = np.where(others == count, enclosed & ~stays, ~ignored) & (rows < n)
     everything = WindingTree.of(np.concatenate(parts[:count]))
     around = everything.levels(system.places, system.normals, system.areas)
-    return around - np.bincount(rows[subtracted], there[subtracted], n)
+    return around - np.bincount(rows[subtracted], numbers_there[subtracted], n)
 
 
 def parts_of(triangles: Floats, numbers: Ints, count: int, closed: Floats) -> list[Floats]:
@@ -200,9 +202,9 @@ def _windings(places: Floats, normals: Floats, sizes: Floats, parts: list[Floats
     inside_box = (places[rows] >= boxes[others, 0]) & (places[rows] <= boxes[others, 1])
     kept = np.flatnonzero(inside_box.all(axis=1))
     kept = kept[np.argsort(others[kept], kind="stable")]
-    rows, others, there = rows[kept], others[kept], np.zeros(len(kept))
+    rows, others, numbers = rows[kept], others[kept], np.zeros(len(kept))
     for body, (begin, end) in enumerate(pairwise(np.searchsorted(others, np.arange(len(parts) + 1)))):
         if end > begin:
-            some = rows[begin:end]
-            there[begin:end] = WindingTree.of(parts[body]).levels(places[some], normals[some], sizes[some])
-    return rows, others, there
+            batch = rows[begin:end]
+            numbers[begin:end] = WindingTree.of(parts[body]).levels(places[batch], normals[batch], sizes[batch])
+    return rows, others, numbers

@@ -47,7 +47,7 @@ def orient_points(cloud: PointCloud) -> PointOrientation:
             remedy="in the plane, give a Polyline",
             element="points",
         )
-    ids, which = np.unique(cloud.representatives, return_inverse=True)
+    ids, owners = np.unique(cloud.representatives, return_inverse=True)
     if len(ids) < 4:
         raise GeometryError(
             f"the point cloud has {len(ids)} distinct points, and a surface needs at least 4",
@@ -55,16 +55,16 @@ def orient_points(cloud: PointCloud) -> PointOrientation:
             element="points",
         )
     given = None if cloud.normals is None else cloud.normals[ids]
-    outward, fits, found = outward_normals(cloud.points[ids], given)
+    outward, fits, decision = outward_normals(cloud.points[ids], given)
     if cloud.normals is None:
-        normals = outward[which.ravel()]
+        normals = outward[owners.ravel()]
         fitted, turned = cloud.n_points, 0
     else:
-        every = found.signs[which.ravel()]
+        every = decision.signs[owners.ravel()]
         normals = cloud.normals * every[:, None]
         fitted, turned = 0, int((every < 0).sum())
     oriented = PointCloud(cloud.points, normals, cloud.areas, cloud.n_neighbors)
-    return PointOrientation(oriented, fitted, turned, fits.n_neighbors, fits.noisy, found.sided, found.coherence)
+    return PointOrientation(oriented, fitted, turned, fits.n_neighbors, fits.noisy, decision.sided, decision.coherence)
 
 
 NEIGHBOURS = 30
@@ -106,13 +106,13 @@ def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats
     result = np.array(phi, dtype=np.float64)
     nodes = np.argwhere(np.abs(phi) < WIDTH * float(steps.max()))
     for begin in range(0, len(nodes), CHUNK):
-        some = tuple(nodes[begin : begin + CHUNK].T)
-        places = np.stack(some, axis=1) * steps
+        batch = tuple(nodes[begin : begin + CHUNK].T)
+        places = np.stack(batch, axis=1) * steps
         ahead = _slopes(phi, nodes[begin : begin + CHUNK], steps)
         ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), np.finfo(float).tiny)
         reach, near = tree.query(places, k=[*range(1, n_neighbours + 1)], workers=-1)
         heights, share = _fit(places, ahead, reach, points[near], normals[near], gap)
-        result[some] += share * (heights - phi[some])
+        result[batch] += share * (heights - phi[batch])
     return result
 
 

@@ -40,40 +40,40 @@ class Regions:
         """Find the regions of pieces that meet in whole edges and contain the cycle with these winding numbers."""
         first, reverse = coincident_faces(pieces.faces.ravel(), np.arange(0, pieces.faces.size + 1, 3))
         first = np.where(first < 0, np.arange(len(first)), first)  # triangles on fewer than three points
-        distinct, which = np.unique(first, return_inverse=True)
-        times = np.bincount(which, np.where(reverse, -1, 1), len(distinct)).astype(np.int64)
+        distinct, groups = np.unique(first, return_inverse=True)
+        times = np.bincount(groups, np.where(reverse, -1, 1), len(distinct)).astype(np.int64)
         vectors = area_vectors(pieces.points[pieces.faces])
         parents = unit(sums_of(vectors, pieces.origins, int(pieces.origins.max(initial=-1)) + 1))
         normals = parents[pieces.origins[distinct]]
         inside = _windings(pieces.points, pieces.faces[distinct], normals, times, windings) > INSIDE
         behind, ahead = inside.T
         behind, ahead = (
-            np.where(reverse, *pair) for pair in ((ahead[which], behind[which]), (behind[which], ahead[which]))
+            np.where(reverse, *pair) for pair in ((ahead[groups], behind[groups]), (behind[groups], ahead[groups]))
         )
         # of copies the first stays that has the inside behind it, if there is one
-        order = np.lexsort((~behind | ahead, which))
-        doubled = np.ones(len(which), dtype=bool)
-        doubled[order[np.unique(which[order], return_index=True)[1]]] = False
+        order = np.lexsort((~behind | ahead, groups))
+        doubled = np.ones(len(groups), dtype=bool)
+        doubled[order[np.unique(groups[order], return_index=True)[1]]] = False
         return cls(behind, ahead, doubled)
 
 
 def _windings(points: Floats, faces: Ints, normals: Floats, times: Ints, windings: Windings) -> Floats:
     """(m, 2) winding numbers behind and in front of each distinct face, given its multiplicity."""
     n = len(faces)
-    one, other = _around_edges(points, faces, normals, times)
-    levels, labels = (values.reshape(-1, 2) for values in _levels(times, one, other))
+    sides, facing_sides = _around_edges(points, faces, normals, times)
+    levels, labels = (values.reshape(-1, 2) for values in _levels(times, sides, facing_sides))
     labels = labels[:, 0]
     # the widest faces of each part
     order = np.lexsort((-_widths(points, faces), labels))
     starts = np.searchsorted(labels[order], np.arange(int(labels.max(initial=-1)) + 1))
     chosen = order[np.arange(n) - starts[labels[order]] < SAMPLES]
-    some = points[faces[chosen]]
+    corners = points[faces[chosen]]
     away = np.minimum(
-        np.maximum(DEPTH * np.sqrt(face_areas(some)), _slack(points)), 0.1 * _widths(points, faces[chosen])
+        np.maximum(DEPTH * np.sqrt(face_areas(corners)), _slack(points)), 0.1 * _widths(points, faces[chosen])
     )
-    away, centres = away[:, None] * normals[chosen], some.mean(axis=1)
-    there = windings.numbers_once(np.concatenate([centres - away, centres + away]))
-    offsets, owners = there - levels[chosen].T.ravel(), np.tile(labels[chosen], 2)
+    away, centres = away[:, None] * normals[chosen], corners.mean(axis=1)
+    sampled = windings.numbers_once(np.concatenate([centres - away, centres + away]))
+    offsets, owners = sampled - levels[chosen].T.ravel(), np.tile(labels[chosen], 2)
     order = np.lexsort((offsets, owners))
     counts = np.bincount(owners)
     medians = offsets[order[np.cumsum(counts) - counts + counts // 2]]
@@ -88,11 +88,11 @@ def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> 
     """
     table = edge_table(faces)
     halfedges = table.pairs[(_ways(table, table.pairs) * times[table.pairs // 3]).sum(axis=1) == 0]
-    one, other = _facing(table, halfedges.ravel(), halfedges[:, ::-1].ravel())
+    sides, facing_sides = _facing(table, halfedges.ravel(), halfedges[:, ::-1].ravel())
 
-    some = np.flatnonzero((table.face_counts > 2)[table.face_edges.ravel()])
-    edges, around = np.unique(table.face_edges.ravel()[some], return_inverse=True)
-    owners, ways, vertices = some // 3, _ways(table, some), table.vertices[edges]
+    crowded = np.flatnonzero((table.face_counts > 2)[table.face_edges.ravel()])
+    edges, around = np.unique(table.face_edges.ravel()[crowded], return_inverse=True)
+    owners, ways, vertices = crowded // 3, _ways(table, crowded), table.vertices[edges]
     along = points[vertices[:, 1]] - points[vertices[:, 0]]
     lengths, along = np.linalg.norm(along, axis=1), unit(along)
     first, second = axes_across(along)
@@ -108,8 +108,8 @@ def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> 
     balanced = np.bincount(around, ways * times[owners], len(edges)) == 0
     clear = np.flatnonzero(balanced[around[order]] & (apart > 0))
     clear = clear[np.argsort(-apart[clear], kind="stable")]
-    beside = _facing(table, some[order[clear]], some[following[clear]])
-    return np.concatenate([one, beside[0]]), np.concatenate([other, beside[1]])
+    beside = _facing(table, crowded[order[clear]], crowded[following[clear]])
+    return np.concatenate([sides, beside[0]]), np.concatenate([facing_sides, beside[1]])
 
 
 def _ways(table: EdgeTable, halfedges: Ints) -> Ints:

@@ -37,13 +37,13 @@ def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:
     [[1, 0], [0, 2], [3, 1], [2, 3]]
     """
     table = edge_table(faces)
-    n, here, owners = len(table.vertices), table.face_edges.ravel(), np.repeat(parts, 3)
+    n, edges_of_sides, owners = len(table.vertices), table.face_edges.ravel(), np.repeat(parts, 3)
     lacking, last = table.balance != 0, np.empty(n, dtype=np.int64)
-    last[here] = owners
-    lacking[here[owners != last[here]]] = True  # of several parts; faces of one cancel
-    some = np.flatnonzero(lacking[here])
-    sides, which = np.unique(owners[some] * n + here[some], return_inverse=True)
-    excess = np.bincount(which, np.where(table.forward.ravel()[some], 1, -1), len(sides)).astype(np.int64)
+    last[edges_of_sides] = owners
+    lacking[edges_of_sides[owners != last[edges_of_sides]]] = True  # of several parts; faces of one cancel
+    lacked = np.flatnonzero(lacking[edges_of_sides])
+    sides, owners_of_sides = np.unique(owners[lacked] * n + edges_of_sides[lacked], return_inverse=True)
+    excess = np.bincount(owners_of_sides, np.where(table.forward.ravel()[lacked], 1, -1), len(sides)).astype(np.int64)
     edges = table.vertices[sides % n]
     missing = np.where(excess[:, None] > 0, edges[:, ::-1], edges)
     return np.repeat(missing, np.abs(excess), axis=0), np.repeat(sides // n, np.abs(excess))
@@ -182,20 +182,20 @@ def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
     along = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(along, axis=1)
     ways = along / np.maximum(lengths, 1e-300)[:, None]
-    at = (np.arange(PLACES) + 0.5) / PLACES
-    places = (ends[:, :1] + at[:, None] * along[:, None]).reshape(-1, 3)
+    shares = (np.arange(PLACES) + 0.5) / PLACES
+    places = (ends[:, :1] + shares[:, None] * along[:, None]).reshape(-1, 3)
     owners = np.repeat(np.arange(len(ends)), PLACES)
     tree, reach = scipy.spatial.cKDTree(places), ALONG * lengths[owners]
     counts = tree.query_ball_point(places, reach, return_length=True)
     crowded = np.flatnonzero(counts > 1)  # each place finds itself
     near = tree.query_ball_point(places[crowded], reach[crowded]) if len(crowded) else []
-    one = np.repeat(crowded, counts[crowded])
-    other = np.concatenate([np.asarray(numbers, dtype=np.int64) for numbers in near]) if len(one) else one
+    first = np.repeat(crowded, counts[crowded])
+    second = np.concatenate([np.asarray(numbers, dtype=np.int64) for numbers in near]) if len(first) else first
     # each place with the edges that it lies along, whichever of the two is the longer
-    beside = np.unique(np.concatenate([one, other]) * len(ends) + owners[np.concatenate([other, one])])
+    beside = np.unique(np.concatenate([first, second]) * len(ends) + owners[np.concatenate([second, first])])
     pairs, shared = np.unique(owners[beside // len(ends)] * len(ends) + beside % len(ends), return_counts=True)
     pairs = np.stack([pairs // len(ends), pairs % len(ends)], axis=1)[shared >= SHARED]
     pairs = np.unique(np.sort(pairs, axis=1), axis=0)
-    one, other = pairs[(ways[pairs[:, 0]] * ways[pairs[:, 1]]).sum(axis=1) < OPPOSITE].T
-    same = (ends[one] == ends[other, ::-1]).all(axis=(1, 2))
-    return one[~same], other[~same]
+    first, second = pairs[(ways[pairs[:, 0]] * ways[pairs[:, 1]]).sum(axis=1) < OPPOSITE].T
+    same = (ends[first] == ends[second, ::-1]).all(axis=(1, 2))
+    return first[~same], second[~same]

@@ -46,10 +46,10 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
         )
     for attempt in range(ATTEMPTS):
         made = given.simplify(0.5**attempt * tolerance).to_mesh64()
-        found = TriangleMesh(np.asarray(made.vert_properties)[:, :3], np.asarray(made.tri_verts).astype(np.int64))
-        if is_within(found, mesh, tolerance) and is_within(mesh, found, tolerance):
-            if not len(self_intersections(found.vertices, found.faces)):
-                return found
+        surface = TriangleMesh(np.asarray(made.vert_properties)[:, :3], np.asarray(made.tri_verts).astype(np.int64))
+        if is_within(surface, mesh, tolerance) and is_within(mesh, surface, tolerance):
+            if not len(self_intersections(surface.vertices, surface.faces)):
+                return surface
     warn_user(
         f"the surface is as it was: manifold3d makes none of fewer triangles that is within {tolerance:.3g} of it and "
         "does not meet itself; another tolerance may do",

@@ -591,8 +591,8 @@ class Solid(Displayed, Represented, Frozen):
         return (self.tree.search(points).distances,)
 
     def _distances(self, points: Floats) -> tuple[Floats]:
-        found = self.tree.search(points)
-        return (np.where(self._inside(points, found), -found.distances, found.distances),)
+        nearest = self.tree.search(points)
+        return (np.where(self._inside(points, nearest), -nearest.distances, nearest.distances),)
 
     def _inside(self, points: Floats, found: NearestFaces) -> Bools:
         """(n,) whether points are inside: by the normal at the nearest place, or the winding number if in doubt."""
@@ -604,20 +604,20 @@ class Solid(Displayed, Represented, Frozen):
         return inside
 
     def _closest(self, points: Floats) -> tuple[NDArray[Any], ...]:
-        found = self.tree.search(points)
-        ids = self.features.ids[found.faces]
-        signs = np.where(self._inside(points, found), -1.0, 1.0)
-        away = points - found.places
-        lengths = found.distances
+        nearest = self.tree.search(points)
+        ids = self.features.ids[nearest.faces]
+        signs = np.where(self._inside(points, nearest), -1.0, 1.0)
+        away = points - nearest.places
+        lengths = nearest.distances
         clear = lengths > 1e-12 * np.abs(points).max(initial=1e-290)
-        normals = self.features.face_normals[found.faces]
+        normals = self.features.face_normals[nearest.faces]
         gradients = np.where(clear[:, None], away * (signs / np.where(clear, lengths, 1.0))[:, None], normals)
         origins = self.origins[ids]
         weights = np.full((len(points), 3), np.nan)
         if self.source is not None:
             given = origins >= 0
-            weights[given] = weights_in(self.source.vertices[self.source.faces[origins[given]]], found.places[given])
-        return signs * lengths, found.places, origins, weights, gradients, self.confidence[ids]
+            weights[given] = weights_in(self.source.vertices[self.source.faces[origins[given]]], nearest.places[given])
+        return signs * lengths, nearest.places, origins, weights, gradients, self.confidence[ids]
 
 
 def _mesh(triangles: Floats) -> TriangleMesh:

@@ -254,12 +254,12 @@ def widths(shape: Mesh) -> Widths:
     normals, tree = _normals_at(triangles, faces, places), FaceTree.of_triangles(triangles)
     facing = tree.features.face_normals
     names, ids = indexed(triangles)[1], tree.features.ids
-    found = []
+    measured = []
     for side in (1.0, -1.0):
         diameters, touched = _diameters(tree, side * facing, places, side * normals)
         folds = (names[faces][:, :, None] == names[ids[touched]][:, None, :]).any(axis=(1, 2))
-        found.append(np.where(folds, np.nan, size * diameters))
-    walls, gaps = found
+        measured.append(np.where(folds, np.nan, size * diameters))
+    walls, gaps = measured
     thinnest = None if np.isnan(walls).all() else int(np.nanargmin(walls))
     return Widths(
         wall=_quantile(walls, SHARE),
@@ -283,15 +283,15 @@ def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) 
 
     ways = _ways(facing, tree.tree.items)
 
-    def measured(at: Floats) -> tuple[Floats, Ints]:
+    def measured(rays: Floats) -> tuple[Floats, Ints]:
         """At places, with their normals."""
-        found, touched = np.full(len(at), extent), np.zeros(len(at), dtype=np.int64)
+        diameters, touched = np.full(len(rays), extent), np.zeros(len(rays), dtype=np.int64)
         rows, boxes = tree.features.rows, tree.tree
-        _descend(rows, facing, boxes.bounds, tree.discs, ways, boxes.items, at, least, found, touched)
-        return found, touched
+        _descend(rows, facing, boxes.bounds, tree.discs, ways, boxes.items, rays, least, diameters, touched)
+        return diameters, touched
 
-    found, touched = in_chunks(measured, np.column_stack([places, normals]))
-    return np.where(found < extent, found, np.nan), touched
+    diameters, touched = in_chunks(measured, np.column_stack([places, normals]))
+    return np.where(diameters < extent, diameters, np.nan), touched
 
 
 def _ways(normals: Floats, items: Ints) -> Floats:
@@ -300,8 +300,8 @@ def _ways(normals: Floats, items: Ints) -> Floats:
     within = np.where((items >= 0).reshape(-1, LEAF, 1), own, 0.0)
     levels = [np.concatenate([within.min(axis=1), within.max(axis=1)], axis=1)]
     while len(levels[-1]) > 1:
-        one, other = levels[-1].reshape(-1, 2, 6).swapaxes(0, 1)
-        lower, upper = np.minimum(one[:, :3], other[:, :3]), np.maximum(one[:, 3:], other[:, 3:])
+        left, right = levels[-1].reshape(-1, 2, 6).swapaxes(0, 1)
+        lower, upper = np.minimum(left[:, :3], right[:, :3]), np.maximum(left[:, 3:], right[:, 3:])
         levels.append(np.concatenate([lower, upper], axis=1))
     return np.concatenate([np.zeros((1, 6)), *levels[::-1]])
 
@@ -315,8 +315,8 @@ def _normals_at(triangles: Floats, faces: Ints, places: Floats) -> Floats:
     flat, pairs = unit(area_vectors(triangles)), edge_table(ids).pairs
     pairs = pairs[np.einsum("ij,ij->i", *flat[pairs // 3].swapaxes(0, 1)) > SMOOTH]
     following = np.roll(np.arange(ids.size).reshape(-1, 3), -1, axis=1).ravel()
-    one, other = pairs.T
-    fans = connected_components(ids.size, np.append(one, following[one]), np.append(following[other], other))
+    first, second = pairs.T
+    fans = connected_components(ids.size, np.append(first, following[first]), np.append(following[second], second))
     sides = unit(np.roll(triangles, -1, axis=1) - triangles)
     angles = np.arccos(np.clip(-np.einsum("mki,mki->mk", sides, np.roll(sides, 1, axis=1)), -1.0, 1.0))
     weighted = angles.reshape(-1, 1) * np.repeat(flat, 3, axis=0)

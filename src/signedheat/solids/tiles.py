@@ -99,8 +99,8 @@ def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Grid
         return distances_in(tree, windings, grid, SIDE * first, places)
 
     for done, (first, (distances, trusted)) in enumerate(zip(firsts, in_threads(tile, firsts), strict=True)):
-        here = tuple(slice(f, f + n) for f, n in zip(SIDE * first, distances.shape, strict=True))
-        values[here], confidence[here] = distances, trusted
+        window = tuple(slice(f, f + n) for f, n in zip(SIDE * first, distances.shape, strict=True))
+        values[window], confidence[window] = distances, trusted
         if progress is not None:
             progress((done + 1) / len(firsts), "distance")
     return cast("GridField[Literal[3]]", GridField(grid, values, solid.diagnostics, confidence, solid=solid))
@@ -170,8 +170,8 @@ def coarser(grid: Grid, factor: int) -> Grid:
 def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> Ints | None:
     """(n, 3) places of the blocks that may have a node within reach of a face; None if there are more than a limit."""
     diagonal = float(np.linalg.norm(grid.spacing))
-    found = blocks_where(grid, lambda centres, half: tree.distances(centres) <= reach + half * diagonal, limit)
-    return found if len(found) <= limit else None
+    places = blocks_where(grid, lambda centres, half: tree.distances(centres) <= reach + half * diagonal, limit)
+    return places if len(places) <= limit else None
 
 
 def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: float = math.inf) -> Ints:
@@ -193,8 +193,8 @@ def blocks_that_fit(store: str | PathLike[str] | None) -> int:
     """Count the blocks that fit in memory, or on the disk of a store."""
     if store is not None:
         folder = Path(store).absolute()
-        there = next(place for place in (folder, *folder.parents) if place.exists())
-        return max(blocks_held(folder), int(shutil.disk_usage(there).free / (NODES * BYTES_IN_BAND)))
+        existing = next(place for place in (folder, *folder.parents) if place.exists())
+        return max(blocks_held(folder), int(shutil.disk_usage(existing).free / (NODES * BYTES_IN_BAND)))
     available = available_memory()
     left = math.inf if available is None else available - libraries() - BYTES_AT_WORK
     return int(min(max(left, 0) / (NODES * BYTES_IN_BAND), 2**40))

@@ -63,7 +63,7 @@ def united(
 ) -> Solid:
     """Make the solid that surfaces close: without what lies inside, where bodies overlap, and idle completion."""
     whole = joined_surfaces(surfaces)
-    closing = np.concatenate([np.full(len(each.triangles), each.closing) for each in surfaces])
+    closing = np.concatenate([np.full(len(surface.triangles), surface.closing) for surface in surfaces])
     windings = Windings(whole.triangles if closing.all() else whole.triangles[closing])
     pieces = _cut(whole, closing)
     regions = Regions.of(pieces, windings)
@@ -167,14 +167,14 @@ def _confidence(triangles: Floats, given: Bools, whole: Surface, points: Floats 
 def joined_surfaces(surfaces: list[Surface]) -> Surface:
     """Several surfaces as one; numbers of vertices that are new, which are negative, stay apart."""
     ids, lowest = [], 0
-    for each in surfaces:
-        own = np.where(each.ids < 0, each.ids + lowest, each.ids)
+    for surface in surfaces:
+        own = np.where(surface.ids < 0, surface.ids + lowest, surface.ids)
         lowest = min(lowest, int(own.min(initial=0)))
         ids.append(own)
     joined = np.concatenate(ids)
     return Surface(
-        surfaces[0].triangles if len(surfaces) == 1 else np.concatenate([each.triangles for each in surfaces]),
+        surfaces[0].triangles if len(surfaces) == 1 else np.concatenate([surface.triangles for surface in surfaces]),
         np.unique(joined, return_inverse=True)[1].reshape(joined.shape),
-        np.concatenate([each.origins for each in surfaces]),
+        np.concatenate([surface.origins for surface in surfaces]),
         True,
     )

@@ -73,16 +73,18 @@ def seams(rims: list[Rim]) -> list[Ints]:
     onward = np.concatenate([rim.onward[places] for rim, places in zip(rims, corners, strict=True)])
     parts = np.concatenate([rim.parts[places] for rim, places in zip(rims, corners, strict=True)])
     ends = np.stack([starts, starts[following]], axis=1)
-    one, other = meeting_edges(ends)
+    first_sides, second_sides = meeting_edges(ends)
     middles = ends.mean(axis=1)
-    across = middles[other] - middles[one]
-    gap = (parts[one] != parts[other]) | (
-        ((across * onward[one]).sum(axis=1) >= 0) & ((across * onward[other]).sum(axis=1) <= 0)
+    across = middles[second_sides] - middles[first_sides]
+    gap = (parts[first_sides] != parts[second_sides]) | (
+        ((across * onward[first_sides]).sum(axis=1) >= 0) & ((across * onward[second_sides]).sum(axis=1) <= 0)
     )
-    one, other = one[gap], other[gap]
+    first_sides, second_sides = first_sides[gap], second_sides[gap]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     strips, used = [], np.zeros(n, dtype=bool)
-    for pairs in _stretches(np.concatenate([one, other]), np.concatenate([other, one]), following, lengths):
+    for pairs in _stretches(
+        np.concatenate([first_sides, second_sides]), np.concatenate([second_sides, first_sides]), following, lengths
+    ):
         free = pairs[~used[pairs].any(axis=1)]
         runs = [_run(np.unique(sides), following) for sides in free.T]
         if min(len(run) for run in runs) == 0 or np.isin(runs[0], runs[1]).any():
@@ -96,31 +98,31 @@ def seams(rims: list[Rim]) -> list[Ints]:
         if whole[0]:
             strips.append(strip(chosen[0], chosen[1]))
             continue
-        points = [rim.corners[at] for rim, at in zip(chosen, places, strict=True)]
-        ids = [rim.ids[at] for rim, at in zip(chosen, places, strict=True)]
+        points = [rim.corners[ids_around] for rim, ids_around in zip(chosen, places, strict=True)]
+        ids = [rim.ids[ids_around] for rim, ids_around in zip(chosen, places, strict=True)]
         faces = _zipped(ids[0], points[0], ids[1][::-1], points[1][::-1])
         strips.append(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
     return strips
 
 
-def _stretches(one: Ints, other: Ints, following: Ints, lengths: Floats) -> list[Ints]:
+def _stretches(first: Ints, second: Ints, following: Ints, lengths: Floats) -> list[Ints]:
     """(k, 2) pairs of sides that meet, each with its reverse, by stretches: from one to the next; the longest first."""
-    if not len(one):
+    if not len(first):
         return []
     n = len(following)
     preceding = np.empty(n, dtype=np.int64)
     preceding[following] = np.arange(n)
-    keys = np.sort(one * n + other)
-    one, other = np.divmod(keys, n)
+    keys = np.sort(first * n + second)
+    first, second = np.divmod(keys, n)
     tails, heads = [], []
-    for e, f in ((following[one], other), (one, preceding[other]), (following[one], preceding[other])):
-        at = np.minimum(np.searchsorted(keys, e * n + f), len(keys) - 1)
-        linked = (keys[at] == e * n + f) & ((e != other) | (f != one))
+    for e, f in ((following[first], second), (first, preceding[second]), (following[first], preceding[second])):
+        rows = np.minimum(np.searchsorted(keys, e * n + f), len(keys) - 1)
+        linked = (keys[rows] == e * n + f) & ((e != second) | (f != first))
         tails.append(np.flatnonzero(linked))
-        heads.append(at[linked])
+        heads.append(rows[linked])
     labels = connected_components(len(keys), np.concatenate(tails), np.concatenate(heads))
     order = np.argsort(labels, kind="stable")
-    groups = np.split(np.stack([one, other], axis=1)[order], np.cumsum(np.bincount(labels))[:-1])
+    groups = np.split(np.stack([first, second], axis=1)[order], np.cumsum(np.bincount(labels))[:-1])
     return sorted(groups, key=lambda pairs: -float(lengths[np.unique(pairs[:, 0])].sum()))
 
 
@@ -153,22 +155,25 @@ def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
         return []
     centres, widths = np.array([rim.centre for rim in rims]), []
     for i, near in enumerate(scipy.spatial.cKDTree(centres).query_ball_point(centres, [rim.radius for rim in rims])):
-        one = rims[i]
+        larger = rims[i]
         for j in near:
-            other = rims[j]
-            if (other.radius, j) >= (one.radius, i) or one.opening @ other.opening >= 0:  # once, from the larger one
+            smaller = rims[j]
+            if (smaller.radius, j) >= (
+                larger.radius,
+                i,
+            ) or larger.opening @ smaller.opening >= 0:  # once, from the larger one
                 continue
-            lids = float(np.linalg.norm(one.opening) + np.linalg.norm(other.opening))
-            if lids > LARGE * areas[np.unique(np.concatenate([one.parts, other.parts]))].sum():
-                (area, onward), (again, back) = _way(one, other), _way(other, one)
+            lids = float(np.linalg.norm(larger.opening) + np.linalg.norm(smaller.opening))
+            if lids > LARGE * areas[np.unique(np.concatenate([larger.parts, smaller.parts]))].sum():
+                (area, onward), (again, back) = _way(larger, smaller), _way(smaller, larger)
                 if area + again <= 2 * lids * (NARROW + (1 - NARROW) * (onward + back) / max(area + again, 1e-300)):
                     widths.append(((area + again) / lids, i, j))
     best: list[tuple[int, int]] = []
-    taken: set[int] = set()
+    paired: set[int] = set()
     for _, i, j in sorted(widths):
-        if not {i, j} & taken:
+        if not {i, j} & paired:
             best.append((i, j))
-            taken |= {i, j}
+            paired |= {i, j}
     return best
 
 
@@ -190,10 +195,10 @@ def _way(rim: Rim, other: Rim) -> tuple[float, float]:
 
 def strip(one: Rim, other: Rim) -> Ints:
     """(n + m, 3) vertices of triangles between rims that run opposite ways, from their nearest two corners on."""
-    away, at = scipy.spatial.cKDTree(other.corners).query(one.corners)
+    away, nearest = scipy.spatial.cKDTree(other.corners).query(one.corners)
     start = int(np.argmin(away))
     i = (start + np.arange(len(one.ids) + 1)) % len(one.ids)
-    j = (at[start] - np.arange(len(other.ids) + 1)) % len(other.ids)
+    j = (nearest[start] - np.arange(len(other.ids) + 1)) % len(other.ids)
     return _zipped(one.ids[i], one.corners[i], other.ids[j], other.corners[j])
 
 

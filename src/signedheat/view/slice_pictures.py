@@ -93,9 +93,9 @@ def draw_slices(
         layer = clearest_layer(field, normal)
         position = float(field.grid.axes[normal][layer])
         u, v = field.grid.axes[horizontal], field.grid.axes[vertical]
-        at = (slice(None),) * normal + (layer,)
-        trusted = None if field.confidence is None else field.confidence[at]
-        _draw_panel(panel, u, v, field.values[at], colors, isolines, levels, trusted)
+        index = (slice(None),) * normal + (layer,)
+        trusted = None if field.confidence is None else field.confidence[index]
+        _draw_panel(panel, u, v, field.values[index], colors, isolines, levels, trusted)
         _draw_section(panel, shape, normal, position, float(field.grid.spacing[normal]))
         panel.set(xlabel=AXES[horizontal], ylabel=AXES[vertical])
         panel.set_title(f"{AXES[normal]} = {rounded(position, field.grid.spacing[normal])}", fontsize=10)
@@ -184,10 +184,10 @@ def level_pieces(
     pieces: dict[str, list[Floats]] = {"solid": [], "dashed": []}
     for line, _ in level_lines(values, np.zeros(2), np.ones(2), level):
         places = line * spacing + [u[0], v[0]]
-        there = np.ones(len(line), dtype=bool)
+        visible = np.ones(len(line), dtype=bool)
         if trusted is not None:
-            there = scipy.ndimage.map_coordinates(trusted, line.T, order=0, mode="nearest") >= 1.0
-        of_edge = there[1:] & there[:-1]
+            visible = scipy.ndimage.map_coordinates(trusted, line.T, order=0, mode="nearest") >= 1.0
+        of_edge = visible[1:] & visible[:-1]
         ends = np.flatnonzero(np.diff(of_edge)) + 1
         for first, last in pairwise([0, *ends.tolist(), len(of_edge)]):
             if last > first:
