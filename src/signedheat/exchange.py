@@ -524,6 +524,9 @@ def from_open3d(thing: Any) -> Elements:
 def from_arrays(pair: Any) -> Elements:
     """From a pair (vertices, faces): rows of positions, and rows of vertex ids of equal length or not."""
     points, faces = (array_of(part, "vertices and faces") if np.ma.isMaskedArray(part) else part for part in pair)
+    if getattr(faces, "ndim", 0) == 2 and faces.dtype != object:
+        flat = np.asarray(faces).astype(np.int64).ravel()
+        return Elements(np.asarray(points), flat, np.full(faces.shape[0], faces.shape[1]))
     rows = faces if isinstance(faces, list | tuple) else list(np.asarray(faces))
     counts = np.array([len(row) for row in rows], dtype=np.int64)
     flat = np.concatenate([np.asarray(row, dtype=np.int64) for row in rows]) if len(rows) else _no_ids()

@@ -214,7 +214,7 @@ def _with_crossings(
         return points, lines, records
     ends = np.stack([records.tails, records.heads], axis=1)
     corners = points[ends[:, [0, 1, 1]]]
-    tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
+    tree = BoxTree.around(corners)
     starts, near = tree.meeting(corners, slack)
     touching, crossing, places = _cross(points, records.faces, records.lines, ends, starts, near, slack)
     first, second = records.lines[crossing].T

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +45,11 @@ class BoxTree(NamedTuple):
         return cls.in_order(lower, upper, np.argsort(morton_codes((lower + upper) / 2), kind="stable"))
 
     @classmethod
+    def around(cls, corners: Floats) -> BoxTree:
+        """Build the tree over the boxes around (n, k, 3) corners."""
+        return cls.of(*boxes_around(corners))
+
+    @classmethod
     def in_order(cls, lower: Floats, upper: Floats, order: Ints, groups: Ints | None = None) -> BoxTree:
         """Build the tree over boxes in a given order, in which boxes near each other in space should be neighbours.
 
@@ -64,8 +70,8 @@ class BoxTree(NamedTuple):
             common[leaves:] = np.where((own == own[:, :1]).all(axis=1), own[:, 0], -1)
         level, below = leaves, boxes.reshape(leaves, LEAF, 6)
         while level:
-            bounds[level : 2 * level, :3] = below[..., :3].min(axis=1)
-            bounds[level : 2 * level, 3:] = below[..., 3:].max(axis=1)
+            bounds[level : 2 * level, :3] = boxes_around(below[..., :3])[0]
+            bounds[level : 2 * level, 3:] = boxes_around(below[..., 3:])[1]
             if level < leaves and groups is not None:
                 left, right = common[2 * level : 4 * level].reshape(-1, 2).T
                 common[level : 2 * level] = np.where(left == right, left, -1)
@@ -76,7 +82,7 @@ class BoxTree(NamedTuple):
     @classmethod
     def over(cls, triangles: Floats, order: Ints, groups: Ints | None = None) -> BoxTree:
         """Build the tree over (n, 3, 3) triangles, bounded by slabs as well."""
-        tree = cls.in_order(triangles.min(axis=1), triangles.max(axis=1), order, groups)
+        tree = cls.in_order(*boxes_around(triangles), order, groups)
         corners = np.ascontiguousarray(triangles).reshape(-1, 9)
         return tree._replace(slabs=_slabs(triangles, tree.items), triangles=corners)
 
@@ -197,6 +203,15 @@ def _is_beyond(triangle: Floats, lower: Floats, upper: Floats, ways: Floats, end
         if least > ends[k, 1] or most < ends[k, 0]:
             return True
     return False
+
+
+def boxes_around(corners: Floats) -> tuple[Floats, Floats]:
+    """Return (n, 3) lower and upper corners of the boxes around (n, k, 3) corners, k small.
+
+    NumPy takes three times as long to reduce a short axis that is not the first.
+    """
+    columns = corners.swapaxes(0, 1)
+    return reduce(np.minimum, columns), reduce(np.maximum, columns)
 
 
 @np.errstate(all="ignore")

@@ -44,7 +44,7 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float)
     places = np.arange(len(ids))
     tree = BoxTree.over(corners, places, hubs)
     arcs = _arcs(centred, ids[fans], hubs[fans]) if len(fans) else corners[:0]
-    around = BoxTree.of(arcs.min(axis=1), arcs.max(axis=1)) if len(fans) else tree
+    around = BoxTree.around(arcs) if len(fans) else tree
 
     def overlapping(first: Ints, second: Ints) -> Ints:
         return np.stack([first, second], axis=1)[_overlapping(flat, ids, first, second, slack, depth)]

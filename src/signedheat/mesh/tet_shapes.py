@@ -93,7 +93,7 @@ class TetShapes:
     def search_tree(self) -> BoxTree:
         """Tree of the bounding boxes of the tets."""
         corners = self.vertices[self.tets]
-        return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
+        return BoxTree.around(corners)
 
 
 def signed_volumes(vertices: Floats, tets: Ints) -> Floats:

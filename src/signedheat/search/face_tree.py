@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..mesh.box_tree import LEAF, BoxTree, morton_codes
+from ..mesh.box_tree import LEAF, BoxTree, boxes_around, morton_codes
 from ..mesh.components import by_first_use, connected_components, grouped, sums_of
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.unit_vectors import unit
@@ -145,8 +145,7 @@ class FaceTree:
     def of(cls, features: FaceFeatures) -> FaceTree:
         """Build the tree of some faces, of which there is at least one."""
         triangles = features.corners.reshape(-1, 3, 3)
-        lower, upper = triangles.min(axis=1), triangles.max(axis=1)
-        return cls(features, BoxTree.in_order(lower, upper, np.arange(len(triangles))))
+        return cls(features, BoxTree.in_order(*boxes_around(triangles), np.arange(len(triangles))))
 
     @classmethod
     def of_triangles(cls, triangles: Floats, trusted: NDArray[np.float32] | None = None) -> FaceTree:

@@ -199,7 +199,7 @@ class TriangleTree:
     def of(cls, triangles: Floats) -> TriangleTree:
         """Build the tree of (m, 3, 3) corners."""
         rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
-        return cls(rows, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)))
+        return cls(rows, BoxTree.around(triangles))
 
     @cached_property
     def _no_discs(self) -> Floats:

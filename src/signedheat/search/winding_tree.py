@@ -40,7 +40,7 @@ class WindingTree:
     @classmethod
     def of(cls, triangles: Floats) -> WindingTree:
         """Build a tree over (m, 3, 3) triangles."""
-        return cls(triangles, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)))
+        return cls(triangles, BoxTree.around(triangles))
 
     def numbers(self, points: Floats) -> Floats:
         """Return (n,) winding numbers around (n, 3) points, to some hundredths; on a face that of one of its sides."""

@@ -363,7 +363,7 @@ class _Surface(Frozen):
     @cached_property
     def tree(self) -> BoxTree:
         """Tree of the faces' boxes."""
-        return BoxTree.of(self.triangles.min(axis=1), self.triangles.max(axis=1))
+        return BoxTree.around(self.triangles)
 
     @cached_property
     def _sides(self) -> tuple[Ints, Ints]:
