@@ -283,12 +283,9 @@ def _split(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
     table = edge_table(faces)
     starts, halfedges = table.halfedges
     edges = table.face_edges.ravel()
-    tails, heads = points[table.vertices[edges[halfedges]]].swapaxes(0, 1)
-    apexes = points[faces.ravel()[3 * (halfedges // 3) + (halfedges + 2) % 3]]
-    first, second = axes_across(heads - tails)
-    away = apexes - tails
-    angles = np.arctan2((away * second).sum(axis=1), (away * first).sum(axis=1))
-    around = halfedges[np.lexsort((angles, edges[halfedges]))]
+    crowded = np.flatnonzero(table.face_counts[edges[halfedges]] > 2)  # which alone have more than one order
+    around = halfedges.copy()
+    around[crowded] = _in_turn(points, faces, table.vertices[edges[halfedges[crowded]]], halfedges[crowded])
     previous = np.arange(len(around)) - 1
     previous[starts[:-1]] = starts[1:] - 1
     forward = table.forward.ravel()
@@ -302,3 +299,13 @@ def _split(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
     owners = np.empty(int(numbers.max()) + 1, dtype=np.int64)
     owners[numbers] = faces.ravel()
     return points[owners], numbers.reshape(-1, 3)
+
+
+def _in_turn(points: Floats, faces: Ints, ends: Ints, halfedges: Ints) -> Ints:
+    """Return (k,) halfedges in the order of their faces around edges, given the (k, 2) ends of these, edge by edge."""
+    tails, heads = points[ends].swapaxes(0, 1)
+    away = points[faces.ravel()[3 * (halfedges // 3) + (halfedges + 2) % 3]] - tails
+    first, second = axes_across(heads - tails)
+    angles = np.arctan2((away * second).sum(axis=1), (away * first).sum(axis=1))
+    edges = np.cumsum(np.append(0, (ends[1:] != ends[:-1]).any(axis=1)))
+    return halfedges[np.lexsort((angles, edges[: len(ends)]))]
