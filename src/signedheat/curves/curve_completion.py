@@ -138,20 +138,20 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
     assert isinstance(surface, SurfaceDiscretization)
     values = fine.values.copy()
     beyond_the_rim(surface.triangles, values)
-    found = replace(fine, values=values).contour(0.0)
+    contour = replace(fine, values=values).contour(0.0)
     given = [each for each in flattened(curves) if isinstance(each, Curve) and each.oriented]
     shortest = min(length(field.domain, each) for each in given)
     near = scipy.spatial.cKDTree(np.concatenate([field.domain.positions(each) for each in given]))
     whole = [
         curve
-        for curve in found
+        for curve in contour
         if not curve.closed
         or (
             length(field.domain, curve) > WHOLE * shortest
             and near.query(field.domain.positions(curve))[0].min() < WHOLE * shortest
         )
     ]
-    return whole or found
+    return whole or contour
 
 
 def beyond_the_rim(triangles: IntrinsicMesh, values: Floats) -> None:

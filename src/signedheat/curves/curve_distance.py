@@ -115,8 +115,8 @@ def copied_faces(faces: Ints, n_vertices: int) -> Ints:
     first = np.arange(len(faces))
     crowded = np.flatnonzero((_pairs(faces, n_vertices).around > 2).reshape(-1, 3).all(axis=1))
     if len(crowded):
-        found, _ = coincident_faces(faces[crowded].ravel(), np.arange(0, 3 * len(crowded) + 1, 3))
-        first[crowded] = np.where(found < 0, crowded, crowded[found])
+        copies, _ = coincident_faces(faces[crowded].ravel(), np.arange(0, 3 * len(crowded) + 1, 3))
+        first[crowded] = np.where(copies < 0, crowded, crowded[copies])
     return first
 
 
@@ -243,11 +243,11 @@ def sheet_faces(mesh: TriangleMesh, crossed: Ints) -> Bools:
     count, kept = np.zeros(len(edges.vertices), dtype=np.int64), np.zeros(len(areas), dtype=bool)
     crowded = edges.face_counts[edges.face_edges] > 2
     starts, members = grouped(part, len(areas))
-    for each in np.lexsort([-areas, ~is_crossed]):
-        faces = members[starts[each] : starts[each + 1]]
-        at, number = np.unique(edges.face_edges[faces][crowded[faces]], return_counts=True)
-        kept[each] = ((count[at] == 0) | (count[at] + number <= 2)).all()
-        count[at] += kept[each] * number
+    for label in np.lexsort([-areas, ~is_crossed]):
+        faces = members[starts[label] : starts[label + 1]]
+        edge_ids, number = np.unique(edges.face_edges[faces][crowded[faces]], return_counts=True)
+        kept[label] = ((count[edge_ids] == 0) | (count[edge_ids] + number <= 2)).all()
+        count[edge_ids] += kept[label] * number
     return np.asarray(kept[part])
 
 
@@ -295,8 +295,8 @@ def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[Curv
 
 def named(numbers: Ints) -> str:
     """Return the numbers of some curves in words."""
-    some = ", ".join(map(str, numbers[:8].tolist())) + (", …" if len(numbers) > 8 else "")
-    return f"curves number {some}" if len(numbers) > 1 else f"curve number {some}"
+    listed = ", ".join(map(str, numbers[:8].tolist())) + (", …" if len(numbers) > 8 else "")
+    return f"curves number {listed}" if len(numbers) > 1 else f"curve number {listed}"
 
 
 def distance_to_curves(

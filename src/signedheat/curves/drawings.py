@@ -166,7 +166,7 @@ def _triangles_around(bounds: Floats) -> TriangleMesh:
     """Return a rectangle around a box, with the usual room: squares cut along one diagonal or the other in turn."""
     nodes = Grid.around(bounds, STROKE_NODES)
     index = np.arange(nodes.n_nodes).reshape(nodes.shape)
-    a, b, c, d = (each.ravel() for each in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
+    a, b, c, d = (ids.ravel() for ids in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
     rising = np.indices(index[1:, 1:].shape).sum(axis=0).ravel() % 2 == 0
     first = np.where(rising, [a, b, c], [a, b, d])
     second = np.where(rising, [a, c, d], [b, c, d])
@@ -215,11 +215,11 @@ class Drawing(Frozen):
         """(m, 2) corners of the lines; sums of the unit normals of the lines that meet there; and their number."""
         along = self.lines[:, 1] - self.lines[:, 0]
         normals = unit(np.stack([-along[:, 1], along[:, 0]], axis=1))
-        corners, at = np.unique(self.lines.reshape(-1, 2), axis=0, return_inverse=True)
+        corners, places = np.unique(self.lines.reshape(-1, 2), axis=0, return_inverse=True)
         return (
-            at.reshape(-1, 2),
-            sums_of(np.repeat(normals, 2, axis=0), at.ravel(), len(corners)),
-            np.bincount(at.ravel()),
+            places.reshape(-1, 2),
+            sums_of(np.repeat(normals, 2, axis=0), places.ravel(), len(corners)),
+            np.bincount(places.ravel()),
         )
 
     def distance(self, points: ArrayLike) -> Floats:

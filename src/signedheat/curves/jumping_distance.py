@@ -188,8 +188,8 @@ def memory_estimate(n_triangles: int) -> float:
     >>> memory_estimate(1_000_000) > 2e9
     True
     """
-    each, per_doubling = BYTES[chosen_backend()]
-    return n_triangles * (each + per_doubling * math.log2(max(n_triangles, 2)))
+    per_triangle, per_doubling = BYTES[chosen_backend()]
+    return n_triangles * (per_triangle + per_doubling * math.log2(max(n_triangles, 2)))
 
 
 def _retriangulated(
@@ -308,7 +308,7 @@ def centered(triangles: IntrinsicMesh, values: Floats, parts: Sequence[CurveSegm
     face, height, weight = (np.concatenate(a) for a in (faces, heights, weights))
     shift = np.full(label.max() + 1, np.nan)
     order = np.lexsort([height, label[face]])
-    for here in np.split(order, 1 + np.flatnonzero(np.diff(label[face[order]]))):
-        total = np.cumsum(weight[here])
-        shift[label[face[here[0]]]] = height[here[np.searchsorted(total, 0.5 * total[-1])]]
+    for piece in np.split(order, 1 + np.flatnonzero(np.diff(label[face[order]]))):
+        total = np.cumsum(weight[piece])
+        shift[label[face[piece[0]]]] = height[piece[np.searchsorted(total, 0.5 * total[-1])]]
     return values - shift[label][:, None]

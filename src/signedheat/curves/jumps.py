@@ -156,13 +156,13 @@ def regions_moved(problem: JumpProblem, constants: Floats) -> Floats:
             break
         sizes = np.bincount(region)
         sizes[np.setdiff1d(region, faces[between])] = problem.n_faces + 1  # parts of the surface on their own
-        here = sizes.argmin()
-        at = np.flatnonzero(between & (faces == here).any(axis=1))
-        way = np.where(faces[at, 0] == here, 1.0, -1.0)
-        shifts = np.concatenate([way * (end[at] - difference[at]) for end in (problem.low, problem.high)])
+        smallest = sizes.argmin()
+        rows = np.flatnonzero(between & (faces == smallest).any(axis=1))
+        way = np.where(faces[rows, 0] == smallest, 1.0, -1.0)
+        shifts = np.concatenate([way * (end[rows] - difference[rows]) for end in (problem.low, problem.high)])
         order = np.argsort(shifts, kind="stable")
-        total = np.cumsum(np.tile(problem.weights[at], 2)[order])
-        constants[region == here] += shifts[order[np.searchsorted(total, 0.5 * total[-1])]]
+        total = np.cumsum(np.tile(problem.weights[rows], 2)[order])
+        constants[region == smallest] += shifts[order[np.searchsorted(total, 0.5 * total[-1])]]
     return constants
 
 
@@ -231,15 +231,15 @@ def without_twigs(edges: Ints, high: Bools) -> Bools:
     >>> without_twigs(np.array([twig, *line]), np.array([False, True, False, True])).tolist()
     [False, True, True, True]
     """
-    once, which = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+    once, numbers = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
     keeps = np.zeros(len(once), dtype=bool)
-    keeps[which.ravel()[high]] = True
+    keeps[numbers.ravel()[high]] = True
     left = np.arange(len(once))
     while True:
         chains = assemble_polylines(once[left, 0], once[left, 1], directed=False)
         low = [chain for chain, _, _ in chains if not keeps[left[chain]].any()]
         if not low:
-            return np.isin(which.ravel(), left)
+            return np.isin(numbers.ravel(), left)
         left = np.delete(left, np.concatenate(low))
 
 

@@ -166,9 +166,9 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         pairs = np.flatnonzero(self.is_cut)
         edges = self.pairs.edges[pairs]
         height = np.abs(self.jumps[pairs])
-        edges, first, which = np.unique(edges, return_index=True, return_inverse=True)
+        edges, first, numbers = np.unique(edges, return_index=True, return_inverse=True)
         largest = np.zeros((len(first), 2))
-        np.maximum.at(largest, which, height)
+        np.maximum.at(largest, numbers, height)
         lengths = self.triangles.lengths_of_edges
         ids, lines = self.triangles.edges.vertices[edges], []
         for chain, backwards, _ in assemble_polylines(ids[:, 0], ids[:, 1], directed=False):
@@ -300,18 +300,20 @@ class IntrinsicPiecewiseField(PiecewiseField):
         polygons, owners, where = subdivided(self.domain)
         sizes = [len(polygon) for polygon in polygons]
         node, face = np.concatenate(polygons), np.repeat(owners, sizes)
-        at, on = np.flatnonzero(node < n), np.flatnonzero(node >= n)  # corners at vertices; where edges cross
+        at_vertices, on = np.flatnonzero(node < n), np.flatnonzero(node >= n)  # corners at vertices; where edges cross
 
         # values at all corners, and keys: corners with the same key become one vertex
         owner = self.split_vertices[0]
         means = np.bincount(owner, self.values.ravel()) / np.bincount(owner)
         at_corners = means[owner].reshape(-1, 3)
-        corner = 3 * face[at] + (triangles.corner_vertices[face[at]] == node[at, None]).argmax(axis=1)
+        corner = 3 * face[at_vertices] + (
+            triangles.corner_vertices[face[at_vertices]] == node[at_vertices, None]
+        ).argmax(axis=1)
         places = where[node[on] - n]
         on_cut = np.zeros(triangles.n_edges, dtype=bool)
         on_cut[self.pairs.edges[self.is_cut]] = True
         values, keys = np.empty(len(node)), np.zeros((len(node), 2), dtype=np.int64)
-        values[at], keys[at, 1] = at_corners.ravel()[corner], owner[corner]
+        values[at_vertices], keys[at_vertices, 1] = at_corners.ravel()[corner], owner[corner]
         values[on] = (at_corners[face[on]] * barycentric_in(triangles, face[on], places)).sum(axis=1)
         keys[on, 0], keys[on, 1] = 1 + node[on], np.where(on_cut[places.elements], face[on], -1)
 

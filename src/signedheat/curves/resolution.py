@@ -72,11 +72,11 @@ def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveO
 def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
     """Return the discretisation that the solver uses for all sources, or else that of its domain."""
     made = solver.discretization
-    found = made if isinstance(made, SurfaceDiscretization) else discretize(solver.domain)
-    if not isinstance(found, SurfaceDiscretization):
+    surface = made if isinstance(made, SurfaceDiscretization) else discretize(solver.domain)
+    if not isinstance(surface, SurfaceDiscretization):
         kind = type(solver.domain).__name__
         raise SourceError(f"curves lie on surfaces, not on a {kind}", element="domain", remedy="pass a mesh")
-    return found
+    return surface
 
 
 def flattened(curves: CurvesAndPoints) -> list[CurveOrPoints]:

@@ -140,17 +140,18 @@ class Decision:
         at_loop[crossed] = True
         nearby = strokes.means.tocoo()
         chosen = at_loop[nearby.col]
-        at = nearby.row[chosen], loop[nearby.col[chosen]]
-        count = sparse.csr_matrix((np.ones(len(at[0])), at), shape=(len(best.signs), triangles.n_vertices))
+        pairs = nearby.row[chosen], loop[nearby.col[chosen]]
+        count = sparse.csr_matrix((np.ones(len(pairs[0])), pairs), shape=(len(best.signs), triangles.n_vertices))
         own = np.asarray(count.argmax(axis=1)).ravel()
         explained = np.where(best.explained >= EXPLAINED, strokes.lengths, 0.0)
         total = np.bincount(own, explained, triangles.n_vertices)
         turned = np.bincount(own, explained * (best.signs < 0), triangles.n_vertices)
         mostly = turned[own] > TURNED * total[own]
         complete = (~self.pieces.movable & (explained > 0) & ~mostly).any()
-        found = mostly & (best.signs < 0) & (explained > 0)
-        few = explained[found].sum() < TURNED * explained[found | (best.signs > 0)].sum()  # others turned prove nothing
-        return self.pieces.curves(found & (not few) & (not complete))
+        against = mostly & (best.signs < 0) & (explained > 0)
+        # others turned prove nothing
+        few = explained[against].sum() < TURNED * explained[against | (best.signs > 0)].sum()
+        return self.pieces.curves(against & (not few) & (not complete))
 
     def worth_little(self) -> Ints:
         """Numbers of the curves without which the inside is another, and the least energy rises by little.
@@ -161,8 +162,8 @@ class Decision:
         missing = cost(strokes, best) + strokes.lengths.sum()  # a stroke is worth its length less this, or more
         chosen = longest_of(strokes, np.flatnonzero((1 - WORTH) * strokes.lengths < missing))
         without = settled_from(strokes, [altered(best.signs, [k], 0.0) for k in chosen.tolist()], self.pieces.movable)
-        worth = np.array([cost(strokes, other) - cost(strokes, best) for other in without])
-        changed = np.array([areas[other.sides != best.sides].sum() for other in without])
+        worth = np.array([cost(strokes, rival) - cost(strokes, best) for rival in without])
+        changed = np.array([areas[rival.sides != best.sides].sum() for rival in without])
         little = (worth < WORTH * strokes.lengths[chosen]) & (changed > OTHERWISE * areas.sum())
         found = np.zeros(len(best.signs), dtype=bool)
         found[chosen[little]] = True
@@ -222,9 +223,9 @@ def decide(pieces: Pieces) -> Decision:
     if mostly_loose(strokes, best):
         return Decision(pieces, strokes.inside(smooth), bounds_nothing=True)
     most = misfit(strokes, best) + TIE * strokes.lengths.sum()
-    rivals = [other for other in strokes.seen if misfit(strokes, other) <= most]
-    best = min(rivals, key=lambda other: (int((other.signs < 0).sum()), (other.signs < 0).tolist()))
-    otherwise = [strokes.either_way(best), *(strokes.areas[other.sides != best.sides].sum() for other in rivals)]
+    rivals = [inside for inside in strokes.seen if misfit(strokes, inside) <= most]
+    best = min(rivals, key=lambda inside: (int((inside.signs < 0).sum()), (inside.signs < 0).tolist()))
+    otherwise = [strokes.either_way(best), *(strokes.areas[inside.sides != best.sides].sum() for inside in rivals)]
     return Decision(pieces, best, tied=bool(max(otherwise) > OTHERWISE * strokes.areas.sum()))
 
 
@@ -351,7 +352,7 @@ class CurveOrientation(Frozen, ShortRepr):
         >>> len(sh.curve_orientation(equator, mesh).agreeing(0.5))
         1
         """
-        return [curve for curve, found in zip(self.curves, self.agreement, strict=True) if found >= least]
+        return [curve for curve, agreement in zip(self.curves, self.agreement, strict=True) if agreement >= least]
 
 
 def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape) -> CurveOrientation:

@@ -57,7 +57,7 @@ class CutGraph:
         if total == 0:
             return np.ones(len(pull))
         costs = np.minimum(np.concatenate([falling, rising])[self.order] / total, 1.0)
-        residual, pulls = (np.rint(UNITS * each).astype(np.int64) for each in (costs, 2 * pull / total))
+        residual, pulls = (np.rint(UNITS * amounts).astype(np.int64) for amounts in (costs, 2 * pull / total))
         return np.where(source_side(self.starts, self.heads, self.reverse, residual, pulls), 1.0, -1.0)
 
 
@@ -360,7 +360,7 @@ class Strokes:
         """(e,) cost of each edge between sides that fall from its first vertex to its second, and that rise."""
         along = self.crossed.multiply(signs[:, None]).tocsr()
         free = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
-        return [np.where(each, 0.0, self.costs) for each in free]
+        return [np.where(mask, 0.0, self.costs) for mask in free]
 
     def _boundary(self, sides: Floats, falling: Floats, rising: Floats) -> Floats:
         """(e,) cost of each edge between these sides."""
@@ -414,23 +414,23 @@ def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, width: float) -> 
     neighbors = sparse.csr_matrix(
         (lengths, (np.concatenate([tails, heads]), np.concatenate([heads, tails]))), shape=(n, n)
     )
-    found = sparse.coo_matrix(seen)
-    taken = np.sort(found.row.astype(np.int64) * n + found.col)
-    off = found.data != 2
-    stroke, vertex, side = found.row[off].astype(np.int64), found.col[off], found.data[off] - 2
+    pairs = sparse.coo_matrix(seen)
+    known = np.sort(pairs.row.astype(np.int64) * n + pairs.col)
+    off = pairs.data != 2
+    stroke, vertex, side = pairs.row[off].astype(np.int64), pairs.col[off], pairs.data[off] - 2
     far, chosen = np.zeros(len(stroke)), [(stroke, vertex, side)]
     while len(stroke):
-        which, at = members_of(neighbors.indptr, np.arange(neighbors.nnz), vertex)
-        stroke, vertex, side = stroke[which], neighbors.indices[at].astype(np.int64), side[which]
-        far = far[which] + neighbors.data[at]
+        origins, links = members_of(neighbors.indptr, np.arange(neighbors.nnz), vertex)
+        stroke, vertex, side = stroke[origins], neighbors.indices[links].astype(np.int64), side[origins]
+        far = far[origins] + neighbors.data[links]
         keys = stroke * n + vertex
-        near = (far <= width) & ~np.isin(keys, taken)
+        near = (far <= width) & ~np.isin(keys, known)
         order = np.flatnonzero(near)[np.lexsort((far[near], keys[near]))]
         order = order[np.diff(keys[order], prepend=-1) > 0]
         stroke, vertex, side, far = stroke[order], vertex[order], side[order], far[order]
-        taken = np.union1d(taken, keys[order])
+        known = np.union1d(known, keys[order])
         chosen.append((stroke, vertex, side))
-    rows, columns, values = (np.concatenate(each) for each in zip(*chosen, strict=True))
+    rows, columns, values = (np.concatenate(parts) for parts in zip(*chosen, strict=True))
     return sparse.csr_matrix((values, (rows, columns)), shape=seen.shape)
 
 

@@ -415,8 +415,8 @@ def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
     length, y = g.length[g.edge[h]], h
     while True:
         along, above = apex_position(g, y)
-        here = fraction if g.forward[y] == g.forward[h] else 1.0 - fraction
-        nearest = min(nearest, np.hypot(along - here * length, above))
+        share = fraction if g.forward[y] == g.forward[h] else 1.0 - fraction
+        nearest = min(nearest, np.hypot(along - share * length, above))
         y = g.sibling[y]
         if y == h:
             return nearest

@@ -57,13 +57,13 @@ class ConformingRefinement(Frozen):
 
     def push_forward(self, faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
         """Transfer points, and vectors (p, k, 3) at them, from the faces before the cuts to the faces after."""
-        which, child = members_of(*grouped(self.parents, int(self.parents.max()) + 1), faces)
+        segments, child = members_of(*grouped(self.parents, int(self.parents.max()) + 1), faces)
         corners = self.corners[child]
         is_flat = np.linalg.det(corners) == 0  # parts without area contain a point only if no other part does
         to_child = np.empty_like(corners)
         to_child[~is_flat], to_child[is_flat] = np.linalg.inv(corners[~is_flat]), np.linalg.pinv(corners[is_flat])
-        weights = np.einsum("pk,pkl->pl", barycentric[which], to_child)
-        best = np.lexsort([-weights.min(axis=1), is_flat, which])[np.searchsorted(which, np.arange(len(faces)))]
+        weights = np.einsum("pk,pkl->pl", barycentric[segments], to_child)
+        best = np.lexsort([-weights.min(axis=1), is_flat, segments])[np.searchsorted(segments, np.arange(len(faces)))]
         return child[best], weights[best], np.einsum("pvk,pkl->pvl", vectors, to_child[best])
 
     def pull_back(self, faces: Ints, barycentric: Floats) -> tuple[Ints, Floats]:

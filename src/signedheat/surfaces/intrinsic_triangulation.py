@@ -271,8 +271,8 @@ class IntrinsicTriangulation(Displayed, Frozen):
         [[1.0, 0.0]]
         """
         sides = np.broadcast_to([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]], (len(faces), 2, 3))
-        found, _, moves = self._forward(faces, barycentric, sides)
-        rises = np.einsum("psk,pk->ps", moves, corners[found])
+        places, _, moves = self._forward(faces, barycentric, sides)
+        rises = np.einsum("psk,pk->ps", moves, corners[places])
         return gradients_along(np.einsum("psk,pkd->psd", sides, self.mesh.vertices[self.mesh.faces[faces]]), rises)
 
     def _forward(self, faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:

@@ -231,9 +231,11 @@ def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, us
         sides, counts = in_chunks(voronoi_fans, np.stack([x, y], axis=2) / planes.reach[chunk, None, None])
         column = np.arange(sides.shape[1])
         following = np.where(column + 1 < counts[:, None], np.roll(sides, -1, axis=1), sides[:, :1])
-        row, at = np.nonzero((column < counts[:, None]) & (sides >= 0) & (following >= 0))
+        row, columns = np.nonzero((column < counts[:, None]) & (sides >= 0) & (following >= 0))
         near = np.take_along_axis(neighbors[part], order, axis=1)
-        triangles.append(np.stack([chunk[row], near[row, sides[row, at]], near[row, following[row, at]]], axis=1))
+        triangles.append(
+            np.stack([chunk[row], near[row, sides[row, columns]], near[row, following[row, columns]]], axis=1)
+        )
     sorted_corners = np.sort(np.concatenate(triangles), axis=1)
     number, first = distinct_rows(sorted_corners)
     distinct = sorted_corners[first]
@@ -243,9 +245,9 @@ def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, us
 
 def accepted_triangles(planes: TangentPlanes, proposals: Sequence[tuple[Ints, Ints]]) -> Ints:
     """Well-shaped triangles that overlap no better one: of earlier proposals, then with more votes, then rounder."""
-    triangles = np.concatenate([some for some, _ in proposals])
-    votes = np.concatenate([some for _, some in proposals])
-    rank = np.repeat(np.arange(len(proposals)), [len(some) for some, _ in proposals])
+    triangles = np.concatenate([part for part, _ in proposals])
+    votes = np.concatenate([part for _, part in proposals])
+    rank = np.repeat(np.arange(len(proposals)), [len(part) for part, _ in proposals])
     once = np.sort(distinct_rows(triangles)[1])
     keep, circumradii = well_shaped_triangles(planes.points, triangles[once], planes.reach)
     once = once[keep]
@@ -267,10 +269,10 @@ def nonoverlapping_triangles(planes: TangentPlanes, triangles: Ints) -> Ints:
     """Accept triangles, in order, unless they overlap an earlier one: in the tangent plane of a common corner."""
     starts, widths = np.empty(triangles.shape), np.empty(triangles.shape)
     for k in range(3):
-        here, right, left = (triangles[:, (k + shift) % 3] for shift in range(3))
+        corners, right, left = (triangles[:, (k + shift) % 3] for shift in range(3))
         angle = []
-        for there in (right, left):
-            step = planes.unfolded(here, there)
+        for others in (right, left):
+            step = planes.unfolded(corners, others)
             angle.append(np.arctan2(step[:, 1], step[:, 0]))
         turn = np.mod(angle[1] - angle[0] + np.pi, 2 * np.pi) - np.pi
         starts[:, k], widths[:, k] = np.where(turn < 0, angle[1], angle[0]), np.abs(turn)
@@ -311,9 +313,9 @@ def facing(planes: TangentPlanes, normals: Floats, faces: Ints) -> Ints:
     up = np.sign((np.cross(planes.axes[:, 0], planes.axes[:, 1]) * normals).sum(axis=1))
     area = np.zeros(len(faces))
     for k in range(3):
-        here, right, left = (faces[:, (k + shift) % 3] for shift in range(3))
-        a, b = (planes.unfolded(here, there) for there in (right, left))
-        area += up[here] * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+        corners, right, left = (faces[:, (k + shift) % 3] for shift in range(3))
+        a, b = (planes.unfolded(corners, others) for others in (right, left))
+        area += up[corners] * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     return np.where((area < 0)[:, None], faces[:, [0, 2, 1]], faces)
 
 
@@ -385,7 +387,7 @@ def accept_apart(triangles: Ints, starts: Floats, widths: Floats, n_points: int)
     At corner k of triangle f the sector goes from angle ``starts[f, k]`` counter-clockwise by ``widths[f, k]``.
     """
     accepted = np.zeros(len(triangles), dtype=np.bool_)
-    taken = np.zeros((n_points, MAX_SIDES, 2))
+    sectors = np.zeros((n_points, MAX_SIDES, 2))
     count = np.zeros(n_points, dtype=np.int64)
     for f in range(len(triangles)):
         apart = True
@@ -393,17 +395,17 @@ def accept_apart(triangles: Ints, starts: Floats, widths: Floats, n_points: int)
             v = triangles[f, k]
             apart = apart and count[v] < MAX_SIDES
             for s in range(count[v]):
-                ahead = (starts[f, k] - taken[v, s, 0]) % (2 * np.pi)
-                behind = (taken[v, s, 0] - starts[f, k]) % (2 * np.pi)
-                inside = min(ahead, behind) > TOUCHING and (ahead < taken[v, s, 1] - TOUCHING)
+                ahead = (starts[f, k] - sectors[v, s, 0]) % (2 * np.pi)
+                behind = (sectors[v, s, 0] - starts[f, k]) % (2 * np.pi)
+                inside = min(ahead, behind) > TOUCHING and (ahead < sectors[v, s, 1] - TOUCHING)
                 around = min(ahead, behind) > TOUCHING and (behind < widths[f, k] - TOUCHING)
-                same = min(ahead, behind) <= TOUCHING and min(widths[f, k], taken[v, s, 1]) > TOUCHING
+                same = min(ahead, behind) <= TOUCHING and min(widths[f, k], sectors[v, s, 1]) > TOUCHING
                 apart = apart and not (inside or around or same)
         if apart:
             accepted[f] = True
             for k in range(3):
                 v = triangles[f, k]
-                taken[v, count[v], 0], taken[v, count[v], 1] = starts[f, k], widths[f, k]
+                sectors[v, count[v], 0], sectors[v, count[v], 1] = starts[f, k], widths[f, k]
                 count[v] += 1
     return accepted
 
@@ -434,10 +436,10 @@ def next_around_gap(points: Floats, normals: Floats, tails: Ints, heads: Ints) -
     the reversed edge.
     """
     arriving, onward = members_of(*grouped(tails, len(points)), heads)
-    at = heads[arriving]
-    back, forth = points[tails[arriving]] - points[at], points[heads[onward]] - points[at]
-    sine = (np.cross(back, forth) * normals[at]).sum(axis=1)
-    flat = [d - (d * normals[at]).sum(axis=1)[:, None] * normals[at] for d in (back, forth)]
+    vertices = heads[arriving]
+    back, forth = points[tails[arriving]] - points[vertices], points[heads[onward]] - points[vertices]
+    sine = (np.cross(back, forth) * normals[vertices]).sum(axis=1)
+    flat = [d - (d * normals[vertices]).sum(axis=1)[:, None] * normals[vertices] for d in (back, forth)]
     turn = np.mod(np.arctan2(sine, (flat[0] * flat[1]).sum(axis=1)), 2 * np.pi)
     order = np.lexsort((turn, arriving))
     following = np.full(len(tails), -1, dtype=np.int64)

@@ -161,8 +161,8 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
                 f"the point cloud has {len(ids)} distinct points, and a surface needs at least 3", element="points"
             )
         normals, _, _ = outward_normals(points, given)
-        found = local_triangulations(points, normals, self.n_neighbors, given)
-        if len(found.faces) == 0:
+        triangulated = local_triangulations(points, normals, self.n_neighbors, given)
+        if len(triangulated.faces) == 0:
             raise GeometryError(
                 "no triangles could be made of the point cloud: its points lie along a line or too far apart",
                 remedy="add points, or raise n_neighbors",
@@ -175,32 +175,32 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
                 "thinner than half of the distance between points",
                 InexactWarning,
             )
-        elif share_of_two_sides(points, found.normals) > MERGED:
+        elif share_of_two_sides(points, triangulated.normals) > MERGED:
             warn_user(
                 "the points look like those of both sides of a plate thinner than they are apart, which are taken for "
                 "one side with noise. Give normals, or more points",
                 InexactWarning,
             )
-        elif (turned := edges_turned(points, found.normals, found.faces)) > SEAM * np.sqrt(len(ids)):
+        elif (turned := edges_turned(points, triangulated.normals, triangulated.faces)) > SEAM * np.sqrt(len(ids)):
             warn_user(
                 f"along {turned} edges the sides of neighbours contradict each other: which side is which is a guess "
                 "there. Give normals, or more points",
                 InexactWarning,
             )
-        return ids, found
+        return ids, triangulated
 
     @cached_property
     def triangulation(self) -> TriangleMesh:
         """The triangles that curves refer to; of points that coincide, the first is the vertex."""
-        ids, found = self._distinct
-        return TriangleMesh(self.points, ids[found.faces])
+        ids, triangulated = self._distinct
+        return TriangleMesh(self.points, ids[triangulated.faces])
 
     @cached_property
     def surface_normals(self) -> Floats:
         """(n, 3) unit normals, estimated from neighbours, on the side from which `triangulation` is oriented."""
-        ids, found = self._distinct
+        ids, triangulated = self._distinct
         normals = np.empty_like(self.points)
-        normals[ids] = found.normals
+        normals[ids] = triangulated.normals
         return frozen(normals[self.representatives])
 
     def _triangulation_vertices(self, vertices: Ints) -> Ints:
@@ -337,13 +337,13 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False, groups: In
         outside = int(groups.max()) + 1
         nodes = np.unique(np.append(groups[chosen], [outside, outside + 1]), return_inverse=True)[1].ravel()
     # signs of the chosen points, relative to the outside or to the given signs; others follow their neighbours
-    found = signs_of(links.renamed(nodes), int(nodes.max()) + 1)[nodes]
+    decision = signs_of(links.renamed(nodes), int(nodes.max()) + 1)[nodes]
     signs = np.zeros(n)
-    signs[chosen] = found[:m] * found[m if sided else m + 1]
+    signs[chosen] = decision[:m] * decision[m if sided else m + 1]
     rest = np.flatnonzero(signs == 0)
     if len(rest):
         signs[rest] = _followed(places, axes[chosen] * signs[chosen, None], fits.places[rest], axes[rest])
-    coherence = links.coherence(found)
+    coherence = links.coherence(decision)
     if groups is not None:  # the sign of the majority of each group
         signs = np.where(np.bincount(groups, signs) >= 0, 1.0, -1.0)[groups]
     if given and min((signs < 0).mean(), (signs > 0).mean()) <= MOST_WRONG * (1 - coherence):
@@ -428,8 +428,8 @@ def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
     step = places[heads] - places[tails]
     length = np.linalg.norm(step, axis=1)
     step /= np.where(length > 0, length, 1.0)[:, None]
-    here, there = axes[tails], axes[heads]
-    cosines = (here * there).sum(axis=1) - 2 * (here * step).sum(axis=1) * (there * step).sum(axis=1)
+    first, second = axes[tails], axes[heads]
+    cosines = (first * second).sum(axis=1) - 2 * (first * step).sum(axis=1) * (second * step).sum(axis=1)
     return Links(tails, heads, weight * _confidence(cosines))
 
 

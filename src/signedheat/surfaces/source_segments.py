@@ -167,11 +167,11 @@ def given_curves(domain: object, sources: list[Any]) -> tuple[list[Any], Without
         return sources, None
     if is_element_list(sources):
         sources = [sources]
-    taken = [_converted(domain, source) for source in sources]
-    lengthless = [k for k, source in enumerate(taken) if isinstance(source, Curve) and _is_point(domain, source)]
-    if not lengthless or len(lengthless) == len(taken):
-        return taken, None
-    return [source for k, source in enumerate(taken) if k not in lengthless], WithoutLength(lengthless)
+    curves = [_converted(domain, source) for source in sources]
+    lengthless = [k for k, source in enumerate(curves) if isinstance(source, Curve) and _is_point(domain, source)]
+    if not lengthless or len(lengthless) == len(curves):
+        return curves, None
+    return [source for k, source in enumerate(curves) if k not in lengthless], WithoutLength(lengthless)
 
 
 def _converted(domain: Surface, source: object) -> object:

@@ -62,7 +62,7 @@ def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
 
     Of points less than `SAME` of a face's least height apart the last stays, whose face holds what follows.
     """
-    found = []
+    kept_curves = []
     for curve in curves:
         corners = mesh.vertices[mesh.faces[curve.faces]]
         points = np.einsum("ik,ikd->id", curve.barycentric, corners)
@@ -74,8 +74,8 @@ def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
         if len(kept) > 1:
             leaves = kept if curve.closed else kept[:-1]
             normals = None if curve.normals is None else curve.normals[leaves]
-            found.append(Curve(curve.faces[kept], curve.barycentric[kept], curve.closed, curve.oriented, normals))
-    return found
+            kept_curves.append(Curve(curve.faces[kept], curve.barycentric[kept], curve.closed, curve.oriented, normals))
+    return kept_curves
 
 
 def snapped(values: Floats, ends: Ints, level: float) -> Floats:

@@ -167,16 +167,16 @@ def nearest_curve(
     regions that no curve bounds, the zero set of φ completes the curves where it is farther from any curve than the
     triangles there are large, or beyond the free end of one.
     """
-    there = CurvesThere.on(triangles, parts, tolerance, report)
-    distance, counts = there.distance, [there.windows]
+    present = CurvesThere.on(triangles, parts, tolerance, report)
+    distance, counts = present.distance, [present.windows]
     if not any(part.oriented for part in parts):
         return Nearest(distance, np.ones(len(values), dtype=np.int64), (note_on_searches(triangles, *counts),))
-    sides, bounded = there.sides, there.sides.regions != 0
+    sides, bounded = present.sides, present.sides.regions != 0
     is_near = sides.reach <= distance * (1 + 1e-9)
     side = np.where(bounded, sides.regions, np.where(is_near, sides.nearby, 0))
     turned = (side != 0) & (np.sign(values) != side) & ~np.isnan(values)
     values = np.where(turned, np.copysign(distance, side), values)
-    missing, more = missing_parts(triangles, values, parts, there, spacing, report)
+    missing, more = missing_parts(triangles, values, parts, present, spacing, report)
     counts += more
     completed = float(missing.lengths.sum())
     if completed > 0:

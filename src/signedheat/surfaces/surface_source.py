@@ -148,8 +148,8 @@ def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments],
             at_vertex = part.nodes.kinds == VERTEX
             touched[part.nodes.elements[at_vertex]] += 2
     ends_free = touched[triangles.edges.vertices[edges]] == 1
-    which, end = np.nonzero(ends_free)
-    faces, arcs = free_end_arcs(triangles, edges[which], triangles.edges.vertices[edges[which], end], spacing)
+    rows, end = np.nonzero(ends_free)
+    faces, arcs = free_end_arcs(triangles, edges[rows], triangles.edges.vertices[edges[rows], end], spacing)
     return sums + from_faces(triangles, faces, arcs)
 
 
@@ -178,10 +178,10 @@ def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr
     """
     corner = np.argwhere(located.barycentric > 0)
     vertices = triangles.corner_vertices[located.faces[corner[:, 0]], corner[:, 1]]
-    which, faces = incident_faces(triangles, points_at_vertices(triangles, vertices))
-    area = np.bincount(which, triangles.face_areas[faces], len(vertices))
+    owners, faces = incident_faces(triangles, points_at_vertices(triangles, vertices))
+    area = np.bincount(owners, triangles.face_areas[faces], len(vertices))
     share = located.barycentric[corner[:, 0], corner[:, 1]] / np.where(area > 0, area, np.inf)
-    outward = -1j * triangles.edge_vectors[faces] * share[which][:, None]
+    outward = -1j * triangles.edge_vectors[faces] * share[owners][:, None]
     in_frames = triangles.in_edge_frames(outward, faces)
     return scatter(triangles.n_edges, triangles.edges.face_edges[faces], in_frames)
 
