@@ -62,7 +62,7 @@ def distance_to_segments(
 ) -> tuple[Floats, int]:
     """Return the distance of every vertex to segments and points as `distance_to_zero_line` does."""
     limit = window_limit(triangles)
-    placed = [through_vertices(triangles, each) for each in placed]
+    placed = [through_vertices(triangles, segments) for segments in placed]
     many = min(MANY_PER_EDGE * triangles.n_edges + MANY_WINDOWS, limit)
     search = PausedSearch.start(triangles, placed, tolerance).until(many, report)
     better = None if search.has_ended else in_delaunay_triangles(triangles, placed)
@@ -185,7 +185,7 @@ def in_delaunay_triangles(
     """
     if not triangles.agree_on_lengths or share_to_flip(triangles) < FLIPPED:
         return None
-    parts = [as_curve(triangles, each) for each in placed]
+    parts = [as_curve(triangles, segments) for segments in placed]
     if any(part is None for part in parts):
         return None
     finer, merged, _, _ = cut_along(triangles, [part for part in parts if part is not None])

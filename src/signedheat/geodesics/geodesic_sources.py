@@ -66,7 +66,7 @@ class PlacedSegments:
         merged = MergedSources.of(parts)
         oriented = np.array([part.oriented for part in parts])[merged.owners]
         both = cls._inside(triangles, merged, oriented), cls._adjacent(triangles, merged, oriented)
-        return cls(merged.nodes, *(np.concatenate(each) for each in zip(*both, strict=True)))
+        return cls(merged.nodes, *(np.concatenate(arrays) for arrays in zip(*both, strict=True)))
 
     @staticmethod
     def _inside(
@@ -99,19 +99,19 @@ class PlacedSegments:
             i = np.flatnonzero(loops & vertex[:, k] & ~vertex[:, 1 - k])
             shares = np.abs(vectors[i]) / triangles.lengths_of_edges[edges[i]]
             along[i, k] = np.where(np.abs(along[i, 1 - k] - shares) < np.abs(1 - along[i, 1 - k] - shares), 0.0, 1.0)
-        which, halfedges = halfedges_of(triangles, edges)
+        owners, halfedges = halfedges_of(triangles, edges)
         faces, local_sides = halfedges // 3, halfedges % 3
         forward = triangles.edges.forward[faces, local_sides]
-        along, ends = along[which], ends[which]
+        along, ends = along[owners], ends[owners]
         swapped = (along[:, 1] < along[:, 0]) == forward
         along[swapped], ends[swapped] = along[swapped, ::-1], ends[swapped, ::-1]
         positions = on_sides(triangles, faces, local_sides, along)
-        seen = vectors[which]
+        seen = vectors[owners]
         seen = triangles.edge_directions[faces, local_sides] * np.where(
             triangles.reflected[faces, local_sides], np.conj(seen), seen
         )
         sides = np.sign((np.conj(1j * triangles.edge_vectors[faces, local_sides]) * seen).real).astype(np.int64)
-        return ends, faces, positions, np.ones(len(faces), dtype=bool), sides * oriented[rows][which], rows[which]
+        return ends, faces, positions, np.ones(len(faces), dtype=bool), sides * oriented[rows][owners], rows[owners]
 
     @cached_property
     def lengths(self) -> Floats:
@@ -132,8 +132,8 @@ class PlacedSegments:
         nodes = self.nodes
         first, second = self._directions(triangles)
         inside, on_edge = np.flatnonzero(nodes.kinds == FACE), np.flatnonzero(nodes.kinds == EDGE)
-        which, halfedges = halfedges_of(triangles, nodes.elements[on_edge])
-        faces, k, node = halfedges // 3, halfedges % 3, on_edge[which]
+        owners, halfedges = halfedges_of(triangles, nodes.elements[on_edge])
+        faces, k, node = halfedges // 3, halfedges % 3, on_edge[owners]
         turns, over = triangles.edge_directions[faces, k], triangles.reflected[faces, k]
         home = nodes.elements[inside]
         points = (nodes.barycentric[inside] * triangles.corner_positions[nodes.faces[inside]]).sum(axis=1)

@@ -93,12 +93,12 @@ class Places(NamedTuple):
     @classmethod
     def of(cls, triangles: IntrinsicMesh, located: LocatedPoints) -> Places:
         """Find all faces that contain each point."""
-        which, faces = incident_faces(triangles, located)
-        order = np.lexsort([faces, which])
-        which, faces = which[order], faces[order]
-        weights = barycentric_in(triangles, faces, located[which])
+        owners, faces = incident_faces(triangles, located)
+        order = np.lexsort([faces, owners])
+        owners, faces = owners[order], faces[order]
+        weights = barycentric_in(triangles, faces, located[owners])
         points = (weights * triangles.corner_positions[faces]).sum(axis=1)
-        return cls(faces, points, np.searchsorted(which, np.arange(len(located) + 1)))
+        return cls(faces, points, np.searchsorted(owners, np.arange(len(located) + 1)))
 
 
 class Routes(NamedTuple):

@@ -144,9 +144,9 @@ def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Itera
             _close_at_walls(height, first, np.array(values.shape))
         height[(height >= 0) & (height < least)] = least
         height[(height < 0) & (height > -least)] = -least
-        found = _window_surface(height)
-        if found is not None:
-            yield window, found[0] + first, found[1].astype(np.int64)
+        part = _window_surface(height)
+        if part is not None:
+            yield window, part[0] + first, part[1].astype(np.int64)
 
 
 def _window_surface(height: NDArray[np.float32]) -> tuple[Floats, NDArray[np.int32]] | None:
@@ -238,5 +238,5 @@ def _looked_up(seam: _Seam, keys: Ints) -> Ints:
     held, numbers = seam
     if not len(held):
         return np.full(len(keys), -1, dtype=np.int64)
-    at = np.minimum(np.searchsorted(held, keys), len(held) - 1)
-    return np.where(held[at] == keys, numbers[at], -1)
+    positions = np.minimum(np.searchsorted(held, keys), len(held) - 1)
+    return np.where(held[positions] == keys, numbers[positions], -1)

@@ -46,11 +46,11 @@ class NodeSources(NamedTuple):
         flat = empty.places.reshape(-1)
         stretches = lines * empty.places.shape[3] + offsets // STRETCH
         flat[stretches] = 0
-        taken = np.flatnonzero(flat == 0)
-        flat[taken] = np.arange(len(taken))
+        first_ids = np.flatnonzero(flat == 0)
+        flat[first_ids] = np.arange(len(first_ids))
         places = flat[stretches] * STRETCH + offsets % STRETCH
         owners = np.nonzero(used)[0]
-        sums = np.zeros((STRETCH * len(taken), 4), dtype=np.float32)
+        sums = np.zeros((STRETCH * len(first_ids), 4), dtype=np.float32)
         for k in range(values.shape[1]):
             sums[:, k] = np.bincount(places, weights[used] * values[owners, k], len(sums))
         return cls(empty.places, sums.reshape(-1, STRETCH, 4), shape, steps)
@@ -63,8 +63,8 @@ class NodeSources(NamedTuple):
 
     def nonzero(self) -> tuple[Ints, NDArray[np.float32]]:
         """Return (k, 4) nodes whose vectors are not zero, and (k, 4) these vectors."""
-        taken = self.places >= 0
-        stretches, vectors = np.argwhere(taken), self.sums[self.places[taken]]
+        stored = self.places >= 0
+        stretches, vectors = np.argwhere(stored), self.sums[self.places[stored]]
         rows, offsets = np.nonzero(vectors.any(axis=2))
         nodes = stretches[rows]
         nodes[:, 3] = STRETCH * nodes[:, 3] + offsets

@@ -309,7 +309,7 @@ def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Int
     axes, on_edge = along.argmax(axis=1), along.sum(axis=1) == 1
     ends = nodes.copy()
     ends[np.arange(len(ends)), axes] += 1
-    tail_sizes, head_sizes = (size[tuple(at[on_edge, unused:].T)] for at in (nodes, ends))
+    tail_sizes, head_sizes = (size[tuple(corner_nodes[on_edge, unused:].T)] for corner_nodes in (nodes, ends))
     largest = np.maximum(tail_sizes, head_sizes)
     vertices[on_edge] = nodes[on_edge]
     vertices[on_edge, axes[on_edge]] += tail_sizes / largest / (tail_sizes / largest + head_sizes / largest)
@@ -317,9 +317,9 @@ def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Int
         _between_others(vertices, faces, ~on_edge)
     edges = np.column_stack([np.zeros(len(nodes)), nodes, axes + 1])[on_edge].astype(np.int32)
     edges[:, 1 : 1 + unused] = 0  # copies of one edge
-    edges, first, which = np.unique(edges, axis=0, return_index=True, return_inverse=True)
+    edges, first, numbers_of = np.unique(edges, axis=0, return_index=True, return_inverse=True)
     numbers = np.full(len(vertices), -1)
-    numbers[on_edge] = which.ravel()
+    numbers[on_edge] = numbers_of.ravel()
     return vertices, faces, edges, np.flatnonzero(on_edge)[first], numbers
 
 

@@ -99,12 +99,12 @@ def slab(axis: int, start: int, stop: int) -> tuple[slice, ...]:
 
 def _divide(eigenvalues: list[Floats], transformed: Floats, axis: int, start: int, stop: int) -> None:
     """Divide by the eigenvalues of C, sums of one-dimensional ones; the quotient is zero where they are zero."""
-    here = slab(axis, start, stop)
+    window = slab(axis, start, stop)
     total = np.zeros(())
-    for values in np.ix_(*(values[part] for values, part in zip(eigenvalues, here, strict=True))):
+    for values in np.ix_(*(values[part] for values, part in zip(eigenvalues, window, strict=True))):
         total = total + values
     total[total == 0.0] = np.inf
-    transformed[here] /= total
+    transformed[window] /= total
 
 
 def _divergence(

@@ -347,11 +347,11 @@ def _with_copies_alike(pieces: Arrangement) -> Arrangement:
     copies = np.flatnonzero(covers)
     origin_of = np.empty(n, dtype=np.int64)
     origin_of[cells] = origins
-    which, members = members_of(*grouped(cells, n), models[copies])
-    reverse = (forward[copies] != forward[models[copies]])[which]
+    rows, members = members_of(*grouped(cells, n), models[copies])
+    reverse = (forward[copies] != forward[models[copies]])[rows]
     kept = ~covers[cells]
     faces = np.concatenate([faces[kept], np.where(reverse[:, None], faces[members, ::-1], faces[members])])
-    cells = np.concatenate([cells[kept], copies[which]])
+    cells = np.concatenate([cells[kept], copies[rows]])
     order = np.argsort(origin_of[cells], kind="stable")
     return Arrangement(points, faces[order], origin_of[cells[order]], cells[order])
 

@@ -220,11 +220,11 @@ def _slabs(triangles: Floats, items: Ints) -> Floats:
     leaves, last = len(items) // LEAF, len(triangles) - 1
     slabs, size = np.tile([0.0, 0.0, 0.0, -np.inf, np.inf], (2 * leaves, 2)), min(leaves, BLOCK)  # bound nothing
     for begin in range(0, leaves if last >= 0 else 0, size):
-        some = items[begin * LEAF : (begin + size) * LEAF]
-        corners = triangles[np.where(some < 0, items[last], some)]
+        batch = items[begin * LEAF : (begin + size) * LEAF]
+        corners = triangles[np.where(batch < 0, items[last], batch)]
         sides = np.roll(corners, -1, axis=1) - corners
         normals = np.cross(sides[:, 0], sides[:, 1])
-        normals[some < 0] = 0.0
+        normals[batch < 0] = 0.0
         lines = sides[np.arange(len(sides)), np.einsum("tcd,tcd->tc", sides, sides).argmax(axis=1)]
         for level in range(min(FLAT_LEVELS, leaves.bit_length())):
             count, below = size >> level, LEAF << level

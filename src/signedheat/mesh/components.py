@@ -64,8 +64,8 @@ def grouped(groups: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
 def members_of(starts: Ints, members: Ints, chosen: NDArray[np.integer]) -> tuple[Ints, Ints]:
     """Return all members of the chosen groups, as pairs: index into `chosen`, and member."""
     begin, count = starts[chosen], starts[chosen + 1] - starts[chosen]
-    which = np.repeat(np.arange(len(chosen)), count)
-    return which, members[np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(which))]
+    owners = np.repeat(np.arange(len(chosen)), count)
+    return owners, members[np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(owners))]
 
 
 def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -> Floats:

@@ -140,17 +140,17 @@ def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple
     tails = tails + np.where(may_go_on & ~turns_back, 0, apart)
     lines = assemble_polylines(tails, heads + np.where(may_go_on, 0, apart))
     members = sorted((line for line, _, _ in lines), key=min)
-    which = np.empty(len(parts), dtype=np.int64)
+    lines_of = np.empty(len(parts), dtype=np.int64)
     joined = []
     for number, line in enumerate(members):
-        which[line] = number
+        lines_of[line] = number
         if len(line) == 1:
             joined.append(parts[line[0]])
             continue
         own = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in line])
         nodes = np.unique(np.concatenate([merged.samples[k] for k in line]))
         joined.append(merged.part(own, nodes, parts[line[0]].oriented))
-    return joined, which
+    return joined, lines_of
 
 
 def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> list[CurveSegments]:
@@ -242,10 +242,10 @@ def given_directions(
         faces[along], np.zeros((len(along), 3)), np.full(len(along), EDGE), edges[along], np.zeros(len(along))
     )
     if len(along):
-        which, around = incident_faces(triangles, on_edges)
-        side = (triangles.edges.face_edges[around] == edges[along][which, None]).argmax(axis=1)
-        seen = in_layout(triangles, positions, around, normals[along[which]])
-        np.add.at(directions, along[which], triangles.in_edge_frames(seen, around, side))
+        owners, around = incident_faces(triangles, on_edges)
+        side = (triangles.edges.face_edges[around] == edges[along][owners, None]).argmax(axis=1)
+        seen = in_layout(triangles, positions, around, normals[along[owners]])
+        np.add.at(directions, along[owners], triangles.in_edge_frames(seen, around, side))
     length = np.abs(directions)
     scale = np.linalg.norm(normals, axis=1)
     flat = np.flatnonzero(length <= 1e-6 * scale)

@@ -107,12 +107,12 @@ def without_seams(segments: Floats) -> Floats:
     start, step = corners[tails], corners[heads] - corners[tails]
     lengths, in_space = np.linalg.norm(step, axis=1), np.pad(corners, ((0, 0), (0, 1)))
     begins, touched = BoxTree.of(in_space, in_space).meeting(in_space[np.stack([tails, heads, heads], axis=1)], near)
-    which = np.repeat(np.arange(len(tails)), np.diff(begins))
-    away, along = corners[touched] - start[which], step[which] / lengths[which, None]
+    owners = np.repeat(np.arange(len(tails)), np.diff(begins))
+    away, along = corners[touched] - start[owners], step[owners] / lengths[owners, None]
     share, off = (away * along).sum(axis=1), np.abs(along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0])
-    on = (off <= near) & (share >= -near) & (share <= lengths[which] + near)
-    order = np.flatnonzero(on)[np.lexsort((share[on], which[on]))]
-    goes_on = np.diff(which[order]) == 0
+    on = (off <= near) & (share >= -near) & (share <= lengths[owners] + near)
+    order = np.flatnonzero(on)[np.lexsort((share[on], owners[on]))]
+    goes_on = np.diff(owners[order]) == 0
     parts = np.stack([touched[order][:-1], touched[order][1:]], axis=1)[goes_on]
     pairs, pair = np.unique(np.sort(parts, axis=1), axis=0, return_inverse=True)
     net = np.bincount(pair.ravel(), np.where(parts[:, 0] < parts[:, 1], 1, -1), len(pairs))

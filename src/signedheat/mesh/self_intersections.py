@@ -50,8 +50,8 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float)
         return np.stack([first, second], axis=1)[_overlapping(flat, ids, first, second, slack, depth)]
 
     def of_tree(start: int) -> Ints:
-        some = slice(start, start + CHUNK)
-        starts, near = tree.meeting(corners[some], slack, hubs[some], places[some] // LEAF)
+        batch = slice(start, start + CHUNK)
+        starts, near = tree.meeting(corners[batch], slack, hubs[batch], places[batch] // LEAF)
         owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         asked = (near > owners) & ((hubs[owners] < 0) | (hubs[owners] != hubs[near]))
         return overlapping(owners[asked], near[asked])

@@ -163,10 +163,10 @@ def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoi
     shared = np.where(contain(triangles, start.faces, end), start.faces, shared)
     left = np.flatnonzero((shared < 0) & (start.kinds != FACE))
     if len(left):
-        which, faces = incident_faces(triangles, start[left])
-        fits = contain(triangles, faces, end[left[which]])
+        owners, faces = incident_faces(triangles, start[left])
+        fits = contain(triangles, faces, end[left[owners]])
         least = np.full(len(left), triangles.n_faces)
-        np.minimum.at(least, which[fits], faces[fits])
+        np.minimum.at(least, owners[fits], faces[fits])
         shared[left] = np.where(least < triangles.n_faces, least, -1)
     return shared
 
@@ -174,7 +174,7 @@ def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoi
 def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[Ints, Ints]:
     """Return all faces that contain each point, as pairs: index of the point, and face."""
     inside = np.flatnonzero(located.kinds == FACE)
-    which, faces = [inside], [located.elements[inside]]
+    owners, faces = [inside], [located.elements[inside]]
     for kind, table, count in (
         (VERTEX, triangles.corner_vertices, triangles.n_vertices),
         (EDGE, triangles.edges.face_edges, triangles.n_edges),
@@ -185,9 +185,9 @@ def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[In
         starts, members_at = grouped(located.elements[members], count)
         face, corner = np.nonzero((np.diff(starts) > 0)[table])
         row, point = members_of(starts, members_at, table[face, corner])
-        which.append(members[point])
+        owners.append(members[point])
         faces.append(face[row])
-    return np.concatenate(which), np.concatenate(faces)
+    return np.concatenate(owners), np.concatenate(faces)
 
 
 def unique_points(located: LocatedPoints) -> tuple[Ints, Ints]:

@@ -205,12 +205,12 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
     gain = _bend(vertices, a, b, normals[first], normals[second]) - _bend(vertices, c, d, *new_normals)
     reach = np.linalg.norm(vertices[c] - vertices[d], axis=1)
     faces_around = [first, second]
-    for tail, head, side, owner, which in rim:
+    for tail, head, side, owner, side_of_rim in rim:
         beyond = table.mates[3 * owner + side]
         neighbor = np.where(beyond >= 0, beyond // 3, owner)
         faces_around.append(neighbor)
         before = _bend(vertices, tail, head, normals[owner], normals[neighbor])
-        after = _bend(vertices, tail, head, new_normals[which], normals[neighbor])
+        after = _bend(vertices, tail, head, new_normals[side_of_rim], normals[neighbor])
         gain += np.where(beyond >= 0, before - after, 0.0)
     keys = edge_keys(c, d)
     present = np.isin(keys, edge_keys(*table.vertices.T))

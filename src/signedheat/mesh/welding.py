@@ -103,17 +103,17 @@ def coincident_faces(corners: Ints, offsets: Ints) -> tuple[Ints, Bools]:
     sizes = np.diff(offsets)
     first, reverse = np.arange(len(sizes)), np.zeros(len(sizes), dtype=bool)
     for size in np.unique(sizes).tolist():
-        which = np.flatnonzero(sizes == size)
-        faces = corners[offsets[which, None] + np.arange(size)]
+        polygons = np.flatnonzero(sizes == size)
+        faces = corners[offsets[polygons, None] + np.arange(size)]
         ordered = np.sort(faces, axis=1)
         distinct = 1 + np.count_nonzero(ordered[:, 1:] != ordered[:, :-1], axis=1)
-        first[which[distinct < min(size, 3)]] = -1
-        which, faces = which[distinct == size], faces[distinct == size]
-        rows, least = np.arange(len(which)), faces.argmin(axis=1)
+        first[polygons[distinct < min(size, 3)]] = -1
+        polygons, faces = polygons[distinct == size], faces[distinct == size]
+        rows, least = np.arange(len(polygons)), faces.argmin(axis=1)
         backwards = faces[rows, least - 1] < faces[rows, (least + 1) % size]
         steps = np.where(backwards, -1, 1)[:, None] * np.arange(size)
         same = same_rows(np.take_along_axis(faces, (least[:, None] + steps) % size, axis=1))
-        first[which], reverse[which] = which[same], backwards != backwards[same]
+        first[polygons], reverse[polygons] = polygons[same], backwards != backwards[same]
     return first, reverse
 
 

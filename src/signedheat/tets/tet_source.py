@@ -181,9 +181,9 @@ def _on_whole_faces(mesh: TetMesh, polygons: ClippedPolygons, components: Ints) 
     if on.any():
         n_faces = len(mesh.faces.vertices)
         face = mesh.faces.tet_faces[polygons.tets[on], polygons.in_face[on]]
-        _, which = np.unique(components[on] * n_faces + face, return_inverse=True)
+        _, groups = np.unique(components[on] * n_faces + face, return_inverse=True)
         area = np.linalg.norm(mesh.geometry.area_vectors[polygons.tets[on], polygons.in_face[on]], axis=1)
-        covered[on] = np.bincount(which, weights=polygons.areas[on])[which] >= (1 - 1e-6) * area
+        covered[on] = np.bincount(groups, weights=polygons.areas[on])[groups] >= (1 - 1e-6) * area
     return covered
 
 
