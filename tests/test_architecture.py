@@ -25,7 +25,6 @@ FLOORS = [
         "memory",
         "packages",
         "parallel",
-        "processes",
         "validation",
     },
     {"mesh"},
