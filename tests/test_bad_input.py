@@ -37,8 +37,8 @@ def case(name, *arguments, error=sh.errors.SignedHeatError, **keywords):
         case("must be a number, not 'x'", BALL, "x"),
         case("must be a number, not None", BALL, None),
         case("must be a number", BALL, [0.1, 0.2]),
-        case("there is no source", [], 0.1, error=sh.errors.SourceError),
-        case("there is no source", [], 0.1, BALL, error=sh.errors.SourceError),
+        case("no source was given", [], 0.1, error=sh.errors.SourceError),
+        case("no source was given", [], 0.1, BALL, error=sh.errors.SourceError),
         case("not to a NoneType", None, 0.1, error=sh.errors.SourceError),
         case("not to a VertexField", HEIGHT, 0.1, error=sh.errors.SourceError),
         case("pass that surface as the domain", RING, 0.1, error=sh.errors.SourceError),
@@ -67,7 +67,7 @@ def test_growing_and_shrinking(operation, arguments, keywords, error):
         case("inner < outer", BALL, 0, 0),
         case("raise the resolution", BALL, 0, 0.01, resolution=24),
         case("not to a NoneType", None, 0, 0.3, error=sh.errors.SourceError),
-        case("there is no source", [], 0, 0.3, error=sh.errors.SourceError),
+        case("no source was given", [], 0, 0.3, error=sh.errors.SourceError),
         case("pass that surface", RING[0], 0, 0.3, error=sh.errors.SourceError),
         case("not on a TriangleMesh", BALL, 0, 0.3, BALL, error=sh.errors.UnsupportedTypeError),
         case("not on a TetMesh", BALL, 0, 0.3, BOX, error=sh.errors.UnsupportedTypeError),
@@ -88,7 +88,7 @@ def test_shell(arguments, keywords, error):
         case("reach above must be a number", BALL, None),
         case("by nothing", BALL, 0),
         case("raise the resolution", BALL, 0.01, resolution=24),
-        case("there is no source", [], 0.3, error=sh.errors.SourceError),
+        case("no source was given", [], 0.3, error=sh.errors.SourceError),
         case("a PointCloud has none", POINTS, 0.3, resolution=24, error=sh.errors.SourceError),
         case("a Polyline has none", sh.Polyline([[0, 0], [1, 0]]), 0.3, resolution=24, error=sh.errors.SourceError),
         case("not on a TetMesh", BALL, 0.3, None, BOX, error=sh.errors.UnsupportedTypeError),
@@ -107,7 +107,7 @@ def test_thicken(arguments, keywords, error):
             case(f"not a {type(domain).__name__}", domain, RING, error=sh.errors.UnsupportedTypeError)
             for domain in (None, POINTS, GRID, BOX, sh.DigitalSurface(np.ones((2, 2, 2), bool)))
         ),
-        case("there is no source", BALL, [], error=sh.errors.SourceError),
+        case("no source was given", BALL, [], error=sh.errors.SourceError),
         case("no empty lists", BALL, [[]], error=sh.errors.SourceError),
         case("source 0 is a NoneType", BALL, None, error=sh.errors.SourceError),
         case("source 0 is a TriangleMesh", BALL, BALL, error=sh.errors.SourceError),
@@ -134,7 +134,7 @@ def test_piecewise_distance(arguments, keywords, error):
     [
         case("is not a domain", None, RING, error=sh.errors.UnsupportedTypeError),
         case("not to a Curve", GRID, RING, error=sh.errors.SourceError),
-        case("there is no source", BALL, [], error=sh.errors.SourceError),
+        case("no source was given", BALL, [], error=sh.errors.SourceError),
         case("source 0 is a NoneType", BALL, None, error=sh.errors.SourceError),
         case("source 0 is a TriangleMesh", BALL, BALL, error=sh.errors.SourceError),
         case("orient the curves", BALL, BALL.path([0, 5], oriented=False), error=sh.errors.SourceError),
@@ -208,8 +208,8 @@ ROUND = np.linalg.norm(GRID.points, axis=-1) - 1
         case(
             "comes without one", sh.TetField(BOX, BOX.vertices[:, 0]), method=sh.Convex(), error=sh.errors.SourceError
         ),
-        case("no method of sharpening", HEIGHT, method="convex", error=sh.errors.UnsupportedTypeError),
-        case("no method of sharpening", HEIGHT, method=sh.Convex, error=sh.errors.UnsupportedTypeError),
+        case("not a method of sharpening", HEIGHT, method="convex", error=sh.errors.UnsupportedTypeError),
+        case("not a method of sharpening", HEIGHT, method=sh.Convex, error=sh.errors.UnsupportedTypeError),
     ],
 )
 def test_sharpen(arguments, keywords, error):
@@ -304,7 +304,7 @@ CLOSE = [
 SURFACE = [
     ("missing.ply ring.json -o out.ply", 1, "there is no such file"),
     ("ball.ply missing.json -o out.ply", 1, "there is no such file"),
-    ("box.mesh ring.json -o out.ply", 1, "this is a TetMesh"),
+    ("box.mesh ring.json -o out.ply", 1, "not on a TetMesh"),
     ("ball.ply ring.json -o out.docx", 1, "use one of"),
     ("ball.ply ring.json -o out.ply --diffusion=-1", 2, "not positive"),
     ("ball.ply ring.json -o out.ply --constraint levels:a", 2, "not a finite number"),

@@ -111,7 +111,7 @@ def _(shape: PolygonMesh) -> AreaElements:
 def _(shape: PointCloud) -> AreaElements:
     if shape.normals is None:
         raise SourceError(
-            "the point cloud has no normals, which say what is inside",
+            "the point cloud has no normals, which are needed to tell inside from outside",
             remedy="give them, or estimate and orient them first",
         )
     areas = point_areas(shape.points) if shape.areas is None else shape.areas
@@ -187,7 +187,7 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid) -> AreaSamples:
         )
     if not nodes.sums.any() and vectors.any():
         raise SourceError(
-            f"the shape is lost in the cells of the grid, whose spacing {grid.spacing.tolist()} is so much larger",
+            f"the cells of the grid, of size {grid.spacing.tolist()}, are too large for the shape",
             element="source",
             remedy="choose a smaller spacing, or scale the shape",
         )

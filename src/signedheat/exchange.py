@@ -544,7 +544,7 @@ def _triangles_only(shape: Elements, package: str) -> Ints:
 def _no_shape(thing: object, taken: str, remedy: str) -> UnsupportedTypeError:
     kind = type(thing)
     return UnsupportedTypeError(
-        f"{kind.__module__}.{kind.__name__} is no shape: {taken} is", remedy=remedy, element=kind.__name__
+        f"{kind.__module__}.{kind.__name__} is not a shape: {taken} is", remedy=remedy, element=kind.__name__
     )
 
 

@@ -105,8 +105,8 @@ def warned(field: AnyField) -> AnyField:
     note = field.diagnostics.note(SmallLoops)
     if note:
         warn_user(
-            f"{note}. The method hardly sees them: sh.signed_distance measures to the curves themselves, as does, on "
-            "triangle meshes, intrinsic=True by triangles that have them along edges",
+            f"{note}. The method hardly resolves them: sh.signed_distance measures to the curves themselves; on "
+            "triangle meshes, intrinsic=True makes triangles with the curves along their edges",
             InexactWarning,
         )
     return field

@@ -144,7 +144,7 @@ def as_shape(thing: Shape | ForeignShape) -> Shape:
     if not isinstance(shape, TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh):
         if isinstance(thing, tuple | list):
             refuse_arrays(thing)
-        raise UnsupportedTypeError(f"a {type(thing).__name__} is no shape", remedy=what_to_pass(thing))
+        raise UnsupportedTypeError(f"a {type(thing).__name__} is not a shape", remedy=what_to_pass(thing))
     return shape
 
 
@@ -171,7 +171,7 @@ def refuse_arrays(things: Sequence[object]) -> None:
         return
     if len(arrays) != 2 or any(array.ndim != 2 for array in arrays):
         raise UnsupportedTypeError(
-            "arrays of numbers alone are no shape",
+            "arrays of numbers alone are not a shape",
             remedy="pass sh.PointCloud(points), or a pair (vertices, faces)",
             element="shape",
         )
@@ -222,5 +222,5 @@ def as_list(sources: One | Sequence[One]) -> list[One]:
     """List one source or several, with those of other packages as shapes; refuse an empty list."""
     listed: list[One] = as_shapes(sources)
     if not listed:
-        raise SourceError("there is no source", remedy="pass at least one curve, point or shape")
+        raise SourceError("no source was given", remedy="pass at least one curve, point or shape")
     return listed

@@ -42,7 +42,7 @@ def libraries() -> int:
 
 
 def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float], remedy: Callable[[int], str]) -> None:
-    """Raise `MemoryLimitError` if memory does not suffice for `count` elements."""
+    """Raise `MemoryLimitError` if there is not enough memory for `count` elements."""
     available = available_memory()
     needed = estimate(count) + libraries()
     if available is None or needed <= available:
@@ -62,7 +62,7 @@ def within_memory(function: Callable[P, T]) -> Callable[P, T]:
     --------
     >>> within_memory(np.zeros)(10**15)
     Traceback (most recent call last):
-    signedheat.errors.MemoryLimitError: memory does not suffice (Unable to allocate ...
+    signedheat.errors.MemoryLimitError: there is not enough memory (Unable to allocate ...
     """
 
     @wraps(function)
@@ -71,7 +71,7 @@ def within_memory(function: Callable[P, T]) -> Callable[P, T]:
             return function(*args, **kwargs)
         except MemoryError as error:
             raise MemoryLimitError(
-                f"memory does not suffice ({error or 'an allocation failed'})",
+                f"there is not enough memory ({error or 'an allocation failed'})",
                 remedy="free some, or ask for less: fewer points, a lower resolution, a smaller shape",
             ) from error
 

@@ -350,7 +350,7 @@ def shell(
     inner, outer = finite_number(inner, "the inner distance"), finite_number(outer, "the outer distance")
     if not inner < outer:
         raise SignedHeatError(
-            f"a shell needs inner < outer, not {inner:g} and {outer:g}", remedy="swap them, or set them apart"
+            f"a shell needs inner < outer, not {inner:g} and {outer:g}", remedy="swap them, or make them different"
         )
     if keep_outside and outer != 0:
         raise SignedHeatError("the faces of the shape are at distance 0", remedy="leave out keep_outside")
@@ -435,7 +435,7 @@ def thicken(
     above = finite_number(above, "the reach above", least=0)
     if side not in ("outside", "inside", "both") or (below is not None and side != "both"):
         raise SignedHeatError(
-            "the side is outside, inside or both, and both where `below` is given", element="side", remedy="name one"
+            "side must be outside, inside or both, and with `below` it must be both", element="side", remedy="name one"
         )
     if below is None:
         above, below = above if side != "inside" else 0.0, above if side != "outside" else 0.0
@@ -454,12 +454,14 @@ def thicken(
 def _chosen(sheet: object, faces: ArrayLike) -> TriangleMesh | PolygonMesh:
     """Return the mesh of some faces."""
     if not isinstance(sheet, TriangleMesh | PolygonMesh):
-        raise SourceError("faces are chosen of one mesh", element="faces", remedy="pass it alone")
+        raise SourceError("faces can be chosen for a single mesh only", element="faces", remedy="pass it alone")
     n = sheet.n_faces if isinstance(sheet, TriangleMesh) else sheet.n_polygons
     named = np.asarray(faces)
     chosen = np.flatnonzero(named) if named.dtype == bool and named.shape == (n,) else named.ravel()
     if not len(chosen) or chosen.dtype.kind not in "iu" or chosen.min() < 0 or chosen.max() >= n:
-        raise SourceError(f"faces are some of 0 to {n - 1}, or one truth value for each", element="faces")
+        raise SourceError(
+            f"faces must be face numbers from 0 to {n - 1}, or one boolean for each face", element="faces"
+        )
     if isinstance(sheet, TriangleMesh):
         return TriangleMesh(sheet.vertices, sheet.faces[chosen])
     polygons = list(sheet.polygons)

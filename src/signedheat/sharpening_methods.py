@@ -349,14 +349,14 @@ def sharpened(
         )
     method = Geodesic() if method is None else method
     if isinstance(method, type) or not isinstance(method, Method):
-        raise UnsupportedTypeError(f"{method!r} is no method of sharpening", remedy="pass Geodesic() or Convex()")
+        raise UnsupportedTypeError(f"{method!r} is not a method of sharpening", remedy="pass Geodesic() or Convex()")
     finite = np.isfinite(values)
     if not finite.any():
         raise OutsideError("the field has no value anywhere", remedy="pass one that a source reaches")
     if not (finite | np.isnan(values)).all():
         raise GeometryError(
             f"the field is infinite at vertex {np.flatnonzero(np.isinf(values))[0]}",
-            remedy="compute it anew",
+            remedy="compute it again",
             element=f"vertex {np.flatnonzero(np.isinf(values))[0]}",
         )
     if source is None:

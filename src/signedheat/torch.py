@@ -77,7 +77,7 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
         now, then = vertices.detach().cpu().double().numpy(), solid.source.vertices
         if now.shape != then.shape or np.abs(now - then).max() > SAME * np.abs(then).max():
             raise SourceError(
-                "the vertices are not those of the mesh that was completed",
+                "the vertices differ from those of the completed mesh",
                 remedy="complete the mesh again after each step",
                 element="vertices",
             )

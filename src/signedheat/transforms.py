@@ -123,7 +123,7 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
     """Join several meshes to one shape; return a single shape as it is, and of tets their boundary."""
     shapes = as_shapes(shape)
     if not shapes:
-        raise SourceError("there is no shape", remedy="pass at least one")
+        raise SourceError("no shape was given", remedy="pass at least one")
     if len(shapes) == 1:
         whole = shapes[0]
         if isinstance(whole, TetMesh):

@@ -129,7 +129,7 @@ def query_points(values: object, columns: int) -> tuple[Floats, tuple[int, ...]]
     if points.shape[-1:] != (columns,):
         raise GeometryError(
             f"points must have shape (..., {columns}), not {points.shape}",
-            remedy=f"give {columns} coordinates for each",
+            remedy=f"give {columns} coordinates for each point",
             element="points",
         )
     if not np.isfinite(points).all():
@@ -137,7 +137,7 @@ def query_points(values: object, columns: int) -> tuple[Floats, tuple[int, ...]]
     farthest = float(np.abs(points).max(initial=0.0))
     if farthest > LARGEST:
         raise GeometryError(
-            f"points reach as far as {farthest:.3g}: the squares of such lengths cannot be computed with",
+            f"points reach as far as {farthest:.3g}: the squares of such lengths overflow",
             remedy=f"evaluate at points up to {LARGEST:g}",
             element="points",
         )

@@ -124,11 +124,11 @@ def test_polylines_come_back_to_the_last_bit(tmp_path, ending):
     [
         ("a.csv", "0,0\n1,zwei\n", "line 2, '1,zwei', does not hold 2 numbers"),
         ("a.csv", "0,0,0\n1,1,1\n", "does not hold 2 numbers"),
-        ("a.csv", "x,y\n", "there is no point"),
+        ("a.csv", "x,y\n", "contains no points"),
         ("a.csv", "0,0\n\n1,1\n", "polyline 0: a polyline needs at least 2 points"),
         ("a.csv", "0,0\nnan,1\n", "NaN"),
-        ("a.svg", "<svg", "no XML"),
-        ("a.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>', "no line in the drawing"),
+        ("a.svg", "<svg", "not XML"),
+        ("a.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>', "contains no lines"),
         ("a.svg", "", "the file is empty"),
     ],
 )

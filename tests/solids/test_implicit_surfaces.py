@@ -128,7 +128,7 @@ def test_single_precision_columns_and_levels():
         (np.full((4, 4, 4), np.nan), CUBE, {}, "finite"),
         (np.zeros((4, 4, 4)), CUBE, {"spacing": 0.1}, "its own spacing"),
         (np.zeros((4, 4, 4)), CUBE, {"gradient": np.zeros((4, 4, 4))}, "gradients"),
-        (ball, CUBE, {"gradient": np.zeros(3)}, "is a function"),
+        (ball, CUBE, {"gradient": np.zeros(3)}, "must be a function"),
         (ball, CUBE, {"level": 9.0}, "below level 9 everywhere"),
         (ball, CUBE, {"level": -9.0}, "nowhere"),
         (ball, CUBE, {"spacing": 1e-6}, "free"),

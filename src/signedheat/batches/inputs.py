@@ -44,7 +44,7 @@ def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None
             paths.setdefault(place, path)
             below.setdefault(place, path.name if ".." in inner.parts else str(inner))
     if not paths:
-        raise FileFormatError("there is no shape among the inputs", remedy="name files, folders or patterns")
+        raise FileFormatError("the inputs contain no shape", remedy="name files, folders or patterns")
     return [Input(path, name) for path, name in zip(paths.values(), _names(below), strict=True)]
 
 
@@ -62,7 +62,7 @@ def _files(path: Path, results: Path | None) -> tuple[list[Path], Path]:
         avoided = None if results is None else os.path.realpath(results)
         if avoided is not None and Path(os.path.realpath(path)).is_relative_to(avoided):
             raise FileFormatError(
-                "results would lie among the shapes, and the next run would take them for shapes",
+                "results would be written among the shapes, and the next run would take them for shapes",
                 remedy="name another folder for them, such as a subfolder",
                 path=path,
             )

@@ -288,7 +288,7 @@ class Watertight:
             positive_number(self.tolerance, "tolerance")
         for unit in (self.units or "m").split(":"):
             if unit not in METRES:
-                raise SignedHeatError(f"{unit!r} is no unit", element="units", remedy=f"use {', '.join(METRES)}")
+                raise SignedHeatError(f"{unit!r} is not a unit", element="units", remedy=f"use {', '.join(METRES)}")
 
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
         """Write the closed mesh of one shape to a file that begins with `stem`; return figures and all notes."""

@@ -183,7 +183,7 @@ def surface_and_curves(arguments: Namespace) -> tuple[Any, list[Any]]:
     kind = type(domain).__name__
     if not hasattr(domain, "triangulation"):
         raise SourceError(
-            f"curves lie on meshes, points and voxels, and this is a {kind}", element="surface", path=arguments.mesh
+            f"curves lie on meshes, points and voxels, not on a {kind}", element="surface", path=arguments.mesh
         )
     if isinstance(domain, sh.TriangleMesh):  # before curves are looked for on it
         with shapes.prefix_errors(arguments.mesh):

@@ -78,7 +78,7 @@ def read_source(arguments: Namespace, path: str | None = None) -> Any:
     path = arguments.shape if path is None else path
     if is_planar(path):
         if arguments.transform is not None:
-            raise SourceError("a matrix moves shapes in space, and not drawings", element="--transform", path=path)
+            raise SourceError("a matrix moves shapes in space, not drawings", element="--transform", path=path)
         scale = 1.0 if arguments.units is None else unit_scale(arguments, path)
         return [Polyline(scale * line.points, line.closed) for line in read_polylines(path)]
     shape = read(path)
@@ -152,7 +152,9 @@ def matrix_of(words: list[str]) -> Floats:
         numbers = np.zeros(0)
     if len(numbers) not in (12, 16) or not np.isfinite(numbers).all():
         raise SourceError(
-            "a transform has 16 numbers, or 12 without the last row", element="--transform", remedy="give them by rows"
+            "a transform has 16 numbers, or 12 without the last row",
+            element="--transform",
+            remedy="give them row by row",
         )
     matrix = np.eye(4)
     matrix[: len(numbers) // 4] = numbers.reshape(-1, 4)

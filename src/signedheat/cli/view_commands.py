@@ -279,7 +279,7 @@ def demo(arguments: Namespace) -> Summary:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileFormatError(
-            f"cannot be made a folder ({error.strerror})", remedy="name another", path=folder
+            f"cannot be made a folder ({error.strerror})", remedy="name another folder", path=folder
         ) from error
     files = {name: folder / name for name in ("duck.stl", "distance.vti", "offset.stl", "picture.png")}
     for path in files.values():

@@ -232,7 +232,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         """
         if self.dimension not in (2, 3):
             raise GeometryError(
-                f"PyVista has grids in the plane and in space, and this one has {self.dimension} axes",
+                f"PyVista has grids with 2 or 3 axes, and this one has {self.dimension}",
                 remedy="take two or three of its axes",
                 element="grid",
             )

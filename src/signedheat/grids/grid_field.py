@@ -117,7 +117,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
                 element="values",
             )
         if self.coarse is None:
-            raise GeometryError("a field in a band has a coarse one for what lies beyond", element="coarse")
+            raise GeometryError("a field in a band needs a coarse field for the nodes beyond it", element="coarse")
 
     def __call__(self, points: ArrayLike) -> Floats:
         """φ at points in space: exact where the field has its solid, else that of `interpolate`.
@@ -215,7 +215,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         """
         if self.solid is None:
             raise SourceError(
-                "the field has no solid whose distance it is",
+                "the field holds no solid",
                 remedy="take it from signed_distance or Solid.field, not from a file",
                 element="field",
             )

@@ -78,8 +78,8 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
     """
     if np.ma.is_masked(values):
         raise GeometryError(
-            "distance does not go round masked nodes",
-            remedy="fill them in, or use scikit-fmm, whose distance does",
+            "masked nodes are not supported: distance would pass through them",
+            remedy="fill them in, or use scikit-fmm, whose distance goes around them",
             element="values",
         )
     read = array_of(np.ma.getdata(values) if np.ma.isMaskedArray(values) else values, "values")

@@ -88,7 +88,7 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
             refuse_gaps(sources, domain.triangulation)
     if not sources:
         raise FileFormatError(
-            "the file has neither curves nor points", remedy="check that it is a file of curves", path=path
+            "the file contains neither curves nor points", remedy="check that it is a file of curves", path=path
         )
     return sources
 

@@ -46,11 +46,11 @@ def read_svg(path: PathLike) -> list[tuple[Floats, bool]]:
     try:
         root = ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
-        raise damaged(f"it is no XML ({error})") from error
+        raise damaged(f"it is not XML ({error})") from error
     drawing = _Drawing({key: element for element in root.iter() if (key := element.get("id")) is not None}, _size(root))
     lines = [line for part in drawing.drawn(root, np.eye(3)) for line in part]
     if not lines:
-        raise FileFormatError("there is no line in the drawing", remedy="convert text and images to paths first")
+        raise FileFormatError("the drawing contains no lines", remedy="convert text and images to paths first")
     return [(points * (1.0, -1.0), closed) for points, closed in lines]
 
 
@@ -215,7 +215,7 @@ def _subpaths(data: str) -> Iterator[tuple[Floats, bool]]:
             start = place = origin + complex(*numbers) if name == "M" else start
             points, closed = [np.array([start])], False
         if not points:
-            raise damaged(f"a path begins with '{command}', and not with M")
+            raise damaged(f"a path begins with '{command}', not with M")
         ends = [origin + complex(x, y) for x, y in zip(numbers[::2], numbers[1::2], strict=False)]
         if name == "Z":
             closed, place = True, start

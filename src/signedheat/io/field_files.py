@@ -234,7 +234,7 @@ def _held_solid(path: PathLike) -> SolidQueries | None:
     arrays = read_npz(path, [PREFIX + name for name in SOURCE], ["solid_factor", *(PREFIX + name for name in NEEDED)])
     factor = arrays.pop("solid_factor")
     if factor.shape or not np.isfinite(factor) or not factor:
-        raise damaged("its solid is scaled by no number", element="solid_factor")
+        raise damaged("the scale of its solid is not a number", element="solid_factor")
     return scaled(solid_of({name.removeprefix(PREFIX): array for name, array in arrays.items()}), float(factor))
 
 

@@ -151,7 +151,10 @@ def companion_contents(path: PathLike, name: str) -> bytes:
     named = os.path.realpath(os.path.join(folder, name))
     if os.path.isabs(name) or os.path.commonpath([folder, named]) != folder:
         raise FileFormatError(
-            f"it refers to {name!r}, outside its folder", remedy="put both into one folder", element=name, path=path
+            f"it refers to {name!r}, outside its folder",
+            remedy="put both files into one folder",
+            element=name,
+            path=path,
         )
     return contents(named)
 

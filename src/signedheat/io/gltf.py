@@ -124,7 +124,7 @@ def _opened(path: PathLike) -> _Scene:
     version = str(tree.get("asset", {}).get("version", "2.0"))
     if not version.startswith("2."):
         raise FileFormatError(
-            f"it is glTF {version}, and glTF 2 is read", remedy="export it as glTF 2.0", element="version"
+            f"it is glTF {version}, and only glTF 2 can be read", remedy="export it as glTF 2.0", element="version"
         )
     buffers = []
     for buffer in tree.get("buffers", []):

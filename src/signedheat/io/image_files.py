@@ -134,7 +134,9 @@ def _read_nrrd(path: PathLike) -> Image:
     sizes = parsed_numbers(header["sizes"].split(), "sizes", int).tolist()
     code = _CODES.get(header["type"].lower())
     if code is None or [str(len(sizes))] != header["dimension"].split() or min(sizes, default=0) < 1:
-        raise damaged(f"its type '{header['type']}', dimension {header['dimension']} and sizes {sizes} make no image")
+        raise damaged(
+            f"its type '{header['type']}', dimension {header['dimension']} and sizes {sizes} do not describe an image"
+        )
     dtype = np.dtype(code).newbyteorder(">" if header.get("endian") == "big" else "<")
     for _ in range(int(header.get("line skip", 0))):
         rest = rest.partition(b"\n")[2]

@@ -49,7 +49,7 @@ def read_stl(path: PathLike) -> TriangleMesh:
     elif len(data) < _HEADER + 50 * announced or len(data) < _HEADER:
         raise FileFormatError(
             f"{announced} facets need {_HEADER + 50 * announced} bytes, the file has {len(data)}: it "
-            "is truncated, or no STL file"
+            "is truncated, or not an STL file"
         )
     else:
         corners = np.frombuffer(data, _FACET, announced, _HEADER)["corners"].astype(np.float32)

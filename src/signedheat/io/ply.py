@@ -61,13 +61,13 @@ def read_ply(path: PathLike, names: Sequence[str] = ()) -> Elements:
     tables = _tables(path)
     vertex = {name: column for name, column in tables.get("vertex", {}).items() if not isinstance(column, tuple)}
     if not {"x", "y", "z"} <= vertex.keys():
-        raise FileFormatError("there is no element 'vertex' with x, y and z: this holds no shape")
+        raise FileFormatError("there is no element 'vertex' with x, y and z: this is not a shape")
     vertices = _columns(vertex, "xyz")
     values = {name: vertex[name] for name in names if name in vertex}
     face = tables.get("face", {})
     lists = face.get("vertex_indices", face.get("vertex_index"))
     if lists is not None and not isinstance(lists, tuple):
-        raise damaged("the vertex ids of faces are no lists")
+        raise damaged("the vertex ids of faces are not lists")
     if lists is not None and len(lists[1]):
         return Elements(vertices, corners=lists[0], counts=lists[1], values=values)
     strips = next((column for column in tables.get("tristrips", {}).values() if isinstance(column, tuple)), None)
@@ -167,7 +167,7 @@ def _unrolled(strip: Ints) -> Ints:
 
 def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
     if not data.startswith(b"ply"):
-        raise FileFormatError("it does not begin with 'ply': this is no PLY file")
+        raise FileFormatError("it does not begin with 'ply': this is not a PLY file")
     end = data.find(b"end_header")
     newline = data.find(b"\n", end)
     if end < 0 or newline < 0:
@@ -188,7 +188,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
         except (IndexError, KeyError, ValueError):
             raise damaged(f"the header line '{' '.join(words)}' makes no sense: the file is damaged") from None
     if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
-        raise damaged(f"the format '{form}' is none that PLY has: the file is damaged")
+        raise damaged(f"the format '{form}' does not exist in PLY: the file is damaged")
     return form, elements, data[newline + 1 :]
 
 

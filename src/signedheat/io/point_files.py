@@ -58,11 +58,11 @@ def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
             wanted = " or ".join(map(str, [columns] if columns else widths))
             raise FileFormatError(
                 f"line {number}, '{line.strip()[:60]}', does not hold {wanted} numbers",
-                remedy="give one point a line",
+                remedy="give one point per line",
                 element=f"line {number}",
             )
     if not columns:
-        raise FileFormatError("there is no point in it", remedy=f"give {' or '.join(map(str, widths))} numbers a line")
+        raise FileFormatError("it contains no points", remedy=f"give {' or '.join(map(str, widths))} numbers per line")
     return [np.array(block) for block in blocks if block]
 
 
@@ -113,7 +113,7 @@ def read_pcd(path: PathLike) -> Elements:
     while "DATA" not in header:
         end = content.find(b"\n", position)
         if end < 0:
-            raise FileFormatError("there is no line DATA: this is no PCD file, or it is truncated")
+            raise FileFormatError("there is no line DATA: this is not a PCD file, or it is truncated")
         words = content[position:end].decode("ascii", "replace").partition("#")[0].split()
         if words:
             header[words[0].upper()] = words[1:]
@@ -184,7 +184,7 @@ def read_e57(path: PathLike) -> PointCloud:
 def _e57_description(data: bytes) -> bytes:
     """Return the XML of an E57 file, whose pages each end with a checksum."""
     if data[:8] != b"ASTM-E57" or len(data) < 48:
-        raise damaged("it does not begin as E57 files do")
+        raise damaged("it does not begin like an E57 file")
     offset, length, page = struct.unpack_from("<QQQ", data, 24)
     if not CHECKSUM < page <= len(data) or max(offset, length) > len(data):
         raise damaged(f"it announces {length} bytes of description at {offset}, and has {len(data)} bytes")
@@ -214,7 +214,7 @@ def _refuse_references(description: bytes) -> None:
     try:
         parser.Parse(description, True)
     except expat.ExpatError as error:
-        raise damaged(f"its description is no XML ({error})") from error
+        raise damaged(f"its description is not XML ({error})") from error
 
 
 def _cloud(points: Floats, path: PathLike) -> PointCloud:
@@ -253,7 +253,7 @@ def _unpacked(body: bytes, size: int) -> bytes:
             part = bytes(result[len(result) - back : len(result) - back + length])
             result += (part * (length // len(part) + 1))[:length]  # it may come again within itself
     except IndexError:
-        raise FileFormatError("what is packed is damaged") from None
+        raise FileFormatError("the compressed data are damaged") from None
     if len(result) != size:
         raise FileFormatError(f"{len(result)} bytes were unpacked, not {size}: it is damaged")
     return bytes(result)

@@ -108,7 +108,7 @@ def unit_of(path: PathLike) -> str | None:
         package = _Package(path)
         unit = package.model(package.root).get("unit", "millimeter")
         if unit not in METRES:
-            raise damaged(f"it has the unit '{unit}', which 3MF does not know")
+            raise damaged(f"it has the unit '{unit}', which does not exist in 3MF")
         return unit
 
 
@@ -220,7 +220,8 @@ def _object(element: ElementTree.Element, part: str) -> _Object:
     ids = np.array(faces, dtype=np.int64).reshape(-1, 3)
     if len(ids) and (ids.min() < 0 or ids.max() >= len(vertices)):
         raise damaged(
-            f"object {element.get('id')} names a vertex that it does not have", element=f"object {element.get('id')}"
+            f"object {element.get('id')} refers to a vertex that it does not have",
+            element=f"object {element.get('id')}",
         )
     return _Object(np.array(vertices, dtype=np.float64).reshape(-1, 3), ids, parts)
 

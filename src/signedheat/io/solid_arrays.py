@@ -45,7 +45,7 @@ def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
     kinds = (triangles, "f", (n, 3, 3)), (closing, "f", (len(closing) if closing.ndim else 0, 3, 3))
     kinds += (origins, "iu", (n,)), (confidence, "f", (n,)), (bounding, "b", (n,))  # type: ignore[assignment]
     if not n or any(array.dtype.kind not in kind or array.shape != shape for array, kind, shape in kinds):
-        raise _damaged("its arrays do not fit to each other")
+        raise _damaged("its arrays do not fit each other")
     if not all(np.isfinite(array).all() for array in (triangles, closing, confidence)):
         raise _damaged("its arrays are not finite")
     source = None
@@ -59,9 +59,9 @@ def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
         raise FileFormatError(error.cause, remedy=error.remedy, element=error.element) from error
     last = int(origins.max()) if source is None else source.n_faces - 1
     if origins.min() < -1 or origins.max() > last or confidence.min() < 0 or confidence.max() > 1:
-        raise _damaged("it names faces that are not there, or its confidence is not from 0 to 1")
+        raise _damaged("it refers to faces that do not exist, or its confidence is not from 0 to 1")
     if not face_areas(triangles).any():
-        raise _damaged("none of its triangles has an area")
+        raise _damaged("all its triangles have zero area")
     if not np.array_equal(arrays["key"], _key({name: arrays[name] for name in arrays if name != "key"})):
         raise _damaged("its arrays were changed after it was written")
     return Solid(

@@ -220,7 +220,7 @@ class LabelImage(Represented, Frozen):
         ensure_field_writable(path)
         if extension(path) != ".nrrd" and not np.array_equal(self.axes, np.diag(self.spacing)):
             raise FileFormatError(
-                "the axes of the image are turned, for which this format has no place",
+                "the axes of the image are rotated, which this format cannot hold",
                 remedy="write a .nrrd or .nii file",
                 path=path,
             )
@@ -319,7 +319,7 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
     image = read_image(path, VOLUME_FORMATS, "a volume")
     with reading(path):
         if image.values.ndim != 3:
-            raise FileFormatError(f"the image has {image.values.ndim} axes, and a volume has 3")
+            raise FileFormatError(f"a volume has 3 axes, and the image has {image.values.ndim}")
         inside = image.values if level is None else image.values > level
         return DigitalSurface(inside, image.spacing, image.origin, radius)
 

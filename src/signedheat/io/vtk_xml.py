@@ -72,7 +72,7 @@ def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Flo
         or len(extent) != 6
         or piece.get("Extent", "").split() != image.get("WholeExtent", "").split()
     ):
-        raise FileFormatError("the image is not in one piece", remedy="write it anew as a single .vti file")
+        raise FileFormatError("the image is not in one piece", remedy="write it again as a single .vti file")
     direction = image.get("Direction", "1 0 0 0 1 0 0 0 1")
     if parsed_numbers(direction.split(), "direction").tolist() != np.eye(3).ravel().tolist():
         raise FileFormatError(f"the axes of the image are turned ({direction})", remedy="resample it along x, y, z")
@@ -182,7 +182,7 @@ def read_vtu(path: PathLike, names: tuple[str, ...] = ()) -> Cells:
     root, arrays = parse(path, "UnstructuredGrid")
     pieces = root.findall("UnstructuredGrid/Piece")
     if len(pieces) != 1:
-        raise FileFormatError(f"it has {len(pieces)} pieces", remedy="write it anew as one", path=path)
+        raise FileFormatError(f"it has {len(pieces)} pieces", remedy="write it again as one", path=path)
     [piece] = pieces
     n_points, n_cells = arrays.count(piece, "NumberOfPoints"), arrays.count(piece, "NumberOfCells")
     element = piece.find("Points/DataArray")

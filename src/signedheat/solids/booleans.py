@@ -49,7 +49,7 @@ def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None)
     (first, of_first), (second, of_second) = ((x.triangles[x.bounding], np.flatnonzero(x.bounding)) for x in (a, b))
     triangles = np.concatenate([first, second[:, ::-1] if turned else second])
     if not len(triangles):
-        raise SourceError("neither of the two encloses anything", remedy="combine solids, not sheets", element="solid")
+        raise SourceError("neither shape encloses anything", remedy="combine solids, not sheets", element="solid")
     chain = triangles if around is None else np.concatenate([triangles, around])
     cut = arranged(*indexed(triangles))
     windings = Windings(chain)

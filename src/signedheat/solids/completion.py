@@ -219,7 +219,7 @@ def completed(
             decided = bounding(chain, options.nested, options.as_oriented)
             notes = () if options.as_oriented else (oriented_as(joined, chain, decided).note,)
         if not chain.areas.any():
-            raise SourceError("no face of the shape has an area", element="shape")
+            raise SourceError("all faces of the shape have zero area", element="shape")
         chain = replace(chain)  # without what deciding needed
         with stopwatch("complete") as run:
             solid = run(partial(_from_mesh, joined.triangulation, chain, decided, options, method))
@@ -321,7 +321,9 @@ def scatter_of(triangles: Floats, labels: Ints) -> float:
 def _from_points(cloud: PointCloud, method: Heat) -> Solid:
     """Make the solid that oriented points sample; points that bound nothing become small triangles."""
     if cloud.normals is None:
-        raise SourceError("the point cloud has no normals, which say what is inside", remedy="give it normals")
+        raise SourceError(
+            "the point cloud has no normals, which are needed to tell inside from outside", remedy="give it normals"
+        )
     gap = mean_gap(np.asarray(cloud.points))
     made = heat_surface(cloud, method, gap / CELLS)
     if made is not None:

@@ -450,7 +450,7 @@ def blocks_at(offset: Offset, grid: Grid) -> Ints:
             remedy=f"use cells of {larger * cell:.3g}",
         )
     if not len(places):
-        raise OutsideError(f"the distance takes {offset.named} nowhere on the grid", remedy="choose another level")
+        raise OutsideError(f"the distance reaches {offset.named} nowhere on the grid", remedy="choose another level")
     return places
 
 
@@ -479,7 +479,7 @@ def joined_crossings(parts: Sequence[Crossings]) -> Crossings:
     """Join the crossings of several windows and axes."""
     if not any(len(part.axes) for part in parts):
         raise OutsideError(
-            "the distance takes the level nowhere between the nodes of the grid",
+            "the distance reaches the level nowhere between the nodes of the grid",
             remedy="choose another level, or smaller cells if the shape is thinner than they are",
         )
     names = ("nodes", "axes", "rising", "shares")

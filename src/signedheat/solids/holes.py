@@ -121,7 +121,7 @@ def fill_holes(
     """
     given = converted(mesh)
     if not isinstance(given, TriangleMesh | PolygonMesh):
-        raise GeometryError(f"a {type(given).__name__} has no holes that faces could close", remedy="pass a mesh")
+        raise GeometryError(f"a {type(given).__name__} has no holes that can be closed by faces", remedy="pass a mesh")
     if lids not in ("bent", "flat"):
         raise SignedHeatError(f'lids must be "bent" or "flat", not {lids!r}', element="lids")
     most = np.inf if largest is None else positive_number(largest, "largest")

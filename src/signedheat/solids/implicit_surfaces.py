@@ -243,7 +243,7 @@ def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats
     if gradient is None:
         return Implicit(values, differences, box)
     if not callable(gradient):
-        raise SignedHeatError("the gradient of a function is a function", element="gradient")
+        raise SignedHeatError("the gradient of a function must be a function", element="gradient")
     return Implicit(values, lambda points: _called(gradient, points, (3,)), box)
 
 
@@ -257,7 +257,7 @@ def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
             raise SignedHeatError(
                 f"the function returns shape {numbers.shape} for {len(asked)} points",
                 element="f",
-                remedy="return one number for each of (n, 3) points, or three of a gradient",
+                remedy="return one number for each of (n, 3) points, or three numbers for a gradient",
             )
         numbers = numbers.reshape(len(asked), -1)
         lost = ~np.isfinite(numbers).all(axis=1)
@@ -275,7 +275,7 @@ def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, 
         raise GeometryError(
             f"an array must hold finite numbers at 2 nodes or more along each of 3 axes, not {values.shape}",
             element="f",
-            remedy="fill in what is not known",
+            remedy="fill in unknown values",
         )
     steps = np.ptp(box, axis=0) / (np.array(values.shape) - 1)
     if gradient is None:

@@ -143,9 +143,7 @@ def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Ori
     shape = converted(shape)
     if not isinstance(shape, TriangleMesh | PolygonMesh):
         kind = type(shape).__name__
-        raise GeometryError(
-            f"faces are oriented here, and a {kind} has none", remedy="pass a TriangleMesh or PolygonMesh"
-        )
+        raise GeometryError(f"a {kind} has no faces to orient", remedy="pass a TriangleMesh or PolygonMesh")
     chain = Chain.of(shape.triangulation)
     return oriented_as(shape, chain, bounding(chain, nested))
 

@@ -216,7 +216,7 @@ class SheetWall:
         mesh = TriangleMesh(*indexed(corners))
         features = FaceFeatures.of(mesh.vertices, agreeing_faces(mesh))
         if not len(features.rows):
-            raise SourceError("no face of the sheet has any extent", remedy="check its vertices")
+            raise SourceError("all faces of the sheet are degenerate", remedy="check its vertices")
         ends = np.stack([features.faces, np.roll(features.faces, -1, axis=1)], axis=-1)
         on_rim = (np.bincount(features.edges.ravel()) == 1)[features.edges]
         places = features.vertices[ends[on_rim]]

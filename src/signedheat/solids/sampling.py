@@ -56,7 +56,7 @@ def sample(
     Raises
     ------
     SourceError
-        If the field does not know its solid, because it was not sharpened to a shape or results from arithmetic.
+        If the field does not hold its solid, because it was not sharpened to a shape or results from arithmetic.
     MemoryLimitError
         If the samples do not fit in memory.
     SignedHeatError
@@ -74,13 +74,13 @@ def sample(
     n = whole_number(n, "the number of samples", 1, SignedHeatError)
     refuse_beyond_memory(f"{n} samples", n, lambda k: BYTES_PER_SAMPLE * k, lambda k: f"take {k} at a time")
     if not 0 <= near <= 1:
-        raise SignedHeatError(f"the share near the surface is {near:g}", remedy="choose it from 0 to 1")
+        raise SignedHeatError(f"near must be a share from 0 to 1, not {near:g}", remedy="choose it from 0 to 1")
     scales = [finite_number(width, "the width of the noise", least=0) for width in widths]
     n_near = round(near * n) if scales else 0
     solid = shape.solid if isinstance(shape, GridField) else complete(shape)
     if solid is None or solid.triangles.shape[-1] != 3:
         raise SourceError(
-            "the field does not know its solid",
+            "the field does not hold its solid",
             remedy="take it from signed_distance or Solid.field, or pass the solid",
             element="field",
         )

@@ -51,7 +51,7 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
             if not len(self_intersections(surface.vertices, surface.faces)):
                 return surface
     warn_user(
-        f"the surface is as it was: manifold3d makes none of fewer triangles that is within {tolerance:.3g} of it and "
+        f"the surface was not simplified: manifold3d finds none with fewer triangles within {tolerance:.3g} of it and "
         "does not meet itself; another tolerance may do",
         InexactWarning,
     )

@@ -105,7 +105,7 @@ class Thickness(Frozen):
     def thinnest(self) -> tuple[float, Floats]:
         """The least thickness, and (3,) the middle of the face where it is."""
         if np.isnan(self.values).all():
-            raise SourceError("no wall has an opposite side", remedy="measure a solid", element="thickness")
+            raise SourceError("no wall has two opposite sides", remedy="measure a solid", element="thickness")
         face = int(np.nanargmin(self.values))
         return float(self.values[face]), self.mesh.vertices[self.mesh.faces[face]].mean(axis=0)
 

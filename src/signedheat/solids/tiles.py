@@ -134,7 +134,7 @@ def band_field(
         )
     blocks = Blocks.of(places, grid.shape)
     if not len(blocks):
-        raise OutsideError("no node of the grid is as near to the surface as the band is wide", element="grid")
+        raise OutsideError("no node of the grid lies within the band", element="grid")
     tiles, diagnostics = tiles_of(blocks), solid.diagnostics
     if store is None:
         values: NDArray[Any] = np.empty((len(blocks), SIDE, SIDE, SIDE), dtype=np.float32)
@@ -304,7 +304,7 @@ def _begin(folder: Path, key: str, plan: dict[str, NDArray[Any]], n_blocks: int,
     if name.exists():
         if name.read_text() != key:
             raise FileFormatError(
-                "the folder holds tiles of another solid, grid or band",
+                "the folder contains tiles of another solid, grid or band",
                 remedy="name another folder, or remove it",
                 path=folder,
             )
@@ -322,7 +322,7 @@ def _begin(folder: Path, key: str, plan: dict[str, NDArray[Any]], n_blocks: int,
             with suppress(OSError):
                 (folder / file).unlink()
         cause = f"the band cannot be kept there ({error.strerror or error})"
-        raise FileFormatError(cause, remedy="choose a folder that is yours and has room", path=folder) from error
+        raise FileFormatError(cause, remedy="choose a writable folder with enough space", path=folder) from error
 
 
 def _reserve(path: Path, dtype: type, shape: tuple[int, ...]) -> None:
@@ -398,7 +398,7 @@ def _finished(jobs: list[Future[int]], in_order: Iterable[Future[int]], folder: 
     except BrokenProcessPool as error:
         raise SignedHeatError(
             "a process of the pool died",
-            remedy="give it more memory, or start it under if __name__ == '__main__'; run again: what is done stays",
+            remedy="give it more memory, or start it under if __name__ == '__main__'; finished tiles are kept",
             path=folder,
         ) from error
     finally:

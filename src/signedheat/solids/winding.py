@@ -43,7 +43,7 @@ class Windings(Frozen):
             raise GeometryError(
                 f"the boundary of the solid is not closed: {len(ends)} edges lack a face, the first around "
                 f"({x:.4g}, {y:.4g}, {z:.4g})",
-                remedy="make solids with complete",
+                remedy="use `complete` to make solids",
                 element="triangles",
             )
 

@@ -492,7 +492,7 @@ def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
     if lost:
         raise GeometryError(
             f"the faces are too thin to be triangulated anew: their {lost}",
-            remedy="remove faces that are all but flat, or scale the shape where it is squashed",
+            remedy="remove nearly degenerate faces, or scale the shape along axes in which it is squashed",
             element="faces",
         )
 

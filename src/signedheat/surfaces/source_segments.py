@@ -150,7 +150,9 @@ def curve_of_elements(triangles: Triangles, points: Sequence[tuple[int, Sequence
             ("vertex", triangles.n_vertices), ("edge", len(starts) - 1), ("face", triangles.n_faces)
         )[min(len(given), 2)]  # fmt: skip
         if not 0 <= element < count or (kind == "vertex" and first_corner[element] < 0):
-            raise SourceError(f"point {k} of a curve is on {kind} {element}, which is none", element=f"point {k}")
+            raise SourceError(
+                f"point {k} of a curve is on {kind} {element}, which does not exist", element=f"point {k}"
+            )
         if kind == "face":
             faces[k] = element
             weights[k] = (*given[:2], 1 - given[0] - given[1])

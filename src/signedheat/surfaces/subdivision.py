@@ -52,7 +52,7 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     """
     if not isinstance(triangulation, IntrinsicTriangulation):
         raise GeometryError(
-            f"a {type(triangulation).__name__} is no IntrinsicTriangulation", remedy="see intrinsic_delaunay"
+            f"a {type(triangulation).__name__} is not an IntrinsicTriangulation", remedy="see intrinsic_delaunay"
         )
     triangles, n = triangulation.triangles, triangulation.n_vertices
     polygons, _, where = subdivided(triangulation)

@@ -133,7 +133,7 @@ class SurfacePoints(Frozen):
     Raises
     ------
     SourceError
-        If there is no point, a number is NaN or infinite, or coordinates are not barycentric.
+        If no point was given, a number is NaN or infinite, or coordinates are not barycentric.
 
     Examples
     --------
@@ -147,7 +147,7 @@ class SurfacePoints(Frozen):
     def __init__(self, faces: ArrayLike, barycentric: ArrayLike) -> None:
         ids, weights = surface_points(faces, barycentric, "point source")
         if not len(ids):
-            raise SourceError("there is no point", remedy="pass at least one")
+            raise SourceError("no point was given", remedy="pass at least one")
         vars(self).update(faces=ids, barycentric=weights)
 
     @property

@@ -60,7 +60,8 @@ def _(
     surface = discretize(field.domain)
     if not isinstance(surface, SurfaceDiscretization):
         raise UnsupportedTypeError(
-            f"a field on a {type(field.domain).__name__} cannot be sharpened: its domain is no surface", element="field"
+            f"a field on a {type(field.domain).__name__} cannot be sharpened: its domain is not a surface",
+            element="field",
         )
     elements = LinearElements.on_triangles(surface.triangles)
     new, diagnostics = sharpened(field, surface, elements, at_triangles(surface, field), source, method, progress)

@@ -79,7 +79,7 @@ def surface_source(
     groups = segments_of_each(sources, triangles, positions)
     parts = [part for group in groups for part in group]
     if not parts or not all(groups):
-        raise SourceError("there is no source", remedy="pass at least one curve or point, and no empty lists")
+        raise SourceError("no source was given", remedy="pass at least one curve or point, and no empty lists")
     if not all(part.is_conforming for part in parts):
         raise SourceError("unoriented curves inside faces must be embedded in the triangles first", element="curves")
     vectors = oriented_vectors(triangles, [p for p in parts if p.oriented])

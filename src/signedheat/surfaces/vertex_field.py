@@ -186,8 +186,8 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         least = 1e-12 * max(high - low, 0.0)
         if not low - least <= level <= high + least:
             raise OutsideError(
-                f"level {level:g} is taken nowhere: φ goes from {low:g} to {high:g}",
-                remedy="choose a level between",
+                f"φ does not reach level {level:g}: it goes from {low:g} to {high:g}",
+                remedy="choose a level in between",
                 element=f"level {level:g}",
             )
         return field.domain.level_set(field.values, level)
