@@ -170,12 +170,9 @@ def distance_to_pieces(
 ) -> tuple[VertexField[Surface], list[CurveOrPoints]]:
     """Distance to curves that may be pieces of broken ones, and the curves that it was measured to.
 
-    The pieces are turned until they bound something together (`curve_orientation`), and those are left out that do not,
-    unless most of them do not. Where faces cannot agree which side of a curve is left, pieces are taken as they are.
-
-    There is a warning then, and if most of them bound nothing, if they bound something else as well, if loops were
-    turned that might as well be right, if the inside hangs on a piece for which wide gaps are closed, if heat completes
-    the curves otherwise than by what is shortest, and if what was left out goes round.
+    Pieces are turned until they bound something together (`curve_orientation`), and those that do not are left out,
+    unless most do not. Where faces cannot agree which side is left, pieces are taken as they are. There is an
+    `InexactWarning` where the answer is a guess.
     """
     listed = flattened(curves)
     surface_of(solver).segments(listed)  # refuses curves that do not fit
@@ -233,8 +230,8 @@ def has_sides(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool:
 def sheet_faces(mesh: TriangleMesh, crossed: Ints) -> Bools:
     """(m,) faces of a sheet in a mesh some of whose edges have three faces or more.
 
-    Parts that hang together across edges of two faces are added one by one, those that curves cross first, then the
-    largest. A part is left out if it would put a third face on an edge that others use, as fins and tents do.
+    Parts are added one by one, those that curves cross first, then the largest, unless they would put a third face on
+    an edge that others use, as fins and tents do.
     """
     edges = mesh.edges
     part = connected_components(mesh.n_faces, *(edges.pairs // 3).T)
@@ -312,11 +309,8 @@ def distance_to_curves(
 ) -> VertexField[AnySurface]:
     """Signed distance to curves and points on a surface: see `signed_distance`, which calls this.
 
-    Pieces of broken curves are turned until they bound something together (`orient`), and those are left out that do
-    not. The signed heat method (`SignedHeatSolver`) decides the sides and completes what is missing; then distance is
-    measured along the surface, exactly, to the curves themselves and to what completes them (`sharpen`). A note
-    `CurvesTaken` says which curves were turned or left out; where that was a close decision, or what is missing is a
-    guess, there is an `InexactWarning`.
+    The signed heat method decides the sides and completes what is missing; then distance is measured along the surface,
+    exactly, to the curves themselves and to what completes them (`sharpen`).
     """
     if isinstance(constraint, EachComponent | LevelValues):
         raise ConstraintError(

@@ -62,11 +62,9 @@ def distance_to_lines(
 ) -> GridField:
     """Signed distance to polylines in the plane: see `signed_distance`, which calls this.
 
-    Closed outlines are filled, and become the boundary of what they fill. Where all lines are closed, that is all.
-    Otherwise strokes are turned until they bound something together, and those left out that do not; the signed heat
-    method decides the sides, and its zero set completes the lines. It runs on a grid around the drawing, however much
-    or little of it is asked for. In other dimensions than two, lines are taken as they are, and φ is returned as the
-    method gives it.
+    Closed outlines become the boundary of what they fill. If strokes are left, they are turned until they bound
+    something together; the signed heat method decides the sides on a grid around the whole drawing, and completes the
+    lines. In other dimensions than two, φ is returned as the method gives it.
     """
     if isinstance(constraint, EachComponent | LevelValues):
         raise ConstraintError(

@@ -61,8 +61,8 @@ drawings; doubled, 15 and 6."""
 class Pieces:
     """Oriented curves on a surface, as strokes; those that end inside the surface may be turned.
 
-    Curves that go on in each other, head to tail, are one stroke: a line may be given in as many bits as one likes, and
-    as often. The order of strokes is that of their places, so that nothing depends on how curves are numbered.
+    Curves that go on in each other, head to tail, are one stroke. Strokes are ordered by place, so that nothing depends
+    on how curves are numbered.
     """
 
     numbers: Ints  # (j,) which of the curves given are oriented, ordered by place

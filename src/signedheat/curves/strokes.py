@@ -69,7 +69,7 @@ FREE, TERMINAL, ORPHAN = -1, -2, -3
 
 @compiled
 def source_side(starts: Ids, heads: Ids, reverse: Ids, residual: Ids, pull: Ids) -> Bools:
-    """(n,) bool: nodes that the source still reaches when the flow is greatest; `residual` and `pull` are overwritten.
+    """(n,) nodes that the source still reaches at the greatest flow; `residual` and `pull` are overwritten.
 
     Arcs of node i are those from starts[i] to starts[i + 1]; `reverse` is the arc back. A pull is the capacity from the
     source to a node, or, if negative, from it to the sink.

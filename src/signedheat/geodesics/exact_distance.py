@@ -47,11 +47,9 @@ def distance_to_zero_line(
 ) -> tuple[Floats, int]:
     """Return the distance of every vertex to the zero set of a function linear in faces, and the number of windows.
 
-    Any surface will do, nonmanifold and nonorientable ones too. Faces with a NaN corner contain no part of the zero
-    set. Windows are merged where that changes distances by less than `tolerance` of the edge; 0 is exact. Distances are
-    inf where the zero set is not connected to the vertex. The number of windows is a measure of the work: if it is as
-    large as `window_limit`, the search was cut short, and some distances are lengths of paths that run along edges from
-    where it ended.
+    Any surface will do. Faces with a NaN corner contain no part of the zero set. Windows are merged where that changes
+    distances by less than `tolerance` of the edge; 0 is exact. Distances are inf where nothing is connected. If there
+    are `window_limit` windows the search was cut short, and some distances are lengths of paths along edges.
     """
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
     return distance_to_segments(triangles, [zero_line(triangles, values)], tolerance, report)
@@ -180,8 +178,7 @@ def in_delaunay_triangles(
 ) -> tuple[IntrinsicMesh, list[PlacedSegments]] | None:
     """Return the surface in Delaunay triangles along whose edges the sources run; None if there is nothing to gain.
 
-    The triangles are cut where segments cross them, and all edges that are no part of a source are flipped. Distances
-    are those on the triangles given, whose vertices come first.
+    Distances are those on the triangles given, whose vertices come first.
     """
     if not triangles.agree_on_lengths or share_to_flip(triangles) < FLIPPED:
         return None

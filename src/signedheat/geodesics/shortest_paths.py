@@ -60,11 +60,10 @@ def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> Ints
 def geodesic_paths(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
 ) -> tuple[LocatedPoints, Ints]:
-    """Return the points at which shortest paths between k starts and ends cross edges or pass vertices, and counts.
+    """Return the points at which locally shortest paths cross edges or pass vertices, and the number of each path.
 
-    Paths are locally shortest: none becomes shorter by passing a vertex on its other side. The first guess is the
-    shortest path through midpoints of edges; its faces are unfolded, the shortest path inside them is found (funnel
-    algorithm), and wherever it bends around a vertex the other side is tried.
+    The first guess is the shortest path through midpoints of edges; its faces are unfolded, the shortest path inside
+    them is found (funnel algorithm), and wherever it bends around a vertex the other side is tried.
     """
     starts, ends = Places.of(triangles, start), Places.of(triangles, end)
     sides, fractions, counts = _shortest_lines(Faces.of(triangles), Routes.of(triangles.n_edges), starts, ends)

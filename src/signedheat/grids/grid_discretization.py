@@ -215,8 +215,7 @@ class GridIntegration(SolvesEach):
     def fit(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
         """Subtract from φ a smooth function that takes φ's error at the samples (in place of Eq. 14).
 
-        At a node it is the mean of the errors of all samples, weighted by area and nearness: errors and areas are
-        diffused as the normals were, and divided.
+        It is the mean of the errors, weighted by area and nearness: both are diffused as the normals were, and divided.
         """
         phi = self.solve(divergence, source)
         excess = deviation(source.at_samples(phi), source, levels)
@@ -226,8 +225,7 @@ class GridIntegration(SolvesEach):
     def penalize(self, divergence: Floats, source: GridSource, strength: float) -> Floats:
         """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas of the samples.
 
-        A negligible λ imposes nothing. Beyond `STIFFEST`, where conjugate gradients would not converge, the level is
-        imposed exactly.
+        A negligible λ imposes nothing; beyond `STIFFEST` the level is imposed exactly.
         """
         levels = Levels(np.zeros(len(source.weights)))
         if strength < LEAST**2 * self.soft_weight:
@@ -240,8 +238,8 @@ class GridIntegration(SolvesEach):
     def fit_exactly(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
         """Solve Eq. 14 by an augmented Lagrangian, then by the least correction at the nodes around the samples.
 
-        The multipliers take up what the penalty leaves, except for the small part that nearly dependent rows hide from
-        it; that is corrected directly. Rows that contradict each other are met in the least-squares sense.
+        Multipliers leave a small part that nearly dependent rows hide. Contradictions are met in the least-squares
+        sense.
         """
         refuse_beyond_memory(
             f"the zero set imposed exactly on {self.grid.n_nodes:,} nodes",

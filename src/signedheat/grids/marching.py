@@ -30,7 +30,7 @@ def closed_surface(
     """Extract a closed, manifold, outward-oriented surface from any values, by marching cubes (Lewiner et al. 2003).
 
     Values are those at ``origin + (i, j, k) * spacing``. `refine` moves (n, 3) points of the level set along the edges
-    of the grid that they lie on. Faces are counter-clockwise as seen from the side of greater values.
+    of the grid.
     """
     if values.ndim != 3:
         raise GeometryError(
@@ -120,9 +120,8 @@ def block_contour(
     """Extract the level set in the cells whose nodes all have a value, closed where the values around it are.
 
     Neighbouring windows share nodes, and so find the same points on the edges between them; these become one. Where the
-    level set leaves the grid it is closed along the walls, `CAP` cells outside. `refine` moves (n, 3) points, in cells,
-    along the edges of the grid that they lie on. Vertices are in cells from the first node on, faces counter-clockwise
-    as seen from the side of greater values.
+    level set leaves the grid it is closed `CAP` cells outside. `refine` moves (n, 3) points, in cells, along edges of
+    the grid. Faces are counter-clockwise as seen from the side of greater values.
     """
     vertices, faces = zip(*contour_parts(values, spacing, level, refine), strict=True)
     return np.concatenate(vertices), np.concatenate(faces)

@@ -72,8 +72,7 @@ def diffuse_multilevel(
 ) -> list[Level]:
     """Solve ``(1 − tΔ) X = B``, Eq. 12 on a grid, on every level from `finest` (0: the sources' grid) to the coarsest.
 
-    `time` is the diffusion time t on a grid of a given mean spacing. Where a coarser solution suffices, the finest
-    levels are skipped. Each combination of sweep directions is used for this many rounds within a band.
+    `time` gives t on a grid of a mean spacing; each combination of sweep directions is used for so many rounds.
     """
     levels: list[Level] = []
     guess = None
@@ -333,8 +332,7 @@ def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int
     """Run ``kernel(*arguments, tiles)`` over all lines along the last axis, in every combination of directions.
 
     A tile is (begin, end, step) for each of the first three axes of `shape`; the tiles of one call run in order. Tiles
-    on one diagonal of a plane of lines do not depend on each other, and each line reads the same values as in
-    sequential order, so results do not depend on the number of threads.
+    on one diagonal do not depend on each other, so results do not depend on the number of threads.
     """
     steps = [(1, -1) if n > 1 else (1,) for n in shape[:3]]
     threads = 1 if np.prod(shape) < FEW_NODES else n_threads()

@@ -85,10 +85,9 @@ def merge_in_cells(
 ) -> tuple[tuple[Floats, Floats, Floats, Ints], NodeSources]:
     """Merge simplices to one sample for each cell of a grid of `shape` nodes and each component.
 
-    Every simplex is bisected at the midpoint of its longest edge until that is at most `size` cells long; parts whose
-    bounding box misses the grid are dropped at once. `order` lists the simplices component by component. The vectors of
-    all parts, divided by `scale`, are added to the `sources` at the nodes around them, with the weights of multilinear
-    interpolation. Returns positions, vectors, weights and components of the samples, and the sources.
+    Simplices are bisected at their longest edge until it is at most `size` cells long. `order` lists them component by
+    component. The vectors of all parts, over `scale`, are added to the `sources` at the nodes around them, with
+    multilinear weights. Returns positions, vectors, weights and components of the samples, and the sources.
     """
     slots = untouched_zeros((int(np.prod(shape - 1)),), np.int32)
     dimension = simplices.corners.shape[2]

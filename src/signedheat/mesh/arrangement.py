@@ -87,10 +87,10 @@ def meeting_faces(points: Floats, faces: Ints) -> Ints:
 
 
 def arranged(points: Floats, faces: Ints, pairs: Ints | None = None) -> Arrangement:
-    """Divide faces where pairs of them, (k, 2), meet, and where edges that do not cancel end on others.
+    """Divide faces where pairs of them, (k, 2), by default all, meet, and where edges that do not cancel end on others.
 
-    By default all faces that meet are divided. Points nearer than rounding become one, points this near to an edge or
-    face lie on it, thinner triangles are left out, and all other faces stay as they are.
+    Points nearer than rounding become one, points this near to an edge or face lie on it; thinner triangles are
+    dropped.
     """
     slack = TOUCHING * float(np.ptp(points, axis=0).max())
     pairs = meeting_faces(points, faces) if pairs is None else pairs

@@ -91,8 +91,8 @@ class BoxTree(NamedTuple):
     ) -> tuple[Ints, Ints]:
         """Return where the boxes near each of (n, 3, 3) triangles begin, and these: all in leaves that they may meet.
 
-        A triangle may meet a node if its box, its plane and the prism over it do, with some slack along each axis,
-        unless all of the node belongs to the triangle's own group, or lies before one of the (n,) leaves.
+        The triangle's box, plane and prism must all meet a node, with some slack, unless the node is all of its own
+        group.
         """
         corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(3, slack)
         own = np.full(len(corners), -1) if groups is None else np.ascontiguousarray(groups, dtype=np.int64)

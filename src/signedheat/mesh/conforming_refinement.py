@@ -247,10 +247,8 @@ def refine_to_conform(
 ) -> tuple[IntrinsicMesh, list[list[CurveSegments]]]:
     """Cut faces wherever an unoriented curve crosses them, and put vertices at isolated points.
 
-    Returns the mesh, and the sources on it. All other segments in a face that is cut, or on an edge that is split,
-    become edges too; other faces and segments stay as they are. Edges of the cut faces that no segment uses are then
-    flipped to Delaunay, which removes slivers. The old vertices come first; if there is nothing to cut, the same mesh
-    is returned.
+    Returns the mesh, the old vertices first, and the sources on it. All segments in a face that is cut, or on an edge
+    that is split, become edges too. Other edges of the cut faces are then flipped to Delaunay, which removes slivers.
     """
     parts = [part for group in groups for part in group]
     if all(part.is_conforming for part in parts):
@@ -281,10 +279,7 @@ def cut_along(
 
 
 def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Sequence[bool]) -> tuple[Ints, Ints]:
-    """Return the faces to cut and the edges to split: those of nonconforming sources, and those that these entail.
-
-    Where a face is cut, the edges on which a segment in it ends are split; where an edge is split, its faces are cut.
-    """
+    """Return the faces to cut and the edges to split: those of nonconforming sources, and those that these entail."""
     nodes, inside, m = merged.nodes, merged.edges < 0, triangles.n_faces
     last = m + triangles.n_edges
     face, end = np.repeat(merged.faces[inside], 2), merged.ends[inside].ravel()

@@ -127,8 +127,7 @@ def without_copies(parts: Sequence[CurveSegments], by_points: Bools) -> tuple[In
 def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple[list[CurveSegments], Ints]:
     """Join curves into lines where one goes on in the next and no third one ends; return lines, and the line of each.
 
-    A curve that runs back along the one before it is a copy of that, and does not continue it. Curves that are not
-    marked in `may_go_on` (k,) are not joined.
+    A curve that runs back along the one before it is a copy of that. Only those marked in `may_go_on` (k,) are joined.
     """
     merged = MergedSources.of(parts)
     bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
@@ -154,10 +153,7 @@ def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple
 
 
 def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> list[CurveSegments]:
-    """Leave out the points at which lines go straight on within a face.
-
-    Points stay at which another line ends or bends, or at which the normals of a line change.
-    """
+    """Leave out points at which lines go straight on within a face, unless other lines or normals need them."""
     merged = MergedSources.of(parts)
     faces, vectors = merged.faces, merged.vectors
     node, before, after = _nodes_between(merged)
@@ -227,8 +223,7 @@ def given_directions(
 ) -> Complexes:
     """Return unit vectors along given normals: in the layout of the face, or in the frame of the edge.
 
-    On an edge this is the mean of the normal's projections into the planes of the edge's faces, in the frame of the
-    edge.
+    On an edge this is the mean of the normal's projections into the planes of the edge's faces.
     """
     largest = np.abs(normals).max(axis=1, initial=0.0)
     extreme = (largest > 1e100) | ((largest > 0) & (largest < 1e-100))  # their squares overflow or underflow
@@ -261,9 +256,8 @@ def given_directions(
 def carried_left(triangles: IntrinsicMesh, faces: Ints, edges: Ints, lengths: Floats) -> Floats:
     """Return −1 where the face that decides a segment's left is turned against those of most of the curve, else 1.
 
-    Faces are compared across the edges around the curve, so that left stays on one side of it however faces are turned;
-    where orientation is lost along the curve, left changes sides somewhere. On a segment along an edge (`edges`, else
-    −1) the first face at the edge decides.
+    Faces are compared across the edges around the curve, so that left stays on one side of it however faces are turned.
+    On a segment along an edge (`edges`, else −1) the first face at the edge decides.
     """
     telling, links, number = _agreement_around(triangles, faces, edges)
     signs = signs_of(links, int(number.max(initial=-1)) + 1)[number[telling]]

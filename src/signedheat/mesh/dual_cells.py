@@ -60,8 +60,8 @@ class DualCells:
 def cells_around(crossings: Crossings, shape: tuple[int, ...]) -> tuple[Ints, Ints, Ints, Ints]:
     """Find the cells around crossed edges, none of which may be on a wall of the grid of this shape.
 
-    Returns the first nodes (c, 3) of the cells; the crossed edges (c, 12) of each, −1 where an edge is not crossed; and
-    the cells around each edge (e, 4), as in `AROUND`, with which of their edges it is.
+    Returns their first nodes (c, 3); the crossed edges (c, 12) of each, or −1; and the cells around each edge (e, 4),
+    as in `AROUND`, with which of their edges it is.
     """
     axes, crossed_edges = crossings.axes, np.arange(len(crossings.axes))[:, None]
     around = np.repeat(crossings.nodes[:, None], 4, axis=1)
@@ -154,9 +154,8 @@ def dual_triangles(
 ) -> tuple[Floats, Ints, Ints]:
     """Join the vertices of pieces, (v, 3) in cells, to triangles (m, 3), counter-clockwise as seen from outside.
 
-    Of the two diagonals between the four vertices around an edge, if both are possible, the one is taken that passes
-    nearer to the crossing of the edge, and of two that are equally near the shorter. The crossings of `fanned` edges,
-    (e,), and of those with no possible diagonal become vertices, after all others; their edges (k,) are returned as
+    Of two possible diagonals around an edge, the one nearer to the crossing is taken, then the shorter. The crossings
+    of `fanned` edges, (e,), and of those with no possible diagonal become vertices; their edges (k,) are returned as
     well.
     """
     quads, axes, shares = cells.quads, crossings.axes, crossings.shares
@@ -189,8 +188,7 @@ def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) 
     """Return vertices and triangles as `dual_triangles` does, none of which pass through each other wherever possible.
 
     Edges are flipped to run along creases. Vertices of triangles that pass through each other go from one of three
-    `choices`, (3, v, 3), to the next, and edges around them are flipped no more. The first choice is the best; the last
-    is inside the cells, where nothing passes through.
+    `choices`, (3, v, 3), to the next: from the best to one inside the cells, where nothing passes through.
     """
     count = choices.shape[1]
     chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(cells.quads), dtype=bool)
@@ -211,9 +209,8 @@ def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) 
 def _safe(flat: Floats, height: Floats) -> tuple[Bools, Floats]:
     """Return (n,) whether the diagonal from the first to the third of four corners (n, 4, 2) stays in the tetrahedra.
 
-    Seen along the edge, which is from 0 to 1 above the origin, the diagonal passes on one side of it. The triangle on
-    the other side must cross the edge, at the height that is returned; and the diagonal must pass between the edge and
-    the corner that is left.
+    It must pass between the edge, from 0 to 1 above the origin, and the corner that is left; the triangle on the other
+    side must cross the edge, at the height that is returned.
     """
     p, r = flat[:, 0], flat[:, 2]
     side = _cross(p, r) > 0  # the origin is to the left of the diagonal, with the fourth corner

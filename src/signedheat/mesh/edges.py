@@ -133,9 +133,8 @@ class EdgeTable(Frozen):
     def elimination_order(self, vertex_order: NDArray[np.integer]) -> Ints:
         """Order unknowns at edges to reduce fill, given an order of the vertices: ``order[k]`` is eliminated k-th.
 
-        An edge is eliminated with its first eliminated end. Vertices that separate two parts of the mesh separate the
-        edges of the two as well, since these share no face: the order is a nested dissection of the edges, for a
-        fraction of the cost of finding one anew.
+        An edge is eliminated with its first end: separators of vertices separate edges as well, which is a nested
+        dissection.
         """
         rank = np.empty(len(vertex_order), dtype=np.int64)
         rank[vertex_order] = np.arange(len(vertex_order))
@@ -163,8 +162,7 @@ def find_edges(tails: Ints, heads: Ints, used: Bools, n_vertices: int) -> tuple[
     """Find the edges of halfedges (h,), in order of first appearance; halfedges that are not used have none.
 
     Returns the edge of each halfedge, or −1, and whether it runs as the first along its edge does; and of each edge
-    (e,) the number of halfedges, the first, and the second, or −1. Each edge is in the list of its end with fewer
-    halfedges, so that lists stay short.
+    (e,) the number of halfedges, the first, and the second, or −1.
     """
     degrees, last = np.zeros(n_vertices, dtype=np.int64), np.full(n_vertices, -1)
     for h in range(len(tails)):

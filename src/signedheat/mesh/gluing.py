@@ -185,8 +185,7 @@ def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
 def flip(g: Gluing, h: int) -> bool:
     """Flip an interior edge, if its two faces form a strictly convex quadrilateral; return whether it was flipped.
 
-    ``h: i → j`` with apex a and its twin ``t: j → i`` with apex b become ``h: b → a`` with apex i, ``t: a → b`` with
-    apex j. Faces and halfedges keep their ids, so that a history can be run backwards.
+    ``h: i → j`` and its twin become ``h: b → a``, ``t: a → b``. Ids stay, so that a history can be run backwards.
     """
     t = g.sibling[h]
     if g.forward[h] == g.forward[t]:
@@ -378,9 +377,8 @@ def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
 def flip_all(gluing: Gluing) -> Gluing:
     """Flip edges, in place, until the two angles opposite every edge sum to at most π.
 
-    The surface stays the same, with its vertices, angle sums and area. Boundary, nonmanifold and fixed edges keep their
-    ids; faces are turned over where neighbours have opposite orientations. Afterwards two edges may join the same two
-    vertices, or an edge a vertex with itself. Returns the gluing, with arrays long enough for its history.
+    Boundary, nonmanifold and fixed edges keep their ids; faces are turned over where neighbours have opposite
+    orientations. Returns the gluing, with arrays long enough for its history.
     """
     n_edges = int(gluing.counts[1])
     gluing.counts[4] = n_edges

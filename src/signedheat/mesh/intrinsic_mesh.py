@@ -221,8 +221,8 @@ def laid_out(mesh: Triangles, margin: float) -> tuple[IntrinsicMesh, float]:
 class FacePairs:
     """Pairs of faces that meet at an edge.
 
-    Around an edge with three or more faces each is paired with the next, cyclically, and each pair has weight ½:
-    separating one face from all others then costs as much as separating two faces at a manifold edge.
+    Around an edge with three or more faces each is paired with the next, cyclically, with weight ½, so that separating
+    one face from all others costs as much as at a manifold edge.
     """
 
     faces: Ints  # (p, 2) the two faces

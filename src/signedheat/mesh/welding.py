@@ -20,9 +20,9 @@ _HALF = 0xFFFFFFFF
 def welded_vertices(points: Floats, tails: Ints, heads: Ints) -> Ints:
     """Return (n,) the first vertex at the place of each, where places may differ by rounding on rims.
 
-    Tails and heads (h,) are those of halfedges. Vertices at different places become one if both are on open edges, with
-    an odd number of faces, and if rounding explains the difference: a few units in the last place of the largest
-    coordinate, along axes whose coordinates make use of that last place.
+    Vertices at different places become one if both are on open edges of the halfedges (h,), with an odd number of
+    faces, and rounding explains the difference: a few units in the last place, along axes whose coordinates make use of
+    it.
     """
     same = same_positions(points)
     single = _is_single(points)

@@ -225,11 +225,9 @@ def _descend(
 ) -> tuple[NDArray[np.int32], Floats]:
     """Find the nearest face of each point (n, 3), and the square of its distance, down a tree of boxes.
 
-    Consecutive points descend together, wherever any of them may find a nearer face, so that processors do several at
-    once. Every `run` points, a multiple of their number, the search starts anew, in between from the face before. Where
-    a node has a disc (`FaceTree.discs`) that is farther than its box, the disc counts. There must be a face; `rows` are
-    those of `triangle_rows`. `best` has an entry for each point that descends with others: if the compiler knew how
-    many, it would do them one by one. All is in one function, since calls cost as much as boxes.
+    Consecutive points descend together, so that processors do several at once. Every `run` points the search starts
+    anew, in between from the face before. A disc (`FaceTree.discs`) that is farther than its box counts. `best` has an
+    entry for each point that descends with others: its length must be unknown to the compiler.
     """
     bounds, items = tree.bounds, tree.items
     out_faces, out_squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))

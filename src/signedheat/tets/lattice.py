@@ -163,8 +163,7 @@ def _octree(
 ) -> tuple[Ints, Ints]:
     """Return lower corners and sizes of the leaves, in half cells of the finest level.
 
-    The distance to the samples is Lipschitz with constant one, so no leaf has a neighbour that was split twice more,
-    and the tree needs no balancing.
+    The distance to the samples has Lipschitz constant one, so the tree needs no balancing.
     """
     size = 2 ** (depth + 1)
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3) * size

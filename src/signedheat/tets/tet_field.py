@@ -123,11 +123,7 @@ def _triangles(
 
 
 def manifold(positions: Floats, triangles: Ints) -> tuple[Floats, Ints]:
-    """Make a closed oriented surface manifold: split vertices and edges at which it touches itself.
-
-    Every halfedge is paired with one that runs in the opposite direction; corners that meet across a pair share a
-    vertex.
-    """
+    """Make a closed oriented surface manifold: split vertices and edges at which it touches itself."""
     m = len(triangles)
     tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     after = np.roll(np.arange(3 * m).reshape(m, 3), -1, axis=1).ravel()  # corner at the head of each halfedge

@@ -163,11 +163,10 @@ def _rows_with(ids: Ints, n: int) -> tuple[Ints, Ints]:
 def _any_angle(
     planes: Planes, vertices: Vertices, surface: Surface, nearest: Ints, slack: float, queue: Queue
 ) -> tuple[Floats, Floats, int]:
-    """Return the distance of each vertex, where its path starts on the surface, and how many do not see that place.
+    """Return distances of vertices, where their paths start on the surface, and how many do not see that place.
 
-    `nearest`, (n,), holds the triangle nearest to each vertex regardless of visibility, −1 for vertices that have no
-    distance; those that paths start from replace them. Distance is inf where no surface is connected. Lines may lie
-    outside the mesh by `slack`; the `queue` is an empty one of the vertices.
+    `nearest`, (n,), holds the triangle nearest to each vertex regardless of visibility, or −1, and is overwritten.
+    Distance is inf where no surface is connected. Lines may lie outside the mesh by `slack`; the `queue` is empty.
     """
     points, tets, _, first_tet, tets_at = vertices
     n = len(points)

@@ -46,8 +46,7 @@ def tet_source(
 ) -> TetSource:
     """Clip sources against a tet mesh; parts outside the mesh are dropped, and noted.
 
-    `unknowns`, (m, 4), holds the unknown of φ at each corner of each tet; `diffusion` and `spacing` are τ and h in
-    ``t = τ max(h, h_source)²``.
+    `unknowns`, (m, 4), holds the unknown of φ at each corner of each tet; ``t = diffusion · max(spacing, h_source)²``.
     """
     cuts, components, outside, n_components, n_unknowns = [], [], np.zeros(len(sources)), 0, int(unknowns.max()) + 1
     for number, source in enumerate(sources):
