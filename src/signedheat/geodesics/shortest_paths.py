@@ -60,7 +60,7 @@ def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> Ints
 def geodesic_paths(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
 ) -> tuple[LocatedPoints, Ints]:
-    """Return the points at which locally shortest paths cross edges or pass vertices, and the number of each path.
+    """Return the points at which locally shortest paths cross edges or pass vertices, and how many each path has.
 
     The first guess is the shortest path through midpoints of edges; its faces are unfolded, the shortest path inside
     them is found (funnel algorithm), and wherever it bends around a vertex the other side is tried.
