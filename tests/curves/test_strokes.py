@@ -12,7 +12,7 @@ import signedheat as sh
 from shapes import strokes
 from shapes.surfaces import disk
 from signedheat.curves.curve_distance import CurvesTaken
-from signedheat.curves.stroke_directions import Pieces
+from signedheat.curves.stroke_directions import CurvePieces
 from signedheat.curves.strokes import CutGraph
 from signedheat.discretization import discretize
 from signedheat.samples import sphere, torus, with_flipped_faces
@@ -45,7 +45,7 @@ def test_agreement_of_strokes_is_that_of_the_surface_whatever_its_diagonals(arou
     step, n = around // 48, around // 2
     pieces = [mesh.path(n * np.arange(begin * step, (begin + 8) * step + 1)) for begin in (0, 12, 24, 36)]
     pieces.append(pieces[0].reversed())
-    seen = Pieces.of(discretize(mesh), pieces)
+    seen = CurvePieces.of(discretize(mesh), pieces)
     rank = seen.stroke[np.argsort(seen.numbers)]
     found = seen.strokes.agreed[np.ix_(rank, rank)]
     assert -found[0, 4] > 20 * found[0, 1]

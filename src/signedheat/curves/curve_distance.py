@@ -30,7 +30,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField
 from ..validation import flag
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
-from .stroke_directions import Decision, Pieces, decide, with_turned
+from .stroke_directions import CurvePieces, Decision, decide, with_turned
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -177,7 +177,7 @@ def distance_to_pieces(
     listed = flattened(curves)
     surface_of(solver).segments(listed)  # refuses curves that do not fit
     once = triangulated_once(solver, listed)
-    pieces = Pieces.of(surface_of(once), listed)
+    pieces = CurvePieces.of(surface_of(once), listed)
     if pieces is None:
         return distance_unwarned(solver, listed, constraint), listed
     if isinstance(solver.domain, TriangleMesh) and not has_sides(solver.domain, listed):

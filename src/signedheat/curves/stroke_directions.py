@@ -58,7 +58,7 @@ drawings; doubled, 15 and 6."""
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class CurvePieces:
     """Oriented curves on a surface, as strokes; those that end inside the surface may be turned.
 
     Curves that go on in each other, head to tail, are one stroke. Strokes are ordered by place, so that nothing depends
@@ -71,7 +71,7 @@ class Pieces:
     strokes: Strokes  # the energy of the sets that they may bound
 
     @classmethod
-    def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> Pieces | None:
+    def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> CurvePieces | None:
         """Return the pieces; None if there are none."""
         numbers = [k for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented]
         listed = [cast("Curve", curves[k]) for k in numbers]
@@ -102,7 +102,7 @@ class Pieces:
 class Decision:
     """The directions of the pieces of curves."""
 
-    pieces: Pieces  # the curves
+    pieces: CurvePieces  # the curves
     best: Inside  # the best directions that were found, and what is inside then
     # whether most of the length bounds nothing in the least energy, so that sides were taken to be smooth
     bounds_nothing: bool = False
@@ -205,7 +205,7 @@ def is_piece(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
     return not all(at_boundary[ends[end].indices].all() for end in (0, 1))
 
 
-def decide(pieces: Pieces) -> Decision:
+def decide(pieces: CurvePieces) -> Decision:
     """Return the directions of strokes for which the inside costs least; only movable strokes may be turned.
 
     Cuts and directions are improved in turn; where more of the curves is gone than there is, sides are smooth instead.
@@ -400,8 +400,8 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | F
     listed = list(curves)
     turned, agreement = np.zeros(len(listed), dtype=bool), np.ones(len(listed))
 
-    def seen(solver: SignedHeatSolver[SurfaceDomain]) -> Pieces | None:
-        return Pieces.of(surface_of(triangulated_once(solver, listed)), listed)
+    def seen(solver: SignedHeatSolver[SurfaceDomain]) -> CurvePieces | None:
+        return CurvePieces.of(surface_of(triangulated_once(solver, listed)), listed)
 
     pieces = on_resolving_triangles(seen, SignedHeatSolver(surface), listed)
     if pieces is not None:

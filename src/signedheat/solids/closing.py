@@ -50,7 +50,7 @@ UNBENT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class RimSamples:
     """Samples of faces near a rim: (k, 3) positions, (k, 3) unit normals, (k,) areas and (k,) smooth patches."""
 
     positions: Floats
@@ -74,7 +74,9 @@ def smooth_patches(triangles: Floats, ids: Ints) -> Ints:
     return connected_components(len(ids), first[smooth], second[smooth])
 
 
-def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spatial.cKDTree, reach: float) -> Samples:
+def samples_near(
+    triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spatial.cKDTree, reach: float
+) -> RimSamples:
     """Sample the triangles within reach of a rim, at most reach / `SAMPLES` apart unless that makes too many."""
     size = reach / SAMPLES
     near_rim = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
@@ -100,10 +102,10 @@ def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spa
     proper = np.flatnonzero(areas > 0)
     proper = proper[:: max(1, len(proper) // MOST)]
     normals = vectors[proper] / areas[proper, None]
-    return Samples(pieces.mean(axis=1)[proper], normals, areas[proper], np.concatenate(labels)[proper])
+    return RimSamples(pieces.mean(axis=1)[proper], normals, areas[proper], np.concatenate(labels)[proper])
 
 
-def continuation(lid: Lid, samples: Samples, patches: Ints, width: float) -> tuple[Floats, Floats, Floats]:
+def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> tuple[Floats, Floats, Floats]:
     """(n, 3) normals and (n,) curvatures with which a surface continues beyond its rim, and (n,) their weights.
 
     Across an opening of width W a surface that meets the flat lid at angle β must turn by 2 sin β, the chord of a
@@ -145,7 +147,7 @@ def continuation(lid: Lid, samples: Samples, patches: Ints, width: float) -> tup
     return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(held, m), 0.0)
 
 
-def _within(samples: Samples, loop: Floats, patches: Ints, reach: float) -> tuple[Ints, Ints]:
+def _within(samples: RimSamples, loop: Floats, patches: Ints, reach: float) -> tuple[Ints, Ints]:
     """Pair each place of a rim with the samples within reach that belong to the patch ending there."""
     if not len(samples.positions):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)

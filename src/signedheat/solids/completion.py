@@ -37,20 +37,20 @@ from .overlaps import Nesting
 from .point_orientation import mean_gap, orient_points
 from .rims import boundary, loops, open_edges
 from .solid import Solid
-from .union import Surface, united
+from .union import TriangleGroup, united
 
 SIDES = 16
 """Gaps between a rim and a border with up to this many sides are closed by triangles between their vertices."""
 
 
-def seams(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Floats, Ints]:
+def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Floats, Ints]:
     """(k, 3) points on rims, at most a step apart, and (m, 3) triangles from them to the borders of patches.
 
     Examples
     --------
     >>> from signedheat import samples
     >>> ball = samples.sphere(2)
-    >>> points, added = seams(ball.vertices, ball.faces[5:], ball.faces[:3], 0.05)
+    >>> points, added = seam_triangles(ball.vertices, ball.faces[5:], ball.faces[:3], 0.05)
     >>> left = boundary(np.concatenate([ball.faces[5:], ball.faces[:3], added]))
     >>> bool(np.isin(left, np.append(boundary(ball.faces[5:]), len(ball.vertices) + np.arange(len(points)))).all())
     True
@@ -271,26 +271,26 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
             notes.append(FacesRestored(len(lost), restored / (1 + restored)))
     idle = np.flatnonzero(counts == 0)
     if len(idle):
-        surfaces.append(Surface(vertices[chain.faces[idle]], chain.faces[idle], chain.firsts[idle], False))
+        surfaces.append(TriangleGroup(vertices[chain.faces[idle]], chain.faces[idle], chain.firsts[idle], False))
     return united(surfaces, options.keep_overlaps, notes)
 
 
-def _made_from(places: Floats, faces: Ints, added: Ints, origins: Ints) -> Surface:
+def _made_from(places: Floats, faces: Ints, added: Ints, origins: Ints) -> TriangleGroup:
     """Make a closed surface of given and added faces. Only given faces have origins."""
     whole = np.concatenate([faces, added])
-    return Surface(places[whole], whole, np.append(origins, np.full(len(whole) - len(origins), -1)), True)
+    return TriangleGroup(places[whole], whole, np.append(origins, np.full(len(whole) - len(origins), -1)), True)
 
 
-def _torn(vertices: Floats, faces: Ints, origins: Ints, scatter: float, method: Heat) -> list[Surface]:
+def _torn(vertices: Floats, faces: Ints, origins: Ints, scatter: float, method: Heat) -> list[TriangleGroup]:
     """Complete a torn body by the zero set of φ, which replaces faces that scatter around it."""
     triangles = vertices[faces]
-    given = Surface(triangles, faces, origins, False)
+    given = TriangleGroup(triangles, faces, origins, False)
     names, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     made = heat_surface(TriangleMesh(names, corners.reshape(-1, 3)), method, scatter)
     if made is None:
         return [given]
     if scatter:
-        return [Surface.made(made[0][made[1]])]
+        return [TriangleGroup.made(made[0][made[1]])]
     tree = FaceTree.of_triangles(triangles)
     patches = made[0][made[1]]
     cell = float(np.median(np.linalg.norm(patches[:, 1] - patches[:, 0], axis=1)))
@@ -299,7 +299,7 @@ def _torn(vertices: Floats, faces: Ints, origins: Ints, scatter: float, method: 
         return [replace(given, closing=True)]
     places = np.concatenate([vertices, made[0]])
     others = made[1][away] + len(vertices)
-    points, joins = seams(places, faces, others, cell)
+    points, joins = seam_triangles(places, faces, others, cell)
     places, whole = np.concatenate([places, points]), np.concatenate([faces, others, joins])
     whole = np.concatenate([whole, small_gaps(places, whole)])
     places, added = closed_by(places, whole)
@@ -327,8 +327,8 @@ def _from_points(cloud: PointCloud, method: Heat) -> Solid:
     gap = mean_gap(np.asarray(cloud.points))
     made = heat_surface(cloud, method, gap / CELLS)
     if made is not None:
-        return united([Surface.made(made[0][made[1]])], True, points=cloud.points)
+        return united([TriangleGroup.made(made[0][made[1]])], True, points=cloud.points)
     first, second = axes_across(cloud.normals)
     turns = np.stack([np.cos(2 * np.pi * np.arange(3) / 3), np.sin(2 * np.pi * np.arange(3) / 3)], axis=1)
     ways = turns[:, :1] * first[:, None] + turns[:, 1:] * second[:, None]
-    return united([Surface.made(cloud.points[:, None] + 0.25 * gap * ways, False)], True, points=cloud.points)
+    return united([TriangleGroup.made(cloud.points[:, None] + 0.25 * gap * ways, False)], True, points=cloud.points)

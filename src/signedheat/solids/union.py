@@ -23,39 +23,27 @@ TRUST = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
-    """Triangles of one kind.
+class TriangleGroup:
+    """Triangles of one kind."""
 
-    Attributes
-    ----------
-    triangles : (m, 3, 3) float
-        Corners.
-    ids : (m, 3) int
-        Vertices, one number for each position.
-    origins : (m,) int
-        Face that was given, or −1.
-    closing : bool
-        Whether they count in the winding number.
-    """
-
-    triangles: Floats
-    ids: Ints
-    origins: Ints
-    closing: bool
+    triangles: Floats  # (m, 3, 3) corners
+    ids: Ints  # (m, 3) vertices, one number for each position
+    origins: Ints  # (m,) face that was given, or −1
+    closing: bool  # whether they count in the winding number
 
     @classmethod
-    def made(cls, triangles: Floats, closing: bool = True) -> Surface:
+    def made(cls, triangles: Floats, closing: bool = True) -> TriangleGroup:
         """Triangles that were not given; their vertices have negative numbers."""
         ids = -1 - same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)
         return cls(triangles, ids, np.full(len(triangles), -1), closing)
 
-    def select(self, chosen: Bools | Ints, closing: bool) -> Surface:
+    def select(self, chosen: Bools | Ints, closing: bool) -> TriangleGroup:
         """Return some of its triangles."""
-        return Surface(self.triangles[chosen], self.ids[chosen], self.origins[chosen], closing)
+        return TriangleGroup(self.triangles[chosen], self.ids[chosen], self.origins[chosen], closing)
 
 
 def united(
-    surfaces: list[Surface],
+    surfaces: list[TriangleGroup],
     keep_overlaps: bool,
     notes: Sequence[Note] = (),
     points: Floats | None = None,
@@ -89,7 +77,7 @@ def united(
     )
 
 
-def _cut(whole: Surface, closing: Bools) -> Arrangement:
+def _cut(whole: TriangleGroup, closing: Bools) -> Arrangement:
     """Faces divided where they meet: those that close by each other, all others by these."""
     ids = whole.ids
     first = np.full(int(ids.max()) + 1, -1)
@@ -147,7 +135,7 @@ def _notes(triangles: Floats, origins: Ints, kept: Bools, buried: Bools, bounds:
     return notes
 
 
-def _confidence(triangles: Floats, given: Bools, whole: Surface, points: Floats | None) -> NDArray[np.float32]:
+def _confidence(triangles: Floats, given: Bools, whole: TriangleGroup, points: Floats | None) -> NDArray[np.float32]:
     """(m,) 1 where surface was given; where it was completed less, the farther from what was given."""
     confidence = np.ones(len(triangles), dtype=np.float32)
     if points is None:
@@ -164,7 +152,7 @@ def _confidence(triangles: Floats, given: Bools, whole: Surface, points: Floats 
     return confidence
 
 
-def joined_surfaces(surfaces: list[Surface]) -> Surface:
+def joined_surfaces(surfaces: list[TriangleGroup]) -> TriangleGroup:
     """Several surfaces as one; numbers of vertices that are new, which are negative, stay apart."""
     ids, lowest = [], 0
     for surface in surfaces:
@@ -172,7 +160,7 @@ def joined_surfaces(surfaces: list[Surface]) -> Surface:
         lowest = min(lowest, int(own.min(initial=0)))
         ids.append(own)
     joined = np.concatenate(ids)
-    return Surface(
+    return TriangleGroup(
         surfaces[0].triangles if len(surfaces) == 1 else np.concatenate([surface.triangles for surface in surfaces]),
         np.unique(joined, return_inverse=True)[1].reshape(joined.shape),
         np.concatenate([surface.origins for surface in surfaces]),

@@ -113,7 +113,7 @@ class Vertices(NamedTuple):
     tets_at: Ints
 
 
-class Surface(NamedTuple):
+class SourceSurface(NamedTuple):
     """The triangles that distance is measured to."""
 
     rows: Floats  # (k, 16) see `triangle_rows`, relative to the centre of the mesh
@@ -138,7 +138,7 @@ def _distance_around(
     triangles, _ = tree.nearest(points)
     triangles[np.isnan(values)] = -1
     vertices = Vertices(points, unknowns, mesh.faces.neighbors, *_rows_with(unknowns, len(values)))
-    surface = Surface(tree.rows, corners, *_rows_with(corners, len(positions)), owners)
+    surface = SourceSurface(tree.rows, corners, *_rows_with(corners, len(positions)), owners)
     slack = GRAZING * lowered.spacing
     distances, places, hidden = _any_angle(planes, vertices, surface, triangles, slack, Queue.empty(len(points)))
     curved = np.flatnonzero(np.isfinite(distances) & (owners[triangles] >= 0))
@@ -161,7 +161,7 @@ def _rows_with(ids: Ints, n: int) -> tuple[Ints, Ints]:
 
 @compiled
 def _any_angle(
-    planes: Planes, vertices: Vertices, surface: Surface, nearest: Ints, slack: float, queue: Queue
+    planes: Planes, vertices: Vertices, surface: SourceSurface, nearest: Ints, slack: float, queue: Queue
 ) -> tuple[Floats, Floats, int]:
     """Return distances of vertices, where their paths start on the surface, and how many do not see that place.
 
@@ -246,7 +246,7 @@ def _sees(planes: Planes, vertices: Vertices, v: int, target: Floats, slack: flo
 
 
 @compiled
-def _nearest_around(surface: Surface, triangle: int, x: float, y: float, z: float) -> tuple[int, Floats]:
+def _nearest_around(surface: SourceSurface, triangle: int, x: float, y: float, z: float) -> tuple[int, Floats]:
     """Return the triangle nearest to (x, y, z) of those that share a corner with a triangle, and its nearest point."""
     least, closest, place = np.inf, triangle, np.zeros(3)
     for c in range(3):
