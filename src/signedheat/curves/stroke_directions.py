@@ -46,9 +46,9 @@ SINGLY = 16
 """Number of strokes, the longest first, that are turned or left out one by one where they explain nothing; limited for
 speed. Halved and doubled, none of 46 drawings changes."""
 TURNED = 0.399
-"""Turning a loop of more than this share of its length, and of all strokes, is a guess: less than two of five pieces.
-Of 515 drawings (`benchmarks/strokes.py`, seeds 0 to 51) none is wrong in silence and 12 are right with a warning; at
-.36 0 and 17, at .45 1 and 9, at .5 3 and 8."""
+"""Turning a loop is a guess if it turns more than this share of the loop's length and of that of all strokes: less than
+two of five pieces. Of 515 drawings (`benchmarks/strokes.py`, seeds 0 to 51) none is wrong in silence and 12 are right
+with a warning; at .36 0 and 17, at .45 1 and 9, at .5 3 and 8."""
 WORTH = 0.5
 """The inside is a guess if it depends on a stroke worth less than this, relative to its length. Of 350 drawings, 140 of
 them with long strays, 9 are wrong in silence and 10 right with a warning; halved 15 and 5, doubled 4 and 56."""

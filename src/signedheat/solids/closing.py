@@ -39,7 +39,7 @@ DIVIDED = 1 << 20
 """Largest number of triangles that division makes behind a rim, before `MOST` of them are taken. A flat side behind
 slots .0012 to .1 as wide as they are long has 140,000 to 430,000."""
 STIFF = 0.03
-"""Walls of this depth, relative to the strip's, count half."""
+"""The bending of a wall of this depth, relative to the strip's, counts half."""
 AGREEMENT = 0.35
 """Ratio between how far a surface bends and how far it would have to bend. A lid does not bend below this ratio, and is
 clamped above twice this ratio. On a ball the ratio is 1."""
