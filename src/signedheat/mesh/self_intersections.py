@@ -21,13 +21,16 @@ CROWD = 64
 """Number of faces around a vertex above which their intersections are found around it, and not in space."""
 
 
-def self_intersections(vertices: Floats, faces: Ints) -> Ints:
-    """Return (k, 2) pairs of faces that intersect or overlap; without a common vertex they must not touch, either."""
+def self_intersections(vertices: Floats, faces: Ints, asked: Bools | None = None) -> Ints:
+    """Return (k, 2) pairs of faces that intersect or overlap; without a common vertex they must not touch, either.
+
+    If only some faces are `asked` about, (m,), the pairs are those with one of them.
+    """
     slack = TOUCHING * float(np.ptp(vertices, axis=0).max(initial=0.0))
-    return overlapping_faces(vertices, same_positions(vertices)[faces], slack, -slack)
+    return overlapping_faces(vertices, same_positions(vertices)[faces], slack, -slack, asked)
 
 
-def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float) -> Ints:
+def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float, asked: Bools | None = None) -> Ints:
     """Return (k, 2) pairs of faces that overlap by more than `depth`, or `slack` if they have a common vertex.
 
     Along their normals they may be apart by `slack`. Faces with a common edge overlap if they are folded.
@@ -37,6 +40,9 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float)
     centred = np.ascontiguousarray(vertices - vertices.mean(axis=0), dtype=np.float64)
     hubs = _hubs(faces, len(vertices))
     order = _order(centred[faces], centred, hubs)
+    if asked is not None:  # those come first, since each face looks for what follows it
+        order = order[np.argsort(~asked[order], kind="stable")]
+    count = len(faces) if asked is None else int(asked.sum())
     ids, hubs = np.ascontiguousarray(faces[order], dtype=np.int64), hubs[order]
     corners = centred[ids]
     flat = corners.reshape(-1, 9)
@@ -50,21 +56,21 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float)
         return np.stack([first, second], axis=1)[_overlapping(flat, ids, first, second, slack, depth)]
 
     def of_tree(start: int) -> Ints:
-        batch = slice(start, start + CHUNK)
+        batch = slice(start, min(start + CHUNK, count))
         starts, near = tree.meeting(corners[batch], slack, hubs[batch], places[batch] // LEAF)
         owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-        asked = (near > owners) & ((hubs[owners] < 0) | (hubs[owners] != hubs[near]))
-        return overlapping(owners[asked], near[asked])
+        chosen = (near > owners) & ((hubs[owners] < 0) | (hubs[owners] != hubs[near]))
+        return overlapping(owners[chosen], near[chosen])
 
     def of_fans(start: int) -> Ints:
         starts, near = around.meeting(arcs[start : start + CHUNK], 1e-6)  # angle against rounding
         owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-        asked = (near > owners) & (hubs[fans[owners]] == hubs[fans[near]])
-        return overlapping(fans[owners[asked]], fans[near[asked]])
+        chosen = (near > owners) & (hubs[fans[owners]] == hubs[fans[near]])
+        return overlapping(fans[owners[chosen]], fans[near[chosen]])
 
     with ThreadPoolExecutor(n_threads()) as pool:
-        parts = list(pool.map(of_tree, range(0, len(ids), CHUNK)))
-        pairs = np.concatenate(parts + list(pool.map(of_fans, range(0, len(fans), CHUNK))))
+        parts = list(pool.map(of_tree, range(0, count, CHUNK)))
+        pairs = np.concatenate(parts + list(pool.map(of_fans, range(0, int((fans < count).sum()), CHUNK))))
     pairs = np.sort(order[pairs], axis=1)
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 

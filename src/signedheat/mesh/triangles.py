@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, mask_of
 from ..compiled import compiled
 from .components import element_components
 from .edges import EdgeTable, edge_keys, edge_table
@@ -165,15 +165,16 @@ def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = No
     _, _, sharp = _creases(vertices, faces)
     if not len(sharp):
         return faces
-    near = np.zeros(len(vertices), dtype=bool)
-    near[faces[sharp // 3]] = True
-    chosen = np.flatnonzero(near[faces].any(axis=1))
+    near = mask_of(len(vertices), faces[sharp // 3])
     result: Ints = faces.copy()
     for _ in range(12):  # nearly all flips are made in the first four rounds
-        first, second, new_first, new_second = _flips(vertices, result[chosen], near, held)
-        if not len(first):
+        chosen = np.flatnonzero(near[result].any(axis=1))
+        rows, replacements, hopeful = _flips(vertices, result[chosen], near, held)
+        if not len(rows):
             break
-        result[chosen[first]], result[chosen[second]] = new_first, new_second
+        result[chosen[rows]] = replacements
+        # all others gained nothing, and nothing changes around them
+        near = mask_of(len(vertices), result[mask_of(len(vertices), hopeful)[result].any(axis=1)])
     return result
 
 
@@ -184,11 +185,12 @@ def _creases(vertices: Floats, faces: Ints) -> tuple[EdgeTable, Floats, Ints]:
     return table, normals, table.pairs[np.einsum("ij,ij->i", first, second) < np.cos(SHARP)]
 
 
-def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> tuple[Ints, Ints, Ints, Ints]:
-    """Return pairs of faces to replace, (k,) each, no two pairs neighbours, and their replacements, (k, 3) each.
+def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> tuple[Ints, Ints, Ints]:
+    """Return (k,) faces to replace, in pairs no two of which are neighbours; (k, 3) their replacements; and vertices.
 
-    The edge from a to b has c and d across; it is replaced by the edge from c to d, unless there is one already. One of
-    these must be `whole`: a vertex all of whose faces are given.
+    The vertices are those of all pairs whose flip would gain something, (h, 4), whether they are flipped now or not.
+    The edge from a to b has c and d across; it is replaced by the edge from c to d, unless there is one already. a, b
+    and one of these must be `whole`: all of their faces are given.
     """
     table, normals, creases = _creases(vertices, faces)
     (first, second), (i, j) = (creases // 3).T, (creases % 3).T
@@ -214,7 +216,9 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
         gain += np.where(beyond >= 0, before - after, 0.0)
     keys = edge_keys(c, d)
     present = np.isin(keys, edge_keys(*table.vertices.T))
-    gain[present | ~(whole[c] | whole[d]) | (c == d)] = 0.0
+    gain[~(whole[a] & whole[b] & (whole[c] | whole[d])) | (c == d)] = 0.0
+    hopeful = np.stack([a, b, c, d], axis=1)[gain > 1e-9 * reach]
+    gain[present] = 0.0
     if held is not None:
         gain[held[a] | held[b] | held[c] | held[d]] = 0.0
     order = np.argsort(gain, kind="stable")
@@ -226,7 +230,7 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
         np.maximum.at(best, face, rank)
     won = np.flatnonzero((rank > 0) & np.all([best[face] == rank for face in faces_around], axis=0))
     won = won[np.unique(keys[won], return_index=True)[1]]  # two flips may make the same edge
-    return first[won], second[won], new[0][won], new[1][won]
+    return np.concatenate([first[won], second[won]]), np.concatenate([new[0][won], new[1][won]]), hopeful
 
 
 def _bend(vertices: Floats, tails: Ints, heads: Ints, first_normals: Floats, second_normals: Floats) -> Floats:

@@ -248,13 +248,15 @@ def divided_along_creases(
 
     This restores creases through cells whose edges the level does not cross, and which thus have no vertex.
     """
+    new = np.ones(len(faces), dtype=bool)
     for _ in range(DIVISIONS if len(faces) <= MOST else 0):
-        edges, points = _creases_off(offset, spacing, vertices, faces)
+        edges, points = _creases_off(offset, spacing, vertices, faces, new)
         while len(edges):
             divided, made = _divided(vertices, faces, edges, points)
             away, _ = scipy.spatial.cKDTree(points).query(divided, distance_upper_bound=NEAR * float(spacing.max()))
-            near = made[np.isfinite(away)[made].any(axis=1)]  # the other triangles are unchanged
-            meeting = near[self_intersections(divided, near)]
+            new = (made >= len(vertices)).any(axis=1)
+            near = np.flatnonzero(np.isfinite(away)[made].any(axis=1))
+            meeting = made[near][self_intersections(divided, made[near], new[near])]
             if not len(meeting):
                 break
             wrong = np.unique(meeting[meeting >= len(vertices)]) - len(vertices)
@@ -266,10 +268,16 @@ def divided_along_creases(
     return vertices, faces
 
 
-def _creases_off(offset: ImplicitSurface, spacing: Floats, vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:
-    """(k, 2) halfedges of bent edges off the level, at most one per face, and (k, 3) points on the crease or level."""
+def _creases_off(
+    offset: ImplicitSurface, spacing: Floats, vertices: Floats, faces: Ints, new: Bools
+) -> tuple[Ints, Floats]:
+    """Return (k, 2) halfedges of bent edges off the level, and (k, 3) points on the crease or level for them.
+
+    Only edges of faces that are `new`, (m,), are looked at, and at most one in each face is returned.
+    """
     step = float(spacing.max())
     normals, edges = unit(area_vectors(vertices[faces])), edge_table(faces).pairs
+    edges = edges[new[edges // 3].any(axis=1)]
     edges = edges[normals[edges // 3].prod(axis=1).sum(axis=1) < np.cos(BENT)]
     tails, heads = faces.ravel()[edges[:, 0]], faces.ravel()[edges[:, 1]]
     middles = 0.5 * (vertices[tails] + vertices[heads])
