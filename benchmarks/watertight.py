@@ -203,6 +203,26 @@ def meshfix(mesh: Mesh, cell: float) -> Mesh:
     return Mesh(np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64))
 
 
+def manifold_plus(mesh: Mesh, cell: float) -> Mesh:
+    import point_cloud_utils
+
+    given = np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32)
+    nodes = np.ptp(mesh.bounds, axis=0).max() / cell
+    vertices, faces = point_cloud_utils.make_mesh_watertight(*given, resolution=round(6 * nodes**2))
+    return Mesh(np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64))
+
+
+def alpha_wrap(mesh: Mesh, cell: float) -> Mesh:
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet()
+    meshes.add_mesh(pymeshlab.Mesh(np.array(mesh.vertices), np.array(mesh.faces)))
+    offset = pymeshlab.PureValue(cell / 30)  # 30 is what CGAL's manual advises
+    meshes.generate_alpha_wrap(alpha=pymeshlab.PureValue(cell), offset=offset)
+    made = meshes.current_mesh()
+    return Mesh(made.vertex_matrix(), made.face_matrix().astype(np.int64))
+
+
 def dual_contouring(mesh: Mesh, cell: float) -> Mesh:
     import gpytoolbox
     import igl
@@ -250,6 +270,8 @@ PROGRAMS: dict[str, Callable[[Mesh, float], Mesh | None]] = {
     "MeshLib, sharpening": partial(meshlib, sharpening=True),
     "trimesh + manifold3d": repaired,
     "pymeshfix": meshfix,
+    "point-cloud-utils": manifold_plus,
+    "pymeshlab, alpha wrap": alpha_wrap,
 }
 
 
