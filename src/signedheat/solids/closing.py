@@ -25,7 +25,7 @@ from ..mesh.unit_vectors import unit
 from . import lids, walls
 from .lids import Lid, running_mean, vertex_normals
 from .rims import boundary, corners_of, loops, open_edges
-from .spanning import Frame, frame_of
+from .spanning import Frame, frame_of, side_lengths
 
 REACH = 0.25
 """Width of the strip of surface around an opening that is sampled, relative to the opening's width."""
@@ -62,7 +62,7 @@ class RimSamples:
 def width_of(lid: Lid) -> float:
     """Width of an opening: four areas over the length of its rim, the diameter of a circle; never zero."""
     rim = lid.vertices[: lid.n_rim]
-    length = float(np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1).sum())
+    length = float(side_lengths(rim).sum())
     return max(4.0 * float(face_areas(lid.vertices[lid.faces]).sum()) / length, NARROWEST * length)
 
 
@@ -114,7 +114,7 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     """
     n, loop = lid.n_rim, lid.vertices[: lid.n_rim]
     reach = REACH * width
-    steps = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    steps = side_lengths(loop)
     m = max(1, min(n // 4, round(reach / steps.mean())))
     along = unit(np.roll(loop, -m, axis=0) - np.roll(loop, m, axis=0))
     rows, near = _within(samples, loop, patches, reach)

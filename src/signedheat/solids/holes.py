@@ -24,6 +24,7 @@ from .chain import Chain
 from .closing import NONE, closed_by
 from .completion import Lids
 from .rims import boundary, loops
+from .spanning import side_lengths
 
 Rims = Sequence[Ints]
 
@@ -132,7 +133,7 @@ def fill_holes(
     turned = decided.turned[used]
     faces = np.where(turned[:, None], chain.faces[used][:, ::-1], chain.faces[used])
     around = loops(vertices, faces, boundary(faces))
-    lengths = np.array([_length(vertices[loop]) for loop in around])
+    lengths = np.array([float(side_lengths(vertices[loop]).sum()) for loop in around])
     if rims is None:
         chosen = _holes(around, lengths, faces, decided, used)
     else:
@@ -153,11 +154,6 @@ def fill_holes(
         made = FilledMesh(points, np.concatenate([given.faces, added]))
     vars(made).update(origins=np.append(np.arange(n), np.full(len(added), -1)), filled=filled, left=left)
     return made
-
-
-def _length(corners: Floats) -> float:
-    """Length of a closed loop."""
-    return float(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1).sum())
 
 
 def _holes(around: Rims, lengths: Floats, faces: Ints, decided: Bounding, used: Ints) -> Bools:

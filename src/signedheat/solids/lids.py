@@ -17,7 +17,7 @@ from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import unit
 from . import spanning
 from .rims import corners_of
-from .spanning import Frame, Spanned, area_vector, frame_of, points_inside, spanned
+from .spanning import Frame, Spanned, area_vector, frame_of, points_inside, side_lengths, spanned
 
 PIECES = 128
 """Number of points of the loop that a lid spans. Half or twice as many change the volume by less than 1 %."""
@@ -91,7 +91,7 @@ class SmoothRim:
 
 def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
     """Edges and shares of points along a loop: its vertices, and more, at most 1 / `PIECES` of its length apart."""
-    lengths = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    lengths = side_lengths(loop)
     counts = np.maximum(np.ceil(lengths * PIECES / lengths.sum() - 1e-9), 1).astype(np.int64)
     edges = np.repeat(np.arange(len(loop)), counts)
     return edges, (np.arange(len(edges)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[edges]
@@ -208,7 +208,7 @@ def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: f
         return lid
     rim = lid.vertices[:n]
     rest, load = _harmonic(lid, held * curvatures), _load(rim, normals)
-    lengths = np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1)
+    lengths = side_lengths(rim)
     springs = (1.0 / np.maximum(held, 1e-9) - 1.0) * 0.25 * width * 0.5 * (lengths + np.roll(lengths, 1))
     size = float(np.linalg.norm(np.ptp(rim, axis=0)))
     moves = [size]
@@ -365,7 +365,7 @@ def creased(loop: Floats, normals: Floats) -> tuple[Floats, Ints] | None:
 def _straight_sides(loop: Floats, normals: Floats) -> list[_Side]:
     """Straight parts of a loop."""
     corners = corners_of(loop)
-    weighted = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)[:, None] * normals
+    weighted = side_lengths(loop)[:, None] * normals
     if not len(corners):
         return []
     order, cuts = np.roll(np.arange(len(loop)), -corners[0]), corners - corners[0]

@@ -80,9 +80,15 @@ def farthest(loop: Floats, away: Floats) -> int:
     return int(ties[np.lexsort(np.rint(1e6 * far).T[::-1])[-1]])
 
 
+def side_lengths(loop: Floats) -> Floats:
+    """(n,) lengths of the sides of a closed loop."""
+    lengths: Floats = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    return lengths
+
+
 def shares_of(loop: Floats) -> tuple[Floats, float]:
     """(n + 1,) share of the length of a closed loop at which each corner comes, and 1; and that length."""
-    lengths = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    lengths = side_lengths(loop)
     along = np.concatenate([[0.0], np.cumsum(lengths)])
     return along / along[-1], float(along[-1])
 
@@ -161,7 +167,7 @@ def counterclockwise(points: Floats) -> Ints:
 
 def points_inside(polygon: Floats) -> Floats:
     """Points within a polygon of few sides, as dense as its corners at its rim, the less dense the farther from it."""
-    steps = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1)
+    steps = side_lengths(polygon)
     size = float(np.quantile(steps, 0.9))
     low, high = polygon.min(axis=0), polygon.max(axis=0)
     tree = scipy.spatial.cKDTree(polygon)
