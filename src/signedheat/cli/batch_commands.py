@@ -132,9 +132,9 @@ def check_watertight(arguments: Namespace) -> None:
     "thickness.",
     output("a file for one shape; or a folder for the files of many, and manifest.jsonl"),
     *(*MANY, LABEL, UNITS_OPTION),
-    option("--thickness", type=positive, metavar="D", help="of the solids around sheets"),
-    option("--contour", action="store_true", help="contour everything: even triangles in place of few"),
-    option("--tolerance", type=positive, metavar="D", help="fewer triangles, no farther away than this (manifold3d)"),
+    option("--thickness", type=positive, metavar="D", help="thickness of solids around sheets"),
+    option("--contour", action="store_true", help="contour everything, with even triangles instead of few"),
+    option("--tolerance", type=positive, metavar="D", help="use fewer triangles, within this distance (manifold3d)"),
     option("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side, for contours (256)"),
     option("--spacing", type=positive, metavar="H", help="cells of contours, in units of the file"),
     option(

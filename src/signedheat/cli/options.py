@@ -197,7 +197,9 @@ def output(help: str, metavar: str = "OUT") -> Option:
 
 def format_option(standard: str) -> Option:
     """Return the option for the format of standard output, with its default."""
-    return option("--format", default=standard, metavar="EXT", help=f"of standard output, with -o - ({standard})")
+    return option(
+        "--format", default=standard, metavar="EXT", help=f"format of standard output (-o -), {standard} by default"
+    )
 
 
 def is_quiet(arguments: Namespace) -> bool:
@@ -353,14 +355,14 @@ LIDS = option(
 )
 REPAIR = group(
     "steps (all taken by default)",
-    option("--as-oriented", action="store_true", help="turn no face, normal or line, and restore no face"),
+    option("--as-oriented", action="store_true", help="turn no faces, normals or lines, and restore no faces"),
     option("--keep-overlaps", action="store_true", help="keep surfaces that lie inside other bodies"),
     LIDS,
     option(
         "--nested",
         choices=("given", "cavities", "bodies"),
         default="given",
-        help="closed pieces inside others are what their orientation says, cavities as in slicers, or bodies",
+        help="closed pieces inside others are oriented as given, cavities as in slicers, or bodies",
     ),
 )
 STEPS = group(

@@ -76,7 +76,7 @@ def check_volume(arguments: Namespace) -> None:
         nargs="?",
         const="",
         metavar="MESH",
-        help="measure on tets, of a .mesh .msh .vtu .vtk .ele file or around the shape; OUT: .vtu .vtk .msh",
+        help="measure on tets, from a .mesh .msh .vtu .vtk .ele file or around the shape; OUT: .vtu .vtk .msh",
     ),
     *(LABEL, PLACE, GRID, STEPS, METHOD, SLICES, TILES, format_option("npz")),
     check=check_volume,
@@ -214,7 +214,9 @@ def check_morph(arguments: Namespace) -> None:
     ),
     group(
         "sheets",
-        option("--side", choices=("outside", "inside", "both"), default="both", help="of the faces, if one D is given"),
+        option(
+            "--side", choices=("outside", "inside", "both"), default="both", help="side of the faces, if one D is given"
+        ),
         option("--faces", type=whole_number(0), nargs="+", metavar="F", help="thicken these only, counted from 0"),
     ),
     option("--preview", metavar="PNG", help="draw the distance to the shape in slices, with the offsets"),
@@ -253,18 +255,18 @@ def morph(arguments: Namespace) -> Summary:
 
 @command(
     "fill",
-    "holes of a mesh closed, the mesh as it is",
+    "close holes of a mesh, and change nothing else",
     "Close holes of a mesh and leave everything else as it is: vertices and faces keep their order, new ones follow. "
     "Sheets stay sheets, with their outlines. `watertight` makes solids of broken shapes.",
     option("mesh", metavar="MESH", help="surface: .stl .obj .ply .off .vtp .glb .3mf"),
     output(SURFACES),
-    option("--largest", type=positive, metavar="L", help="length of the longest rim that is closed"),
+    option("--largest", type=positive, metavar="L", help="close only rims up to this length"),
     option(
         "--rims",
         type=whole_number(0),
         nargs="+",
         metavar="V",
-        help="close rims through these vertices only, outlines of sheets among them; counted from 0",
+        help="close only rims through these vertices, counted from 0, including outlines of sheets",
     ),
     *(LIDS, format_option("stl")),
     usage="MESH -o OUT [options]",
@@ -316,7 +318,12 @@ def combining(name: str) -> Command:
         name,
         help,
         f"A closed surface around {help}, broken or not. Faces are kept, and cut where they cross.",
-        option("files", metavar="SHAPE", nargs="+", help="surfaces or oriented points, in one place; solids: .npz"),
+        option(
+            "files",
+            metavar="SHAPE",
+            nargs="+",
+            help="surfaces or oriented points, in the same coordinates; solids: .npz",
+        ),
         output(f"{SURFACES}; solid: .npz"),
         UNITS_OPTION,
         REPAIR,

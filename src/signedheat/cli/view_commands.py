@@ -190,12 +190,23 @@ def take_inputs(arguments: Namespace, *names: str) -> None:
     option(
         "scan", metavar="SCAN", nargs="?", help="mesh or points: .stl .obj .ply .off .vtp .glb .xyz .pcd .las .laz .e57"
     ),
-    option("nominal", metavar="NOMINAL", nargs="?", help="the part as it should be, broken or not, also .step"),
+    option("nominal", metavar="NOMINAL", nargs="?", help="the nominal part, broken or not, also .step"),
     outputs("any of: coloured .ply, picture .png .pdf .svg .jpg, table .csv"),
     option(
-        "--tolerance", type=positive, metavar="T", action="append", default=[], help="share of points within; again"
+        "--tolerance",
+        type=positive,
+        metavar="T",
+        action="append",
+        default=[],
+        help="report the share of points within; may be repeated",
     ),
-    option("--worst", type=whole_number(0), metavar="N", default=10, help="list the places that are farthest off (10)"),
+    option(
+        "--worst",
+        type=whole_number(0),
+        metavar="N",
+        default=10,
+        help="list the places with the largest deviations (10)",
+    ),
     UNITS_OPTION,
     check=lambda arguments: take_inputs(arguments, "scan", "nominal"),
     usage="SCAN NOMINAL [-o OUT ...] [--tolerance T ...]",
