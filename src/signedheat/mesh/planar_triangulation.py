@@ -14,6 +14,10 @@ FLAT = 1e-13
 DELAUNAY = 1e-10
 """Sine of the excess over π up to which two opposite angles satisfy Delaunay's condition."""
 
+TRIES = 64
+"""Tries to flip edges, for each that a segment crosses, after which rounding is taken to prevent it. Segments that are
+not thinner than rounding took ten at most, also across a thousand edges."""
+
 
 class Planar(NamedTuple):
     """The triangulation of one face; edge k of a triangle begins at its vertex k."""
@@ -398,7 +402,7 @@ def _clear(mesh: Planar, t: int, k: int, a: int, b: int) -> int:
         t, k = s, ((j + 1) % 3 if turn > 0.0 else (j + 2) % 3)  # (u, z) or (z, head)
         tails.append(tri[t, k])
         heads.append(tri[t, (k + 1) % 3])
-    begin, left = 0, 16 * (len(tails) + 4) ** 2
+    begin, left = 0, TRIES * (len(tails) + 4)
     while begin < len(tails):
         left -= 1
         if left < 0:
