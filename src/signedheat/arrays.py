@@ -32,7 +32,7 @@ MOST = 6
 class Frozen:
     """A frozen dataclass whose copies and pickles hold only its fields; read-only arrays stay read-only.
 
-    Cached properties are computed anew, since they are often larger than the fields, or in memory of other libraries.
+    Cached properties are computed again, since they are often larger than the fields, or in memory of other libraries.
     """
 
     def __getstate__(self) -> tuple[dict[str, object], frozenset[str]]:

@@ -34,7 +34,7 @@ ANCHOR = 10.0
 
 @dataclass(frozen=True, eq=False)
 class DirectIntegration(Frozen):
-    """``C φ = b`` on vertices, under the constraints of Sec. 7.1 but for `fit`, which derived classes define."""
+    """``C φ = b`` on vertices, under the constraints of Sec. 7.1 except `fit`, which derived classes define."""
 
     stiffness: sparse.csr_matrix  # (n, n) upper triangle of C, whose kernel are the constants on each component
     factorize: Callable[..., Factor] = factorize  # of an upper triangle; takes the last `PardisoFactor` as `like`

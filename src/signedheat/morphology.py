@@ -1,6 +1,6 @@
 """Morphological operations on broken shapes, by successive offsets of their signed distance (Sec. 9.3.1).
 
-Each step computes the distance anew, since the distance to an offset differs from that to the shape by a constant on
+Each step computes the distance again, since the distance to an offset differs from that to the shape by a constant on
 one side only.
 """
 
@@ -563,7 +563,7 @@ def _sided(domain: Domain, shape: Sources) -> Field:
 def _offsets(
     shape: Sources, distance: float, signs: tuple[int, ...], domain: Domain | None, resolution: int, measure: Measure
 ) -> Boundary:
-    """Offset successively, outward for a sign of 1 and inward for −1, and compute the distance anew each time."""
+    """Offset successively, outward for a sign of 1 and inward for −1, and compute the distance again each time."""
     distance = finite_number(distance, "the distance", least=0)
     if domain is None:
         domain = _room(shape, distance if 1 in signs else 0.0, resolution)

@@ -33,7 +33,7 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
     Parameters
     ----------
     solid : Solid
-        What `complete` has made of a mesh. Complete anew when an optimiser has moved the vertices.
+        What `complete` has made of a mesh. Complete it again when an optimiser has moved the vertices.
     points : (..., 3) tensor
         Where, on any device; batches of any shape.
     vertices : (k, 3) tensor, optional

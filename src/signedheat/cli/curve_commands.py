@@ -132,7 +132,7 @@ def surface(arguments: Namespace) -> Summary:
 @command(
     "close",
     "complete broken curves on a surface",
-    "The zero set of the signed distance to broken curves: closed, but for ends at the boundary of the surface.",
+    "The zero set of the signed distance to broken curves: closed, except for ends at the boundary of the surface.",
     *about_curves("completed curves: .obj .json"),
     option("--preview", metavar="PNG", help="draw the distance, with the completed curves"),
     *(UP, format_option("json")),

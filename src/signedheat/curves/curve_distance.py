@@ -214,7 +214,7 @@ def distance_to_pieces(
 
 
 def has_sides(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool:
-    """Whether the faces that each curve runs on hang together, and can agree which side of the curve is left."""
+    """Whether the faces that each curve runs on are connected, and can agree which side of the curve is left."""
     if (mesh.edges.face_counts == 2 - (mesh.edges.balance != 0)).all():
         return True
     crossed = [segments_of(curve, mesh.intrinsic, mesh.vertices).faces for curve in curves]
@@ -270,7 +270,7 @@ def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[Curv
     hinges = decision.worth_little()
     if len(hinges):
         return (
-            f"what is bounded hangs on {named(hinges)}, and closing the gaps takes lines more than half as long: that "
+            f"the region depends on {named(hinges)}, and closing the gaps takes lines more than half as long: that "
             "is a guess. Remove what belongs to no curve, turn what faces the wrong way, or draw what is missing; "
             f"{as_given}"
         )

@@ -230,7 +230,7 @@ def decide(pieces: CurvePieces) -> Decision:
 
 
 def least_of(strokes: Strokes, insides: list[Inside]) -> Inside:
-    """Return the first of those that cost the least, but for rounding."""
+    """Return the first of those with the least cost, to rounding."""
     costs = np.array([misfit(strokes, inside) for inside in insides])
     return insides[int(np.argmax(costs <= costs.min() + TIE * strokes.lengths.sum()))]
 

@@ -29,7 +29,7 @@ from .nearest_triangles import foot_on_triangle, nearest_faces, triangle_rows
 FOLD = 0.02
 """Length of the sum of two unit normals below which the edge between them is a fold, and decides no side."""
 RUN = 512
-"""Number of points after which a search starts anew: a part of the points that a thread takes at a time."""
+"""Number of points after which a search starts again: a part of the points that a thread takes at a time."""
 FLAT = 0.5
 """Thickness over radius up to which a disc is used besides the box."""
 FAR = 1e7

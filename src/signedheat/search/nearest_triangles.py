@@ -226,7 +226,7 @@ def _descend(
     """Find the nearest face of each point (n, 3), and the square of its distance, down a tree of boxes.
 
     Consecutive points descend together, so that processors do several at once. Every `run` points the search starts
-    anew, in between from the face before. A disc (`FaceTree.discs`) that is farther than its box counts. `best` has an
+    again, in between from the face before. A disc (`FaceTree.discs`) that is farther than its box counts. `best` has an
     entry for each point that descends with others: its length must be unknown to the compiler.
     """
     bounds, items = tree.bounds, tree.items

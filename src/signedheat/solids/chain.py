@@ -1,4 +1,4 @@
-"""Chains: the distinct triangles of a shape, how often each is there, and what hangs together and closes.
+"""Chains: the distinct triangles of a shape, how often each is there, and which are connected and closed.
 
 Triangles on the same corners are one. It is there as often as it is given one way, less how often the other way, and
 that may be never. A chain whose directed edges all cancel is a *cycle*: it has an integer winding number off its faces.

@@ -1,6 +1,6 @@
 """Close the boundary of a chain of triangles by lids.
 
-A small hole that lost no vertices is known but for its diagonals. Of all triangulations of its loop, the one whose
+Only the diagonals of a small hole that lost no vertices are unknown. Of all triangulations of its loop, the one whose
 edges bend least, ``Σ length · angle`` with the rim's edges included (twice the total absolute mean curvature),
 continues the faces around it; dynamic programming over the loop finds it (Barequet and Sharir 1995, Liepa 2003).
 Larger ones get lids that bend as the surface does towards its rim (`continuation`).

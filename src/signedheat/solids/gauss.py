@@ -130,7 +130,7 @@ class Matrix:
         return cls(matrix, places, normals, owners, pieces.areas[owners] / counts[owners], np.zeros(len(owners)))
 
     def chosen(self, kept: Bools) -> Matrix:
-        """Restrict the system to some of the pieces, which are numbered anew."""
+        """Restrict the system to some of the pieces, which are renumbered."""
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
         matrix = self.matrix[rows][:, kept]
@@ -265,7 +265,7 @@ class Dipoles:
         return np.where(np.isfinite(balls), balls, 0.0)
 
     def chosen(self, kept: Bools) -> Dipoles:
-        """Restrict the system to some of the pieces, which are numbered anew."""
+        """Restrict the system to some of the pieces, which are renumbered."""
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
         values = (self.places, self.normals, self.areas, self.softening, self.within)

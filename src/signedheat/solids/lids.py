@@ -201,7 +201,7 @@ def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: f
     is half as stiff as a disc of width W for h = ½. Spheres and cylinders go on as they are. Each round takes m, L and
     n from the last. Normals, curvatures and held are those of `continuation`.
 
-    None where it moves farther than its rim is wide, as on rims in tatters, where nothing is smooth.
+    None where it moves farther than its rim is wide, as on very ragged rims.
     """
     n = lid.n_rim
     if n == len(lid.vertices):

@@ -1,8 +1,8 @@
 """On which side of each face of a solid's boundary the inside is.
 
 The winding number differs on the two sides of a face by how often the face is there, and between two faces that follow
-each other around an edge it is the same. These steps give it on both sides of all faces that hang together, but for a
-number, of which samples tell. So the inside does not depend on places between faces that nearly coincide.
+each other around an edge it is the same. These steps give it on both sides of all connected faces, up to a
+constant that samples determine. So the inside does not depend on places between faces that nearly coincide.
 """
 
 from __future__ import annotations

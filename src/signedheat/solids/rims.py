@@ -68,7 +68,7 @@ def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
     """Find closed loops around the gaps of faces, along all boundary edges; no loop passes a vertex twice.
 
     Where several loops meet at a vertex, each edge that arrives there goes on along the edge at the other side of the
-    gap beside it. Where gaps hang together at vertices, loops come apart there, beginning far from the middle of all.
+    gap beside it. Where gaps are connected at vertices, loops come apart there, beginning far from the middle of all.
 
     Examples
     --------

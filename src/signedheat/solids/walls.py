@@ -31,7 +31,7 @@ class Rim:
     ids: Ints  # (n,) and (n, 3) its vertices
     corners: Floats
     onward: Floats  # (n, 3) unit vectors at its edges, along the surface and away from it
-    parts: Ints  # (n,) what ends at each edge: faces that hang together
+    parts: Ints  # (n,) connected part that ends at each edge
     centre: Floats  # (3,) a ball around it
     radius: float
     opening: Floats  # (3,) area vector of a lid

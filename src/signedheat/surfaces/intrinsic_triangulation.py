@@ -491,7 +491,7 @@ def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
         lost = f"longest edge would be {longest:.6g}, and all edges together are {most:.6g}"
     if lost:
         raise GeometryError(
-            f"the faces are too thin to be triangulated anew: their {lost}",
+            f"the faces are too thin for another triangulation: their {lost}",
             remedy="remove nearly degenerate faces, or scale the shape along axes in which it is squashed",
             element="faces",
         )

@@ -95,7 +95,7 @@ def gradient_directions(mesh: Triangles, values: Floats, faces: Ints) -> Floats:
     of_corners = np.cross(area_vectors(corners)[:, None], opposite)
     rise = values[mesh.faces[faces]]
     most = np.abs(rise).max(axis=1, keepdims=True, initial=0.0)
-    rise = rise / np.where(most > 0, most, 1.0)  # lest their sum is beyond what can be written
+    rise = rise / np.where(most > 0, most, 1.0)  # so that their sum does not overflow
     return np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
 
 

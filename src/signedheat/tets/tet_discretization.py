@@ -154,7 +154,7 @@ class TetDiscretization(DiffusesEach):
         """Whether the mesh fills its convex hull."""
         try:
             hull = scipy.spatial.ConvexHull(self.mesh.vertices[np.unique(self.mesh.boundary.faces)])
-        except scipy.spatial.QhullError:  # flat but for rounding
+        except scipy.spatial.QhullError:  # flat, to rounding
             return False
         return bool(self.mesh.tet_volumes.sum() >= (1 - 1e-9) * hull.volume)
 
