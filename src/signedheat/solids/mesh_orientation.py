@@ -42,7 +42,7 @@ class Orientation(Frozen, ShortRepr):
     turned : (k,) bool
         Which of them were turned.
     parts : (k,) int
-        Piece of each, connected across edges of two faces or closes as it was given; −1 for faces on fewer
+        Piece of each face, connected across edges of two faces or closed as given; −1 for faces on fewer
         than three places, and inner walls.
     undecided : (k,) bool
         Faces of sheets, which bound nothing: they agree with their neighbours.
