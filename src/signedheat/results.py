@@ -1,4 +1,4 @@
-"""Classes of what functions and methods return, for annotations; users make none of them."""
+"""Classes of what functions and methods return, for annotations."""
 
 from .curves.stroke_directions import CurveOrientation
 from .diagnostics import Diagnostics

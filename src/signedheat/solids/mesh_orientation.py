@@ -1,4 +1,4 @@
-"""Orientation of meshes, whose faces come to agree and to bound outwards; and, by the same function, of curves."""
+"""Orientation: faces of meshes agree with their neighbours and bound outwards; pieces of curves agree."""
 
 from __future__ import annotations
 

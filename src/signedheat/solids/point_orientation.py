@@ -1,4 +1,4 @@
-"""Point clouds without normals get normals, and those known up to sign get signs; and surfaces are fitted to them."""
+"""Normals of point clouds: fitted where there are none, turned outwards, and surfaces fitted to them."""
 
 from __future__ import annotations
 

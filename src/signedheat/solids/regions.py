@@ -1,7 +1,7 @@
-"""On which side of each face of a solid's boundary the inside is.
+"""Regions on both sides of the faces of a solid's boundary.
 
-The winding number differs on the two sides of a face by how often the face is there, and between two faces that follow
-each other around an edge it is the same. These steps give it on both sides of all connected faces, up to a
+The winding number differs on the two sides of a face by the number of times that the face is there; between two faces
+that follow each other around an edge it does not change. This gives it on both sides of all connected faces, up to a
 constant that samples determine. So the inside does not depend on places between faces that nearly coincide.
 """
 

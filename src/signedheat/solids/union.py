@@ -1,4 +1,4 @@
-"""Unite what closes a solid: faces cut where they cross, and those left out that lie inside."""
+"""Unite the triangles that close a solid: cut faces where they cross, and leave out those inside."""
 
 from __future__ import annotations
 
