@@ -130,7 +130,7 @@ class Decision:
         return not self.bounds_nothing and bool((self.best.explained[~self.loose] >= EXPLAINED).all())
 
     def turned_loops(self) -> Ints:
-        """Numbers of the pieces turned of loops that are mostly turned, unless they are few or a loop is complete."""
+        """Numbers of the pieces turned of loops that are mostly turned, unless they are few."""
         strokes, best = self.pieces.strokes, self.best
         triangles = strokes.surface.triangles
         signs = best.sides[triangles.corner_vertices]
@@ -147,11 +147,10 @@ class Decision:
         total = np.bincount(own, explained, triangles.n_vertices)
         turned = np.bincount(own, explained * (best.signs < 0), triangles.n_vertices)
         mostly = turned[own] > TURNED * total[own]
-        complete = (~self.pieces.movable & (explained > 0) & ~mostly).any()
         against = mostly & (best.signs < 0) & (explained > 0)
         # others turned prove nothing
         few = explained[against].sum() < TURNED * explained[against | (best.signs > 0)].sum()
-        return self.pieces.curves(against & (not few) & (not complete))
+        return self.pieces.curves(against & (not few))
 
     def worth_little(self) -> Ints:
         """Numbers of the curves without which the inside is another, and the least energy rises by little.
