@@ -225,6 +225,16 @@ def test_bands_too_fine_for_the_memory_are_refused_with_a_spacing_that_fits(monk
     solid.field(spacing=float(re.search(r"spacing of ([0-9.e-]+)", told.value.remedy)[1]), band=0.02)
 
 
+def test_bands_of_any_width_are_refused_after_few_distances(monkeypatch):
+    solid, asked = complete(SHAPES["ball"]()), []
+    search = type(solid.tree).distances
+    monkeypatch.setattr(type(solid.tree), "distances", lambda *given: asked.append(len(given[1])) or search(*given))
+    for width in (1e-3, 1.0):
+        with refused(sh.errors.MemoryLimitError):
+            solid.field(spacing=1e-5, band=width)
+    assert 0 < sum(asked) < 1_000_000
+
+
 def test_progress_goes_up_and_cancels():
     told = []
     complete(SHAPES["brick"]()).field(resolution=40, progress=lambda share, step: told.append(share))

@@ -439,23 +439,17 @@ def blocks_at(offset: Offset, grid: Grid) -> Ints:
     Heights change by no more than one goes, so that the one at the middle of a block says how near the surface is.
     """
     diagonal = (1.0 if offset.level is not None else STEEPEST) * float(np.linalg.norm(grid.spacing))
-    halves = []
 
     def near(centres: Floats, half: float) -> Bools:
-        halves.append(half)
         return np.abs(offset.distance(centres)) <= (half + 1.0) * diagonal
 
     free = available_memory()
-    limit = math.inf if free is None else max(free - libraries(), 0) / BYTES_PER_BLOCK
-    places = blocks_where(grid, near, limit)
-    if len(places) > limit:
-        cell, larger = (
-            float(grid.spacing.max()),
-            3 * (2 * halves[-1] + 1) / SIDE,
-        )  # cubes twice as large were few enough
+    places, times = blocks_where(grid, near, math.inf if free is None else max(free - libraries(), 0) / BYTES_PER_BLOCK)
+    if times > 1:
+        cell = float(grid.spacing.max())
         raise MemoryLimitError(
             f"a surface in cells of {cell:.3g} needs more than the {(free or 0) / 1e9:.2g} GB that are free",
-            remedy=f"use cells of {larger * cell:.3g}",
+            remedy=f"use cells of {1.5 * times * cell:.3g}",
         )
     if not len(places):
         raise OutsideError(f"the distance reaches {offset.named} nowhere on the grid", remedy="choose another level")

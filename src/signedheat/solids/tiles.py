@@ -52,6 +52,8 @@ BYTES_IN_BAND = 6.5
 """Memory per node of a band, including its share of the tables of blocks."""
 COARSE = 65
 """Upper bound of the nodes along the longest side of the coarse grid of a band."""
+SOME, UNSURE = 1024, 1.5
+"""Cubes of each size that are followed to estimate the number of blocks, and by what factor it may be wrong."""
 Result = TypeVar("Result")
 
 
@@ -121,11 +123,8 @@ def band_field(
     coarse = dense_field(solid, coarser(grid, 1 << max(0, math.ceil(math.log2(max(grid.shape) / COARSE)))), None)
     reach = width + float(np.linalg.norm(grid.spacing))  # complete the cells at the ends of the band
     limit = blocks_that_fit(store)
-    places = blocks_near(tree, grid, reach, limit)
-    if places is None:
-        factor = 2
-        while blocks_near(tree, coarser(grid, factor), reach, limit) is None:
-            factor *= 2
+    places, factor = blocks_near(tree, grid, reach, limit)
+    if factor > 1:
         raise MemoryLimitError(
             f"the band has more than {limit:,} blocks of {NODES} nodes, {limit * NODES * BYTES_IN_BAND / 1e9:.2g} GB, "
             "for which there is room",
@@ -167,23 +166,42 @@ def coarser(grid: Grid, factor: int) -> Grid:
     return Grid(grid.origin, factor * grid.spacing, [max(2, 1 - (-(n - 1) // factor)) for n in grid.shape])
 
 
-def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> Ints | None:
-    """(n, 3) places of the blocks that may have a node within reach of a face; None if there are more than a limit."""
+def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> tuple[Ints, int]:
+    """(n, 3) places of the blocks that may have a node within reach of a face: see `blocks_where`."""
     diagonal = float(np.linalg.norm(grid.spacing))
-    places = blocks_where(grid, lambda centres, half: tree.distances(centres) <= reach + half * diagonal, limit)
-    return places if len(places) <= limit else None
+    return blocks_where(grid, lambda centres, half: tree.distances(centres) <= reach + half * diagonal, limit)
 
 
-def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: float = math.inf) -> Ints:
-    """(n, 3) places of blocks whose cubes of nodes may be `near`, from coarse to fine; no further beyond a limit."""
+def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: float) -> tuple[Ints, int]:
+    """(n, 3) places of blocks, found from coarse to fine, and 1; or none, and how many times larger cells have room.
+
+    `near` says of cubes of nodes, by their centres and half the nodes along their edges, which may be wanted. If the
+    grid has more blocks than the limit, the number of those wanted is first estimated by following some cubes only.
+    """
+    if math.prod(-(-n // SIDE) for n in grid.shape) > limit:
+        numbers = {side: number for side, _, number in _cubes(grid, near, SOME)}
+        if max(numbers.values()) > UNSURE * limit:
+            return np.zeros((0, 3), dtype=np.int64), 2 * max(s for s in numbers if numbers[s] * UNSURE > limit)
+    for side, places, number in _cubes(grid, near, None):
+        if number > limit:
+            return places[:0], 2 * side
+    return places, 1
+
+
+def _cubes(grid: Grid, near: Callable[[Floats, float], Bools], few: int | None) -> Iterator[tuple[int, Ints, float]]:
+    """Yield cubes that may be wanted, from coarse to fine: the blocks along their edges, their places, their number.
+
+    The number is estimated if only the parts of `few` cubes are followed.
+    """
     n_blocks = -(-np.array(grid.shape) // SIDE)
-    side = 1 << max(0, int(np.ceil(np.log2(n_blocks.max()))))
+    side, each, random = 1 << max(0, int(np.ceil(np.log2(n_blocks.max())))), 1.0, np.random.default_rng(0)
     places, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))
-    while True:
+    while side and len(places):
         half = 0.5 * (side * SIDE - 1)
         places = places[near(grid.origin + (places * side * SIDE + half) * grid.spacing, half)]
-        if side == 1 or not 0 < len(places) <= limit:
-            return places
+        yield side, places, each * len(places)
+        if few is not None and len(places) > few:
+            places, each = random.choice(places, few, replace=False), each * len(places) / few
         side //= 2
         places = (2 * places[:, None] + halves).reshape(-1, 3)
         places = places[(places * side < n_blocks).all(axis=1)]
