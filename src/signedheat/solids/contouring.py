@@ -254,7 +254,7 @@ def divided_along_creases(
         while len(edges):
             divided, made = _divided(vertices, faces, edges, points)
             away, _ = scipy.spatial.cKDTree(points).query(divided, distance_upper_bound=NEAR * float(spacing.max()))
-            new = (made >= len(vertices)).any(axis=1)
+            new = np.any(made >= len(vertices), axis=1)
             near = np.flatnonzero(np.isfinite(away)[made].any(axis=1))
             meeting = made[near][self_intersections(divided, made[near], new[near])]
             if not len(meeting):
