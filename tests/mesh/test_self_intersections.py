@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from signedheat import samples
 from signedheat.mesh import self_intersections as crossings
 from signedheat.mesh.box_tree import BoxTree
 
@@ -57,3 +58,17 @@ def test_long_thin_faces_meet_few_others():
     order = np.concatenate([side, n + side])
     starts, _ = BoxTree.over(triangles, order).meeting(walls, 1e-9)
     assert np.diff(starts).max() < 40
+
+
+@pytest.mark.parametrize("share", [0.0, 0.2, 1.0])
+def test_pairs_of_some_faces_are_those_of_all_that_have_one_of_them_in_any_order(share):
+    rng = np.random.default_rng(5)
+    mesh = samples.sphere(2)
+    points = mesh.vertices + 0.3 * rng.normal(size=mesh.vertices.shape)
+    order = rng.permutation(len(mesh.faces))
+    asked = rng.random(len(order)) < share
+    pairs = crossings.self_intersections(points, mesh.faces)
+    assert len(pairs) > 50
+    expected = {tuple(pair) for pair in pairs[asked[pairs].any(axis=1)].tolist()}
+    found = np.sort(order[crossings.self_intersections(points, mesh.faces[order], asked[order])], axis=1)
+    assert {tuple(pair) for pair in found.tolist()} == expected

@@ -35,14 +35,14 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float,
 
     Along their normals they may be apart by `slack`. Faces with a common edge overlap if they are folded.
     """
-    if not len(faces):
+    count = len(faces) if asked is None else int(asked.sum())
+    if not count:
         return np.zeros((0, 2), dtype=np.int64)
     centred = np.ascontiguousarray(vertices - vertices.mean(axis=0), dtype=np.float64)
     hubs = _hubs(faces, len(vertices))
     order = _order(centred[faces], centred, hubs)
     if asked is not None:  # those come first, since each face looks for what follows it
         order = order[np.argsort(~asked[order], kind="stable")]
-    count = len(faces) if asked is None else int(asked.sum())
     ids, hubs = np.ascontiguousarray(faces[order], dtype=np.int64), hubs[order]
     corners = centred[ids]
     flat = corners.reshape(-1, 9)
