@@ -123,7 +123,7 @@ def size_of(path: PathLike) -> int:
 
 @contextmanager
 def _opened(path: PathLike) -> Iterator[tuple[BinaryIO, int]]:
-    """Open a regular file, and yield it with its size."""
+    """Open a regular file, and yield it with its size in bytes; errors, also of the `with` block, name the file."""
     try:
         # O_NONBLOCK, so that opening a pipe does not wait for its writer
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))) as file:
@@ -131,6 +131,8 @@ def _opened(path: PathLike) -> Iterator[tuple[BinaryIO, int]]:
             if not stat.S_ISREG(status.st_mode):
                 raise _no_file(path, status.st_mode)
             yield file, status.st_size
+    except SignedHeatError:
+        raise
     except FileNotFoundError:
         raise FileFormatError("there is no such file", remedy="check the name", path=path) from None
     except IsADirectoryError:
@@ -140,8 +142,6 @@ def _opened(path: PathLike) -> Iterator[tuple[BinaryIO, int]]:
             f"cannot be read ({error.strerror})", remedy="check its permissions", path=path
         ) from error
     except ValueError as error:  # the name holds a null character
-        if isinstance(error, SignedHeatError):
-            raise
         raise FileFormatError(f"this is not a valid file name ({error})", remedy="check the name", path=path) from error
 
 
@@ -170,8 +170,8 @@ def ensure_fits(size: int, path: PathLike, remedy: str = "check that it is not d
         )
 
 
-def unpacked(data: bytes | memoryview, machine: Any, size: int) -> bytes:
-    """Unpack at most `size` bytes of data.
+def unpacked(data: bytes | memoryview, decompressor: Any, limit: int) -> bytes:
+    """Unpack data with a decompressor of `zlib` or `bz2`; return at most the first `limit` bytes of the result.
 
     Examples
     --------
@@ -179,7 +179,7 @@ def unpacked(data: bytes | memoryview, machine: Any, size: int) -> bytes:
     >>> unpacked(zlib.compress(bytes(10**6)), zlib.decompressobj(), 3)
     b'\\x00\\x00\\x00'
     """
-    return bytes(machine.decompress(data, size)) if size else b""
+    return bytes(decompressor.decompress(data, limit)) if limit else b""  # to zlib, 0 means no limit
 
 
 def _no_file(path: PathLike, mode: int) -> FileFormatError:

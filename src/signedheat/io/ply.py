@@ -54,11 +54,13 @@ class _Element:
 
 
 def read_ply(path: PathLike, names: Sequence[str] = ()) -> Elements:
-    """Read the faces of a PLY file, including triangle strips; or its points, with ``nx ny nz`` and ``area`` if there.
+    """Read the faces of a PLY file; if it has none, the triangles of its strips; and without those, its points.
 
-    `names` are further properties of the vertices that are wanted, where there are such.
+    Points have normals and areas if the file has ``nx ny nz`` and ``area``; faces have neither. `names` are further
+    properties of the vertices to read as `values`; those that the file lacks are left out.
     """
     tables = _tables(path)
+    # without lists
     vertex = {name: column for name, column in tables.get("vertex", {}).items() if not isinstance(column, tuple)}
     if not {"x", "y", "z"} <= vertex.keys():
         raise FileFormatError("there is no element 'vertex' with x, y and z: this is not a shape")
@@ -145,7 +147,7 @@ def write_parts(parts: Iterator[tuple[Floats, Ints]], path: PathLike) -> tuple[i
 
 
 def _tables(path: PathLike) -> dict[str, dict[str, Any]]:
-    """Return the columns of each element."""
+    """Return the columns of each element: arrays; for lists, pairs of all entries in a row and (n,) counts."""
     form, elements, body = _header(contents(path).removeprefix(codecs.BOM_UTF8))
     read_element = _text_reader(body) if form == "ascii" else _BinaryReader(body, form).read
     return {element.name: read_element(element) for element in elements}

@@ -26,7 +26,12 @@ class Round(NamedTuple):
 def split_rounds(
     proximal: Map, solve: Map, apply: Map, image: NDArray[Any], split: NDArray[Any], relaxation: float = RELAXATION
 ) -> Iterator[Round]:
-    """Iterate without end from K x and z; `proximal` makes z of K x + dual, and `solve` the x nearest to z − dual."""
+    """Yield the state after each round, without end.
+
+    `image` and `split` are K x and z to begin with. Given v = K x + u, `proximal` returns the z that minimises
+    f(z) + ρ/2 |z − v|²; given v = z − u, `solve` returns the x that minimises g(x) + ρ/2 |K x − v|². `apply` maps x to
+    K x. The duals u are multipliers over the penalty ρ, which both functions know.
+    """
     relaxed, dual = image, np.zeros_like(image)
     while True:
         before, target = split, relaxed + dual

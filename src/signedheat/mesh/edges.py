@@ -80,15 +80,19 @@ def orient_faces(pairs: HalfedgePairs, tails: Ints, owners: NDArray[np.integer],
 
 
 def may_coincide(pairs: HalfedgePairs, tails: Ints, following: NDArray[np.integer]) -> bool:
-    """Return whether any two faces may be on the same corners: they would share an edge, and a corner next to it."""
+    """Return whether two faces may be on the same corners; if not, `coincident_faces` has nothing to look for.
+
+    `tails` (c,) has the vertex at each corner, `following` (c,) the corner after it around its face. Faces on the same
+    corners share an edge and the corner beyond it; edges of more than two faces are not examined, and count as True.
+    """
     two = pairs.counts == 2
     first, second = pairs.first[two], pairs.second[two]
     preceding = np.empty_like(following)
     preceding[following] = np.arange(len(following), dtype=following.dtype)
-    first_next = tails[following[following[first]]]
+    first_beyond = tails[following[following[first]]]
     alike = tails[first] == tails[second]  # else the corner beyond the edge is the one before it
-    second_next = tails[np.where(alike, following[following[second]], preceding[second])]
-    return bool((pairs.counts > 2).any() or (first_next == second_next).any())
+    second_beyond = tails[np.where(alike, following[following[second]], preceding[second])]
+    return bool((pairs.counts > 2).any() or (first_beyond == second_beyond).any())
 
 
 @dataclass(frozen=True, eq=False)

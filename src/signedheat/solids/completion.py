@@ -247,11 +247,15 @@ def oriented_points(cloud: PointCloud) -> tuple[PointCloud, tuple[Note, ...]]:
 
 
 def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
-    """Make the solid of a mesh whose bounding faces are known. Its origins are triangles of the mesh."""
+    """Make the solid of a mesh, given its distinct triangles (`chain`) and what each of them bounds (`decided`).
+
+    Bodies of which little is left are completed by heat, all other triangles that bound something by lids; those that
+    bound nothing are kept as sheets. Origins of the solid are ids of triangles of the mesh.
+    """
     vertices = mesh.vertices
     counts = np.abs(decided.counts)
     faces = np.where((decided.counts < 0)[:, None], chain.faces[:, ::-1], chain.faces)
-    torn, surfaces, notes = np.zeros(len(faces), dtype=bool), [], []
+    torn, surfaces, notes = np.zeros(len(faces), dtype=bool), list[TriangleGroup](), list[Note]()
     by_heat = options.completion == "heat"
     clusters = np.zeros(len(faces), dtype=np.int64) if by_heat else decided.loose
     for cluster in np.unique(clusters[(clusters >= 0) & (counts > 0)]):
@@ -259,20 +263,27 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
         scatter = 0.0 if by_heat else scatter_of(vertices[faces[chosen]], decided.pieces[chosen])
         if by_heat or scatter or decided.levels[chosen[0]] < TORN:
             torn[chosen] = True
-            surfaces += _torn(vertices, faces[chosen], chain.firsts[chosen], scatter, method)
-    bounds = np.repeat(np.arange(len(faces)), np.where(torn, 0, counts))
+            surfaces += _completed_by_heat(vertices, faces[chosen], chain.firsts[chosen], scatter, method)
+    bounds = np.repeat(np.arange(len(faces)), np.where(torn, 0, counts))  # a face that bounds twice is taken twice
     if len(bounds):
-        lost = small_lids(vertices, faces[bounds])
-        whole = np.concatenate([faces[bounds], lost])
-        places, added = closed_by(vertices, whole, bent=options.lids == "bent")
-        surfaces.append(_made_from(places, whole, added, chain.firsts[bounds]))
-        if len(lost):
-            restored = float(face_areas(vertices[lost]).sum() / face_areas(vertices[faces[bounds]]).sum())
-            notes.append(FacesRestored(len(lost), restored / (1 + restored)))
-    idle = np.flatnonzero(counts == 0)
-    if len(idle):
-        surfaces.append(TriangleGroup(vertices[chain.faces[idle]], chain.faces[idle], chain.firsts[idle], False))
+        closed, notes = _closed_by_lids(vertices, faces[bounds], chain.firsts[bounds], options.lids == "bent")
+        surfaces.append(closed)
+    sheets = np.flatnonzero(counts == 0)
+    if len(sheets):
+        surfaces.append(TriangleGroup(vertices[faces[sheets]], faces[sheets], chain.firsts[sheets], False))
     return united(surfaces, options.keep_overlaps, notes)
+
+
+def _closed_by_lids(vertices: Floats, faces: Ints, origins: Ints, bent: bool) -> tuple[TriangleGroup, list[Note]]:
+    """Close (m, 3) faces, of (m,) origins, by lids; note the faces that were lost between given vertices."""
+    lost = small_lids(vertices, faces)
+    restored = np.concatenate([faces, lost])
+    places, added = closed_by(vertices, restored, bent=bent)
+    surface = _made_from(places, restored, added, origins)
+    if not len(lost):
+        return surface, []
+    area_lost, area_given = (float(face_areas(vertices[part]).sum()) for part in (lost, faces))
+    return surface, [FacesRestored(len(lost), area_lost / (area_lost + area_given))]
 
 
 def _made_from(places: Floats, faces: Ints, added: Ints, origins: Ints) -> TriangleGroup:
@@ -281,7 +292,9 @@ def _made_from(places: Floats, faces: Ints, added: Ints, origins: Ints) -> Trian
     return TriangleGroup(places[whole], whole, np.append(origins, np.full(len(whole) - len(origins), -1)), True)
 
 
-def _torn(vertices: Floats, faces: Ints, origins: Ints, scatter: float, method: Heat) -> list[TriangleGroup]:
+def _completed_by_heat(
+    vertices: Floats, faces: Ints, origins: Ints, scatter: float, method: Heat
+) -> list[TriangleGroup]:
     """Complete a torn body by the zero set of φ, which replaces faces that scatter around it."""
     triangles = vertices[faces]
     given = TriangleGroup(triangles, faces, origins, False)

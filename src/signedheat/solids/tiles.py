@@ -87,7 +87,7 @@ class Evaluated(SolidQueries, Protocol):
 
 def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> GridField[Literal[3]]:
     """Compute the signed distance to a solid at all nodes of a grid."""
-    refuse_walls(grid)
+    refuse_plane_grid(grid)
     refuse_large_grid(grid, BYTES_PER_NODE, BYTES_AT_WORK)
     values, confidence = np.empty(grid.shape), np.empty(grid.shape, dtype=np.float32)
     n_blocks = -(-np.array(grid.shape) // SIDE)
@@ -116,8 +116,12 @@ def band_field(
     scheduler: Scheduler,
     progress: Progress | None,
 ) -> GridField[Literal[3]]:
-    """Compute the signed distance to a solid in blocks near its surface, and on a coarse grid everywhere."""
-    refuse_walls(grid)
+    """Compute the signed distance to a solid in blocks near its surface, and on a coarse grid everywhere.
+
+    `width` is the distance from the surface up to which the band reaches, on both sides. Values are kept in memory, or
+    in the folder `store`, whose tiles `scheduler` computes: see `Solid.field`.
+    """
+    refuse_plane_grid(grid)
     width = positive_number(width, "band")
     tree, windings = prepared(solid)
     coarse = dense_field(solid, coarser(grid, 1 << max(0, math.ceil(math.log2(max(grid.shape) / COARSE)))), None)
@@ -218,7 +222,7 @@ def blocks_that_fit(store: str | PathLike[str] | None) -> int:
     return int(min(max(left, 0) / (NODES * BYTES_IN_BAND), 2**40))
 
 
-def refuse_walls(grid: Grid) -> None:
+def refuse_plane_grid(grid: Grid) -> None:
     """Raise if a grid is not in space."""
     if grid.dimension != 3:
         raise UnsupportedTypeError(

@@ -234,23 +234,24 @@ def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
 
 @kernel
 def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
-    """Insert one vertex to remove a bad face, where possible; return False if the arrays have no room for it.
+    """Try to remove bad face f by one new vertex: at its circumcentre, or on a segment that is in the way of that.
 
-    A face at vertices that nearly coincide is left as it is, unless an angle above 150° makes its circumcircle large
-    and no segment blocks its circumcentre: grading faces towards such vertices would take hundreds of new ones.
+    Return False if the arrays have no room for the vertex, so that f must be tried again; else True, even if f stays.
+    A face whose shortest side joins vertices that nearly coincide stays, unless an angle above 150° makes its
+    circumcircle large and no segment is in the way: grading faces towards such vertices would take hundreds more.
     """
     h = is_bad(g, f, goal)[1]
     close = coincide(g, agenda, h)
     if is_hopeless(g, agenda, h) or (close and not is_cap(g, agenda, f)):
         return True
-    outcome, place, x, y = find_circumcenter(g, f)
+    outcome, place, x, y = find_circumcenter(g, f)  # the place is the face that has it, or the halfedge in the way
     if outcome == LOST:
         return True
     segment = place if outcome == BLOCKED else encroached(g, place, x, y, agenda.room, agenda.halfedges)
-    if segment < 0 and too_near(g, h, place, x, y):
-        return True
     if segment >= 0:
         return close or coincide(g, agenda, segment) or split_segment(g, agenda, segment, f, goal)
+    if too_near(g, h, place, x, y):
+        return True
     if not has_room(g, agenda, 2):
         return False
     insert(g, agenda, place, x, y)

@@ -215,9 +215,11 @@ def principal_axes(offsets: Floats, weights: Floats, normals: Floats, reach: Flo
     return np.stack([first, second, np.cross(first, second)], axis=1)
 
 
-def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, used: Bools) -> tuple[Ints, Ints]:
-    """(m, 3) distinct triangles, with sorted corners, that points (c,) propose among some of their neighbours (c, k);
-    and (m,) votes for each.
+def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, allowed: Bools) -> tuple[Ints, Ints]:
+    """(m, 3) distinct triangles, with sorted corners, that points propose; and (m,) votes: how many propose each.
+
+    Points `centers` (c,) propose their Delaunay triangles among those of their `neighbors` (c, k) that are `allowed`
+    (c, k), unfolded into their tangent planes.
     """
     triangles = [np.empty((0, 3), dtype=np.int64)]
     k = neighbors.shape[1]
@@ -225,16 +227,19 @@ def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, us
         part = slice(begin, begin + _CHUNK)
         chunk = centers[part]
         places = planes.unfolded(np.repeat(chunk, k), neighbors[part].ravel()).reshape(len(chunk), k, 2)
-        x, y = np.moveaxis(places * used[part, :, None], 2, 0)
+        # the others are moved to the origin, where voronoi_fans skips them
+        x, y = np.moveaxis(places * allowed[part, :, None], 2, 0)
         order = np.argsort(x * x + y * y, axis=1)
         x, y = np.take_along_axis(x, order, axis=1), np.take_along_axis(y, order, axis=1)
-        sides, counts = in_chunks(voronoi_fans, np.stack([x, y], axis=2) / planes.reach[chunk, None, None])
-        column = np.arange(sides.shape[1])
-        following = np.where(column + 1 < counts[:, None], np.roll(sides, -1, axis=1), sides[:, :1])
-        row, columns = np.nonzero((column < counts[:, None]) & (sides >= 0) & (following >= 0))
+        # places in `order` of the neighbours around each point; −1 where no neighbour bounds its cell
+        fans, counts = in_chunks(voronoi_fans, np.stack([x, y], axis=2) / planes.reach[chunk, None, None])
+        column = np.arange(fans.shape[1])
+        # the next one around; after the last comes the first
+        following = np.where(column + 1 < counts[:, None], np.roll(fans, -1, axis=1), fans[:, :1])
+        row, columns = np.nonzero((column < counts[:, None]) & (fans >= 0) & (following >= 0))
         near = np.take_along_axis(neighbors[part], order, axis=1)
         triangles.append(
-            np.stack([chunk[row], near[row, sides[row, columns]], near[row, following[row, columns]]], axis=1)
+            np.stack([chunk[row], near[row, fans[row, columns]], near[row, following[row, columns]]], axis=1)
         )
     sorted_corners = np.sort(np.concatenate(triangles), axis=1)
     number, first = distinct_rows(sorted_corners)
@@ -325,11 +330,11 @@ TOUCHING = 1e-7  # radians by which the sectors of two triangles at a corner may
 
 @compiled
 def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
-    """(n, MAX_SIDES) Delaunay neighbours of the origin among places (n, k, 2), counter-clockwise; (n,) their numbers.
+    """(n, MAX_SIDES) Delaunay neighbours of the origin among places (n, k, 2), counter-clockwise; (n,) sides.
 
     The Voronoi cell of the origin starts as a square, to ±1, and is cut by the bisectors of its neighbours, nearest
     first. Two neighbours whose sides of the cell meet span a Delaunay triangle with the origin, and the corner between
-    them is its circumcentre: no circumradius exceeds the square's.
+    them is its circumcentre: no circumradius exceeds the square's. Sides of the square that remain are −1, and count.
     """
     n, k = places.shape[:2]
     neighbours = np.full((n, MAX_SIDES), -1, dtype=np.int64)

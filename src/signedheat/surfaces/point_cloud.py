@@ -259,6 +259,7 @@ MUTUAL = 0.98
 which each is above it, above which given normals are kept on thin sheets: there it is 1, and .9 if a fifth of the
 normals are turned."""
 _CHUNK = 4096
+"""Number of points whose neighbours are listed at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -434,22 +435,26 @@ def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
 
 
 def spread_out(points: Floats, radii: Floats) -> Ints:
-    """Ids of points, none within the radius of an earlier one, and every point within that of one of them."""
+    """Ids, ascending, of points (n, d) that are kept: in order, all but those too near to one kept before.
+
+    Too near means within the radius (n,) of the point kept before, so that points left out are near a kept one.
+    """
     tree = scipy.spatial.cKDTree(points)
-    free = np.ones(len(points), dtype=bool)
+    kept = np.ones(len(points), dtype=bool)
     for begin in range(0, len(points), _CHUNK):
         part = np.arange(begin, min(begin + _CHUNK, len(points)))
-        part = part[free[part]]
+        part = part[kept[part]]
         near = tree.query_ball_point(points[part], radii[part], workers=-1)
         ends = np.cumsum([0, *map(len, near)])
-        _keep_first(part, ends, np.concatenate([*map(np.asarray, near), np.zeros(0)]).astype(np.int64), free)
-    return np.flatnonzero(free)
+        _keep_first(part, ends, np.concatenate([*map(np.asarray, near), np.zeros(0)]).astype(np.int64), kept)
+    return np.flatnonzero(kept)
 
 
 @compiled
-def _keep_first(ids: Ints, ends: Ints, near: Ints, free: Bools) -> None:
+def _keep_first(ids: Ints, ends: Ints, near: Ints, kept: Bools) -> None:
+    """Unmark in `kept` the later neighbours ``near[ends[i]:ends[i + 1]]`` of each kept point ``ids[i]``."""
     for i in range(len(ids)):
-        if free[ids[i]]:
+        if kept[ids[i]]:
             for k in range(ends[i], ends[i + 1]):
                 if near[k] > ids[i]:
-                    free[near[k]] = False
+                    kept[near[k]] = False

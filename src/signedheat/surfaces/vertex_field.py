@@ -274,8 +274,9 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     def subdivided(self) -> VertexField[EmbeddedSurface]:
         """Subdivide the surface into flat pieces on which φ is linear, to draw, save or measure in space.
 
-        Where φ was computed on an intrinsic triangulation of the mesh (`finer`), these are the polygons of their
-        `common_subdivision`, whose first vertices are those of the mesh; elsewhere the field is returned as it is.
+        Where φ was computed on an intrinsic triangulation of the mesh (the domain, or `finer`), these are the polygons
+        into which edges of the mesh cut its triangles (`common_subdivision`); their first vertices are those of the
+        mesh, and φ is NaN at vertices of no face. Elsewhere the field is returned as it is.
 
         Returns
         -------
@@ -294,8 +295,8 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         if not isinstance(fine.domain, IntrinsicTriangulation):
             return self._embedded
         polygons, interpolate = common_subdivision(fine.domain)
-        unused = np.diff(interpolate.indptr) == 0
-        return VertexField(polygons, np.where(unused, np.nan, interpolate @ fine.values), self.diagnostics)
+        no_face = np.diff(interpolate.indptr) == 0  # rows that interpolate from nothing
+        return VertexField(polygons, np.where(no_face, np.nan, interpolate @ fine.values), self.diagnostics)
 
     def __repr__(self) -> str:
         low, high = (float(f.reduce(self.values)) for f in (np.fmin, np.fmax))
