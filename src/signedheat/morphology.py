@@ -519,7 +519,11 @@ def _without_crumbs(wall: TriangleMesh, thickness: float) -> TriangleMesh:
 
 
 def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
-    """Make a hole straight down from the bottom of the largest cavity, at its widest place."""
+    """Make a round hole straight down from the bottom of the largest cavity, where that is widest.
+
+    A prism that faces inwards is added, from below the wall to `lift` above the bottom: winding numbers subtract it.
+    Where faces of wall and prism do not join, they are contoured with cells of size `cell`.
+    """
     parts, volumes = part_volumes(wall.vertices, wall.faces)
     if not volumes.min() < 0:
         raise SignedHeatError("the wall has no cavity to drain", remedy="leave out drain, or make the wall thinner")
@@ -528,9 +532,8 @@ def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
     low, high = cavity[:, 2].min(), cavity[:, 2].max()
     lift = min(radius, 0.5 * (high - low))
     bottom = cavity[cavity[:, 2] <= low + 0.5 * lift]
-    given = complete(wall, as_oriented=True)
-    room = given.distance(np.column_stack([bottom[:, :2], np.full(len(bottom), low + lift)]))
-    x, y = bottom[np.argmax(np.round(room / cell, 6)), :2]
+    room = complete(wall, as_oriented=True).distance(np.column_stack([bottom[:, :2], np.full(len(bottom), low + lift)]))
+    x, y = bottom[np.argmax(np.round(room / cell, 6)), :2]  # the first of equally wide places
     angles = 2 * np.pi * np.arange(SIDES) / SIDES
     rim = np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles)])
     ends = wall.bounds[0, 2] - diameter, low + lift

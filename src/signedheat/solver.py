@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
-from typing import Any, Generic, Literal, TypeVar, overload
+from typing import Any, Generic, Literal, NamedTuple, TypeVar, overload
 
 from .arrays import Frozen
 from .constraints import Constraint, ZeroSet
-from .diagnostics import Diagnostics
-from .discretization import Adaptable, Discretization, discretize
+from .diagnostics import Diagnostics, Note
+from .discretization import Adaptable, Discretization, SourceTerm, discretize
 from .errors import InexactWarning, SignedHeatError, UnsupportedTypeError, warn_user
 from .field_kinds import Field, to_field, warned
 from .foreign import ForeignShape, as_list, converted
@@ -35,6 +35,19 @@ from .validation import positive_number
 _BATCH = 16  # sources diffused at a time
 
 AnyDomain = TypeVar("AnyDomain", bound=Domain | ForeignShape, covariant=True)
+
+
+class _Prepared(NamedTuple):
+    """Sources of one field, ready to be diffused."""
+
+    discretization: Discretization
+    terms: Sequence[SourceTerm]  # one for each diffusion time
+    notes: tuple[Note, ...]
+
+    @property
+    def times(self) -> list[float]:
+        """Diffusion times."""
+        return [term.time for term in self.terms]
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,10 +193,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         with stopwatch("prepare"):
             discretization = self.discretization
         with stopwatch("sources"):
-            listed, left_out = given_curves(self.domain, as_list(sources))
-            _warn_of_one_sided_curves(self.domain, listed)
-            discretization, adapted = discretization.adapt(listed)
-            sources_by_time = lowered_for_times(discretization, adapted, self._times(discretization))
+            prepared = self._prepared(sources)
+            discretization, sources_by_time = prepared.discretization, prepared.terms
         with stopwatch("diffuse"):
             vectors = [diffuse(discretization, source) for source in sources_by_time]
         with stopwatch("normalize"):
@@ -192,10 +203,16 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             del vectors
         with stopwatch("integrate"):
             values = integrate(discretization, directions, source, constraint)
-        diagnostics = Diagnostics(timings=dict(stopwatch.seconds), time=source.time)
-        if left_out is not None:
-            diagnostics = diagnostics.noting(left_out)
+        diagnostics = Diagnostics(timings=dict(stopwatch.seconds), time=source.time, notes=prepared.notes)
         return to_field(discretization, values, source, diagnostics)
+
+    def _prepared(self, sources: Sources) -> _Prepared:
+        """Prepare sources for diffusion; warn of curves with one side only."""
+        listed, left_out = given_curves(self.domain, as_list(sources))
+        _warn_of_one_sided_curves(self.domain, listed)
+        discretization, adapted = self.discretization.adapt(listed)
+        terms = lowered_for_times(discretization, adapted, self._times(discretization))
+        return _Prepared(discretization, terms, () if left_out is None else (left_out,))
 
     @overload
     def distance_many(
@@ -238,24 +255,22 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         constraint = checked(constraint)
         fields: list[Field] = []
         for begin in range(0, len(sources), _BATCH):
-            batch = []
-            for entry in sources[begin : begin + _BATCH]:
-                discretization, adapted = self.discretization.adapt(given_curves(self.domain, as_list(entry))[0])
-                batch.append((discretization, lowered_for_times(discretization, adapted, self._times(discretization))))
-            for (discretization, _), run in groupby(batch, key=lambda entry: (entry[0], [s.time for s in entry[1]])):
-                of_each = [sources for _, sources in run]
-                by_time = list(zip(*of_each, strict=True))
-                lowered = by_time[0]
+            batch = map(self._prepared, sources[begin : begin + _BATCH])
+            for (discretization, _), run in groupby(batch, lambda each: (each.discretization, each.times)):
+                alike = list(run)
+                by_time = list(zip(*(each.terms for each in alike), strict=True))
+                first = by_time[0]
                 stopwatch = Stopwatch(None, steps=1)
                 with stopwatch("together"):
                     diffused = [diffuse_many(discretization, each) for each in by_time]
-                    together = zip(*diffused, strict=True)
-                    cells = ([normalize(discretization, vectors) for vectors in each] for each in together)
-                    directions = (blended(sources, each) for sources, each in zip(of_each, cells, strict=True))
-                    solved = list(integrate_many(discretization, directions, lowered, constraint))
-                seconds = {step: total / len(lowered) for step, total in stopwatch.seconds.items()}
-                for source, values in zip(lowered, solved, strict=True):
-                    diagnostics = Diagnostics(timings=seconds, time=source.time)
+                    directions = (
+                        blended(each.terms, [normalize(discretization, vectors) for vectors in of_times])
+                        for each, of_times in zip(alike, zip(*diffused, strict=True), strict=True)
+                    )
+                    solved = list(integrate_many(discretization, directions, first, constraint))
+                seconds = {step: total / len(first) for step, total in stopwatch.seconds.items()}
+                for source, values, each in zip(first, solved, alike, strict=True):
+                    diagnostics = Diagnostics(timings=seconds, time=source.time, notes=each.notes)
                     fields.append(warned(to_field(discretization, values, source, diagnostics)))
         return fields
 

@@ -86,6 +86,7 @@ def test_positions_of_curves():
     [
         lambda mesh, curves: sh.signed_distance(curves, mesh),
         lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),
+        lambda mesh, curves: sh.SignedHeatSolver(mesh).distance_many([curves])[0],
     ],
 )
 def test_a_click_among_strokes_is_left_out_with_a_note(measure, click):

@@ -76,7 +76,7 @@ def report(file: str, arguments: Namespace) -> Summary:
     if outwards is not None:
         measured = widths(outwards)
         summary["thickness"] = {**asdict(measured), "spacing": measured.spacing}
-        rows |= _widths_text(measured)
+        rows |= _width_rows(measured)
     extra: dict[str, object] = {"memory_bytes": {str(n): _memory(shape, n) for n in arguments.resolution}}
     extra["least_spacing"] = _least_spacing(shape)
     summary |= extra
@@ -287,14 +287,15 @@ def _count(number: int, name: str) -> str:
     return f"{number} {name}" if number == 1 else f"{number} {name}s"
 
 
-def _widths_text(widths: Widths) -> dict[str, str]:
+def _width_rows(widths: Widths) -> dict[str, str]:
+    """Rows of the table by their names; only the thinnest place is the least of all, walls and gaps are percentiles."""
     rows = {}
-    for name, least, typical in (
-        ("thinnest wall", widths.wall, widths.typical_wall),
-        ("narrowest gap", widths.gap, widths.typical_gap),
+    for name, low, typical in (
+        ("thin walls (1 %)", widths.wall, widths.typical_wall),
+        ("narrow gaps (1 %)", widths.gap, widths.typical_gap),
     ):
-        if least is not None:
-            rows[name] = f"{least:.4g}" + (f" (typical {typical:.4g})" if typical is not None else "")
+        if low is not None:
+            rows[name] = f"{low:.4g}" + (f" (typical {typical:.4g})" if typical is not None else "")
     if widths.thinnest is not None and widths.thinnest_place is not None:
         place = ", ".join(f"{x:.4g}" for x in widths.thinnest_place)
         rows["thinnest place"] = f"{widths.thinnest:.4g} at ({place})"

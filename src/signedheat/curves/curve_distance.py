@@ -201,7 +201,7 @@ def distance_to_pieces(
         share = float(strokes.lengths[decision.loose].sum() / strokes.lengths.sum()) if len(left_out) else 0.0
         note = CurvesTaken(np.flatnonzero(turn).tolist(), left_out.tolist(), share)
         field = replace(field, diagnostics=field.diagnostics.noting(note))
-    reason = guess(decision, field, listed)
+    reason = reason_for_doubt(decision, field, listed)
     loops = decision.loops_left_out() if len(left_out) else left_out
     if len(loops) and not reason:
         reason = (
@@ -248,8 +248,11 @@ def sheet_faces(mesh: TriangleMesh, crossed: Ints) -> Bools:
     return np.asarray(kept[part])
 
 
-def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> str:
-    """Why what the pieces bound is a guess, and what to do; empty if it is none."""
+def reason_for_doubt(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> str:
+    """Return a warning that says why the region that the curves bound is a guess, and what to do; "" if it is none.
+
+    `field` is the distance to those that were taken, completed by heat; `curves` are all that were given.
+    """
     as_given = "as_oriented=True takes curves as they are"
     if decision.bounds_nothing:
         return (
@@ -278,6 +281,7 @@ def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[Curv
     if not decision.all_bound or not all(isinstance(curve, Curve) and curve.oriented for curve in curves):
         return ""  # other curves and points have sides of their own
     surface = strokes.surface
+    # the shortest completion against that by heat
     chosen = slice(None) if surface.restriction is None else surface.restriction
     areas, sides = strokes.areas[chosen], decision.best.sides[chosen]
     near = np.abs(field.values) <= surface.triangles.lengths_of_edges.mean()

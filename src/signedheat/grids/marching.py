@@ -21,7 +21,7 @@ measure: Any = lazy_module("skimage.measure", "contours")
 CLEARANCE = 1e-3
 """Least distance of crossings from the nodes, in cells, so that no two vertices of a surface coincide."""
 CAP = 0.01
-"""Distance, in cells, from the box to a surface that is closed along it outside."""
+"""Distance, in cells, by which the walls that close a surface lie outside the box of the nodes."""
 
 
 def closed_surface(

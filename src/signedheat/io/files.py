@@ -234,7 +234,10 @@ def move_into_place(source: Path, path: PathLike) -> None:
 
 
 def replaceable(path: PathLike) -> os.stat_result | None:
-    """Return the status of the file that would be replaced, or None; raise if it cannot be replaced."""
+    """Return the status of the file that writing to `path` would replace, or None; raise if it must not be replaced.
+
+    Renaming would replace a file that is not writable, too; here that is refused.
+    """
     real = Path(os.path.realpath(path))
     status = os.stat(real) if real.exists() else None
     if status is not None and not stat.S_ISREG(status.st_mode):

@@ -34,7 +34,7 @@ def read_bodies(path: PathLike) -> list[Body]:
 
     Buffers that the file names must lie in the same folder or below it. Materials, skins and morph targets are ignored.
     """
-    scene = _opened(path)
+    scene = _read_scene(path)
     missing = [name for name in scene.tree.get("extensionsRequired", []) if not name.startswith(SUPPORTED)]
     if any(INSTANCES in node.get("extensions", {}) for node in scene.tree.get("nodes", [])):
         missing.append(INSTANCES)
@@ -111,15 +111,20 @@ class _Scene:
         return np.ndarray((count, width), dtype, buffer, start, (stride, dtype.itemsize))
 
 
-def _opened(path: PathLike) -> _Scene:
-    data, inner = contents(path), b""
+def _read_scene(path: PathLike) -> _Scene:
+    """Read the description of a scene, and its buffers: embedded in a ``.glb`` file, in data URIs, or in other files.
+
+    A ``.glb`` file has 12 bytes of header, the last four its size; the JSON; and at most one buffer. Before each of the
+    latter two stand 8 bytes: size and type.
+    """
+    data, embedded = contents(path), b""
     text = data
     if data[:4] == b"glTF":
         if int.from_bytes(data[8:12], "little") > len(data):
             raise damaged("it is shorter than it says: it is truncated")
-        length = int.from_bytes(data[12:16], "little")
-        text = data[20 : 20 + length]
-        inner = data[28 + length : 28 + length + int.from_bytes(data[20 + length : 24 + length], "little")]
+        json_end = 20 + int.from_bytes(data[12:16], "little")
+        text = data[20:json_end]
+        embedded = data[json_end + 8 : json_end + 8 + int.from_bytes(data[json_end : json_end + 4], "little")]
     tree = json.loads(text.decode("utf-8-sig"))
     version = str(tree.get("asset", {}).get("version", "2.0"))
     if not version.startswith("2."):
@@ -130,7 +135,7 @@ def _opened(path: PathLike) -> _Scene:
     for buffer in tree.get("buffers", []):
         uri = buffer.get("uri")
         if uri is None:
-            buffers.append(inner)
+            buffers.append(embedded)
         elif uri.startswith("data:"):
             buffers.append(base64.b64decode(uri.partition(",")[2]))
         else:

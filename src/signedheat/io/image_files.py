@@ -103,7 +103,7 @@ def _aligned(values: NDArray[Any], origin: Any, spacing: Any, **others: Any) -> 
 
 
 def _read_npy(path: PathLike) -> Image:
-    """Read an array, with origin and spacing from the ``.json`` file of the same name, if it exists."""
+    """Read an array, with origin and spacing from the ``.json`` file of the same name, otherwise 0 and 1."""
     values, companion = read_npy(path), Path(path).with_suffix(".json")
     if not companion.exists():
         return _aligned(values, np.zeros(values.ndim), np.ones(values.ndim))

@@ -135,7 +135,7 @@ class LabelImage(Represented, Frozen):
         return DigitalSurface(inside, self.spacing).smooth_surface
 
     def to_world(self, surface: Mesh) -> Mesh:
-        """Map a mesh from the axes of the image to the world; faces turn if these are left-handed: inside stays so.
+        """Map a mesh from the axes of the image to the world. If the map mirrors it, its faces are turned over.
 
         Parameters
         ----------

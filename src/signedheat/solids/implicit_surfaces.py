@@ -269,7 +269,11 @@ def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
 
 
 def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, level: float) -> tuple[Implicit, Grid]:
-    """Make the level set of values at nodes, and the grid with one more node on each side."""
+    """Make the level set of values f, (nx, ny, nz), at the nodes of a grid that fills the box, from corner to corner.
+
+    `gradient`: slopes at the nodes, (nx, ny, nz, 3); by default differences, unknown at nodes where they change much.
+    Also return the grid to contour on, with one more node on each side: walls just outside the box close the surface.
+    """
     values = array_of(f, "f").astype(np.float64)
     if values.ndim != 3 or min(values.shape) < 2 or not np.isfinite(values).all():
         raise GeometryError(
@@ -290,7 +294,7 @@ def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, 
     planes = NodePlanes(box[0], steps, values - level, slopes, known)
     grid = Grid(box[0] - steps, steps, np.array(values.shape) + 2)
     walls = box + CAP * steps * np.array([[-1.0], [1.0]])
-    return Implicit(
+    return Implicit(  # between box and walls, values are those on the box
         lambda points: planes.function(np.clip(points, *box)),
         lambda points: planes.gradient(np.clip(points, *box)),
         walls,

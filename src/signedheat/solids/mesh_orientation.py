@@ -274,7 +274,11 @@ def orient(
 
 
 def agreeing_faces(mesh: TriangleMesh) -> Ints:
-    """(m, 3) faces that agree, oriented as most of the area of their component."""
+    """(m, 3) faces of a mesh, some turned so that neighbours run along their common edge in opposite directions.
+
+    In each component, connected across edges of two faces, those of most of the area stay; if they cannot agree, all.
+    Faces name the first of the vertices at each place, so that they agree across seams, too.
+    """
     heads = np.roll(mesh.faces, -1, axis=1).ravel()
     ids = welded_vertices(mesh.vertices, mesh.faces.ravel(), heads)
     tails, owners = ids[mesh.faces.ravel()], np.repeat(np.arange(mesh.n_faces), 3)

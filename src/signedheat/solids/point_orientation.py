@@ -84,10 +84,13 @@ CHUNK = 50_000
 def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats) -> Floats:
     """Move the zero set of φ onto a smooth surface through oriented points, where there are any.
 
-    Near the zero set φ becomes the weighted mean of ``½ (n_i + n) · (x − p_i)`` over the nearest points, n the weighted
-    mean of their normals. The plane of a point lies on one side of a curved surface, and the plane through it with the
-    normal at x on the other: half the sum of both has no error of second order. Points that face against ∇φ do not
-    count, so that the two sides of a thin wall stay apart.
+    φ, (nx, ny, nz), is given at nodes `steps`, (3,), apart, and positive where the unit normals, (n, 3), point to; the
+    points, (n, 3), are relative to the first node. Return the new φ.
+
+    At a node x near the zero set φ becomes the weighted mean of ``½ (n_i + n) · (x − p_i)`` over nearby points p_i; n_i
+    are their normals, n the weighted mean of these. The plane of a point lies on one side of a curved surface, and
+    the plane through it with the normal at x on the other: half the sum of both has no error of second order. Points
+    that face against ∇φ do not count, so that the two sides of a thin wall stay apart.
 
     Examples
     --------
@@ -109,7 +112,7 @@ def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats
         batch = tuple(nodes[begin : begin + CHUNK].T)
         places = np.stack(batch, axis=1) * steps
         ahead = _slopes(phi, nodes[begin : begin + CHUNK], steps)
-        ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), np.finfo(float).tiny)
+        ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), np.finfo(float).tiny)  # along ∇φ
         reach, near = tree.query(places, k=[*range(1, n_neighbours + 1)], workers=-1)
         heights, share = _fit(places, ahead, reach, points[near], normals[near], gap)
         result[batch] += share * (heights - phi[batch])

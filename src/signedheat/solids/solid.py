@@ -52,6 +52,8 @@ CLEAR = 1e-9
 """Relative distance above which the side of a point is reliable."""
 SLANT = 1e-3
 """Cosine between the normal and the direction from the surface above which the side is reliable."""
+ON_SURFACE = 1e-12
+"""Relative distance up to which a point is on the surface: the gradient there is the normal."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -604,14 +606,15 @@ class Solid(Displayed, Represented, Frozen):
         return inside
 
     def _closest(self, points: Floats) -> tuple[NDArray[Any], ...]:
+        """Return what `Closest` holds, field by field, for (n, 3) points."""
         nearest = self.tree.search(points)
-        ids = self.features.ids[nearest.faces]
+        ids = self.features.ids[nearest.faces]  # of triangles of the solid; `origins` are faces of its source
         signs = np.where(self._inside(points, nearest), -1.0, 1.0)
         away = points - nearest.places
         lengths = nearest.distances
-        clear = lengths > 1e-12 * np.abs(points).max(initial=1e-290)
+        off = lengths > ON_SURFACE * np.abs(points).max(initial=1e-290)  # which is above 0, also for points at 0
         normals = self.features.face_normals[nearest.faces]
-        gradients = np.where(clear[:, None], away * (signs / np.where(clear, lengths, 1.0))[:, None], normals)
+        gradients = np.where(off[:, None], away * (signs / np.where(off, lengths, 1.0))[:, None], normals)
         origins = self.origins[ids]
         weights = np.full((len(points), 3), np.nan)
         if self.source is not None:

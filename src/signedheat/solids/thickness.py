@@ -71,7 +71,7 @@ class Widths:
 
     @property
     def spacing(self) -> float | None:
-        """Spacing of a grid that has two cells across the thinnest wall and the narrowest gap."""
+        """Spacing of a grid that has two cells across thin walls and narrow gaps."""
         widths = [width for width in (self.wall, self.gap) if width is not None]
         return 0.5 * min(widths) if widths else None
 

@@ -412,10 +412,10 @@ def _computed(folder: str, key: str, missing: list[int], scheduler: Scheduler) -
         yield from _finished(jobs, distributed.as_completed(jobs), folder)
 
 
-def _finished(jobs: list[Future[int]], in_order: Iterable[Future[int]], folder: str) -> Iterator[int]:
-    """Yield results of jobs as they end; cancel the others if one fails or the caller stops."""
+def _finished(jobs: list[Future[int]], as_they_end: Iterable[Future[int]], folder: str) -> Iterator[int]:
+    """Yield results of jobs, which `as_they_end` iterates over; cancel the others if one fails or the caller stops."""
     try:
-        for job in in_order:
+        for job in as_they_end:
             yield job.result()
     except BrokenProcessPool as error:
         raise SignedHeatError(

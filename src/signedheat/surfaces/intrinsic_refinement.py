@@ -385,7 +385,7 @@ def insert(g: Gluing, agenda: Agenda, f: int, px: float, py: float) -> None:
 
 @kernel
 def folded_face(g: Gluing, h: int) -> int:
-    """Find a face that has the edge of h twice, or −1."""
+    """Find a face two of whose sides are the edge of halfedge h, which `split_edge` cannot split; −1 if none is."""
     y = h
     while True:
         if g.edge[following(y)] == g.edge[h] or g.edge[preceding(y)] == g.edge[h]:
@@ -429,7 +429,8 @@ def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool
 
     The segment is split in the middle, with two exceptions: next to a vertex that nearly lies on it; and, near an end
     where segments meet at a small angle, at a distance from that end that is a power of two, so that the parts of both
-    segments have equal lengths and stop splitting each other (Ruppert 1995). Tiny parts are not split.
+    segments have equal lengths and stop splitting each other (Ruppert 1995). Tiny parts are not split. If two sides of
+    a face are the segment, that face is split in its place.
     """
     e = g.edge[h]
     segment, length, step = agenda.segment[e], g.length[e], g.counts[3]

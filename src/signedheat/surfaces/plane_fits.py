@@ -55,14 +55,14 @@ def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
     """Fit a plane near each of (n, 3) distinct points.
 
     Without noise the neighbourhoods are small, and sheets that lie close together, or meet in an edge, stay apart: the
-    plane that explains most neighbours is taken. Noisy points need neighbourhoods of the size `n_neighbors`.
+    plane that explains most neighbours is taken. A number of neighbours says that points are noisy: that many are used.
     """
     tree = scipy.spatial.cKDTree(points)
     noisy = n_neighbors is not None
     size = n_neighbors or min(CLEAN_NEIGHBORS, len(points) - 1)
-    heights, starts = (NOISY_HEIGHTS, 1) if noisy else (CLEAN_HEIGHTS, 5)
-    axes, places, reaches, _ = planes_near(points, tree, np.arange(len(points)), size, heights, starts)
-    places = points - ((points - places) * axes).sum(axis=1, keepdims=True) * axes if noisy else points
+    heights, n_starts = (NOISY_HEIGHTS, 1) if noisy else (CLEAN_HEIGHTS, 5)  # several starts: planes through the points
+    axes, centers, reaches, _ = planes_near(points, tree, np.arange(len(points)), size, heights, n_starts)
+    places = points - ((points - centers) * axes).sum(axis=1, keepdims=True) * axes if noisy else points
     return PlaneFits(axes, places, reaches, size, noisy)
 
 

@@ -232,23 +232,25 @@ def missing_parts(
 
 
 def without_false_zeros(triangles: IntrinsicMesh, values: Floats, near: Bools, sided: Ints) -> Floats:
-    """Values with NaN along those parts of the zero set that are due to unoriented sources.
+    """(n,) values of φ, NaN at the corners of faces in which it is zero due to unoriented sources only.
 
     φ is zero at such a source only on average, so it may change sign around it. A connected part of the zero set that
-    lies entirely near the source, and at no vertex of an oriented curve, is due to the source alone.
+    lies entirely `near` the source, an (n,) mask, and at no vertex of an oriented curve, is due to the source alone.
+    `sided` are the numbers of the vertices at oriented curves, in any order.
     """
     signs = np.sign(values)[triangles.corner_vertices]
     crossed = np.flatnonzero((signs.min(axis=1) < 0) & (signs.max(axis=1) > 0))
     m, e = len(crossed), triangles.n_edges
     through = np.roll(signs, -1, axis=1)[crossed] * signs[crossed] < 0
     face, side = np.nonzero(through)
+    # a graph of the faces that are crossed, and then all edges, each face joined to those that it is crossed at
     line = connected_components(m + e, face, m + triangles.edges.face_edges[crossed[face], side])[:m]
     corners = triangles.corner_vertices[crossed]
     is_sided = mask_of(len(values), sided)
-    own = np.ones(line.max(initial=-1) + 1, dtype=bool)
-    own[line[(~near[corners] | is_sided[corners]).any(axis=1)]] = False
+    is_false = np.ones(line.max(initial=-1) + 1, dtype=bool)
+    is_false[line[(~near[corners] | is_sided[corners]).any(axis=1)]] = False
     result = values.copy()
-    result[corners[own[line]]] = np.nan
+    result[corners[is_false[line]]] = np.nan
     return result
 
 
