@@ -28,10 +28,12 @@ import signedheat as sh
 from fuzz.cases_files import KINDS, Files
 from fuzz.frame import _peak
 
-ISOLATED = frozenset("dae step las laz e57 mesh meshb vtu vtk msh node ele nii nii.gz".split())
-"""Formats whose parsers run in a process of their own, which takes time: fewer files are tried."""
-PLACES, FEW = 2000, 24
-"""Places of a file that are attacked: of formats of our own, every byte of small files; of isolated ones, a few."""
+ISOLATED = frozenset("dae step las laz e57 mesh meshb vtk msh node ele nii nii.gz".split())
+"""Formats whose parsers run in a process of their own, which takes .1 to 1 s a file: fewer are tried."""
+EVERY, FEW = 1 << 20, 100
+"""Places of a file that are attacked: every byte, or a few in formats that are isolated."""
+LIES_TOLD = 1000
+"""Lies that are told in place of the sizes of a file, at most."""
 SECONDS, MEMORY = 10.0, 600_000_000
 """What a file of some kilobytes may take: parsers of other packages, half a gigabyte."""
 LARGE = 1 << 28
@@ -91,10 +93,10 @@ def lying(files: Files, places: int, _: Path) -> Iterator[Files]:
     """Counts, sizes and indices are others: the first numbers of a text, and words of four and eight bytes."""
     for data, packed in contents(files):
         changes = [data[: found.start()] + lie + data[found.end() :]
-                   for found in list(NUMBER.finditer(data[:4000]))[: max(places // 40, 4)] for lie in LIES]  # fmt: skip
+                   for found in NUMBER.finditer(data[:4000]) for lie in LIES]  # fmt: skip
         if not data[:4000].isascii() or b"\0" in data[:4000]:
             changes += [data[:at] + word + data[at + len(word) :] for at in range(0, 400, 2) for word in WORDS]
-        for k in np.unique(np.linspace(0, len(changes) - 1, min(places, len(changes))).astype(int)):
+        for k in np.unique(np.linspace(0, len(changes) - 1, min(places, LIES_TOLD, len(changes))).astype(int)):
             yield packed(changes[k])
 
 
@@ -228,7 +230,7 @@ def main(wanted: list[str]) -> int:
     for ending, variants in formats().items():
         if wanted and ending not in wanted:
             continue
-        cells, places = [], FEW if ending in ISOLATED else PLACES
+        cells, places = [], FEW if ending in ISOLATED else EVERY
         for name, attack in ATTACKS.items():
             kinds: Counter[str] = Counter()
             for read, files in variants:
@@ -236,7 +238,7 @@ def main(wanted: list[str]) -> int:
                     folder, outside = Path(root) / "in", Path(root) / "outside.bin"
                     folder.mkdir()
                     outside.write_text(f"{SECRET} {SECRET} {SECRET}\n")
-                    for attacked in attack(files, max(places // len(variants), 4), outside):
+                    for attacked in attack(files, places, outside):
                         kind = outcome(read, attacked, folder, opened)
                         kinds[kind] += 1
                         if kind not in ("read", "refused"):

@@ -35,6 +35,12 @@ def test_contour_lies_in_world_coordinates_and_encloses_the_negative_side():
     assert enclosed_volume(sh.TriangleMesh(inverse.vertices - center, inverse.faces)) < 0
 
 
+def test_contours_beside_a_number_near_the_largest_are_finite():
+    values = ball().values.copy()
+    values[10, 10, 10] = -1e300
+    assert np.isfinite(sh.GridField(ball().grid, values).contour().vertices).all()
+
+
 def test_offset_keeps_its_distance_or_says_why_not():
     field = ball()
     assert_closed_manifold(field.offset(0.2))

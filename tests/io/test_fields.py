@@ -140,6 +140,16 @@ def test_bands_whose_blocks_lie_nowhere(tmp_path, places):
         load_field(tmp_path / "band.npz")
 
 
+def test_bands_in_another_order_of_bytes(tmp_path):
+    band = sh.complete(sh.samples.sphere(1)).field(spacing=0.2, band=0.2)
+    band.save(tmp_path / "band.npz")
+    with np.load(tmp_path / "band.npz") as file:
+        arrays = dict(file)
+    np.savez(tmp_path / "band.npz", **arrays | {"values": arrays["values"].astype(">f8")})
+    points = band.grid.points.reshape(-1, 3)[::50]
+    np.testing.assert_array_equal(load_field(tmp_path / "band.npz")(points), band(points))
+
+
 @pytest.mark.parametrize("version", [np.nan, np.inf, -1, "one", [1, 2]])
 def test_solids_of_odd_versions(tmp_path, version):
     sh.complete(sh.samples.sphere(1)).save(tmp_path / "solid.npz")

@@ -1,5 +1,7 @@
 """LAS, LAZ and E57: points as other packages write them."""
 
+import struct
+
 import numpy as np
 import pytest
 
@@ -23,6 +25,23 @@ def test_las(tmp_path, kind):
     np.testing.assert_allclose(sh.read(path).points, POINTS, rtol=0, atol=0.6e-4)
     path.write_bytes(path.read_bytes()[:200])
     with refused(sh.errors.FileFormatError):
+        sh.read(path)
+
+
+def test_more_chunks_than_a_laz_file_has_room_for_do_not_end_the_process(tmp_path):
+    laspy = pytest.importorskip("laspy")
+    pytest.importorskip("lazrs")
+    path = tmp_path / "scan.laz"
+    data = laspy.LasData(laspy.LasHeader(point_format=3, version="1.2"))
+    data.x, data.y, data.z = np.random.default_rng(0).normal(size=(3, 50))
+    data.write(path)
+    changed = bytearray(path.read_bytes())
+    (points,) = struct.unpack_from("<I", changed, 96)  # where they begin, with the place of the table of chunks
+    (table,) = struct.unpack_from("<q", changed, points)
+    assert struct.unpack_from("<II", changed, table) == (0, 1)  # version, chunks
+    struct.pack_into("<I", changed, table + 4, 2**32 - 1)
+    path.write_bytes(changed)
+    with refused(sh.errors.SignedHeatError):
         sh.read(path)
 
 

@@ -1,5 +1,7 @@
 """STEP: solids as Open CASCADE writes them."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,18 @@ def test_as_any_shape(drilled):
     mesh = sh.read(drilled)
     assert isinstance(mesh, sh.TriangleMesh)
     assert sh.complete(mesh).inside([[3.0, 1.5, 1.0]]).all()
+
+
+def test_entities_that_are_damaged_do_not_end_the_process(drilled):
+    """Open CASCADE crashed at a direction whose number was lost, or which was of another kind."""
+    data = drilled.read_bytes()
+    [first, *_] = re.findall(rb"#\d+ ?= ?VECTOR", data)
+    for damaged in (b"?" + first[1:], first.replace(b"VECTOR", b"ORIENTED_EDGE")):
+        drilled.write_bytes(data.replace(first, damaged))
+        try:
+            assert sh.read(drilled).n_faces
+        except sh.errors.SignedHeatError as error:
+            assert error.path == str(drilled)
 
 
 def test_what_is_no_step_file_is_refused(tmp_path, capfd):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -540,6 +542,29 @@ def test_a_torus_without_many_of_its_slender_triangles_is_a_torus(share):
     torus = samples.torus(n_around=48, n_across=24)  # corners of down to 30°: rims that only meet there are no seam
     solid = sh.complete(samples.without_faces(torus, share))
     assert solid.volume == pytest.approx(sh.complete(torus).volume, rel=0.01)
+
+
+def double_cone(n):
+    """Two tips in each of which n faces meet."""
+    turn, k = np.linspace(0, 2 * np.pi, n, endpoint=False), np.arange(n)
+    ring = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    above, below = np.c_[k, (k + 1) % n, 0 * k + n], np.c_[(k + 1) % n, k, 0 * k + n + 1]
+    return np.concatenate([ring, [[0, 0, 1], [0, 0, -1]]]), np.concatenate([above, below])
+
+
+def crossing_faces(n):
+    """Large triangles through each other: faces of a ball on its vertices in another order."""
+    ball = samples.sphere(round(np.log(n / 20) / np.log(4)))
+    return ball.vertices[::-1], ball.faces
+
+
+@pytest.mark.parametrize(("shape", "few", "many"), [(double_cone, 20, 30_000), (crossing_faces, 80, 320)])
+def test_time_is_not_quadratic(shape, few, many):
+    """It was: minutes for each of these."""
+    assert sh.complete(shape(few)).bounding.any()  # compiles
+    begin = time.process_time()
+    assert sh.complete(shape(many)).bounding.any()
+    assert time.process_time() - begin < 15
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

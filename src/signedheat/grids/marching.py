@@ -22,6 +22,8 @@ CLEARANCE = 1e-3
 """Least distance of crossings from the nodes, in cells, so that no two vertices of a surface coincide."""
 CAP = 0.01
 """Distance, in cells, by which the walls that close a surface lie outside the box of the nodes."""
+LARGEST = 1e30
+"""Marching cubes computes with single precision: numbers it is given, and their inverses, are not larger."""
 
 
 def closed_surface(
@@ -40,8 +42,9 @@ def closed_surface(
         raise GeometryError("infinite values have no contour", element="values")
     height = closed_without_values(heights_above(values, spacing, level))
     largest = float(np.abs(height).max())
-    if not 1e-30 < largest < 1e30 and largest > 0:  # what follows computes with single precision
+    if not 1 / LARGEST < largest < LARGEST and largest > 0:
         height = height / largest
+    height = np.copysign(np.maximum(np.abs(height), 1 / LARGEST), height)  # each keeps its sign
     shift = 0
     if wall_signs(height) == {True, False}:
         height, shift = capped(height), 1
