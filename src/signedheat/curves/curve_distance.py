@@ -205,8 +205,8 @@ def distance_to_pieces(
     loops = decision.loops_left_out() if len(left_out) else left_out
     if len(loops) and not reason:
         reason = (
-            f"{named(loops)} go round, and bound nothing with the others: they were left out. every_piece=True takes "
-            "all curves"
+            f"what goes round, but bounds nothing with the others, was left out: {named(loops)}. every_piece=True "
+            "takes all curves"
         )
     if reason:
         warn_user(reason, InexactWarning)
