@@ -1,4 +1,4 @@
-"""How running times grow: seconds for n, 2n and 4n, and the exponent fitted to them; 1 is linear.
+"""How running times grow: seconds for n, 2n and 4n, and exponents fitted to them, of n and of the solids' triangles.
 
 python benchmarks/growth.py [CASE …]
 """
@@ -132,17 +132,18 @@ def corners_of_polygons(n: int) -> Callable[[], object]:
 
 
 def crossing_faces(n: int) -> Callable[[], object]:
-    """The solid of n large triangles through each other; what they bound grows as well."""
-    ball = samples.sphere(3)
-    shape = ball.vertices[::-1], ball.faces[np.random.default_rng(0).permutation(ball.n_faces)[:n]]
-    return lambda: sh.complete(shape)
+    """The solid of n large triangles through each other: those of a ball whose vertices change places."""
+    points = spiral(n // 2 + 2)
+    shape = np.random.default_rng(0).permutation(points), hull(points)
+    return lambda: sh.complete(shape, keep_overlaps=True)
 
 
 def bars(n: int) -> Callable[[], object]:
     """The solid of n bars through one place, where the faces of all cross those of all others."""
     rng, box = np.random.default_rng(0), hull_of(np.array(list(np.ndindex(2, 2, 2))) * [2, 0.1, 0.1] - [1, 0.05, 0.05])
     turns = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(n)]
-    return lambda: sh.complete(copies(box, [box.vertices @ (turn * np.linalg.det(turn)) for turn in turns]))
+    shape = copies(box, [box.vertices @ (turn * np.linalg.det(turn)) for turn in turns])
+    return lambda: sh.complete(shape, keep_overlaps=True)  # all pieces are the output
 
 
 def overlapping_balls(n: int) -> Callable[[], object]:
@@ -214,9 +215,9 @@ CASES = {
     voxels: 20000,
     valence: 4000,
     rim_edges: 1000,
-    slivers: 500,
+    slivers: 4000,
     corners_of_polygons: 2000,
-    loose_pieces: 500,
+    loose_pieces: 4000,
     overlapping_balls: 50,
     clustered_balls: 60,
     crossing_faces: 40,
@@ -224,23 +225,25 @@ CASES = {
 }
 
 
-def seconds(run: Callable[[], object]) -> float:
-    """Processor time of one run."""
+def measured(run: Callable[[], object]) -> tuple[float, float]:
+    """Processor time of one run, and how many triangles it made, if it made a solid."""
     begin = time.process_time()
-    run()
-    return time.process_time() - begin
+    made = run()
+    return time.process_time() - begin, float(len(made.triangles)) if isinstance(made, sh.Solid) else np.nan
 
 
 def main() -> None:
+    print("| case | n | seconds for n, 2 n, 4 n | exponent of n | of the output |\n|---|--:|--:|--:|--:|")
     for case, n in CASES.items():
         if sys.argv[1:] and case.__name__ not in sys.argv[1:]:
             continue
-        seconds(case(n))  # compiles
-        sizes = [n, 2 * n, 4 * n]
-        times = [seconds(case(size)) for size in sizes]
-        exponent = np.polyfit(np.log(sizes), np.log(times), 1)[0]
-        print(f"{case.__name__:26}", *(f"{m:6d}: {t:7.3f} s" for m, t in zip(sizes, times, strict=True)), end="")
-        print(f"   n^{exponent:.2f}", flush=True)
+        measured(case(n))  # compiles
+        sizes = np.array([n, 2 * n, 4 * n])
+        times, made = np.transpose([measured(case(size)) for size in sizes.tolist()])
+        exponents = [np.polyfit(np.log(x), np.log(times), 1)[0] for x in (sizes, made) if x[-1] > 1.5 * x[0]]
+        told = ", ".join(f"{seconds:.3g}" for seconds in times)
+        row = f"{case.__name__.replace('_', ' ')} | {n:,} | {told} | " + " | ".join(f"{x:.2f}" for x in exponents)
+        print(f"| {row} |" + " – |" * (2 - len(exponents)), flush=True)
 
 
 if __name__ == "__main__":
