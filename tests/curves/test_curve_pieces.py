@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 import pytest
 
@@ -69,19 +67,21 @@ def test_closing_leaves_it_out_too(mesh, pieces):
     assert np.abs(np.linalg.norm(at, axis=1) - 0.6).max() < 0.05
 
 
-@pytest.mark.parametrize("closed", [False, True])
-def test_what_is_part_of_nothing_larger_stays(mesh, closed):
-    """A stroke apart from another one or from a closed curve: none is left out; two that bound nothing are a guess."""
-    stroke, other = (mesh.polyline([[x, -0.2, 0], [x, 0.2, 0]]) for x in (-0.6, 0.5))
-    ring = mesh.polyline([[0.3, 0, 0], [0, 0.3, 0], [-0.3, 0, 0], [0, -0.3, 0]], closed=True)
-    curves = [ring if closed else other, stroke]
-    with warnings.catch_warnings(record=True) as announced:
-        warnings.simplefilter("always")
-        phi = sh.signed_distance(curves, mesh)
-    assert bool(announced) != closed
+def test_strokes_of_which_none_bounds_anything_are_a_guess_and_stay(mesh):
+    strokes = [mesh.polyline([[x, -0.2, 0], [x, 0.2, 0]]) for x in (-0.6, 0.5)]
+    with pytest.warns(sh.InexactWarning, match="bound nothing"):
+        phi = sh.signed_distance(strokes, mesh)
     assert taken(phi)[1] == []
-    for curve in curves:
+    for curve in strokes:
         assert np.abs(phi(curve)).max() < 0.06
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_stroke_is_left_out_beside_a_curve_that_is_whole_as_beside_one_with_a_gap(mesh, closed):
+    last = [[0.28, -0.02, 0]] * (not closed)
+    ring = mesh.polyline([[0.3, 0, 0], [0, 0.3, 0], [-0.3, 0, 0], [0, -0.3, 0], *last], closed=closed)
+    phi = sh.signed_distance([ring, mesh.polyline([[-0.6, -0.2, 0], [-0.6, 0.2, 0]])], mesh)
+    assert taken(phi) == ([], [1])
 
 
 @pytest.mark.filterwarnings("ignore::signedheat.errors.InexactWarning")  # that it may as well be nothing is told

@@ -118,7 +118,7 @@ class Decision:
     def loose(self) -> Bools:
         """(k,) which strokes bound nothing, where others do."""
         movable, explained = self.pieces.movable, self.best.explained >= EXPLAINED
-        return movable & ~explained & (movable & explained).any()
+        return movable & ~explained & explained.any()
 
     def loops_left_out(self) -> Ints:
         """Numbers of the curves that are left out although they are likely to be a closed curve."""
