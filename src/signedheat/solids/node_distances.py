@@ -45,7 +45,7 @@ def distances_in(
     lattice = np.array(grid.origin), np.array(grid.spacing), np.array(grid.shape)
     firsts = SIDE * places[np.argsort(morton_codes(places.astype(np.float64)), kind="stable")]
     last = np.minimum(firsts + SIDE, grid.shape) - 1
-    near = tree.search(grid.origin + 0.5 * (firsts + last) * grid.spacing).faces
+    near, _ = tree.nearest(grid.origin + 0.5 * (firsts + last) * grid.spacing)
     crowded = _fill(*boxes, *lattice, firsts, near, first, EIGHTHS, squares, faces)
     if crowded.any():
         nodes = (firsts[crowded, None] + ALONG_A_CURVE).reshape(-1, 3)
