@@ -1,8 +1,9 @@
-"""Boxes, distance to them, sheets of few faces, and shapes turned inside out."""
+"""Boxes, distance to them, sheets of few faces, and shapes turned inside out or cut finer."""
 
 import numpy as np
 
 from signedheat import TriangleMesh
+from signedheat.mesh.edges import edge_table
 
 
 def turned(mesh):
@@ -28,3 +29,11 @@ def distance_to_box(points, lower, upper):
 def sheet(corners):
     """Two faces on four corners."""
     return TriangleMesh(corners, [[0, 1, 2], [0, 2, 3]])
+
+
+def finer(vertices, faces):
+    """The same surface with each triangle cut in four."""
+    table = edge_table(faces)
+    (a, b, c), (ab, bc, ca) = faces.T, (len(vertices) + table.face_edges).T
+    quarters = [np.stack(corners, axis=1) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+    return np.concatenate([vertices, vertices[table.vertices].mean(axis=1)]), np.concatenate(quarters)

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import signedheat as sh
+from shapes.bodies import finer
 from signedheat import samples
 from signedheat.mesh.edges import edge_table
 from signedheat.solids.closing import closed_by
@@ -53,16 +54,6 @@ def cut_open(seed=0):
     faces = ball.faces[kept]
     used, numbers = np.unique(faces, return_inverse=True)
     return ball.vertices[used], numbers.reshape(-1, 3)
-
-
-def finer(vertices, faces):
-    """Each triangle cut in four."""
-    edges = np.sort(np.concatenate([faces, np.roll(faces, -1, axis=1)], axis=1).reshape(-1, 2, 3).transpose(0, 2, 1))
-    pairs, numbers = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
-    a, b, c = faces.T
-    d, e, f = (len(vertices) + numbers.reshape(-1, 3)).T
-    quarters = [np.stack(corners, axis=1) for corners in ((a, d, f), (d, b, e), (f, e, c), (d, e, f))]
-    return np.concatenate([vertices, vertices[pairs].mean(axis=1)]), np.concatenate(quarters)
 
 
 def wavy_tube(around=40):

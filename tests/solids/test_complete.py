@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from shapes.bodies import finer
 from signedheat import samples
 from signedheat.diagnostics import BoundsNothing, LeftOut
-from signedheat.mesh.edges import edge_table
 from signedheat.solids.winding import open_edges_of
 
 
@@ -50,25 +50,13 @@ def ball():
     return np.array(mesh.vertices), np.array(mesh.faces)
 
 
-def cut_finer(vertices, faces):
-    """The same surface with each triangle in four."""
-    table = edge_table(faces)
-    middles = len(vertices) + table.face_edges
-    (a, b, c), (ab, bc, ca) = faces.T, middles.T
-    parts = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
-    return (
-        np.concatenate([vertices, vertices[table.vertices].mean(axis=1)]),
-        np.concatenate([np.stack(part, axis=1) for part in parts]),
-    )
-
-
 @pytest.mark.parametrize(("sides", "subdivisions"), [(1, 3), (2, 4), (3, 4)])
 def test_lids_do_not_depend_on_how_finely_a_shape_is_cut(sides, subdivisions):
     """Half a ball, a quarter and an eighth with a bit more, cut off along the zigzags of triangles."""
     vertices, faces = samples.sphere(subdivisions).vertices, samples.sphere(subdivisions).faces
     kept = faces[(vertices[faces].mean(axis=1)[:, :sides] > (-0.15 if sides == 3 else 0)).all(axis=1)]
-    once = cut_finer(vertices, kept)
-    volumes = [volume(sh.complete(shape)) for shape in ((vertices, kept), once, cut_finer(*once))]
+    once = finer(vertices, kept)
+    volumes = [volume(sh.complete(shape)) for shape in ((vertices, kept), once, finer(*once))]
     np.testing.assert_allclose(volumes, volumes[0], rtol=0.02)
 
 
@@ -259,11 +247,7 @@ def test_zigzag_rims_of_a_bowl_close_to_the_same_lip_however_finely_faces_are_cu
     kept = outer.faces[outer.vertices[outer.faces].mean(axis=1)[:, 2] < 0.3]
     inner = outer.faces[0.9 * outer.vertices[outer.faces].mean(axis=1)[:, 2] < 0.3][:, ::-1]
     mesh = sh.TriangleMesh(*joined((outer.vertices, kept), (0.9 * outer.vertices, inner)))
-    middles = (mesh.vertices[mesh.faces] + mesh.vertices[np.roll(mesh.faces, -1, axis=1)]) / 2
-    (a, b, c), (d, e, f) = mesh.vertices[mesh.faces].transpose(1, 0, 2), middles.transpose(1, 0, 2)
-    quarters = np.concatenate([np.stack(t, axis=1) for t in ((a, d, f), (d, b, e), (f, e, c), (d, e, f))])
-    fine = np.unique(quarters.reshape(-1, 3), axis=0, return_inverse=True)
-    solids = sh.complete(mesh), sh.complete((fine[0], fine[1].reshape(-1, 3)))
+    solids = sh.complete(mesh), sh.complete(finer(mesh.vertices, mesh.faces))
     np.testing.assert_allclose(volume(solids[1]), volume(solids[0]), rtol=0.01)
 
 

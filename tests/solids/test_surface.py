@@ -6,11 +6,10 @@ import scipy
 
 import signedheat as sh
 from refusals import refused
-from shapes.bodies import box
+from shapes.bodies import box, finer
 from shapes.grid_cases import assert_closed_manifold
 from signedheat import samples
 from signedheat.errors import InexactWarning, OutsideError
-from signedheat.mesh.edges import edge_table
 from signedheat.mesh.self_intersections import self_intersections
 from signedheat.solids import contouring, simplification
 from signedheat.solids.completion import complete
@@ -20,14 +19,6 @@ from signedheat.solids.simplification import is_within
 def turned(mesh, seed=0):
     turn = scipy.spatial.transform.Rotation.random(random_state=seed).as_matrix()
     return sh.TriangleMesh(mesh.vertices @ turn.T, mesh.faces)
-
-
-def divided(mesh):
-    """Each face into four."""
-    table = edge_table(mesh.faces)
-    (a, b, c), (p, q, r) = mesh.faces.T, (len(mesh.vertices) + table.face_edges).T
-    faces = np.concatenate([np.stack(each, 1) for each in ((a, p, r), (p, b, q), (r, q, c), (p, q, r))])
-    return sh.TriangleMesh(np.concatenate([mesh.vertices, mesh.vertices[table.vertices].mean(axis=1)]), faces)
 
 
 def crumpled(seed):
@@ -283,7 +274,7 @@ def test_distances_between_surfaces_are_proven_whichever_way_they_are_divided():
     coarse = SHAPES["box"]()
     fine = coarse
     for _ in range(4):
-        fine = divided(fine)
+        fine = sh.TriangleMesh(*finer(fine.vertices, fine.faces))
     up = np.array([0.0, 0.0, 0.01])
     for one, other in ((fine, coarse), (coarse, fine)):
         assert is_within(one, other, 1e-9)
