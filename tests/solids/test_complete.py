@@ -355,6 +355,12 @@ def test_what_is_inside_does_not_depend_on_how_the_shape_is_given(name, as_given
         assert np.mean(sh.complete((vertices, faces)).inside(along(AROUND)) != inside) < 6e-3
 
 
+def test_faces_that_face_outwards_need_no_turning(as_given):
+    for (vertices, faces), inside in as_given:
+        assert inside.any()
+        np.testing.assert_array_equal(sh.complete((vertices, faces), as_oriented=True).inside(AROUND), inside)
+
+
 @pytest.mark.parametrize("parts", [1, 2, 3, 4])
 def test_rounding_chooses_nothing(parts):
     """Where what is left of a ball is symmetric, triangles of lids are equal: no choice changes the volume."""
