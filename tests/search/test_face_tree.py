@@ -50,3 +50,15 @@ def test_discs_hold_the_corners_of_what_is_below_them():
             assert (np.abs(along) <= thickness + 1e-12).all()
             assert (np.linalg.norm(away - along[:, None] * normal, axis=1) <= radius + 1e-12).all()
     assert (tree.discs[leaves:, 7] >= 0).mean() > 0.5
+
+
+def test_points_far_beyond_rounding_find_their_place_beside_near_ones():
+    """At 10¹⁰⁰ radii all places of a ball are equally far, to rounding; the nearest still lies in that direction."""
+    mesh = sphere(700)
+    tree = FaceTree.of(FaceFeatures.of(mesh.vertices, mesh.faces))
+    ways = np.random.default_rng(2).normal(size=(40, 3))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    found = tree.search(np.concatenate([2 * ways, 1e100 * ways]))
+    np.testing.assert_allclose(found.distances[40:], 1e100)
+    for places in (found.places[:40], found.places[40:]):
+        assert (np.einsum("ij,ij->i", places, ways) > 0.99).all()
