@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
 import io
 import json
@@ -117,6 +118,13 @@ def nrrd(folder, name, extra, data=b""):
     head = "NRRD0004\ntype: double\ndimension: 3\nsizes: 2 2 2\nendian: little\n" + extra + "\n"
     path.write_bytes(head.encode() + data)
     return path
+
+
+@pytest.mark.parametrize(("encoding", "pack"), [("gzip", gzip.compress), ("bzip2", bz2.compress)])
+def test_packed_files_of_several_members_are_read_to_the_end(tmp_path, encoding, pack):
+    data = np.arange(8.0).tobytes()
+    path = nrrd(tmp_path, "packed.nrrd", f"encoding: {encoding}\n", pack(data[:20]) + pack(b"") + pack(data[20:]))
+    assert sh.load_field(path).values.ravel(order="F").tolist() == list(range(8))
 
 
 @posix

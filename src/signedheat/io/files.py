@@ -170,18 +170,6 @@ def ensure_fits(size: int, path: PathLike, remedy: str = "check that it is not d
         )
 
 
-def unpacked(data: bytes | memoryview, decompressor: Any, limit: int) -> bytes:
-    """Unpack data with a decompressor of `zlib` or `bz2`; return at most the first `limit` bytes of the result.
-
-    Examples
-    --------
-    >>> import zlib
-    >>> unpacked(zlib.compress(bytes(10**6)), zlib.decompressobj(), 3)
-    b'\\x00\\x00\\x00'
-    """
-    return bytes(decompressor.decompress(data, limit)) if limit else b""  # to zlib, 0 means no limit
-
-
 def _no_file(path: PathLike, mode: int) -> FileFormatError:
     kinds = ((stat.S_ISDIR, "folder"), (stat.S_ISFIFO, "pipe"), (stat.S_ISSOCK, "socket"))
     kind = next((name for test, name in kinds if test(mode)), "device")

@@ -6,11 +6,11 @@ No more is read or unpacked than a header announces. NIfTI is read by nibabel.
 from __future__ import annotations
 
 import bz2
+import gzip
 import io
 import json
 import math
 import re
-import zlib
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +31,6 @@ from .files import (
     format_for,
     parsed_numbers,
     reading,
-    unpacked,
 )
 from .numpy_files import read_npy, read_npz
 from .sandbox import parsed
@@ -184,9 +183,9 @@ def _nrrd_values(data: bytes, header: dict[str, str], count: int, dtype: np.dtyp
         return parsed_numbers(words[:count], "values").astype(dtype.newbyteorder("="))
     ensure_fits(size, path)
     if encoding in ("gzip", "gz"):
-        data = unpacked(data, zlib.decompressobj(zlib.MAX_WBITS | 16), size + max(skip, 0))
+        data = gzip.GzipFile(fileobj=io.BytesIO(data)).read(size + max(skip, 0))
     elif encoding in ("bzip2", "bz2"):
-        data = unpacked(data, bz2.BZ2Decompressor(), size + max(skip, 0))
+        data = bz2.BZ2File(io.BytesIO(data)).read(size + max(skip, 0))
     elif encoding != "raw":
         raise FileFormatError(f"packed by '{encoding}'", remedy="save it as raw or gzip")
     start = len(data) - size if skip == -1 else max(skip, 0)

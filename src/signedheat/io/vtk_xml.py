@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError
 from ..exchange import Elements
-from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers, unpacked
+from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers
 
 _TYPES = {f"{kind}{8 * size}": f"{kind[0].lower()}{size}" for kind in ("Int", "UInt") for size in (1, 2, 4, 8)}
 _TYPES |= {"Float32": "f4", "Float64": "f8"}
@@ -327,7 +327,7 @@ class _Arrays:
         everything, _ = take(at, ends[-1])
         parts, left = [], size
         for begin, end in pairwise(ends):
-            parts.append(unpacked(everything[begin:end], zlib.decompressobj(), left + 1))
+            parts.append(zlib.decompressobj().decompress(everything[begin:end], left + 1))
             left -= len(parts[-1])
             if left < 0:
                 raise ValueError(f"it has more than {size} bytes")
