@@ -206,3 +206,11 @@ def test_what_does_not_fit_is_refused():
         sh.signed_distance(sides(0.1), resolution=16, band=0.1)
     with refused(sh.errors.SourceError):
         sh.signed_distance(samples.sphere(1).path([0, 1]))
+
+
+@pytest.mark.parametrize("ending", ["svg", "csv"])
+def test_lines_there_and_back_are_closed_in_every_format(tmp_path, ending):
+    back = sh.Polyline([[0, 0], [1, 0]], closed=True)
+    sh.io.write_polylines(tmp_path / f"back.{ending}", back)
+    [read] = sh.io.read_polylines(tmp_path / f"back.{ending}")
+    assert read.closed and read.points.tolist() == back.points.tolist()

@@ -78,7 +78,7 @@ def _has_decimal_commas(content: str) -> bool:
 def read_point_lists(path: PathLike, dimension: int) -> list[tuple[Floats, bool]]:
     """Read the points (n, dimension) of each polyline, which is closed if its last point equals its first."""
     lists = read_rows(path, (dimension,))
-    closed = [len(points) > 3 and bool((points[0] == points[-1]).all()) for points in lists]
+    closed = [len(points) > 2 and bool((points[0] == points[-1]).all()) for points in lists]
     return [(points[:-1] if end else points, end) for points, end in zip(lists, closed, strict=True)]
 
 
