@@ -55,7 +55,7 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
     kinds = {block.type for block in mesh.cells}
     if "tetra" in kinds:
         return TetMesh.from_meshio(mesh)
-    if kinds & {"tetra10", "hexahedron", "wedge", "hierarchy"} or not kinds & {"triangle", "quad"}:
+    if kinds & {"tetra10", "hexahedron", "wedge", "pyramid"} or not kinds & {"triangle", "quad"}:
         present = ", ".join(sorted(kinds)) or "no cells"
         raise GeometryError(f"{path} holds no tets, but {present}", remedy="convert it to linear tetrahedra first")
     return (TriangleMesh if "quad" not in kinds else PolygonMesh).from_meshio(mesh)
