@@ -47,7 +47,7 @@ def lattice(n_tets: float) -> sh.TetMesh:
 
 def walls_for(n_tets: float) -> tuple[np.ndarray, np.ndarray]:
     """The sides of the box in triangles about as large as the faces of so many tets."""
-    return box_walls(np.full(3, -HALF), np.full(3, HALF), np.full(3, round((n_tets / 9) ** (1 / 3))))
+    return box_walls(np.full(3, -HALF), np.full(3, 2 * HALF), np.full(3, round((n_tets / 9) ** (1 / 3))))
 
 
 def with_tetgen(vertices: np.ndarray, faces: np.ndarray, n_tets: float) -> sh.TetMesh:

@@ -92,22 +92,10 @@ def tetrahedralize(
     True
     """
     own = cast("Shape", converted(shape))
-    lower, upper = bounds_around([own])
-    longest = float((upper - lower).max())
-    if len(lower) != 3 or not longest > 0:
-        raise GeometryError(f"{own!r} has no extent in space of three dimensions to put a mesh around", element="shape")
-    size = finite_number(resolution, "resolution", error=GeometryError)
-    padding = room_around((lower, upper)) if padding is None else finite_number(padding, "padding", 0, GeometryError)
+    lower, sides, spacing = _box_around(own, resolution, padding)
     if not (isinstance(grading, float) and grading == np.inf):
-        grading = finite_number(grading, "grading", error=GeometryError)
-    if not 1 <= size <= FINEST or grading < LEAST_GRADING:
-        raise GeometryError(
-            f"resolution must be 1 to {FINEST:g}, not {size:g}, and grading at least {LEAST_GRADING}, not {grading:g}",
-            element="resolution or grading",
-        )
-    spacing = longest / size
-    refuse_extreme(lower - padding, upper + padding, "padding")
-    lower, sides = lower - padding, upper - lower + 2 * padding
+        grading = finite_number(grading, "grading", LEAST_GRADING, GeometryError)
+    size = float(resolution)
     depth = int(np.clip(np.floor(np.log2(np.maximum(sides.max() / spacing / 4, 1))), 0, 16))
     if np.isinf(grading):
         depth = 0
@@ -238,9 +226,9 @@ tetgen: Any = lazy_module("tetgen", "tets of TetGen")
 
 def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:
     """Fill a box around a shape with tets of about the same size, by TetGen, which is given the box alone."""
-    lower, upper, spacing = _box_around(shape, resolution, padding)
+    lower, sides, spacing = _box_around(shape, resolution, padding)
     volume = 1.64 * spacing**3 / (6 * np.sqrt(2))  # an upper bound for TetGen that gives this mean edge length
-    mesher = tetgen.TetGen(*box_walls(lower, upper, np.ceil((upper - lower) / (1.4 * spacing)).astype(np.int64)))
+    mesher = tetgen.TetGen(*box_walls(lower, sides, np.ceil(sides / (1.4 * spacing)).astype(np.int64)))
     options = {"mindihedral": 10, "minratio": 1.4, "nobisect": True, "maxvolume": volume, "fixedvolume": True}
     return TetMesh(*mesher.tetrahedralize(order=1, **options)[:2])
 
@@ -249,8 +237,8 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
     """Fill a box around a shape with tets that approximately conform to its faces, by fTetWild."""
     if isinstance(shape, PointCloud):
         raise GeometryError("fTetWild follows faces, and a point cloud has none", remedy="use tetrahedralize")
-    lower, upper, spacing = _box_around(shape, resolution, padding)
-    corners, faces = box_walls(lower, upper, np.ones(3, dtype=np.int64))
+    lower, sides, spacing = _box_around(shape, resolution, padding)
+    corners, faces = box_walls(lower, sides, np.ones(3, dtype=np.int64))
     triangles = area_elements(shape).corners
     vertices, ids = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     leftover = Path("__tracked_surface.stl")  # fTetWild leaves it in the working directory
@@ -266,18 +254,22 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
 
 
 def _box_around(shape: Any, resolution: int, padding: float | None) -> tuple[Floats, Floats, float]:
-    """Return the corners of the padded bounding box of a shape, and the target edge length."""
+    """Return the lower corner and the sides of the padded box of a shape, and the target edge length; check all."""
     lower, upper = bounds_around([shape])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
         raise GeometryError(
             f"{shape!r} has no extent in space of three dimensions to put a mesh around", element="shape"
         )
-    padding = room_around((lower, upper)) if padding is None else padding
-    return lower - padding, upper + padding, longest / resolution
+    size = finite_number(resolution, "resolution", 1, GeometryError)
+    if size > FINEST:
+        raise GeometryError(f"resolution must be at most {FINEST:g}, not {size:g}", element="resolution")
+    padding = room_around((lower, upper)) if padding is None else finite_number(padding, "padding", 0, GeometryError)
+    refuse_extreme(lower - padding, upper + padding, "padding")
+    return lower - padding, upper - lower + 2 * padding, longest / size
 
 
-def box_walls(lower: Floats, upper: Floats, counts: Ints) -> tuple[Floats, NDArray[np.int32]]:
+def box_walls(lower: Floats, sides: Floats, counts: Ints) -> tuple[Floats, NDArray[np.int32]]:
     """Return vertices and triangles of a box, from `counts` rectangles along x, y and z, each cut in two."""
     stride = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
     faces = []
@@ -290,4 +282,4 @@ def box_walls(lower: Floats, upper: Floats, counts: Ints) -> tuple[Floats, NDArr
     quads = np.concatenate(faces)
     ids, triangles = np.unique(np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), return_inverse=True)
     places = np.stack([ids // stride[0], ids % stride[0] // stride[1], ids % stride[1]], axis=1)
-    return lower + places * (upper - lower) / counts, triangles.reshape(-1, 3).astype(np.int32)
+    return lower + places * sides / counts, triangles.reshape(-1, 3).astype(np.int32)
