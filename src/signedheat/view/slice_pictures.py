@@ -41,8 +41,8 @@ def save_slices(
 ) -> None:
     """Write a picture of three orthogonal slices through a field, each through most of the inside, with the shape.
 
-    Blue is inside, orange outside; the black line is φ = 0, dashed where surface was completed; the shape is red; solid
-    nodes are grey. A field in the plane is drawn whole.
+    Blue is inside, orange outside; the black line is φ = 0, dashed where surface was completed; the shape is red;
+    nodes without a value are grey. A field in the plane is drawn whole.
 
     Parameters
     ----------

@@ -47,6 +47,8 @@ SIZE = 900
 """Pixels along the longer side."""
 MARGIN = 10
 """Width of the empty margin in pixels."""
+VIEW = (22, -58)
+"""Elevation and azimuth of the view on a coloured surface, in degrees."""
 LIGHT = np.array([0.25, 0.35, 0.9]) / np.linalg.norm([0.25, 0.35, 0.9])
 """Direction to the light: right, up and towards the eye."""
 
@@ -358,7 +360,7 @@ def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> F
         stacked = np.concatenate(normals)
         lengths = np.linalg.norm(stacked, axis=1)
         mean = (stacked[lengths > 0] / lengths[lengths > 0, None]).sum(axis=0) / len(stacked)
-    direction = oblique(22, -58, up)
+    direction = oblique(*VIEW, up)
     if np.linalg.norm(mean) > 0.3:
         return mean / np.linalg.norm(mean) + 0.2 * direction
     extents = np.ptp(mesh.bounds, axis=0)
@@ -369,8 +371,6 @@ def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> F
     return direction
 
 
-VIEW = (22, -58)
-"""Elevation and azimuth of the view, in degrees."""
 DEVIATION_FORMATS = frozenset({".csv", ".ply"}) | PICTURE_FORMATS
 THICKNESS_FORMATS = frozenset({".npz", ".ply"}) | PICTURE_FORMATS
 THICK = 95.0
@@ -407,10 +407,8 @@ def save_thickness(found: Thickness, path: PathLike) -> None:
         arrays = {"vertices": mesh.vertices, "faces": mesh.faces, "origins": found.origins}
         write_npz(path, **arrays, thickness=found.values)
     else:  # each face with corners of its own, since programs show colours of vertices
-        corners, faces = mesh.vertices[mesh.faces].reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3)
-        shape = Elements.of_triangles(corners, faces)
-        values = {"thickness": np.repeat(found.values, 3)}
-        shape = Elements(shape.points, shape.corners, shape.counts, values=values)
+        corners, counts = mesh.vertices[mesh.faces].reshape(-1, 3), np.full(mesh.n_faces, 3)
+        shape = Elements(corners, np.arange(len(corners)), counts, values={"thickness": np.repeat(found.values, 3)})
         with replacing(path) as temporary:
             temporary.write_bytes(write_ply(shape, path, np.repeat(_thickness_colors(found), 3, axis=0)))
 
