@@ -51,7 +51,7 @@ BYTES_AT_WORK = 40e6
 BYTES_IN_BAND = 6.5
 """Memory per node of a band, including its share of the tables of blocks."""
 COARSE = 65
-"""Upper bound of the nodes along the longest side of the coarse grid of a band."""
+"""About the most nodes along the longest side of the coarse grid of a band, whose cells are 2, 4, 8, … fine ones."""
 SOME, UNSURE = 1024, 1.5
 """Cubes of each size that are followed to estimate the number of blocks, and by what factor it may be wrong."""
 Result = TypeVar("Result")
