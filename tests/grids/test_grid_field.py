@@ -4,6 +4,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from shapes.grid_cases import assert_closed_manifold, enclosed_volume
+from signedheat import samples
 
 
 def ball(radius=0.5, spacing=0.1):
@@ -87,3 +88,20 @@ def test_bad_input_is_refused():
         field([[np.nan, 0, 0]])
     with refused(sh.errors.GeometryError, "points"):
         field([[0.0, 0.0]])
+
+
+def test_bands_are_sharpened_and_combined_as_whole_fields_are():
+    band = sh.complete(samples.sphere(2)).field(resolution=48, band=0.2)
+    assert np.array_equal(sh.sharpen(2 * band).values, band.values, equal_nan=True)
+    read = sh.GridField(band.grid, band.values, blocks=band.blocks, coarse=band.coarse, width=band.width)
+    with refused(sh.errors.GeometryError, "field"):
+        sh.sharpen(read)
+    for either in (2 * read | read, read | 2 * read):
+        with refused(sh.errors.OutsideError, "level 0.3"):
+            either.contour(0.3)
+
+
+def test_contours_in_the_plane_are_not_written_as_meshes(tmp_path):
+    grid = sh.Grid((-1, -1), 0.1, (21, 21))
+    with refused(sh.errors.GeometryError):
+        sh.GridField(grid, np.linalg.norm(grid.points, axis=-1) - 0.5).save_contour(tmp_path / "disk.ply")

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Generic, Literal, cast, overload
+from typing import TYPE_CHECKING, Any, Generic, Literal, overload
 
 import numpy as np
 import scipy
@@ -334,8 +334,8 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
         Raises
         ------
-        OutsideError
-            As `contour`.
+        OutsideError, GeometryError
+            As `contour`; also if the field lies in the plane.
         FileFormatError
             If the file is of another kind, or cannot be written.
 
@@ -351,7 +351,9 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         """
         level = finite_number(level, "level")
         if self.blocks is None:
-            surface = cast("TriangleMesh", self.contour(level))
+            surface = self.contour(level)
+            if not isinstance(surface, TriangleMesh):
+                raise GeometryError("a field in the plane has lines", remedy="use contour and sh.io.write_polylines")
             parts = iter([(surface.vertices, surface.faces)])
         else:
             self._refuse_beyond_band(level)
@@ -435,7 +437,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             )
         coarse = self.whole.combined_with(other.whole, rule)
         values = np.asarray(rule(self.values, other.values), dtype=self.values.dtype)
-        return GridField(self.grid, values, blocks=self.blocks, coarse=coarse, width=self.width)
+        return GridField(self.grid, values, blocks=self.blocks, coarse=coarse, width=min(self.width, other.width))
 
     def _scaled(self, factor: float) -> GridField[Dimension]:
         """Return the field times a number; it is exact if this one is and the number is neither 0 nor infinite."""

@@ -115,14 +115,16 @@ def _(field: GridField, source: object, method: Method | None, progress: Progres
         raise UnsupportedTypeError(
             "fields on grids are measured to their zero set", remedy="leave out source and method", element="method"
         )
+    if field.solid is not None:
+        return field / (abs(field.solid.factor) if isinstance(field.solid, Scaled) else 1.0)
+    if field.blocks is not None:
+        raise GeometryError("a field in a band cannot be sharpened", remedy="use its dense()", element="field")
     if not np.isfinite(field.values).all():
         raise GeometryError(
             "a field with values that are not finite cannot be sharpened",
             remedy="fill them in, or use it as it is",
             element="field",
         )
-    if field.solid is not None:
-        return field / (abs(field.solid.factor) if isinstance(field.solid, Scaled) else 1.0)
     run = partial(distance_to_nearest, field.grid, field.values, None, None, 0.0, progress)
     values, diagnostics = timed(run, field.diagnostics, progress)
     return GridField(field.grid, values, diagnostics)
