@@ -10,10 +10,10 @@ from typing import Any, Literal, cast, get_args, overload
 from numpy.typing import ArrayLike
 
 from .area_elements import bounds_around
-from .constraints import Constraint, Free, Soft, ZeroSet
+from .constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from .curves.curve_distance import distance_to_curves
 from .curves.drawings import distance_to_lines
-from .errors import SourceError, UnsupportedTypeError
+from .errors import ConstraintError, SourceError, UnsupportedTypeError
 from .field_kinds import Field
 from .foreign import ForeignShape, as_list, as_shapes, converted
 from .grids.grid import Dimension, Grid, room_around
@@ -320,6 +320,11 @@ def distance_to_shapes(
     On tets, distance is along paths around walls, with the signs of the solid: where none is in between, it is the
     solid's.
     """
+    if isinstance(constraint, EachComponent | LevelValues):
+        raise ConstraintError(
+            f"distance to a shape is zero on all of it, which {constraint!r} denies",
+            remedy="use SignedHeatSolver.distance",
+        )
     options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
     method = Heat(checked(constraint), positive_number(diffusion, "diffusion"))
     joined = joined_shape(shape)
@@ -344,9 +349,7 @@ def completed_distance(
         )
     in_space = isinstance(domain, Grid) and domain.dimension == 3
     if band is not None and not in_space:
-        raise UnsupportedTypeError(
-            "a band is computed around solids, on a grid in space without walls", remedy="leave out the band"
-        )
+        raise UnsupportedTypeError("a band is computed around solids, on a grid in space", remedy="leave out the band")
     joined = shape if isinstance(shape, Solid) else joined_shape(shape)
     solid = completed(joined, options, method, within(progress, 0.0, 0.5))
     progress = within(progress, 0.5, 1.0)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from batch_jobs import Here, measure
+from batch_jobs import Here, counted, measure
 from refusals import refused
 from signedheat import samples
 from signedheat.batches import pool
@@ -147,7 +147,7 @@ def test_results_do_not_depend_on_the_number_of_workers(tmp_path):
 def test_killing_the_whole_batch_loses_only_what_was_under_way(tmp_path, files):
     folder, out = files("a.ply", "b.ply", "slow.ply"), tmp_path / "out"
     code = (
-        "import signedheat as sh\nfrom batch_jobs import Here, measure\n"
+        "import signedheat as sh\nfrom batch_jobs import Here, counted, measure\n"
         f"sh.batches.run({str(folder)!r}, {str(out)!r}, measure, workers=1)"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
@@ -387,3 +387,21 @@ def test_results_go_where_links_lead_with_the_permissions_there(tmp_path, files)
     assert sh.batches.run(folder, out, measure, workers=1).outcomes[0].is_done
     assert (out / "a.txt").is_symlink() and (tmp_path / "elsewhere").read_text() == "this is a.ply"
     assert (tmp_path / "elsewhere").stat().st_mode & 0o777 == 0o640
+
+
+def test_figures_that_the_manifest_cannot_hold_fail_alone(tmp_path, files):
+    batch = sh.batches.run(files("a.ply"), tmp_path / "out", counted, workers=1)
+    assert [outcome.state for outcome in batch.outcomes] == ["failed"]
+    assert "not JSON serializable" in batch.outcomes[0].message
+
+
+def test_constraints_of_plain_fields_give_them_in_batches_too(tmp_path):
+    source = tmp_path / "ball.ply"
+    samples.sphere(2).save(source)
+    job = sh.batches.Job(volume=".npz", resolution=12, constraint=sh.EachComponent())
+    job(source, tmp_path / "made")
+    grid = sh.load_field(tmp_path / "made.npz").grid
+    plain = sh.SignedHeatSolver(grid).distance(sh.read(source), sh.EachComponent())
+    assert np.array_equal(sh.load_field(tmp_path / "made.npz").values, plain.values)
+    with pytest.raises(sh.SignedHeatError, match="a band would need"):
+        sh.batches.Job(volume=".npz", band=0.1, constraint=sh.EachComponent())

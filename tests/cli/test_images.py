@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from signedheat import samples
 from signedheat.cli import main
 from signedheat.io.image_files import write_nrrd
 
@@ -64,3 +65,39 @@ def test_nifti(mask, tmp_path, capsys):
     capsys.readouterr()
     assert main(["info", field, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["space"] == "right-anterior-superior"
+
+
+@pytest.fixture
+def voxels(tmp_path):
+    """The ball with axes along x, y, z, as an array."""
+    labels = np.linalg.norm(np.moveaxis(np.indices((25, 21, 17)), 0, -1) - CENTER, axis=-1) < RADIUS
+    np.save(tmp_path / "voxels.npy", labels)
+    return tmp_path / "voxels.npy"
+
+
+def test_a_band_fills_the_image(voxels, tmp_path):
+    for name in ("band.nrrd", "band.npz"):
+        assert main(["volume", str(voxels), "--band", "3", "-o", str(tmp_path / name)]) == 0
+        field = sh.load_field(tmp_path / name)
+        assert field.values.shape == (25, 21, 17)
+        assert field(np.stack([CENTER, CENTER + np.array([RADIUS + 2, 0, 0])])) == pytest.approx([-RADIUS, 2], abs=1.0)
+
+
+def test_images_are_placed_as_the_options_say(voxels, tmp_path, capsys):
+    scaled, moved, made = (str(tmp_path / name) for name in ("scaled.npz", "moved.npz", "made.stl"))
+    assert main(["volume", str(voxels), "--units", "cm:mm", "-o", scaled]) == 0
+    assert sh.load_field(scaled).grid.upper.tolist() == [240.0, 200.0, 160.0]
+    matrix = [str(number) for number in (1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7)]
+    assert main(["volume", str(voxels), "--transform", *matrix, "-o", moved]) == 0
+    assert sh.load_field(moved).grid.origin.tolist() == [5.0, 6.0, 7.0]
+    assert main(["watertight", str(voxels), "--units", "cm:mm", "-o", made]) == 0
+    assert np.ptp(sh.read(made).vertices, axis=0) == pytest.approx(20 * RADIUS, abs=20)
+    sheared = [str(number) for number in (1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0)]
+    assert main(["volume", str(voxels), "--transform", *sheared, "-o", moved]) == 1
+    assert "not at right angles" in capsys.readouterr().err
+
+
+def test_labels_are_those_of_images(tmp_path, capsys):
+    samples.sphere(1).save(tmp_path / "ball.ply")
+    assert main(["volume", str(tmp_path / "ball.ply"), "--label", "3", "-o", str(tmp_path / "ball.npz")]) == 1
+    assert "only images have labels" in capsys.readouterr().err

@@ -11,7 +11,7 @@ from typing import Literal, cast
 import numpy as np
 
 from ..arrays import Floats
-from ..constraints import Constraint, ZeroSet
+from ..constraints import Constraint, EachComponent, LevelValues, ZeroSet
 from ..distances import completed_distance, grid_around, plain_distance
 from ..errors import FileFormatError, GeometryError, InexactWarning, SignedHeatError, SourceError
 from ..foreign import as_shape
@@ -99,13 +99,15 @@ class Job:
         The grid around each shape, as for `signed_distance`; by default with room for the offsets.
     band : float, optional
         Half width of a band, outside of which the grid is coarse, as for `signed_distance`.
-    constraint, diffusion, as_oriented, keep_overlaps, lids, nested, plain
+    constraint, diffusion, as_oriented, keep_overlaps, lids, nested
         As for `signed_distance`.
+    plain : bool
+        Take the method's own field, not distance to the shape; so do the constraints `EachComponent` and `LevelValues`.
 
     Raises
     ------
     SignedHeatError
-        If nothing is asked for, samples are asked for of a plain field, or offsets lie beyond the band.
+        If nothing is asked for, samples or a band are asked for of a plain field, or offsets lie beyond the band.
 
     Examples
     --------
@@ -140,9 +142,10 @@ class Job:
         cause = remedy = ""
         if not (self._measures or self.info):
             cause, remedy = "the job has no results", "ask for a volume, offsets, samples or info"
-        elif self.plain and (self.samples is not None or self.band is not None):
+        elif self._is_plain and (self.samples is not None or self.band is not None):
             result = "samples" if self.samples is not None else "a band"
-            cause, remedy = f"a plain field has no distances to the shape, as {result} would need", "leave out plain"
+            cause = f"a plain field has no distances to the shape, as {result} would need"
+            remedy = "leave out plain" if self.plain else "take another constraint"
         elif self.band is not None and self.volume not in (None, *BAND_FORMATS):
             cause, remedy = f"a band cannot be written as {self.volume}", f"use {' or '.join(sorted(BAND_FORMATS))}"
         elif self.band is not None and reach > self.band:
@@ -152,7 +155,13 @@ class Job:
             raise SignedHeatError(cause, remedy=remedy)
 
     @property
+    def _is_plain(self) -> bool:
+        """Whether the field is the method's own: distance is zero on the whole shape, which some constraints deny."""
+        return self.plain or isinstance(self.constraint, EachComponent | LevelValues)
+
+    @property
     def _measures(self) -> bool:
+        """Whether there are results besides `info`."""
         return self.volume is not None or bool(self.offsets) or self.samples is not None
 
     @property
@@ -220,7 +229,7 @@ class Job:
 
     def _distance(self, shape: ShapeLike, grid: Grid) -> GridField:
         method = Heat(checked(self.constraint), positive_number(self.diffusion, "diffusion"))
-        if self.plain:
+        if self._is_plain:
             return cast("GridField", plain_distance(shape, grid, method, self.as_oriented))
         options = Completion("lids", self.lids, self.nested, self.as_oriented, self.keep_overlaps)
         return cast("GridField", completed_distance(shape, grid, options, method, self.band))
@@ -294,10 +303,11 @@ class Watertight:
         """Write the closed mesh of one shape to a file that begins with `stem`; return figures and all notes."""
         if extension(path) in LABEL_FORMATS:
             image = read_labels(path)
-            solid = complete(image.to_world(image.surface(self.label)))
+            shape: ShapeLike = image.to_world(image.surface(self.label))
         else:
-            shape, scale = read(path), 1.0 if self.units is None else scale_to(path, self.units)
-            solid = complete(shape if scale == 1 else transform(shape, np.diag([scale, scale, scale, 1.0])))
+            shape = read(path)
+        scale = 1.0 if self.units is None else scale_to(path, self.units)
+        solid = complete(shape if scale == 1 else transform(shape, np.diag([scale, scale, scale, 1.0])))
         names = ("thickness", "contoured", "tolerance", "resolution", "spacing")
         options = {name: getattr(self, name) for name in names}
         with warnings.catch_warnings(record=True) as caught:

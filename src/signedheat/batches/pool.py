@@ -8,6 +8,7 @@ because starting one takes two seconds.
 from __future__ import annotations
 
 import errno
+import json
 import os
 import pickle
 import queue
@@ -70,6 +71,7 @@ class Task:
             try:
                 self.scratch.mkdir(parents=True)
                 figures = dict(self.job(self.shape.path.absolute(), self.scratch / target.name))
+                json.dumps(figures)  # raises TypeError if the manifest could not hold them
                 outputs = [(Path(self.shape.name).parent / name).as_posix() for name in self._move_to(target.parent)]
                 warned = [str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)]
                 message = "; ".join(map(str, [*figures.pop("notes", []), *dict.fromkeys(warned)]))

@@ -38,7 +38,7 @@ from ..io.image_files import CONFIDENCE, NIFTI
 from ..io.key_figures import describe as describe
 from ..io.scenes import scale_to, unit_of
 from ..io.solid_arrays import holds_solid
-from ..io.voxel_files import LabelImage, read_labels
+from ..io.voxel_files import LabelImage, image_at, read_labels
 from ..jobs import Progress, within
 from ..memory import refuse_beyond_memory
 from ..solids.completion import Completion, complete, completed
@@ -222,7 +222,7 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
         if isinstance(domain, Grid) and arguments.band is not None:
             solid = completed(shape, options, method, within(progress, 0.0, COMPLETED))
             field = in_band(solid, domain, arguments, within(progress, COMPLETED, 1.0))
-        elif arguments.plain or not isinstance(method.constraint, Free | ZeroSet | Soft):
+        elif arguments.plain or isinstance(method.constraint, EachComponent | LevelValues):
             field = plain_distance(shape, domain, method, as_oriented, progress)
         elif isinstance(domain, Grid) and domain.dimension == 2:
             field = distance_to_lines(shape, domain, **vars(method), as_oriented=as_oriented, progress=progress)
@@ -309,13 +309,17 @@ def field_or_image(path: str) -> Any:
 
 
 def image_of(arguments: Namespace) -> LabelImage | None:
-    """Return the image of labels of a command, if there is one."""
+    """Return the image of labels of a command, placed as its options say, if there is one."""
     if extension(arguments.shape) not in IMAGES:
+        if arguments.label is not None:
+            raise SourceError("only images have labels", element="--label", remedy="leave it out", path=arguments.shape)
         return None
-    image = read_labels(arguments.shape)
-    if image.labels.size and arguments.label is None and image.labels.dtype == bool:
-        return LabelImage(image.labels.astype(np.uint8), image.axes, image.origin, image.space)
-    return image
+    image, matrix = read_labels(arguments.shape), placement(arguments, arguments.shape)
+    if matrix is None:
+        return image
+    turn = matrix[:3, :3]
+    with prefix_errors(arguments.shape):
+        return image_at(image.labels, turn @ image.axes, turn @ image.origin + matrix[:3, 3], image.space)
 
 
 def labels_of(image: LabelImage) -> list[int] | None:

@@ -454,6 +454,8 @@ def check_grid(arguments: Namespace) -> None:
     refuse_together(arguments, "--origin", "--resolution", "--padding")
     refuse_together(arguments, "--spacing", "--resolution")
     refuse_together(arguments, "--band", "--plain")
+    if arguments.band is not None and arguments.constraint == "each-component":
+        error("--band and --constraint each-component do not go together: a band holds distance to the shape")
     refuse_together(arguments, "--scheduler", "--workers")
     if arguments.band is not None and dimension == 2:
         error("--band is for shapes in space")

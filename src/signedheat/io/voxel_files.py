@@ -1,9 +1,9 @@
-"""Voxels from images: digital surfaces, grids with walls, and labels with their place in the world."""
+"""Voxels from images: digital surfaces, and labels with their place in the world."""
 
 from __future__ import annotations
 
 import gzip
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -180,6 +180,7 @@ class LabelImage(Represented, Frozen):
         ...     image.save(sh.signed_distance(image.surface(7), image.grid), f"{folder}/distance.nrrd")
         """
         self.ensure_writable(path)
+        field = field.dense()  # images have a value at every voxel
         first = self.matrix[:3, :3] @ field.grid.origin + self.origin
         axes = self.axes * (field.grid.spacing / self.spacing)
         if extension(path) in NIFTI:
@@ -189,7 +190,7 @@ class LabelImage(Represented, Frozen):
             with replacing(path) as temporary:
                 write_nrrd(temporary, field.values, axes, first, self.space, content=NAME, convention=CONVENTION)
         else:
-            save_field(GridField(Grid(first, field.grid.spacing, field.grid.shape), field.values), path)
+            save_field(replace(field, grid=Grid(first, field.grid.spacing, field.grid.shape), solid=None), path)
 
     def ensure_writable(self, path: PathLike) -> None:
         """Check before a long computation that a field can be written into the place of the image.
@@ -272,16 +273,21 @@ def read_labels(path: PathLike) -> LabelImage:
             raise FileFormatError(f"the image has {image.values.ndim} axes, not 3")
         if image.axes.shape != (3, 3) or image.origin.shape != (3,):
             raise FileFormatError("its axes or its origin are not those of space", remedy="write it again")
-        lengths = np.linalg.norm(image.axes, axis=0)
-        if not (np.isfinite(image.axes).all() and (lengths > 0).all() and np.isfinite(image.origin).all()):
-            raise FileFormatError("its axes have no directions", remedy="write it again")
-        cosines = (image.axes / lengths).T @ (image.axes / lengths) - np.eye(3)
-        if np.abs(cosines).max() > SQUARE:
-            raise FileFormatError(
-                f"its axes are not at right angles, but off by {np.degrees(np.arcsin(np.abs(cosines).max())):.3g}°",
-                remedy="resample the image along right angles",
-            )
-        return LabelImage(image.values, image.axes, image.origin, image.space)
+        return image_at(image.values, image.axes, image.origin, image.space)
+
+
+def image_at(labels: NDArray[np.generic], axes: Floats, origin: Floats, space: str | None) -> LabelImage:
+    """Make an image of labels; raise `FileFormatError` if its axes (3, 3) are not at right angles."""
+    lengths = np.linalg.norm(axes, axis=0)
+    if not (np.isfinite(axes).all() and (lengths > 0).all() and np.isfinite(origin).all()):
+        raise FileFormatError("its axes have no directions", remedy="write it again")
+    cosines = (axes / lengths).T @ (axes / lengths) - np.eye(3)
+    if np.abs(cosines).max() > SQUARE:
+        raise FileFormatError(
+            f"its axes are not at right angles, but off by {np.degrees(np.arcsin(np.abs(cosines).max())):.3g}°",
+            remedy="resample the image along right angles",
+        )
+    return LabelImage(labels, axes, origin, space)
 
 
 def read_volume(path: PathLike, level: float | None = None, radius: float | None = None) -> DigitalSurface:
