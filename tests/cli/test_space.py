@@ -138,6 +138,17 @@ def test_offset_of_one_distance_has_the_name_given(tmp_path, ball, capsys):
     assert sh.read(tmp_path / "a.obj").n_faces > 100
 
 
+def test_options_that_mean_nothing_are_refused(tmp_path, ball, capsys):
+    out, field = str(tmp_path / "wall.stl"), str(tmp_path / "ball.npz")
+    for option in (["--lids", "flat"], ["--nested", "bodies"], ["--keep-overlaps"], ["--band", "0.5"]):
+        told = fail(capsys, "morph", "thicken", ball, "0.1", "-o", out, *option, code=2)
+        assert f"{option[0]} is for solids" in told
+    each = ["--constraint", "each-component"]
+    assert "do not go together" in fail(capsys, "volume", ball, "-o", field, "--band", "0.5", *each, code=2)
+    sh.signed_distance(sh.read(ball), resolution=12).save(field)
+    assert "curves lie on surfaces" in fail(capsys, "info", field, "--curves", "c.json")
+
+
 def test_contour(tmp_path, ball, capsys):
     field, output = str(tmp_path / "phi.npz"), str(tmp_path / "zero.ply")
     succeed(capsys, "volume", ball, "-o", field, "--resolution", "32")

@@ -69,3 +69,16 @@ def test_what_goes_wrong_names_standard_input(tmp_path, run):
     assert status == 2 and b"one surface" in said and printed == b""
     status, printed, said = run("offset", str(tmp_path / "ball.ply"), "0.1", "-o", "-", "--format", "txt")
     assert status == 1 and said.startswith(b"signedheat: standard output: ") and printed == b""
+
+
+@pytest.mark.parametrize(
+    "arguments", [["watertight", "x.stl"], ["batch", "x.stl", "--info"], ["view", "x.stl"], ["demo"]]
+)
+def test_commands_that_write_files_do_not_write_to_standard_output(run, arguments):
+    status, out, err = run(*arguments, "-o", "-")
+    assert status == 1 and not out and b"this command writes files" in err
+
+
+def test_isolines_need_a_named_output(run):
+    status, _, err = run("surface", "x.obj", "c.json", "-o", "-", "--contours", "3")
+    assert status == 2 and b"--contours writes a file next to the output" in err

@@ -70,6 +70,12 @@ def about_curves(written: str) -> tuple[Option, ...]:
     )
 
 
+def check_surface(arguments: Namespace) -> None:
+    """Reject isolines next to standard output."""
+    if arguments.output == "-" and arguments.contours:
+        arguments.parser.error("--contours writes a file next to the output: name a file instead of standard output")
+
+
 @command(
     "surface",
     "signed distance to curves on a surface",
@@ -89,6 +95,7 @@ def about_curves(written: str) -> tuple[Option, ...]:
         "triangles than those of the mesh, whose vertices come first",
     ),
     *(option("--preview", metavar="PNG", help="draw the result"), UP, format_option("ply")),
+    check=check_surface,
     diffusion=None,
 )
 def surface(arguments: Namespace) -> Summary:
@@ -154,7 +161,7 @@ def close(arguments: Namespace) -> Summary:
                 constraint,
                 arguments.diffusion or 1.0,
                 progress,
-                arguments.as_oriented,
+                arguments.as_oriented or arguments.plain,
                 arguments.every_piece,
             )
         completed = closing.zero_set(field, sources)

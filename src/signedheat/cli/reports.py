@@ -46,6 +46,8 @@ WHOLE = 0.9999
 def report(file: str, arguments: Namespace) -> Summary:
     """Inspect a shape, a field or an image."""
     field = field_or_image(file)
+    if arguments.curves and (field is not None or is_planar(file)):
+        raise SourceError("curves lie on surfaces, and this file holds none", element="--curves", path=file)
     if isinstance(field, LabelImage):
         summary = image_report(file, field)
         return summary, _table(summary)

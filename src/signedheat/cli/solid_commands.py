@@ -14,6 +14,7 @@ from ..errors import printable
 from ..packages import require
 from .late_imports import operands as shapes
 from .options import (
+    ABSENT,
     FLAT_SHAPE,
     GRID,
     LABEL,
@@ -58,7 +59,7 @@ DISTANCES = {
 
 def check_volume(arguments: Namespace) -> None:
     """Reject options that contradict each other."""
-    refuse_together(arguments, "--tets", "--spacing", "--origin", "--shape", "--band")
+    refuse_together(arguments, "--tets", "--spacing", "--origin", "--shape", "--band", "--label")
     if arguments.tets:  # a mesh of one's own
         refuse_together(arguments, "--tets", "--resolution", "--padding")
     check_tiles(arguments)
@@ -183,8 +184,10 @@ def offset(arguments: Namespace) -> Summary:
 def check_morph(arguments: Namespace) -> None:
     """Reject a wrong number of distances, and options that contradict each other."""
     check_grid(arguments)
-    if arguments.operation == "thicken" and (arguments.as_oriented or arguments.keep_overlaps or arguments.plain):
-        arguments.parser.error("--as-oriented, --keep-overlaps and --plain are for solids, and thicken takes sheets")
+    of_solids = ("as_oriented", "keep_overlaps", "lids", "nested", "plain", "band")
+    given = [name for name in of_solids if getattr(arguments, name) != ABSENT[name]]
+    if arguments.operation == "thicken" and given:
+        arguments.parser.error(f"--{given[0].replace('_', '-')} is for solids, and thicken takes sheets")
     if arguments.operation != "shell" and (arguments.keep_outside or arguments.drain is not None):
         arguments.parser.error("--keep-outside and --drain are for shells")
     if arguments.operation != "thicken" and (arguments.side != "both" or arguments.faces):
@@ -394,7 +397,7 @@ def contour(arguments: Namespace) -> Summary:
         sh.io.write_curves(path, surface, field.domain)
         numbers = {"curves": len(surface)}
     else:
-        shapes.save_level(surface, path, image)
+        shapes.save_level(surface, path, image, field if isinstance(field, sh.GridField) else None)
         numbers = shapes.counts(surface)
     kind = next(name for name in ("curves", "lines", "faces") if name in numbers)
     summary = {"input": arguments.field, "level": arguments.level, "output": path, **numbers}

@@ -212,6 +212,8 @@ def standard_files(arguments: Namespace) -> Iterator[StandardFiles]:
     if not (inputs or listed or output):
         yield StandardFiles()
         return
+    if output and "format" not in arguments:
+        raise FileFormatError("this command writes files", remedy="name a file or a folder", path="standard output")
     with tempfile.TemporaryDirectory(prefix="signedheat-") as folder:
         names = {}
         if inputs or listed:
