@@ -240,11 +240,12 @@ def _subpaths(data: str) -> Iterator[tuple[Floats, bool]]:
 
 
 def _whole(parts: list[Complexes], closed: bool) -> Iterator[tuple[Floats, bool]]:
-    """Return a subpath if it has a length; it is closed also if it ends where it begins."""
+    """Return a subpath if it has a length; it is closed also if it ends where it begins, up to rounding."""
     points = np.concatenate([np.zeros(0, dtype=np.complex128), *parts])
     if len(points) == 0 or (points == points[0]).all():
         return
-    if len(points) > 2 and abs(points[-1] - points[0]) <= 1e-9 * np.abs(points).max():
+    rounding = len(points) * np.finfo(float).eps * np.abs(points).max()
+    if len(points) > 2 and abs(points[-1] - points[0]) <= rounding:
         points, closed = points[:-1], True
     yield np.stack([points.real, points.imag], axis=1), closed
 
@@ -366,7 +367,7 @@ def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> Non
     Raises
     ------
     FileFormatError
-        If the format is unknown or the file cannot be written.
+        If there is no polyline, the format is unknown or the file cannot be written.
 
     Examples
     --------
@@ -377,7 +378,10 @@ def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> Non
     [Polyline(4 points, closed)]
     """
     content_of = format_for(path, WRITERS, "polylines in the plane")
-    content = content_of([lines] if isinstance(lines, Polyline) else list(lines))
+    listed = [lines] if isinstance(lines, Polyline) else list(lines)
+    if not listed:
+        raise FileFormatError("there is no polyline to write", remedy="pass at least one", path=path)
+    content = content_of(listed)
     with replacing(path) as temporary:
         temporary.write_text(content, encoding="utf-8")
 
