@@ -104,3 +104,13 @@ def test_numbers_of_nodes_for_whose_table_there_is_no_memory(tmp_path, monkeypat
     (tmp_path / "box.msh").write_bytes(data.replace(number, number[:-5] + b"\x09" + number[-4:]))
     with refused(sh.errors.MemoryLimitError):
         sh.read(tmp_path / "box.msh")
+
+
+@pytest.mark.parametrize("others", [["triangle"], ["triangle", "tetra"]])
+def test_no_part_of_a_volume_is_left_out(tmp_path, others):
+    corners = {"pyramid": [0, 1, 2, 3, 4], "triangle": [0, 1, 2], "tetra": [0, 1, 2, 5]}
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1], [0.5, 0.5, -1]])
+    cells = [(kind, np.array([corners[kind]])) for kind in ["pyramid", *others]]
+    meshio.Mesh(points, cells).write(tmp_path / "mixed.vtu")
+    with refused(sh.errors.GeometryError, file="mixed.vtu"):
+        sh.read(tmp_path / "mixed.vtu")

@@ -41,8 +41,8 @@ TETGEN = (".node", ".ele")
 TET_FORMATS = frozenset(MODULES)
 
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
-
-
+OTHER_VOLUMES = {"tetra10", "hexahedron", "wedge", "pyramid"}
+"""Cells in space, by their names in meshio, that are refused, since no part of a volume may be left out."""
 COUNTED = {"PhysicalNames": 1, "Entities": 4, "Nodes": 2, "Elements": 2, "Periodic": 1, "NodeData": 1, "ElementData": 1}
 """Sections of Gmsh files, and the number of counts at the beginning of each (one in version 2)."""
 IN_TEXT = ("PhysicalNames", "NodeData", "ElementData")
@@ -53,11 +53,11 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
     """Read a `TetMesh`; or, from a file without tets, its surface."""
     mesh = load_cells(path)
     kinds = {block.type for block in mesh.cells}
+    if kinds & OTHER_VOLUMES or not kinds & {"tetra", "triangle", "quad"}:
+        present = ", ".join(sorted(kinds)) or "no cells"
+        raise GeometryError(f"it holds {present}, not tets alone", remedy="convert it to linear tetrahedra first")
     if "tetra" in kinds:
         return TetMesh.from_meshio(mesh)
-    if kinds & {"tetra10", "hexahedron", "wedge", "pyramid"} or not kinds & {"triangle", "quad"}:
-        present = ", ".join(sorted(kinds)) or "no cells"
-        raise GeometryError(f"{path} holds no tets, but {present}", remedy="convert it to linear tetrahedra first")
     return (TriangleMesh if "quad" not in kinds else PolygonMesh).from_meshio(mesh)
 
 
