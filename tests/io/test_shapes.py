@@ -343,3 +343,13 @@ def test_stl_says_when_single_precision_is_too_little(tmp_path, place, loses):
         house.save(tmp_path / "house.stl")
         house.save(tmp_path / "house.ply")
     assert [issubclass(warning.category, sh.errors.InexactWarning) for warning in caught] == [True] * loses
+
+
+def test_normals_of_some_pieces_only_are_left_out(tmp_path):
+    array = '<DataArray type="Float64" format="ascii" NumberOfComponents="3"{}>0 0 1</DataArray>'
+    points = f"<Points>{array.format('')}</Points>"
+    normals = "<PointData>{}</PointData>".format(array.format(' Name="Normals"'))
+    pieces = "".join(f'<Piece NumberOfPoints="1">{data}{points}</Piece>' for data in ("", normals))
+    (tmp_path / "two.vtp").write_text(f'<VTKFile type="PolyData"><PolyData>{pieces}</PolyData></VTKFile>')
+    cloud = sh.read(tmp_path / "two.vtp")
+    assert cloud.n_points == 2 and cloud.normals is None

@@ -123,7 +123,8 @@ def write_vtp(shape: Elements, path: PathLike) -> bytes:
 def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
     """Read the polygons of all pieces, or the points if there are no polygons.
 
-    `names` are further values at the points that are wanted, where all pieces have them.
+    `names` are further values at the points that are wanted. These, normals and areas are read where all pieces have
+    them.
     """
     root, arrays = parse(path, "PolyData")
     points, corners, counts, n_points = [], [], [], 0
@@ -151,13 +152,13 @@ def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
         n_points += n_own
     if not n_points:
         raise FileFormatError("there are no points: the file holds no shape")
-    values = {name: np.concatenate(found[name]) for name in names if len(found[name]) == len(points)}
+    columns = {name: np.concatenate(parts) for name, parts in found.items() if len(parts) == len(points)}
+    values = {name: columns[name] for name in names if name in columns}
     faces = np.concatenate(corners), np.concatenate(counts)
     if len(faces[1]):
         return Elements(np.concatenate(points), *faces, values=values)
-    normals = np.concatenate(found["Normals"]).reshape(-1, 3) if found["Normals"] else None
-    areas = np.concatenate(found["area"]) if found["area"] else None
-    return Elements(np.concatenate(points), normals=normals, areas=areas, values=values)
+    normals = columns["Normals"].reshape(-1, 3) if "Normals" in columns else None
+    return Elements(np.concatenate(points), normals=normals, areas=columns.get("area"), values=values)
 
 
 @dataclass(frozen=True)
