@@ -145,6 +145,8 @@ def test_options_that_mean_nothing_are_refused(tmp_path, ball, capsys):
         assert f"{option[0]} is for solids" in told
     each = ["--constraint", "each-component"]
     assert "do not go together" in fail(capsys, "volume", ball, "-o", field, "--band", "0.5", *each, code=2)
+    for command in (["watertight", ball], ["batch", ball, "--info"]):
+        assert "goes with --sample" in fail(capsys, *command, "-o", out, "--normalize", code=2)
     sh.signed_distance(sh.read(ball), resolution=12).save(field)
     assert "curves lie on surfaces" in fail(capsys, "info", field, "--curves", "c.json")
 

@@ -47,3 +47,11 @@ def test_a_single_point_needs_padding():
 
 def test_sizes_beyond_counting_are_exact():
     assert sh.Grid((0, 0, 0), 1.0, (10**8, 10**8, 10**8)).n_nodes == 10**24
+
+
+def test_grids_contain_points_of_their_dimension():
+    grid = sh.Grid((0, 0, 0), 0.5, (3, 3, 3))
+    assert grid.contains([[[0.5, 0.5, 1.0]], [[0.5, 0.5, 1.1]]]).tolist() == [[True], [False]]
+    for points in ([0.5], [[0.5, 0.5]]):
+        with refused(sh.errors.GeometryError, "points"):
+            grid.contains(points)

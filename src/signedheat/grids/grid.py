@@ -22,8 +22,10 @@ from ..validation import (
     frozen,
     numbers,
     positive_steps,
+    query_points,
     refuse_extreme,
     refuse_lost_spacing,
+    shaped,
     whole_number,
     whole_numbers,
 )
@@ -194,12 +196,12 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
 
         Parameters
         ----------
-        points : (n, d) float
+        points : (..., d) float
             Positions, in the units of the grid.
 
         Returns
         -------
-        (n,) bool
+        (...) bool
             True on the boundary, too.
 
         Examples
@@ -207,8 +209,8 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         >>> Grid((0, 0), 0.5, (3, 3)).contains([[1.0, 0.2], [1.1, 0.2]])
         array([ True, False])
         """
-        positions = numbers(points, "points")
-        return np.all((positions >= self.origin) & (positions <= self.upper), axis=-1)
+        places, shape = query_points(points, self.dimension)
+        return shaped(((places >= self.origin) & (places <= self.upper)).all(axis=1), shape)
 
     def to_pyvista(self) -> pyvista.ImageData:
         """Convert to an image of PyVista.

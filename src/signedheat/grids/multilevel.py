@@ -154,9 +154,14 @@ def _dilated(mask: Bools, width: Ints) -> Bools:
 
 def _coarser(shape: tuple[int, ...], steps: Floats) -> tuple[tuple[int, ...], Floats]:
     """Return shape and spacing of the next coarser grid."""
-    factors, counts = coarsening(shape, steps), np.array(shape)
-    coarse = np.where(factors == 2, counts // 2 + 1, np.where(factors == 1, counts, 1))
-    return tuple(int(n) for n in coarse), np.where(coarse > 1, steps * factors, 0.0)
+    factors = coarsening(shape, steps)
+    coarse = _coarse_shape(shape, factors)
+    return coarse, np.where(np.array(coarse) > 1, steps * factors, 0.0)
+
+
+def _coarse_shape(shape: tuple[int, ...], factors: Ints) -> tuple[int, ...]:
+    """Return the nodes along each axis of the next coarser grid."""
+    return tuple(n if f == 1 else n // 2 + 1 if f == 2 else 1 for n, f in zip(shape, factors.tolist(), strict=True))
 
 
 def _carried(level: Level, shape: tuple[int, ...], power: float) -> Guess | None:
@@ -177,8 +182,7 @@ def collapse(
     """Return (components, *shape) what ``extract(vectors, inside, out, …)`` makes of X on the finest valid level."""
     shapes = [tuple(shape)]
     for level in levels[:-1]:
-        halves = [n if f == 1 else n // 2 + 1 if f == 2 else 1 for n, f in zip(shapes[-1], level.factors, strict=True)]
-        shapes.append(tuple(halves))
+        shapes.append(_coarse_shape(shapes[-1], level.factors))
     result: NDArray[np.float32] = np.empty((components, 1, 1, 1, 1), dtype=np.float32)
     for depth in range(len(levels) - 1, -1, -1):
         level = levels[depth]
