@@ -217,7 +217,9 @@ def convergence(page: Page) -> None:
 def broken_curves_on_surfaces(page: Page) -> None:
     """Five surfaces, ten seeds each, a closed curve in twelve pieces, damaged in seven ways
     (`benchmarks/broken_curves.py`; all but the first three with 25 % gone). ε as median / worst; in brackets, how
-    often a program failed. Surface winding numbers (SWN, Feng et al. 2023) give the sign in the last column.
+    often a program failed. Surface winding numbers (SWN, Feng et al. 2023) give the sign in the last column. With half
+    gone, `sh.signed_distance` is off by more than 4 % on eight of the twenty stars, six of which it announces; at worst
+    it leaves out seven of twelve pieces.
     """
     names = {"one call": "signed_distance", "nearest": "nearest side × exact", "winding": "SWN × exact"}
     errors = broken_curves.study(10)
