@@ -270,7 +270,7 @@ def reason_for_doubt(decision: Decision, field: VertexField[Surface], curves: Se
             "the curves bound something else as well: which of the two is meant is a guess. Draw what is missing, or "
             f"turn curves that face the wrong way; {as_given}"
         )
-    hinges = decision.worth_little()
+    hinges = decision.worth_little(field.values)
     if len(hinges):
         return (
             f"the region depends on {named(hinges)}, and closing the gaps takes lines more than half as long: that "
@@ -280,11 +280,9 @@ def reason_for_doubt(decision: Decision, field: VertexField[Surface], curves: Se
     strokes = decision.pieces.strokes
     if not decision.all_bound or not all(isinstance(curve, Curve) and curve.oriented for curve in curves):
         return ""  # other curves and points have sides of their own
-    surface = strokes.surface
     # the shortest completion against that by heat
-    chosen = slice(None) if surface.restriction is None else surface.restriction
-    areas, sides = strokes.areas[chosen], decision.best.sides[chosen]
-    near = np.abs(field.values) <= surface.triangles.lengths_of_edges.mean()
+    areas, sides = strokes.areas[strokes.own], decision.best.sides[strokes.own]
+    near = np.abs(field.values) <= strokes.surface.triangles.lengths_of_edges.mean()
     apart = areas[(np.sign(field.values) != sides) & ~near & ~np.isnan(field.values)].sum() / areas.sum()
     if apart > APART:
         return (

@@ -281,6 +281,12 @@ class Strokes:
         """(n,) area that belongs to each vertex."""
         return self.surface.triangles.vertex_areas
 
+    @property
+    def own(self) -> Ints:
+        """(j,) which of the n vertices are those of the domain."""
+        chosen = self.surface.restriction
+        return np.arange(self.surface.triangles.n_vertices) if chosen is None else chosen
+
     @cached_property
     def graph(self) -> CutGraph:
         """The vertices and edges of the surface."""
