@@ -60,6 +60,28 @@ def test_long_thin_faces_meet_few_others():
     assert np.diff(starts).max() < 40
 
 
+def test_faces_on_fewer_than_three_places_overlap_nothing():
+    """Neither beside flat neighbours, which may seem to be folded, nor across others."""
+    rng = np.random.default_rng(0)
+    n = 5
+    ids = np.arange(n * n).reshape(n, n)
+    a, b, c, d = ids[:-1, :-1].ravel(), ids[1:, :-1].ravel(), ids[1:, 1:].ravel(), ids[:-1, 1:].ravel()
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    flat = np.column_stack([*(axis.ravel() for axis in np.meshgrid(np.arange(n), np.arange(n))), np.zeros(n * n)])
+    points = np.concatenate([flat, flat[:1]])
+    ends = rng.integers(0, n * n, (40, 2))
+    degenerate = np.concatenate([ends[:, [0, 0, 1]], ends[:, [1, 0, 1]], [[0, n * n, 7]]])
+    whole = np.concatenate([faces, degenerate])
+    for _ in range(4):
+        assert not len(crossings.self_intersections(points, whole[rng.permutation(len(whole))]))
+    bent = points + rng.normal(scale=1.0, size=points.shape)
+    bent[-1] = bent[0]
+    order = rng.permutation(len(whole))
+    found = np.sort(order[crossings.self_intersections(bent, whole[order])], axis=1)
+    expected = crossings.self_intersections(bent, faces)
+    assert len(expected) and set(map(tuple, found.tolist())) == set(map(tuple, expected.tolist()))
+
+
 @pytest.mark.parametrize("share", [0.0, 0.2, 1.0])
 def test_pairs_of_some_faces_are_those_of_all_that_have_one_of_them_in_any_order(share):
     rng = np.random.default_rng(5)

@@ -33,8 +33,13 @@ def self_intersections(vertices: Floats, faces: Ints, asked: Bools | None = None
 def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float, asked: Bools | None = None) -> Ints:
     """Return (k, 2) pairs of faces that overlap by more than `depth`, or `slack` if they have a common vertex.
 
-    Along their normals they may be apart by `slack`. Faces with a common edge overlap if they are folded.
+    Along their normals they may be apart by `slack`. Faces with a common edge overlap if they are folded. Faces on
+    fewer than three vertices overlap nothing.
     """
+    proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
+    if len(proper) < len(faces):
+        asked_proper = None if asked is None else asked[proper]
+        return proper[overlapping_faces(vertices, faces[proper], slack, depth, asked_proper)]
     count = len(faces) if asked is None else int(asked.sum())
     if not count:
         return np.zeros((0, 2), dtype=np.int64)
