@@ -32,6 +32,16 @@ def test_the_nearest_face_is_that_of_all(mesh):
     np.testing.assert_allclose(tree.search(points).distances, nearest, rtol=1e-9, atol=1e-12 * size)
 
 
+def test_copies_of_faces_go_also_where_the_surface_ends():
+    square, faces = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
+    once = FaceFeatures.of(square, faces)
+    for copies in (faces[:1], np.roll(faces, 1, axis=1)):
+        twice = FaceFeatures.of(square, np.concatenate([faces, copies]))
+        np.testing.assert_array_equal(twice.edge_regular[twice.edges], once.edge_regular[once.edges])
+    turned = FaceFeatures.of(square, np.concatenate([faces, faces[:1, ::-1]]))
+    assert len(turned.faces) == 3
+
+
 def test_discs_hold_the_corners_of_what_is_below_them():
     mesh = torus(n_around=60, n_across=30)
     features = FaceFeatures.of(mesh.vertices, mesh.faces)

@@ -126,11 +126,12 @@ def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: in
 
 def _copies(faces: Ints, table: EdgeTable) -> Bools:
     """Return which faces repeat earlier ones, with the same corners in the same order of rotation."""
-    copies = np.zeros(len(faces), dtype=bool)
-    crowded = np.flatnonzero((table.face_counts > 2)[table.face_edges].all(axis=1))
-    if len(crowded):
-        first, reverse = coincident_faces(faces[crowded].ravel(), np.arange(0, 3 * len(crowded) + 1, 3))
-        copies[crowded] = same_rows(np.column_stack([first, reverse])) != np.arange(len(crowded))
+    copies, ahead = np.zeros(len(faces), dtype=bool), (table.face_counts + table.balance) // 2
+    alike = np.where(table.forward, ahead[table.face_edges], (table.face_counts - ahead)[table.face_edges])
+    beside_others = np.flatnonzero((alike > 1).all(axis=1))  # others run along all their edges as they do
+    if len(beside_others):
+        first, reverse = coincident_faces(faces[beside_others].ravel(), np.arange(0, 3 * len(beside_others) + 1, 3))
+        copies[beside_others] = same_rows(np.column_stack([first, reverse])) != np.arange(len(beside_others))
     return copies
 
 
@@ -297,9 +298,8 @@ def _nearest_of_candidates(
                 vx, vy, vz = places[vertex, 0], places[vertex, 1], places[vertex, 2]
                 dx, dy, dz = x - vx, y - vy, z - vz
                 steepest = 0.0
-                turns = (
-                    1 if vertex_regular[vertex] else 2
-                )  # around a regular vertex every side is the first of a corner
+                # around a regular vertex every side is the first of a corner
+                turns = 1 if vertex_regular[vertex] else 2
                 for k in range(starts[vertex], starts[vertex + 1]):
                     near = np.int64(around[k]) // 3
                     corner = np.int64(around[k]) - 3 * near

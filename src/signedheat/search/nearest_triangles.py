@@ -44,9 +44,8 @@ def _rows(corners: Floats) -> Floats:
     across = _dot(v, u)
     w = v - across * u
     flat = ~(np.sqrt(_dot(w, w)) > HEIGHT * np.abs(across))
-    w = np.where(
-        flat, np.arange(3)[:, None] == np.abs(u).argmin(axis=0), w
-    )  # the plane of flat ones is any through the side
+    # the plane of flat ones is any through the side
+    w = np.where(flat, np.arange(3)[:, None] == np.abs(u).argmin(axis=0), w)
     for _ in range(2):  # twice, since the height of slivers has few accurate digits
         w = w - _dot(w, u) * u
         w /= np.sqrt(_dot(w, w))

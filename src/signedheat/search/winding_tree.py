@@ -24,8 +24,8 @@ DEPTH = 1e-5
 IN_PLANE = 1e-9
 """Volume of the cone to a triangle, relative to the product of its edges at the apex, up to which the apex is in its
 plane."""
-BLOCK = 1 << 15
-"""Triangles that are summed at once."""
+BLOCK = 2**13
+"""Number of triangles, or of leaves, that are summed at a time."""
 OPENING = 1.25
 """Distance, relative to a node's radius, above which its moments replace its faces."""
 
@@ -131,9 +131,8 @@ def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> F
                 for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
                     if items[k] >= 0:
                         rest, volume = solid_angle(corners, items[k], x, y, z)
-                        if rest > abs(
-                            volume
-                        ):  # angles below an eighth of a turn are added by multiplying complex numbers
+                        # angles below an eighth of a turn are added by multiplying complex numbers
+                        if rest > abs(volume):
                             share = volume / rest
                             real, imaginary = real - imaginary * share, imaginary + real * share
                         elif volume != 0.0:
@@ -174,8 +173,6 @@ SQUARES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Terms of M: xx, yy, zz, xy, xz, yz."""
 CUBES = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 0, 1), (0, 0, 2), (0, 1, 1), (1, 1, 2), (0, 2, 2), (1, 2, 2), (0, 1, 2))
 """Terms of S: xxx, yyy, zzz, xxy, xxz, xyy, yyz, xzz, yzz, xyz."""
-BLOCK = 2**13
-"""Number of leaves whose moments are computed at a time."""
 
 
 def moments_of(triangles: Floats, tree: BoxTree, opening: float) -> Floats:
