@@ -45,6 +45,8 @@ def test_vertices_that_no_face_uses_were_not_scanned(kind):
     assert found.rms == alone.rms and found.extreme == alone.extreme and found.within(0.2) == 1
     np.testing.assert_array_equal(found.percentiles(), alone.percentiles())
     assert found.histogram()[0].sum() == found.figures["points"] == ball.n_vertices
+    sheet = sh.deviation(stray, sh.TriangleMesh([[-1, -1, 0], [1, -1, 0], [0, 1, 0.0]], [[0, 1, 2]]))
+    assert sheet.figures["beyond_rim"] == sheet.beyond_rim[1:].mean() != sheet.beyond_rim.mean()
 
 
 def test_places_on_completion_are_marked():
@@ -155,6 +157,31 @@ def test_polygons_and_parts_of_an_assembly_have_sides():
     both = samples.union(body, sh.TriangleMesh(corners, [[0, 1, 2], [0, 2, 3]]))
     found = sh.deviation(np.vstack([points, [[0.5, 0.5, 1.25], [0.5, 0.5, 0.75]]]), both)
     np.testing.assert_allclose(found.distances, [0.1, -0.1, -0.25, 0.25])
+
+
+def test_solids_of_polygons_have_the_sides_of_the_polygons():
+    """Their faces are triangles, numbered otherwise than the polygons."""
+    x, y = np.meshgrid(np.arange(4.0), np.arange(4.0), indexing="ij")
+    ids = np.arange(16).reshape(4, 4)
+    quads = np.stack([ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]], axis=-1).reshape(-1, 4)
+    sheet = np.column_stack([x.ravel(), y.ravel(), 0.1 * x.ravel() ** 2])
+    body = box((5, 0, 0), (6, 1, 1))
+    part = sh.PolygonMesh(np.concatenate([body.vertices, sheet]), [*body.faces, *(quads + len(body.vertices))])
+    points = sheet[ids[1:3, 1:3].ravel()] + np.array([0.0, 0, 0.1]) * np.array([[1], [-1], [-1], [1]])
+    distances = sh.deviation(points, part).distances
+    np.testing.assert_array_equal(np.sign(distances), [1, -1, -1, 1])
+    np.testing.assert_allclose(sh.deviation(points, sh.complete(part)).distances, distances)
+
+
+def test_faces_given_twice_have_the_sides_of_one():
+    vertices, faces = terrain(HEIGHTS["waves"], 12)
+    faces[::5] = faces[::5, ::-1]
+    points = vertices + np.array([0, 0, 0.1]) * np.random.default_rng(0).choice([-1, 1], (len(vertices), 1))
+    once = sh.deviation(points, (vertices, faces))
+    for copies in (faces, faces[:1], np.roll(faces, 1, axis=1)):
+        twice = sh.deviation(points, (vertices, np.concatenate([faces, copies])))
+        np.testing.assert_allclose(twice.distances, once.distances)
+        np.testing.assert_array_equal(twice.beyond_rim, once.beyond_rim)
 
 
 def test_points_beyond_the_rim_say_so():

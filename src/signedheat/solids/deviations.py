@@ -25,7 +25,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
 from ..transforms import joined_shape
 from .completion import complete
-from .mesh_orientation import agreeing_faces
+from .mesh_orientation import agreeing_faces, owners_of
 from .solid import Solid
 
 pictures: Any = lazy_module("signedheat.view.surface_pictures", "pictures")
@@ -219,8 +219,8 @@ class Deviation(Frozen):
             "mean": float(self.of_surface.mean()),
             "rms": self.rms,
             "percentiles": {f"{p:g}": v for p, v in zip(PERCENTILES, self.percentiles().tolist(), strict=True)},
-            "on_completion": float(self.completed.mean()),
-            "beyond_rim": float(self.beyond_rim.mean()),
+            "on_completion": float(self.completed[self._ids].mean()),
+            "beyond_rim": float(self.beyond_rim[self._ids].mean()),
         }
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -319,7 +319,7 @@ def deviation(
 
 
 def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, FaceFeatures | None]:
-    """Whether a part is open as a whole; and its faces that bound nothing, turned to agree."""
+    """Whether a part is open as a whole; and, turned to agree, its faces that have two sides: all, or sheets only."""
     if isinstance(given, PointCloud):
         return False, None
     areas, was_given = face_areas(solid.triangles), solid.origins >= 0
@@ -331,11 +331,13 @@ def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, Face
         has_sides[has_sides] = ~(behind | ahead)
     if not has_sides.any():
         return False, None
-    if isinstance(given, Solid):
-        given = solid.faces if solid.source is None else solid.source
-    mesh = given.triangulation
-    owners = given.refinement.face_polygons if isinstance(given, PolygonMesh) else np.arange(mesh.n_faces)
-    return is_open, FaceFeatures.of(mesh.vertices, agreeing_faces(mesh)[np.isin(owners, solid.origins[has_sides])])
+    if not isinstance(given, Solid):
+        mesh, chosen = given.triangulation, np.isin(owners_of(given), solid.origins[has_sides])
+    elif solid.source is not None:
+        mesh, chosen = solid.source, np.isin(np.arange(solid.source.n_faces), solid.origins[has_sides])
+    else:  # origins are faces of a mesh that is not known any more
+        mesh, chosen = solid.faces, has_sides[was_given]
+    return is_open, FaceFeatures.of(mesh.vertices, agreeing_faces(mesh)[chosen])
 
 
 def _beyond_rim(surface: FaceFeatures, front: NearestFaces) -> Bools:

@@ -16,9 +16,6 @@ from ..errors import GeometryError
 from ..foreign import ForeignShape, converted
 from ..kinds import SurfaceDomain
 from ..memory import within_memory
-from ..mesh.edges import orient_faces, pair_halfedges
-from ..mesh.triangles import face_areas
-from ..mesh.welding import welded_vertices
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.surface_curves import CurveOrPoints
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -277,12 +274,10 @@ def agreeing_faces(mesh: TriangleMesh) -> Ints:
     """(m, 3) faces of a mesh, some turned so that neighbours run along their common edge in opposite directions.
 
     In each component, connected across edges of two faces, those of most of the area stay; if they cannot agree, all.
-    Faces name the first of the vertices at each place, so that they agree across seams, too.
+    Faces name the first of the vertices at each place, so that they agree across seams, too, and copies are equal.
     """
-    heads = np.roll(mesh.faces, -1, axis=1).ravel()
-    ids = welded_vertices(mesh.vertices, mesh.faces.ravel(), heads)
-    tails, owners = ids[mesh.faces.ravel()], np.repeat(np.arange(mesh.n_faces), 3)
-    pairs = pair_halfedges(tails, ids[heads], mesh.n_vertices)
-    turned = orient_faces(pairs, tails, owners, face_areas(mesh.vertices[mesh.faces])).turned
-    faces = tails.reshape(-1, 3)
-    return np.where(turned[:, None], faces[:, ::-1], faces)
+    chain, faces = Chain.of(mesh), mesh.faces.copy()
+    turned = chain.pieces(np.ones(len(chain.faces), dtype=bool)).turned
+    proper = chain.numbers >= 0
+    faces[proper] = np.where(turned[:, None], chain.faces[:, ::-1], chain.faces)[chain.numbers[proper]]
+    return faces
