@@ -135,6 +135,15 @@ def test_what_touches_a_wall_is_the_nearest_place_of_brute_force():
     assert np.median(np.abs(sh.thickness(broken, resolution=8).values / 0.8 - 1)) < 0.02
 
 
+def test_what_has_no_opposite_sides_says_so():
+    corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]  # faces of a tetrahedron are 109° apart
+    found = sh.thickness(sh.TriangleMesh(corners, [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]), resolution=1)
+    assert np.isnan(found.values).all() and found.below(1) == 0 and "none opposite" in repr(found)
+    for asked in (lambda: found.thinnest, lambda: found.percentiles([50])):
+        with refused(sh.SourceError, element="thickness"):
+            asked()
+
+
 def test_sheets_have_no_thickness():
     with refused(sh.SourceError):
         sh.thickness(sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))

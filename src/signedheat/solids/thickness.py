@@ -102,11 +102,16 @@ class Thickness(Frozen):
     origins: Ints
 
     @cached_property
-    def thinnest(self) -> tuple[float, Floats]:
-        """The least thickness, and (3,) the middle of the face where it is."""
+    def _from_thin_to_thick(self) -> Ints:
+        """(k,) faces whose thickness is known, in order."""
         if np.isnan(self.values).all():
             raise SourceError("no wall has two opposite sides", remedy="measure a solid", element="thickness")
-        face = int(np.nanargmin(self.values))
+        return np.argsort(self.values, kind="stable")[: np.count_nonzero(~np.isnan(self.values))]  # NaN comes last
+
+    @cached_property
+    def thinnest(self) -> tuple[float, Floats]:
+        """The least thickness, and (3,) the middle of the face where it is."""
+        face = int(self._from_thin_to_thick[0])
         return float(self.values[face]), self.mesh.vertices[self.mesh.faces[face]].mean(axis=0)
 
     def below(self, least: float) -> float:
@@ -144,14 +149,18 @@ class Thickness(Frozen):
         (k,) float
             Lengths.
 
+        Raises
+        ------
+        SourceError
+            If no wall has two opposite sides, as in a tetrahedron.
+
         Examples
         --------
         >>> import signedheat as sh
         >>> sh.thickness(sh.samples.torus(major=1.0, minor=0.4)).percentiles([50]).round(1).tolist()
         [0.8]
         """
-        known = np.flatnonzero(~np.isnan(self.values))
-        order = known[np.argsort(self.values[known])]
+        order = self._from_thin_to_thick
         ends = np.cumsum(self.mesh.face_areas[order])
         ranks = np.searchsorted(ends, 0.01 * np.asarray(percents, dtype=np.float64) * ends[-1])
         return self.values[order[np.minimum(ranks, len(order) - 1)]]
