@@ -270,6 +270,12 @@ def test_simplified_surfaces_are_closed_and_within_the_tolerance(name):
         solid.surface(tolerance=-1)
 
 
+def test_tolerances_larger_than_the_shape_leave_something():
+    solid = complete(samples.sphere(2))
+    made = solid.surface(keep_faces=True, tolerance=10.0)
+    assert 0 < made.n_faces < len(solid.triangles) and complete(made).volume > 0
+
+
 def test_distances_between_surfaces_are_proven_whichever_way_they_are_divided():
     coarse = SHAPES["box"]()
     fine = coarse

@@ -45,7 +45,10 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
             element="surface",
         )
     for attempt in range(ATTEMPTS):
-        made = given.simplify(0.5**attempt * tolerance).to_mesh64()
+        simpler = given.simplify(0.5**attempt * tolerance)
+        if simpler.is_empty():
+            continue
+        made = simpler.to_mesh64()
         surface = TriangleMesh(np.asarray(made.vert_properties)[:, :3], np.asarray(made.tri_verts).astype(np.int64))
         if is_within(surface, mesh, tolerance) and is_within(mesh, surface, tolerance):
             if not len(self_intersections(surface.vertices, surface.faces)):
@@ -90,7 +93,9 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
 def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
     """(k, 3, 3) parts of (n, 3, 3) pieces, cut upright on the side of a triangle that leaves most on both sides.
 
-    Pieces much larger than their triangle, and those that no side cuts, are halved along their longest side.
+    `rows`, (n, 16), are the triangles nearest to the pieces, as `triangle_rows` gives them. A cut leaves pieces wider
+    than `least` on both sides. Pieces much larger than their triangle, and those that no side cuts, are halved along
+    their longest side.
     """
     sides = np.linalg.norm(np.roll(pieces, -1, axis=1) - pieces, axis=2)
     relative = pieces - rows[:, None, :3]
