@@ -7,7 +7,7 @@ import signedheat as sh
 from refusals import refused
 from shapes import bodies
 from signedheat import samples
-from signedheat.solids.sampling import WIDTHS
+from signedheat.solids.sample_set import WIDTHS
 
 
 @pytest.fixture(scope="module")

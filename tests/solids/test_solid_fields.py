@@ -5,7 +5,7 @@ import multiprocessing
 import pickle
 import re
 import shutil
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -186,6 +186,14 @@ def test_stores_hold_the_same_bits_whoever_computes_them(tmp_path):
         np.testing.assert_array_equal(stored.values, band.values)
         np.testing.assert_array_equal(stored.confidence, band.confidence)
         np.testing.assert_array_equal(stored.blocks.places, band.blocks.places)
+
+
+def test_options_of_stores_need_a_store(tmp_path):
+    solid = sh.complete(samples.sphere(1))
+    with ThreadPoolExecutor() as pool, refused(sh.SourceError, element="scheduler"):
+        solid.field(resolution=8, band=0.1, scheduler=pool)
+    with refused(sh.SourceError):
+        solid.field(resolution=8, store=tmp_path / "dense")
 
 
 def test_stopped_runs_go_on_and_other_runs_are_refused(tmp_path):

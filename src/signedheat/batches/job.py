@@ -34,8 +34,8 @@ from ..solids.completion import Completion, Lids, complete
 from ..solids.heat_surfaces import Heat
 from ..solids.kept_faces import given_surface, unjoined
 from ..solids.overlaps import Nesting
-from ..solids.sample_set import Layout
-from ..solids.sampling import WIDTHS, sample, training_points
+from ..solids.sample_set import WIDTHS, Layout
+from ..solids.sampling import sample, training_points
 from ..solids.simplification import simplified
 from ..solids.solid import Solid
 from ..solver import checked

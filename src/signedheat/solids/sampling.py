@@ -18,10 +18,8 @@ from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import finite_number, whole_number
 from .completion import complete
-from .sample_set import Samples
+from .sample_set import WIDTHS, Samples
 
-WIDTHS = (0.05, 0.0158)
-"""Default widths of the noise, relative to the radius of the shape: variances .0025 and .00025 (Park et al. 2019)."""
 BYTES_PER_SAMPLE = 165
 """Peak memory per sample, including the search for its nearest face."""
 

@@ -33,7 +33,7 @@ from ..validation import finite_number, flag, positive_number, query_points, sha
 from .contouring import announce_lost, sharp_surface
 from .kept_faces import given_surface, unjoined
 from .offsets import Offset, Reach
-from .sample_set import Samples
+from .sample_set import WIDTHS, Samples
 from .simplification import simplified
 from .tiles import Scheduler, band_field, dense_field
 from .winding import Windings
@@ -312,7 +312,7 @@ class Solid(Displayed, Represented, Frozen):
         FileFormatError
             If the store holds another field.
         SourceError
-            If a store is named without a band.
+            If a store is named without a band, or a scheduler without a store.
 
         Examples
         --------
@@ -323,9 +323,11 @@ class Solid(Displayed, Represented, Frozen):
         ((32, 32, 32), array([-0.1]))
         """
         where = Grid.around(self.bounds, resolution, padding, spacing) if grid is None else grid
+        if scheduler is not None and store is None:
+            raise SourceError("a scheduler computes the tiles of a store", remedy="name a store", element="scheduler")
         if band is not None:
             return band_field(self, where, band, store, scheduler, progress)
-        if store is not None or scheduler is not None:
+        if store is not None:
             raise SourceError("only bands are stored tile by tile", remedy="give a band, or save the field")
         return dense_field(self, where, progress)
 
@@ -465,7 +467,7 @@ class Solid(Displayed, Represented, Frozen):
         return surface
 
     def sample(
-        self, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = (0.05, 0.0158), seed: int = 0
+        self, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = WIDTHS, seed: int = 0
     ) -> Samples:
         """Sample points with distances and gradients, near the surface and around it: see `signedheat.sample`.
 
