@@ -17,7 +17,7 @@ from ..mesh.components import connected_components, sums_of
 from ..mesh.triangles import area_vectors
 from ..mesh.unit_vectors import unit
 from ..search.winding_tree import WindingTree
-from .chain import Chain
+from .chain import Chain, inner_walls
 from .gauss import Dipoles, Matrix, Pieces, means, sampled, system_of, without_slender
 from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, levels_of_pieces, levels_within
 from .rims import meeting_edges, open_edges
@@ -69,7 +69,7 @@ class Bounding(Frozen):
 def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False) -> Bounding:
     """Decide which triangles bound something and which way they face, or take them as oriented."""
     counts, whole = whole_complexes(chain)
-    inner = chain.walls() & ~whole
+    inner = inner_walls(chain) & ~whole
     agreed = chain.pieces_as_given() if as_oriented else chain.pieces(~inner)
     # complexes that are whole are pieces, and so are all others' pieces
     pieces = np.where(whole, len(agreed.orientable) + chain.complexes, agreed.parts)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..mesh.components import connected_components, element_components
-from ..mesh.edges import EdgeTable, FaceOrientation, HalfedgePairs, edge_table, orient_faces, pair_halfedges
-from ..mesh.triangles import area_vectors
+from ..mesh.edges import EdgeTable, FaceOrientation, edge_table, orient_faces, pair_halfedges
+from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import axes_across, unit
 from ..mesh.welding import coincident_faces, welded_vertices
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -31,42 +31,35 @@ MOSTLY = 0.9
 all six walls of a cell face inwards once in 64 times."""
 
 
-def inner_walls(
-    positions: Floats,
-    pairs: HalfedgePairs,
-    tails: Ints,
-    heads: Ints,
-    owners: NDArray[np.integer],
-    normals: Floats,
-    areas: Floats,
-    volumes: Floats,
-) -> Bools:
-    """(p,) whether a closed cell lies on both sides of each face, where some edges have three or more faces.
+def inner_walls(chain: Chain) -> Bools:
+    """(m,) whether a closed cell lies on both sides of each face, where some edges have three or more faces.
 
     A complex is what is connected by edges; a cell that lacks a wall is part of the outside. In two cases faces with a
     cell on both sides are not inner: if along each edge of the complex as many faces run one way as the other, since it
     is then the boundary of a solid as it is; and if the outside of the complex faces outwards and the walls of one of
     the two cells face into it, since that cell is then a cavity.
     """
+    n, table = len(chain.faces), chain.edges
+    if not (table.face_counts > 2).any():
+        return np.zeros(n, dtype=bool)
     # halfedges in order of angle around their edges, and the next one after each
-    n = len(normals)
-    used = np.flatnonzero(pairs.edges >= 0)
-    forward = tails[used] < heads[used]
-    angles = _angles(positions, tails[used], heads[used], forward, normals[owners[used]])
-    order = np.lexsort((angles, pairs.edges[used]))
-    halfedges, forward, angles = used[order], forward[order], angles[order]
-    edges, faces = pairs.edges[halfedges], owners[halfedges]
+    tails, heads = chain.faces.ravel(), np.roll(chain.faces, -1, axis=1).ravel()
+    forward, normals = tails < heads, np.repeat(unit(area_vectors(chain.triangles)), 3, axis=0)
+    angles = _angles(chain.positions, tails, heads, forward, normals)
+    halfedges = np.lexsort((angles, table.face_edges.ravel()))
+    forward, angles = forward[halfedges], angles[halfedges]
+    edges, faces = table.face_edges.ravel()[halfedges], halfedges // 3
     last = np.append(edges[1:] != edges[:-1], True)
     first = np.append(True, last[:-1])
     following = np.arange(1, len(edges) + 1)
     following[last] = np.flatnonzero(first)
 
     # complexes that have inner walls at all
-    complexes = connected_components(n, faces, faces[following])
+    complexes = chain.complexes
     gaps = np.where(last, 2 * np.pi, 0.0) + angles[following] - angles
-    many = pairs.counts[edges] > 2
+    many = table.face_counts[edges] > 2
     unclear = many & ~(gaps > SAME_ANGLE)  # also where an angle is no number
-    balance = np.bincount(edges, np.where(forward, 1, -1), len(pairs.counts))
+    balance = np.bincount(edges, np.where(forward, 1, -1), len(table.vertices))
     nonmanifold, unbalanced = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     nonmanifold[complexes[faces[many]]] = unbalanced[complexes[faces[balance[edges] != 0]]] = True
     nonmanifold[complexes[faces[unclear]]] = False
@@ -76,9 +69,11 @@ def inner_walls(
     ahead, behind = 2 * faces + ~forward, 2 * faces + forward
     shells = connected_components(2 * n, ahead, behind[following]).reshape(n, 2)
     front, back = shells.T
+    a, b, c = chain.triangles.transpose(1, 0, 2)
+    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
     volumes = np.where(front != back, volumes, 0.0)  # surface that is open has one shell around it
     inside = np.bincount(shells.ravel(), np.stack([-volumes, volumes], axis=1).ravel()) > 0
-    cavities = _cavities(shells, inside, np.where(chosen, areas, 0.0))
+    cavities = _cavities(shells, inside, np.where(chosen, chain.areas, 0.0))
     return chosen & inside[front] & inside[back] & (cavities[front] == cavities[back])
 
 
@@ -119,9 +114,6 @@ class Chain(Frozen):
         ids = welded_vertices(mesh.vertices, tails, heads)[mesh.faces]
         first, backwards = coincident_faces(ids.ravel(), np.arange(0, 3 * len(ids) + 1, 3))
         distinct = np.flatnonzero(first == np.arange(len(ids)))
-        distinct = distinct[
-            (np.sort(ids[distinct], axis=1)[:, 1:] != np.sort(ids[distinct], axis=1)[:, :-1]).all(axis=1)
-        ]
         numbers = np.full(len(ids) + 1, -1)
         numbers[distinct] = np.arange(len(distinct))
         middle = mesh.bounds.mean(axis=0)
@@ -137,7 +129,7 @@ class Chain(Frozen):
     @cached_property
     def areas(self) -> Floats:
         """(m,) areas."""
-        return np.linalg.norm(area_vectors(self.triangles), axis=1)
+        return face_areas(self.triangles)
 
     @cached_property
     def multiplicities(self) -> Ints:
@@ -166,18 +158,6 @@ class Chain(Frozen):
         result = np.zeros(int(groups.max(initial=-1)) + 1, dtype=bool)
         result[sides[open_sides] // n] = True
         return result
-
-    def walls(self) -> Bools:
-        """(m,) whether each triangle is a wall between closed cells, which bounds nothing."""
-        if not len(self.faces) or not (self.edges.face_counts > 2).any():
-            return np.zeros(len(self.faces), dtype=bool)
-        tails, heads = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
-        owners = np.repeat(np.arange(len(self.faces)), 3)
-        a, b, c = self.triangles.transpose(1, 0, 2)
-        volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
-        pairs = pair_halfedges(tails, heads, len(self.positions))
-        normals = unit(area_vectors(self.triangles))
-        return inner_walls(self.positions, pairs, tails, heads, owners, normals, self.areas, volumes)
 
     def pieces(self, used: Bools) -> FaceOrientation:
         """Join triangles across edges that two used triangles share; most of the area of each piece stays as given."""
