@@ -199,7 +199,7 @@ class LeftOut(Note):
     doubled_walls: int = 0  # faces given twice, once facing each way; they stay, unless they lie inside a body
     text: ClassVar[str] = (
         "left out: {0.covered_faces} faces, {0.covered_area:.1%} of the area, that lie inside other bodies "
-        "({0.cut_faces} of them in part), and {0.merged_faces} duplicates"
+        "({0.cut_faces} of them in part)"
     )
 
     @property

@@ -237,7 +237,7 @@ def _divided(
 ) -> Arrangement:
     """Triangulate all faces that have points on edges or lines within."""
     n_lines = len(lines.ends)
-    on = Incidence.of(lines.on).along(points, lines.ends)
+    on = lines.on.along(points, lines.ends)
     counts = np.bincount(on.owners, minlength=n_lines)
     starts = np.append(0, np.cumsum(counts + 2))  # of the points of each line, including its ends
     whole = np.empty(starts[-1], dtype=np.int64)

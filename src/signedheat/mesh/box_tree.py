@@ -89,10 +89,11 @@ class BoxTree(NamedTuple):
     def meeting(
         self, triangles: Floats, slack: float | Floats = 0.0, groups: Ints | None = None, leaves: Ints | None = None
     ) -> tuple[Ints, Ints]:
-        """Return where the boxes near each of (n, 3, 3) triangles begin, and these: all in leaves that they may meet.
+        """Find boxes near each of (n, 3, 3) triangles: (n + 1,) where those of each begin, and (k,) their numbers.
 
-        The triangle's box, plane and prism must all meet a node, with some slack, unless the node is all of its own
-        group.
+        A box is near if the triangle's box, plane and prism all meet the nodes around it, with some slack, along each
+        axis or along all. Nodes that are all of the triangle's own group, (n,), are passed over. With `leaves`, (n,),
+        the search of each triangle begins at that leaf of the tree and goes on to its right.
         """
         corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(3, slack)
         own = np.full(len(corners), -1) if groups is None else np.ascontiguousarray(groups, dtype=np.int64)

@@ -302,7 +302,12 @@ def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Se
 
 
 class FaceCutter:
-    """An intrinsic mesh while some of its faces are cut."""
+    """An intrinsic mesh while some of its faces are cut.
+
+    `vertex_of` has the vertex of each node of the sources, −1 where it has none, and `node_at` the node at a vertex;
+    `on_edge` and `in_face` the nodes on each edge that is split, in order, and in each face that is cut; `sub_edges`
+    the parts of each such edge; `faces` and `pieces` what has been made of faces and segments so far.
+    """
 
     def __init__(self, triangles: IntrinsicMesh, merged: MergedSources, faces: Ints, edges: Ints, begin: Ints) -> None:
         self.triangles, self.merged, self.begin = triangles, merged, begin

@@ -64,19 +64,19 @@ class CurveSegments:
 
 @dataclass(frozen=True, eq=False)
 class MergedSources:
-    """The segments of several sources in one list, with points that coincide counted once."""
+    """The segments of several sources in one list, with points that coincide counted once: see `CurveSegments`."""
 
-    nodes: LocatedPoints
-    ends: Ints
-    faces: Ints
+    nodes: LocatedPoints  # (s,) distinct points of all sources
+    ends: Ints  # (k, 2) nodes of each segment
+    faces: Ints  # (k,) each, as in `CurveSegments`
     edges: Ints
     vectors: Complexes
-    owners: Ints
-    samples: list[Ints]
+    owners: Ints  # (k,) the source of each segment
+    samples: list[Ints]  # the nodes of each source
 
     @classmethod
     def of(cls, parts: Sequence[CurveSegments]) -> MergedSources:
-        """Merge sources; `samples` holds the nodes of each."""
+        """Merge sources."""
         located = concatenated([p.nodes for p in parts])
         first, who = unique_points(located)
         offsets = np.cumsum([0] + [len(p.nodes) for p in parts])
@@ -109,9 +109,10 @@ class MergedSources:
 
 
 def without_copies(parts: Sequence[CurveSegments], by_points: Bools) -> tuple[Ints, Ints]:
-    """Find the first (u,) of all curves with the same segments, and which of these each curve is (k,).
+    """Find curves that repeat others: (u,) the first curve of each kind, and (k,) which of these each curve repeats.
 
-    Only curves marked in `by_points` (k,) are compared; normals tell the others apart.
+    Curves that join the same points in the same directions are of one kind if both are marked in `by_points`, (k,); all
+    others are of a kind of their own, since normals tell them apart.
     """
     merged = MergedSources.of(parts)
     bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
@@ -166,9 +167,8 @@ def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegmen
     bent &= merged.edges[before] < 0
     straight = np.bincount(run[before], bent, len(first))[run[before]] == 0
     ends_at = np.bincount(np.concatenate([merged.ends.ravel(), *merged.samples]), minlength=len(merged.nodes))
-    passes = np.bincount(
-        node[straight], minlength=len(merged.nodes)
-    )  # each passing line has two segment ends and one sample there
+    # each passing line has two segment ends and one sample there
+    passes = np.bincount(node[straight], minlength=len(merged.nodes))
     straight &= (3 * passes == ends_at)[node]
     node, before, after = node[straight], before[straight], after[straight]
 
@@ -195,9 +195,8 @@ def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
     for elements in (merged.edges, np.where(merged.edges < 0, merged.faces, -1)):
         alike &= elements[before] == elements[after]
     places_between, before, after = places_between[alike], before[alike], after[alike]
-    run = connected_components(
-        k, before, after
-    )  # loops that go straight on, as loops without area do, must begin somewhere
+    # loops that go straight on, as loops without area do, must begin somewhere
+    run = connected_components(k, before, after)
     of_runs, link = np.unique(run[before], return_index=True)
     begins = link[np.bincount(run[before], minlength=k)[of_runs] == np.bincount(run)[of_runs]]
     places_between, before, after = (np.delete(column, begins) for column in (places_between, before, after))

@@ -392,7 +392,7 @@ def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
     for loop in surface.loops:
         places = corners_of(surface.vertices[loop])
         if len(places) < 3:
-            triangles.append(_fan(loop))
+            triangles.append(fan(loop))
         elif len(places) <= MOST_SIDES:
             chosen.append(loop)
             corners.append(places)
@@ -427,7 +427,7 @@ def _with_sides(loop: Ints, places: Ints, lid: Ints) -> Ints:
     return lid
 
 
-def _fan(points: Ints) -> Ints:
+def fan(points: Ints) -> Ints:
     """(k − 2, 3) triangles from the first of k points to the others."""
     return np.stack([np.full(len(points) - 2, points[0]), points[1:-1], points[2:]], axis=1)
 

@@ -30,7 +30,7 @@ from ..transforms import joined_shape
 from ..validation import flag
 from .bounding import Bounding, bounding
 from .chain import Chain
-from .closing import closed_by, small_lids
+from .closing import closed_by, fan, small_lids
 from .heat_surfaces import Heat, heat_surface
 from .mesh_orientation import oriented_as, owners_of
 from .overlaps import Nesting
@@ -80,8 +80,7 @@ def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) ->
 def small_gaps(vertices: Floats, faces: Ints) -> Ints:
     """(k, 3) triangles that fill the small gaps that seams leave."""
     around = [loop for loop in loops(vertices, faces, boundary(faces)) if len(loop) <= SIDES]
-    fans = [np.stack([np.full(len(loop) - 2, loop[0]), loop[1:-1], loop[2:]], axis=1) for loop in around]
-    return np.concatenate([np.empty((0, 3), dtype=np.int64), *fans])
+    return np.concatenate([np.empty((0, 3), dtype=np.int64), *map(fan, around)])
 
 
 STEPS = 2
@@ -187,8 +186,6 @@ def complete(
     >>> solid.distance([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]).round(1).tolist()
     [-1.0, 1.0]
     """
-    if isinstance(shape, Solid):
-        return shape
     options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
     return completed(shape, options, Heat(constraint, diffusion), progress)
 

@@ -93,17 +93,18 @@ def means(values: Floats, groups: Ints, weights: Floats, n: int) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Matrix:
-    """Matrix W of few pieces, by exact solid angles."""
+    """Matrix W of few pieces, by exact solid angles, at sampled places."""
 
-    matrix: Floats
-    places: Floats
+    matrix: Floats  # (n, k) winding number of each piece at each place, of the place's own piece between its two sides
+    places: Floats  # (n, 3) each: where they are, and unit normals
     normals: Floats
-    owners: Ints
-    areas: Floats
-    within: Floats
+    owners: Ints  # (n,) pieces that they are on
+    areas: Floats  # (n,) part of the area of its piece that each stands for
+    within: Floats  # (n,) winding numbers of the bodies that do not matter at each place
 
     @classmethod
     def of(cls, pieces: Pieces) -> Matrix:
+        """Sample places on the pieces, and compute their winding numbers there."""
         faces, places = sampled(pieces, min(SAMPLES, ENTRIES // len(pieces.areas)))
         order = np.argsort(pieces.labels, kind="stable")
         starts = np.concatenate([[0], np.cumsum(np.bincount(pieces.labels))])

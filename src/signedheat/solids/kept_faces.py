@@ -28,12 +28,12 @@ from .tiles import Evaluated
 from .winding import Windings
 
 OFF = 0.5
-"""Cells between contour and faces from which on faces are missing; edges of contours are cut off by less."""
+"""Distance from the faces, in cells, above which a contour shows that faces are missing. Cut edges are nearer."""
 SHIFT = np.array([0.37, 0.41, 0.43])
-"""Of the walls of boxes, in cells, so that they lie in no face along the axes."""
+"""Shift of the walls of boxes, in cells, so that they do not lie in faces along the axes."""
 ATTEMPTS = 6
-"""Times that boxes are put around what does not join, and around triangles that pass through each other; each time with
-other walls."""
+"""Number of times that boxes are put around edges that do not join and triangles that pass through each other, each
+time with other walls."""
 SQUARES = np.array([[[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [1, 1, 1], [1, 0, 1]]])
 """Corners of the sides of a cell across the first axis, counter-clockwise as seen from outside."""
 
@@ -59,7 +59,7 @@ class Joined:
 
     @classmethod
     def of(cls, points: Floats, faces: Ints) -> Joined:
-        """Look at triangles."""
+        """Find where triangles do not close or pass through each other."""
         table = edge_table(faces)
         gaps = table.vertices[table.balance != 0]
         meeting = faces[np.unique(self_intersections(points, faces))]
@@ -67,7 +67,7 @@ class Joined:
 
     @property
     def mesh(self) -> TriangleMesh:
-        """They alone; where bodies touch along an edge or at a vertex, each has its own."""
+        """The triangles as a mesh; where bodies touch along an edge or at a vertex, each has vertices of its own."""
         used, faces = np.unique(self.faces, return_inverse=True)
         return TriangleMesh(*split_at_pinches(self.points[used], faces.reshape(-1, 3)))
 
@@ -192,11 +192,11 @@ class Boxes:
     Attributes
     ----------
     places : (n, 3) int
-        Which.
+        Their numbers along each axis.
     cell : float
-        Their size.
+        Length of their edges.
     shift : (3,) float
-        In cells, of the grid against the origin.
+        Position of the grid's origin, in cells.
     """
 
     places: Ints
@@ -210,17 +210,17 @@ class Boxes:
 
     @cached_property
     def grown(self) -> Boxes:
-        """With all that touch them."""
+        """These cells and all that touch them."""
         near = self.places[:, None] + np.array(list(np.ndindex(3, 3, 3))) - 1
         return Boxes(np.unique(near.reshape(-1, 3), axis=0), self.cell, self.shift)
 
     def have(self, points: Floats) -> Bools:
-        """(m,) which of (m, 3) points are in them."""
+        """(m,) which of (m, 3) points are in these cells."""
         return _among(np.floor(points / self.cell - self.shift).astype(np.int64), self.places)
 
     @cached_property
     def walls(self) -> Floats:
-        """(k, 3, 3) triangles of their sides towards other cells, which face outwards."""
+        """(k, 3, 3) triangles of the sides between these cells and others; they face the others."""
         found = []
         for axis in range(3):
             for side in range(2):
@@ -233,7 +233,7 @@ class Boxes:
 
     @property
     def middles(self) -> Floats:
-        """(k, 3) of their connected parts."""
+        """(k, 3) middle of each connected group of cells."""
         corners = (self.places[:, None] + np.array(list(np.ndindex(2, 2, 2)))).reshape(-1, 3)
         _, ids = np.unique(corners, axis=0, return_inverse=True)
         parts = element_components(ids.reshape(-1, 8))

@@ -196,11 +196,11 @@ class SheetWall:
     step: float  # by which places are moved from planes of symmetry, where a rim that stands on a face is as near
     above: float
     below: float
-    rim: TriangleTree | None  # its sides, as triangles without area
-    corners: Floats  # (r, 2, 3) their ends
-    sides: Ints  # (m, 3) the one of the rim that each side of each face is, −1 of others
-    at_vertices: Ints  # (n, 2) those that begin and end at each vertex, −1 where there is no rim
-    outward: Floats  # (r + 1, 2, 3) directions away from the surface at both ends of each, and zeros for none
+    rim: TriangleTree | None  # the r sides of the rim, as triangles without area; None of closed surfaces
+    corners: Floats  # (r, 2, 3) begin and end of each side of the rim
+    sides: Ints  # (m, 3) the side of the rim that each side of each face is; −1 of those inside
+    at_vertices: Ints  # (n, 2) the sides of the rim that end and that begin at each vertex; −1 where there are none
+    outward: Floats  # (r + 1, 2, 3) directions away from the surface at begin and end of each side; last zeros, for −1
 
     @classmethod
     def around(cls, sheet: Shapes, grid: Grid[Literal[3]], above: float, below: float) -> SheetWall:
@@ -254,9 +254,8 @@ class SheetWall:
         edges, vertices = (features > 0) & (features < 4), features > 3
         rim_sides[edges] = self.sides[faces[edges], features[edges] - 1][:, None]
         rim_sides[vertices] = self.at_vertices[self.tree.features.faces[faces[vertices], features[vertices] - 4]]
-        shares = np.broadcast_to(
-            [1.0, 0.0], rim_sides.shape
-        ).copy()  # of what ends at a vertex, its end, and of the other its begin
+        # of the side that ends at a vertex its end, and of the one that begins there its begin
+        shares = np.broadcast_to([1.0, 0.0], rim_sides.shape).copy()
         sides = rim_sides[edges, 0]
         begin, end = self.corners[sides].swapaxes(0, 1)
         along = np.linalg.norm(nearest_places.places[edges] - begin, axis=1) / np.linalg.norm(end - begin, axis=1)

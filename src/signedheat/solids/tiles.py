@@ -70,19 +70,19 @@ class Evaluated(SolidQueries, Protocol):
 
     @property
     def source(self) -> TriangleMesh | None:
-        """The input."""
+        """Triangles of the input, if they are known."""
 
     @property
     def tree(self) -> FaceTree:
-        """Of its triangles."""
+        """Search tree over the triangles."""
 
     @property
     def windings(self) -> Windings:
-        """Decides what is inside."""
+        """Winding numbers, which decide what is inside."""
 
     @property
     def diagnostics(self) -> Diagnostics:
-        """Notes."""
+        """Notes on faces that were turned, left out and added."""
 
 
 def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> GridField[Literal[3]]:

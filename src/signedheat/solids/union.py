@@ -37,19 +37,14 @@ class TriangleGroup:
         ids = -1 - same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)
         return cls(triangles, ids, np.full(len(triangles), -1), closing)
 
-    def select(self, chosen: Bools | Ints, closing: bool) -> TriangleGroup:
-        """Return some of its triangles."""
-        return TriangleGroup(self.triangles[chosen], self.ids[chosen], self.origins[chosen], closing)
-
 
 def united(
-    surfaces: list[TriangleGroup],
-    keep_overlaps: bool,
-    notes: Sequence[Note] = (),
-    points: Floats | None = None,
-    copies: int = 0,
+    surfaces: list[TriangleGroup], keep_overlaps: bool, notes: Sequence[Note] = (), points: Floats | None = None
 ) -> Solid:
-    """Make the solid that surfaces close: without what lies inside, where bodies overlap, and idle completion."""
+    """Make the solid that surfaces close: without what lies inside, where bodies overlap, and idle completion.
+
+    Confidence in completion falls with the distance from `points`, (n, 3), by default the corners of given faces.
+    """
     whole = joined_surfaces(surfaces)
     closing = np.concatenate([np.full(len(surface.triangles), surface.closing) for surface in surfaces])
     windings = Windings(whole.triangles if closing.all() else whole.triangles[closing])
@@ -70,7 +65,7 @@ def united(
     if not kept.any():
         kept[:] = True
     confidence = _confidence(triangles[kept], given[kept], whole, points)
-    diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds, copies)))
+    diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds)))
     bounding = (bounds & behind)[kept]
     return Solid(
         triangles if kept.all() else triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics
@@ -115,15 +110,16 @@ def _arranged(points: Floats, faces: Ints, chosen: Ints, pairs: Ints) -> Arrange
     return pieces._replace(origins=chosen[pieces.origins])
 
 
-def _notes(triangles: Floats, origins: Ints, kept: Bools, buried: Bools, bounds: Bools, copies: int) -> list[Note]:
+def _notes(triangles: Floats, origins: Ints, kept: Bools, buried: Bools, bounds: Bools) -> list[Note]:
+    """Say what was left out (`buried`), what was completed, and how much bounds nothing."""
     notes: list[Note] = []
     areas, given = face_areas(triangles), origins >= 0
     total = max(float(areas[given].sum()), np.finfo(float).tiny)
     covered = buried & given
-    if covered.any() or copies:
+    if covered.any():
         faces, others = np.unique(origins[covered]), np.unique(origins[given & kept])
         cut = int(np.isin(faces, others).sum())
-        notes.append(LeftOut(len(faces), float(areas[covered].sum()) / total, cut, copies))
+        notes.append(LeftOut(len(faces), float(areas[covered].sum()) / total, cut))
     made = kept & ~given
     if made.any():
         area, corners = float(areas[made].sum()), triangles[made].reshape(-1, 3)

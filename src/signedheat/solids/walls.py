@@ -158,10 +158,8 @@ def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
         larger = rims[i]
         for j in near:
             smaller = rims[j]
-            if (smaller.radius, j) >= (
-                larger.radius,
-                i,
-            ) or larger.opening @ smaller.opening >= 0:  # once, from the larger one
+            # each pair once, from the larger rim
+            if (smaller.radius, j) >= (larger.radius, i) or larger.opening @ smaller.opening >= 0:
                 continue
             lids = float(np.linalg.norm(larger.opening) + np.linalg.norm(smaller.opening))
             if lids > LARGE * areas[np.unique(np.concatenate([larger.parts, smaller.parts]))].sum():

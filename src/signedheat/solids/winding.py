@@ -57,7 +57,7 @@ class Windings(Frozen):
         return self.tree.numbers(points) if len(self.triangles) else np.zeros(len(points))
 
     def numbers_once(self, points: Floats) -> Floats:
-        """(n,) winding numbers, without a tree if the points are few: for who will not ask again."""
+        """(n,) winding numbers, summed without a tree if the points are few: for callers that ask only once."""
         return winding_sums(self.triangles, points) if len(points) <= FEW else self.numbers(points)
 
     def inside(self, points: Floats) -> Bools:
@@ -77,7 +77,7 @@ class Windings(Frozen):
 def open_edges_of(triangles: Floats) -> Floats:
     """(n, 2, 3) ends of unbalanced edges."""
     corners = triangles.reshape(-1, 3)
-    faces = same_positions(corners)[np.arange(len(corners)).reshape(-1, 3)]
+    faces = same_positions(corners).reshape(-1, 3)
     a, b, c = faces.T
     table = edge_table(faces[(a != b) & (b != c) & (c != a)])
     ends: Floats = corners[table.vertices[table.balance != 0]]
