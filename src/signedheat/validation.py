@@ -209,6 +209,14 @@ def flag(value: object, name: str) -> bool:
     return bool(value)
 
 
+def percentages(values: object) -> Floats:
+    """`values` as numbers from 0 to 100."""
+    percents = numbers(values, "percents", SignedHeatError)
+    if not ((percents >= 0) & (percents <= 100)).all():
+        raise SignedHeatError("percents must be from 0 to 100", element="percents")
+    return percents
+
+
 def positive_steps(values: object, count: int) -> Floats:
     """Return a spacing, one positive number for all axes or one for each, as one for each."""
     steps = numbers(values, "spacing")

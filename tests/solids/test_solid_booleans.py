@@ -7,6 +7,7 @@ import signedheat as sh
 from refusals import refused
 from shapes.bodies import box, sheet
 from signedheat import samples
+from signedheat.diagnostics import CompletedArea
 
 CUBE = sh.complete(box((0, 0, 0), (1, 1, 1)))
 TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
@@ -118,3 +119,18 @@ def test_with_fields_they_are_fields():
 @pytest.mark.parametrize("operation", ["__or__", "__and__", "__sub__"])
 def test_numbers_are_not_combined(operation):
     assert getattr(CUBE, operation)(0.1) is NotImplemented
+
+
+def test_notes_of_moved_and_combined_solids_say_what_is_completed_of_these():
+    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
+    faces = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    whole, broken = (
+        sh.complete(sh.TriangleMesh(corners + np.array([9, 0, 0]), faces)),
+        sh.complete(sh.TriangleMesh(corners, faces[:3])),
+    )
+    moved = sh.transform(broken, np.diag([2.0, 2, 2, 1])).diagnostics
+    given, told = (solid.note(CompletedArea) for solid in (broken.diagnostics, moved))
+    assert told.completed_area == pytest.approx(4 * given.completed_area)
+    np.testing.assert_allclose(told.where, 2 * np.array(given.where))
+    both = [note for note in (whole | broken).diagnostics.notes if isinstance(note, CompletedArea)]
+    assert [note.completed_share for note in both] == pytest.approx([1 / 8])

@@ -11,7 +11,7 @@ from shapes.bodies import box
 from signedheat import samples
 from signedheat.cli import main
 from signedheat.io.ply import read_ply
-from signedheat.solids.thickness import widths
+from signedheat.solids.thickness import Thickness, widths
 
 
 def slab(lower, upper, n=1):
@@ -142,6 +142,16 @@ def test_what_has_no_opposite_sides_says_so():
     for asked in (lambda: found.thinnest, lambda: found.percentiles([50])):
         with refused(sh.SourceError, element="thickness"):
             asked()
+
+
+@pytest.mark.parametrize("percents", [[101], [-1, 50], [np.nan], "half"])
+def test_percents_go_from_0_to_100(percents):
+    corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+    flat = sh.TriangleMesh(corners, [[0, 1, 2]])
+    walls = Thickness(flat, np.ones(1), np.zeros(1, dtype=np.int64))
+    for found in (walls, sh.deviation(flat, flat)):
+        with refused(sh.SignedHeatError, element="percents"):
+            found.percentiles(percents)
 
 
 def test_sheets_have_no_thickness():

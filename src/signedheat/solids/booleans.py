@@ -17,7 +17,7 @@ from ..mesh.welding import indexed
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import concatenated
 from .regions import Regions
-from .solid import Solid
+from .solid import Solid, still_true
 from .winding import Windings
 
 BOX = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
@@ -66,6 +66,6 @@ def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None)
     source = None
     if a.source is not None and b.source is not None:
         source = TriangleMesh(*concatenated([(mesh.vertices, mesh.faces) for mesh in (a.source, b.source)]))
-    notes = Diagnostics(notes=(*a.diagnostics.notes, *b.diagnostics.notes))
+    notes = still_true((*a.diagnostics.notes, *b.diagnostics.notes), pieces, origins[parents] < 0)
     bounding = np.ones(len(pieces), dtype=np.bool_)
-    return Solid(pieces, origins[parents], confidence[parents], bounding, windings, source, notes)
+    return Solid(pieces, origins[parents], confidence[parents], bounding, windings, source, Diagnostics(notes=notes))

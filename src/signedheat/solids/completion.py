@@ -198,11 +198,12 @@ def completed(
         return shape
     joined = joined_shape(shape)
     count = joined.n_points if isinstance(joined, PointCloud) else joined.triangulation.n_faces
+    parts = "points" if isinstance(joined, PointCloud) else "faces"
     refuse_beyond_memory(
-        f"completing a shape of {count} faces",
+        f"completing a shape of {count} {parts}",
         count,
         lambda n: bytes_to_complete(joined, n),
-        lambda n: f"simplify it to {n} faces, or free memory",
+        lambda n: f"simplify it to {n} {parts}, or free memory",
     )
     stopwatch = Stopwatch(progress, STEPS)
     if isinstance(joined, PointCloud):

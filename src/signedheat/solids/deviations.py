@@ -24,6 +24,7 @@ from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
 from ..transforms import joined_shape
+from ..validation import finite_number, percentages
 from .completion import complete
 from .mesh_orientation import agreeing_faces, owners_of
 from .solid import Solid
@@ -128,7 +129,7 @@ class Deviation(Frozen):
         >>> off.within(0.2)
         1.0
         """
-        return float((np.abs(self.of_surface) <= tolerance).mean())
+        return float((np.abs(self.of_surface) <= finite_number(tolerance, "tolerance", least=0)).mean())
 
     def percentiles(self, percents: ArrayLike = PERCENTILES) -> Floats:
         """Compute percentiles of the deviations.
@@ -151,7 +152,7 @@ class Deviation(Frozen):
         >>> off.percentiles([50]).round(2).tolist()
         [0.1]
         """
-        return np.asarray(np.percentile(self.of_surface, np.asarray(percents, dtype=np.float64)))
+        return np.asarray(np.percentile(self.of_surface, percentages(percents)))
 
     def histogram(self, bins: int = BINS) -> tuple[Ints, Floats]:
         """Count points by deviation; those beyond `extreme` count in the first or last bin.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Frozen, Ints, short
-from ..diagnostics import Diagnostics
+from ..diagnostics import CompletedArea, Diagnostics, Note
 from ..errors import InexactWarning, SignedHeatError, SourceError, warn_user
 from ..exchange import Displayed
 from ..foreign import Represented
@@ -625,6 +625,21 @@ class Solid(Displayed, Represented, Frozen):
         return signs * lengths, nearest.places, origins, weights, gradients, self.confidence[ids]
 
 
+def completed_area(triangles: Floats, made: Bools) -> list[Note]:
+    """Note how much of the area of (m, 3, 3) triangles was made, (m,), to complete others, and where; or nothing."""
+    if not made.any():
+        return []
+    areas, corners = face_areas(triangles), triangles[made].reshape(-1, 3)
+    area, box = float(areas[made].sum()), np.stack([corners.min(axis=0), corners.max(axis=0)])
+    return [CompletedArea(area, area / float(areas.sum()), [box.tolist()])]
+
+
+def still_true(notes: Sequence[Note], triangles: Floats, made: Bools) -> tuple[Note, ...]:
+    """Return the notes on solids that were moved or combined, the one on their completion made anew."""
+    others = [note for note in notes if not isinstance(note, CompletedArea)]
+    return (*others, *completed_area(triangles, made))
+
+
 def _mesh(triangles: Floats) -> TriangleMesh:
     if not len(triangles):
         raise SourceError("this part of the solid has no triangles", element="solid")
@@ -643,4 +658,6 @@ def _(shape: Solid, linear: Floats, move: Floats) -> Solid:
 
     triangles, closing = moved(shape.triangles), moved(shape.windings.triangles)
     source = None if shape.source is None else cast("TriangleMesh", transformed(shape.source, linear, move))
-    return replace(shape, triangles=triangles, windings=Windings(closing), source=source)
+    notes = still_true(shape.diagnostics.notes, triangles, shape.origins < 0)
+    diagnostics = replace(shape.diagnostics, notes=notes)
+    return replace(shape, triangles=triangles, windings=Windings(closing), source=source, diagnostics=diagnostics)

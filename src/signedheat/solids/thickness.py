@@ -14,6 +14,7 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Frozen, Ints
 from ..compiled import compiled
@@ -30,7 +31,7 @@ from ..parallel import in_chunks
 from ..search.face_tree import FaceTree
 from ..search.nearest_triangles import foot_on_triangle, weights_in
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import positive_number, whole_number
+from ..validation import percentages, positive_number, whole_number
 from .completion import complete
 from .mesh_orientation import Mesh
 from .sampling import evenly_on
@@ -136,7 +137,7 @@ class Thickness(Frozen):
         areas = self.mesh.face_areas
         return float(areas[self.values < positive_number(least, "least")].sum() / areas.sum())
 
-    def percentiles(self, percents: Floats | list[float]) -> Floats:
+    def percentiles(self, percents: ArrayLike) -> Floats:
         """Compute percentiles of the thickness, by area.
 
         Parameters
@@ -162,7 +163,7 @@ class Thickness(Frozen):
         """
         order = self._from_thin_to_thick
         ends = np.cumsum(self.mesh.face_areas[order])
-        ranks = np.searchsorted(ends, 0.01 * np.asarray(percents, dtype=np.float64) * ends[-1])
+        ranks = np.searchsorted(ends, 0.01 * percentages(percents) * ends[-1])
         return self.values[order[np.minimum(ranks, len(order) - 1)]]
 
     def save(self, path: str | PathLike[str]) -> None:

@@ -10,12 +10,12 @@ import scipy
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
-from ..diagnostics import BoundsNothing, CompletedArea, Diagnostics, LeftOut, Note
+from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
 from ..mesh.arrangement import Arrangement, arranged, meeting_faces
 from ..mesh.triangles import face_areas
 from ..mesh.welding import same_positions
 from .regions import Regions
-from .solid import Solid
+from .solid import Solid, completed_area
 from .winding import Windings
 
 TRUST = 0.05
@@ -120,11 +120,7 @@ def _notes(triangles: Floats, origins: Ints, kept: Bools, buried: Bools, bounds:
         faces, others = np.unique(origins[covered]), np.unique(origins[given & kept])
         cut = int(np.isin(faces, others).sum())
         notes.append(LeftOut(len(faces), float(areas[covered].sum()) / total, cut))
-    made = kept & ~given
-    if made.any():
-        area, corners = float(areas[made].sum()), triangles[made].reshape(-1, 3)
-        box = np.stack([corners.min(axis=0), corners.max(axis=0)])
-        notes.append(CompletedArea(area, area / float(areas[kept].sum()), [box.tolist()]))
+    notes += completed_area(triangles[kept], ~given[kept])
     idle = given & kept & ~bounds
     if float(areas[idle].sum()) > 1e-6 * total:
         notes.append(BoundsNothing(float(areas[idle].sum()) / total))
