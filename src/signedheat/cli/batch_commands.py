@@ -163,7 +163,7 @@ def watertight(arguments: Namespace) -> Summary:
         thickness=arguments.thickness,
         contoured=arguments.contour,
         tolerance=arguments.tolerance,
-        resolution=arguments.resolution or 256,
+        resolution=arguments.resolution or sh.batches.Watertight.resolution,
         spacing=arguments.spacing,
         samples=arguments.sample,
         normalize=arguments.normalize,

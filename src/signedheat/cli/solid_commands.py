@@ -185,9 +185,9 @@ def check_morph(arguments: Namespace) -> None:
     """Reject a wrong number of distances, and options that contradict each other."""
     check_grid(arguments)
     of_solids = ("as_oriented", "keep_overlaps", "lids", "nested", "plain", "band")
-    given = [name for name in of_solids if getattr(arguments, name) != ABSENT[name]]
-    if arguments.operation == "thicken" and given:
-        arguments.parser.error(f"--{given[0].replace('_', '-')} is for solids, and thicken takes sheets")
+    for name in of_solids:
+        if arguments.operation == "thicken" and getattr(arguments, name) != ABSENT[name]:
+            arguments.parser.error(f"--{name.replace('_', '-')} is for solids, and thicken takes sheets")
     if arguments.operation != "shell" and (arguments.keep_outside or arguments.drain is not None):
         arguments.parser.error("--keep-outside and --drain are for shells")
     if arguments.operation != "thicken" and (arguments.side != "both" or arguments.faces):

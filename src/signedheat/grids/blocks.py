@@ -113,12 +113,13 @@ class BlockValues:
 def row_of_node(tables: Tables, i: int, j: int, k: int) -> np.int32:
     """Return the block that holds a node of the grid; −1 if there is none."""
     cubes, rows = tables
-    cube = cubes[i // 128, j // 128, k // 128]
-    return rows[cube, i // 8 % 16, j // 8 % 16, k // 8 % 16] if cube >= 0 else np.int32(-1)
+    cube = cubes[i // (SIDE * CUBE), j // (SIDE * CUBE), k // (SIDE * CUBE)]
+    return rows[cube, i // SIDE % CUBE, j // SIDE % CUBE, k // SIDE % CUBE] if cube >= 0 else np.int32(-1)
 
 
 @compiled
 def _interpolate(tables: Tables, values: NDArray[np.float32], points: Floats, limit: Floats) -> Floats:
+    """Interpolate linearly at points in cells; NaN beyond the last node, `limit`, and where a node has no block."""
     out = np.empty(len(points))
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
@@ -138,13 +139,14 @@ def _interpolate(tables: Tables, values: NDArray[np.float32], points: Floats, li
                 if row < 0:
                     total = np.nan
                     break
-                total += part * values[row, (i + a) % 8, (j + b) % 8, (k + c) % 8]
+                total += part * values[row, (i + a) % SIDE, (j + b) % SIDE, (k + c) % SIDE]
         out[p] = total
     return out
 
 
 @compiled
 def _gather(tables: Tables, values: NDArray[np.float32], first: Ints, limit: Ints, out: NDArray[np.float32]) -> None:
+    """Copy the values of a box of nodes, from `first` on, into `out`, which keeps its own where there are none."""
     for a in range(out.shape[0]):
         for b in range(out.shape[1]):
             i, j = first[0] + a, first[1] + b
@@ -154,7 +156,7 @@ def _gather(tables: Tables, values: NDArray[np.float32], first: Ints, limit: Int
             for c in range(out.shape[2]):
                 k = first[2] + c
                 if 0 <= k < limit[2]:
-                    if k // 8 != held:
-                        row, held = row_of_node(tables, i, j, k), k // 8
+                    if k // SIDE != held:
+                        row, held = row_of_node(tables, i, j, k), k // SIDE
                     if row >= 0:
-                        out[a, b, c] = values[row, i % 8, j % 8, k % 8]
+                        out[a, b, c] = values[row, i % SIDE, j % SIDE, k % SIDE]

@@ -210,7 +210,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         array([ True, False])
         """
         places, shape = query_points(points, self.dimension)
-        return shaped(((places >= self.origin) & (places <= self.upper)).all(axis=1), shape)
+        return shaped(np.all((places >= self.origin) & (places <= self.upper), axis=1), shape)
 
     def to_pyvista(self) -> pyvista.ImageData:
         """Convert to an image of PyVista.
