@@ -105,3 +105,14 @@ def test_contours_in_the_plane_are_not_written_as_meshes(tmp_path):
     grid = sh.Grid((-1, -1), 0.1, (21, 21))
     with refused(sh.errors.GeometryError):
         sh.GridField(grid, np.linalg.norm(grid.points, axis=-1) - 0.5).save_contour(tmp_path / "disk.ply")
+
+
+def test_fields_without_values_say_so(tmp_path):
+    plane = sh.GridField(sh.Grid((0, 0), 1.0, (4, 5)), np.full((4, 5), np.nan))
+    space = sh.GridField(sh.Grid((0, 0, 0), 1.0, (4, 5, 6)), np.full((4, 5, 6), np.nan))
+    corner = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+    for field in (plane, space, sh.TetField(corner, np.full(4, np.nan))):
+        with refused(sh.errors.GeometryError, "values"):
+            field.contour()
+        with refused(sh.errors.GeometryError, "field"):
+            sh.view.save_slices(field, tmp_path / "none.png")

@@ -268,7 +268,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         OutsideError
             If φ does not take the level anywhere on the grid.
         GeometryError
-            If the grid has neither 2 nor 3 dimensions, or values are infinite.
+            If the grid has neither 2 nor 3 dimensions, values are infinite, or no node has one.
 
         Examples
         --------

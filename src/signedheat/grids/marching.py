@@ -64,7 +64,9 @@ def heights_above(values: Floats, spacing: Floats, level: float) -> Floats:
     """Return values minus the level, kept away from zero so that crossings respect `CLEARANCE`."""
     height = values - level
     finite = height[np.isfinite(height)]
-    low, high = float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
+    if not len(finite):
+        raise GeometryError("no node has a value", remedy="compute the field anew", element="values")
+    low, high = float(finite.min()), float(finite.max())
     if not low < 0 < high:
         raise OutsideError(
             f"level {level:g} is outside the values of the grid, {low + level:g} to {high + level:g}",

@@ -58,6 +58,8 @@ def closed_level_set(mesh: TetShapes, values: Floats, gradients: Floats, level: 
     boundary, on the side below the level. Tets with a NaN corner count as outside the mesh.
     """
     tets = mesh.tets[~np.isnan(values[mesh.tets]).any(axis=1)]
+    if not len(tets):
+        raise GeometryError("no tet has values at its corners", remedy="compute the field anew", element="values")
     below = values < level
     used = below[tets]
     if not used.any() or used.all():
@@ -271,6 +273,8 @@ class TetField(Displayed, Combinable, Frozen):
         ------
         OutsideError
             If φ does not take the level anywhere in the mesh.
+        GeometryError
+            If no tet has a value at all its corners.
 
         Examples
         --------

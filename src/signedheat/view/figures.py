@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Floats
+from ..errors import GeometryError
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..packages import lazy_module, require
 
@@ -79,6 +80,13 @@ def _scale_of(norm: Any) -> ScalarMappable:
 def signed_root(values: Any) -> Any:
     """√|x|, with the sign of x."""
     return np.sign(values) * np.sqrt(np.abs(values))
+
+
+def range_of(values: Floats) -> tuple[float, float]:
+    """Return the least and the greatest value of a field; raise `GeometryError` if it has none."""
+    if np.isnan(values).all():
+        raise GeometryError("the field has no value anywhere", remedy="compute it anew", element="field")
+    return float(np.nanmin(values)), float(np.nanmax(values))
 
 
 def isolines_between(low: float, high: float, most: int = 16) -> tuple[Floats, float]:

@@ -22,7 +22,7 @@ from ..packages import lazy_module
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_field import TetField
-from .figures import add_color_bar, distance_colors, isolines_between, picture
+from .figures import add_color_bar, distance_colors, isolines_between, picture, range_of
 from .surface_pictures import outside_of, triangulated
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def save_slices(
     FileFormatError
         If the picture cannot be written.
     GeometryError
-        If the field has one dimension, or more than three.
+        If the field has one dimension, or more than three, or no value anywhere.
     """
     if isinstance(field, TetField):
         grid = Grid.around(field.mesh.bounds, resolution=TET_NODES, padding=0.0)
@@ -141,7 +141,7 @@ def draw_line(line: Polyline, axes: Axes) -> None:
 
 def _look(field: GridField) -> tuple[ScalarMappable, Floats, float]:
     """Choose colours, isolines and the step between them, shared by all panels of a picture."""
-    low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
+    low, high = range_of(field.values)
     return distance_colors(low, high), *isolines_between(low, high)
 
 

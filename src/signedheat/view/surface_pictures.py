@@ -41,6 +41,7 @@ from .figures import (
     even_colors,
     isolines_between,
     picture,
+    range_of,
 )
 
 SIZE = 900
@@ -297,7 +298,7 @@ def draw_surface(
     corners = camera.pixels(mesh.vertices)[mesh.faces]
     depth, face, phi = rasterize(corners, values[mesh.faces], camera.width, camera.height)
 
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    low, high = range_of(values)
     scale = distance_colors(low, high) if colors is None else colors
     shade = scale.to_rgba(np.where(np.isfinite(phi), phi, 0.0))[..., :3]
     shade[~np.isfinite(phi)] = 0.7

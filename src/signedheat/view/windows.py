@@ -6,8 +6,6 @@ from contextlib import suppress
 from functools import singledispatch
 from typing import Any
 
-import numpy as np
-
 from ..curves.piecewise_field import PiecewiseField
 from ..errors import GeometryError, OutsideError
 from ..exchange import NAME
@@ -18,7 +16,7 @@ from ..packages import lazy_module
 from ..surfaces.vertex_field import VertexField
 from ..tets.tet_field import TetField
 from ..tets.tet_mesh import TetMesh
-from .figures import even_colors, isolines_between
+from .figures import even_colors, isolines_between, range_of
 from .surface_pictures import INNER_COLOR, OUTER_COLOR
 
 pyvista: Any = lazy_module("pyvista", "windows")
@@ -90,7 +88,7 @@ def _(field: VertexField | PiecewiseField, plotter: Any) -> None:
 
 def _look(values: Any) -> dict[str, Any]:
     """Colours centred on zero, and isolines."""
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    low, high = range_of(values)
     reach = max(abs(low), abs(high), 1e-300)
     levels = isolines_between(low, high)[0]
     return {"reach": reach, "colors": even_colors(reach).cmap, "levels": levels, "zero": low < 0 < high}
