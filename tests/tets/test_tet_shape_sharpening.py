@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy
 
 import signedheat as sh
 from refusals import refused
@@ -94,3 +95,14 @@ def test_it_can_be_cancelled(tets):
 
     with pytest.raises(Stop):
         sh.sharpen(sh.SignedHeatSolver(tets).distance(cube(0.8)), cube(0.8), progress=stop)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-13])
+def test_lines_of_sight_pass_flat_tets(noise):
+    """Delaunay's tets of a lattice fill the cube, a fifth of them flat, and inside out or not by rounding."""
+    side = np.linspace(-1, 1, 8)
+    points = np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3)
+    points = points + noise * np.random.default_rng(3).normal(size=points.shape)
+    mesh = sh.TetMesh(points, scipy.spatial.Delaunay(points).simplices)
+    phi = sh.signed_distance(sh.samples.sphere(4, radius=0.5), mesh)
+    assert np.abs(phi.values - (np.linalg.norm(points, axis=1) - 0.5)).max() < 1e-3

@@ -61,6 +61,9 @@ class Planes(NamedTuple):
         normals /= np.where(twice_area > 0, twice_area, 1)[:, None]
         signs = np.sign(np.einsum("mki,mki->mk", normals[faces.tet_faces], mesh.area_vectors))
         solid = mesh.thickness > FLAT
+        # rounding turns flat tets inside out: their faces look away from the tets beside them, so that lines pass
+        beside = np.bincount(faces.tet_faces[solid].ravel(), signs[solid].ravel(), len(normals))[faces.tet_faces]
+        signs[~solid & ((signs * beside).sum(axis=1) > 0)] *= -1
         counts = np.bincount(faces.tet_faces[solid].ravel(), minlength=len(normals))
         return cls(
             tet_faces=np.ascontiguousarray(faces.tet_faces),
