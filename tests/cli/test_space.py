@@ -2,6 +2,7 @@
 
 import json
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -143,8 +144,12 @@ def test_options_that_mean_nothing_are_refused(tmp_path, ball, capsys):
     for option in (["--lids", "flat"], ["--nested", "bodies"], ["--keep-overlaps"], ["--band", "0.5"]):
         told = fail(capsys, "morph", "thicken", ball, "0.1", "-o", out, *option, code=2)
         assert f"{option[0]} is for solids" in told
-    each = ["--constraint", "each-component"]
-    assert "do not go together" in fail(capsys, "volume", ball, "-o", field, "--band", "0.5", *each, code=2)
+    line = str(tmp_path / "line.csv")
+    Path(line).write_text("0,0\n1,0\n")
+    for shape, own in ((ball, ["--plain"]), (ball, ["--constraint", "each-component"]), (line, [])):
+        for option in (["--lids", "flat"], ["--nested", "bodies"], ["--keep-overlaps"], ["--band", "0.5"]):
+            told = fail(capsys, "volume", shape, "-o", field, *own, *option, code=2)
+            assert f"{option[0]} is for solids" in told
     for command in (["watertight", ball], ["batch", ball, "--info"]):
         assert "goes with --sample" in fail(capsys, *command, "-o", out, "--normalize", code=2)
     sh.signed_distance(sh.read(ball), resolution=12).save(field)

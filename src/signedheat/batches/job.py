@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, cast
 
@@ -146,6 +146,9 @@ class Job:
             result = "samples" if self.samples is not None else "a band"
             cause = f"a plain field has no distances to the shape, as {result} would need"
             remedy = "leave out plain" if self.plain else "take another constraint"
+        elif self._is_plain and replace(self._completion, as_oriented=False) != Completion():
+            cause = "a plain field has no solid, as lids, nested and keep_overlaps would need"
+            remedy = "leave out plain" if self.plain else "take another constraint"
         elif self.band is not None and self.volume not in (None, *BAND_FORMATS):
             cause, remedy = f"a band cannot be written as {self.volume}", f"use {' or '.join(sorted(BAND_FORMATS))}"
         elif self.band is not None and reach > self.band:
@@ -158,6 +161,10 @@ class Job:
     def _is_plain(self) -> bool:
         """Whether the field is the method's own: distance is zero on the whole shape, which some constraints deny."""
         return self.plain or isinstance(self.constraint, EachComponent | LevelValues)
+
+    @property
+    def _completion(self) -> Completion:
+        return Completion("lids", self.lids, self.nested, self.as_oriented, self.keep_overlaps)
 
     @property
     def _measures(self) -> bool:
@@ -231,8 +238,7 @@ class Job:
         method = Heat(checked(self.constraint), positive_number(self.diffusion, "diffusion"))
         if self._is_plain:
             return cast("GridField", plain_distance(shape, grid, method, self.as_oriented))
-        options = Completion("lids", self.lids, self.nested, self.as_oriented, self.keep_overlaps)
-        return cast("GridField", completed_distance(shape, grid, options, method, self.band))
+        return cast("GridField", completed_distance(shape, grid, self._completion, method, self.band))
 
 
 @dataclass(frozen=True)

@@ -45,6 +45,8 @@ ABSENT: Mapping[str, Any] = {
     "diffusion": 1.0,
 }
 """Defaults of options that a command lacks, so that all commands can share the functions that read them."""
+OF_SOLIDS = ("band", "lids", "nested", "keep_overlaps")
+"""Options that only solids have."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -440,6 +442,13 @@ def refuse_together(arguments: Namespace, first: str, *others: str) -> None:
             arguments.parser.error(f"{other} and {first} do not go together: give one of them")
 
 
+def refuse_of_solids(arguments: Namespace, what: str, *others: str) -> None:
+    """Exit with an error if an option of solids, or one of some others, is given for `what`, which uses no solid."""
+    for name in (*OF_SOLIDS, *others):
+        if getattr(arguments, name) != ABSENT[name]:
+            arguments.parser.error(f"--{name.replace('_', '-')} is for solids, and {what} uses none")
+
+
 def check_grid(arguments: Namespace) -> None:
     """Reject options that contradict each other, and numbers for another dimension."""
     error = arguments.parser.error
@@ -453,12 +462,11 @@ def check_grid(arguments: Namespace) -> None:
             error(f"argument {name}: {' or '.join(map(str, counts))} numbers, not {len(numbers)}")
     refuse_together(arguments, "--origin", "--resolution", "--padding")
     refuse_together(arguments, "--spacing", "--resolution")
-    refuse_together(arguments, "--band", "--plain")
-    if arguments.band is not None and arguments.constraint == "each-component":
-        error("--band and --constraint each-component do not go together: a band holds distance to the shape")
+    if arguments.plain or arguments.constraint == "each-component":
+        refuse_of_solids(arguments, "--plain" if arguments.plain else "--constraint each-component")
+    if dimension == 2:
+        refuse_of_solids(arguments, "a drawing")
     refuse_together(arguments, "--scheduler", "--workers")
-    if arguments.band is not None and dimension == 2:
-        error("--band is for shapes in space")
     own_grid = (arguments.origin, arguments.spacing, arguments.grid_shape)
     if (arguments.origin, arguments.grid_shape) != (None, None) and None in own_grid:
         error("a custom grid needs all of --origin, --spacing and --shape")

@@ -14,7 +14,6 @@ from ..errors import printable
 from ..packages import require
 from .late_imports import operands as shapes
 from .options import (
-    ABSENT,
     FLAT_SHAPE,
     GRID,
     LABEL,
@@ -41,6 +40,7 @@ from .options import (
     option,
     output,
     positive,
+    refuse_of_solids,
     refuse_together,
     shape_option,
     whole_number,
@@ -184,10 +184,8 @@ def offset(arguments: Namespace) -> Summary:
 def check_morph(arguments: Namespace) -> None:
     """Reject a wrong number of distances, and options that contradict each other."""
     check_grid(arguments)
-    of_solids = ("as_oriented", "keep_overlaps", "lids", "nested", "plain", "band")
-    for name in of_solids:
-        if arguments.operation == "thicken" and getattr(arguments, name) != ABSENT[name]:
-            arguments.parser.error(f"--{name.replace('_', '-')} is for solids, and thicken takes sheets")
+    if arguments.operation == "thicken":
+        refuse_of_solids(arguments, "thicken", "as_oriented", "plain")
     if arguments.operation != "shell" and (arguments.keep_outside or arguments.drain is not None):
         arguments.parser.error("--keep-outside and --drain are for shells")
     if arguments.operation != "thicken" and (arguments.side != "both" or arguments.faces):

@@ -142,6 +142,8 @@ def write_curves(
     """
     content_of = format_for(path, WRITERS, "curves")
     listed = [curves] if isinstance(curves, (Curve, SurfacePoints)) else list(curves)
+    if not listed:
+        raise FileFormatError("there is no curve to write", remedy="pass at least one", path=path)
     content = content_of(listed, surface_in_space(domain))
     with replacing(path) as temporary:
         temporary.write_text(content, encoding="utf-8")
