@@ -93,7 +93,7 @@ def sharpen(
     OutsideError
         If the field has the same sign everywhere, or is NaN everywhere; with a source, if that has no faces besides.
     GeometryError
-        If a value is infinite, or there is not one value for each vertex.
+        If a value is infinite.
     SourceError
         If the source is none that the field can be sharpened to.
 

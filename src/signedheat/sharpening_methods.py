@@ -354,11 +354,8 @@ def sharpened(
     if not finite.any():
         raise OutsideError("the field has no value anywhere", remedy="pass one that a source reaches")
     if not (finite | np.isnan(values)).all():
-        raise GeometryError(
-            f"the field is infinite at vertex {np.flatnonzero(np.isinf(values))[0]}",
-            remedy="compute it again",
-            element=f"vertex {np.flatnonzero(np.isinf(values))[0]}",
-        )
+        vertex = f"vertex {np.argmax(np.isinf(values))}"
+        raise GeometryError(f"the field is infinite at {vertex}", remedy="compute it again", element=vertex)
     if source is None:
         run = partial(method.sharpened, discretization, elements, values, field.source, progress)
     else:

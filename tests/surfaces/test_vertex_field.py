@@ -190,3 +190,17 @@ def test_sets_of_regions_keep_the_finer_triangles():
     assert np.abs(np.abs(flat[:, 0] - 4.5) - 1.5).max() < 0.1
     other = sh.VertexField(plate, left.values)
     assert (left | other).finer is not None and (other | other).finer is None
+
+
+def test_values_are_one_number_for_each_vertex():
+    """As of fields on grids and tets: lists and whole numbers are taken, and anything else is refused."""
+    mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    phi = sh.VertexField(mesh, [0, 1, 2, 3])
+    assert phi([0.5, 0.5, 0.0]) == 1.0
+    assert (-phi).values.tolist() == [0, -1, -2, -3]
+    assert (phi | sh.VertexField(mesh, np.arange(3, -1, -1))).values.tolist() == [0, 1, 1, 0]
+    for wrong in (np.zeros(3), np.zeros(5), np.zeros((4, 1)), ["a"] * 4, [1j] * 4):
+        with refused(sh.errors.GeometryError, "values"):
+            sh.VertexField(mesh, wrong)
+    with refused(sh.errors.UnsupportedTypeError, "domain"):
+        sh.VertexField(sh.Grid(0.0, 1.0, 4), np.zeros(4))

@@ -101,11 +101,8 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
             _same_length(directions, positions, "normals")
             lengths = np.abs(directions).max(axis=1)
             if not lengths.all():
-                raise GeometryError(
-                    f"the normal of point {int(np.argmin(lengths))} is zero",
-                    remedy="remove it or estimate it",
-                    element=f"point {int(np.argmin(lengths))}",
-                )
+                zero = f"point {np.argmin(lengths)}"
+                raise GeometryError(f"the normal of {zero} is zero", remedy="remove it or estimate it", element=zero)
             directions = directions / lengths[:, None]
             directions = frozen(directions / np.linalg.norm(directions, axis=1)[:, None])
         if areas is not None:
@@ -115,9 +112,8 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
             if sizes.ndim != 1 or not (np.isfinite(sizes) & (sizes > 0)).all():
                 raise GeometryError("areas must be one positive, finite number per point", element="areas")
             sizes = frozen(sizes)
-        if whole_number(n_neighbors, "n_neighbors", 0) < 3:
-            raise GeometryError(f"neighbourhoods need at least 3 points, not {n_neighbors}", element="n_neighbors")
-        vars(self).update(points=positions, normals=directions, areas=sizes, n_neighbors=int(n_neighbors))
+        neighbors = whole_number(n_neighbors, "n_neighbors", 3)
+        vars(self).update(points=positions, normals=directions, areas=sizes, n_neighbors=neighbors)
 
     @classmethod
     def _of(cls, elements: Elements) -> PointCloud:
@@ -130,6 +126,11 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
     @property
     def n_points(self) -> int:
         """Number of points."""
+        return len(self.points)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of points, each of which has a value of a field."""
         return len(self.points)
 
     @property

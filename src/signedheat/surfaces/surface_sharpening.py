@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints, mask_of
 from ..diagnostics import GeodesicWindows, SharpenedToCurves
 from ..discretization import SourceTerm, discretize
-from ..errors import GeometryError, InexactWarning, SourceError, UnsupportedTypeError, warn_user
+from ..errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
 from ..foreign import as_list
 from ..geodesics.exact_distance import Report, cleared, distance_to_segments, distance_to_zero_line, window_limit
 from ..geodesics.geodesic_sources import PlacedSegments, zero_line
@@ -26,6 +26,7 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import EDGE, VERTEX, incident_faces
 from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_field, sharpened
 from .intrinsic_triangulation import IntrinsicTriangulation
+from .source_segments import given_curves
 from .surface_curves import CurvesAndPoints
 from .surface_discretization import SurfaceDiscretization
 from .surface_source import SurfaceSource, lie_along
@@ -71,20 +72,12 @@ def _(
 
 def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> Floats:
     """Values at the vertices of the surface's triangles; averages of neighbours at those that the domain lacks."""
-    n = surface.triangles.n_vertices
-    values = np.asarray(field.values)
-    wanted = n if surface.restriction is None else len(surface.restriction)
-    if values.shape != (wanted,) or not np.issubdtype(values.dtype, np.number):
-        raise GeometryError(
-            f"the field has {values.dtype} values of shape {values.shape}, and its domain {wanted} vertices",
-            remedy="give one number for each",
-        )
     if surface.restriction is None:
-        return values.astype(np.float64)
+        return field.values
     assert not isinstance(field.domain, IntrinsicTriangulation)  # it has the vertices of its triangles
     values = field.domain.on_triangulation(field.values)
-    if len(values) != n:
-        values = np.full(n, np.nan)
+    if len(values) != surface.triangles.n_vertices:
+        values = np.full(surface.triangles.n_vertices, np.nan)
         values[surface.restriction] = field.values
     return values
 
@@ -100,7 +93,8 @@ def _(
 ) -> Nearest:
     if given is None:
         return nearest_zero(surface, values, source, tolerance, report)
-    parts = list(chain.from_iterable(surface.segments(as_list(given))))
+    curves, _ = given_curves(surface.domain, as_list(given))
+    parts = list(chain.from_iterable(surface.segments(curves)))
     if not parts:
         raise SourceError("there are no curves to sharpen to", remedy="leave them out", element="curves")
     return nearest_curve(surface.triangles, values, parts, surface.spacing, tolerance, report)

@@ -13,18 +13,19 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, Frozen, Ints
 from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
-from ..errors import OutsideError
+from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..exchange import Displayed, with_values
 from ..field_arithmetic import Combinable, Rule
 from ..foreign import SurfaceShape
 from ..kinds import EmbeddedSurface, SurfaceDomain
 from ..mesh.triangles import gradients_along
 from ..packages import lazy_module
-from ..validation import array_of, finite_number, query_points, shaped
+from ..validation import contiguous, finite_number, query_points, shaped
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
 from .subdivision import common_subdivision
+from .surface import Surface as AnySurface
 from .surface import closest_points
 from .surface_curves import Curve, SurfacePoints
 from .triangle_mesh import TriangleMesh
@@ -62,6 +63,13 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         The same on an intrinsic triangulation of the mesh, on whose vertices φ was computed: contours, values at points
         and sharpening use these too.
 
+    Raises
+    ------
+    UnsupportedTypeError
+        If the domain is not a surface.
+    GeometryError
+        If there is not one number for each vertex.
+
     Examples
     --------
     >>> import signedheat as sh
@@ -82,7 +90,15 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     finer: VertexField[IntrinsicTriangulation] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        array_of(self.values, "values")
+        if not isinstance(self.domain, AnySurface | IntrinsicTriangulation):
+            raise UnsupportedTypeError(f"{self.domain!r:.80} is not a surface", element="domain")
+        values = contiguous(self.values, "values")
+        if values.shape != (self.domain.n_vertices,):
+            raise GeometryError(
+                f"values have shape {values.shape}, but the surface has {self.domain.n_vertices} vertices",
+                element="values",
+            )
+        object.__setattr__(self, "values", values)
 
     def __call__(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
         """Evaluate φ at points of the surface, linearly between vertices.
