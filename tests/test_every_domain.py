@@ -93,6 +93,14 @@ def test_several_sources_at_once_are_as_one_after_the_other(ball):
         assert known(field.values) == pytest.approx(ball.distance(sources), abs=1e-6)
 
 
+def test_several_sources_report_what_is_done():
+    fractions = []
+    lines = [sh.Polyline([[x, -1], [x, 2]]) for x in np.linspace(0.1, 1.9, 20)]
+    grid = sh.Grid((0, 0), 0.25, (9, 5))
+    sh.SignedHeatSolver(grid, progress=lambda fraction, step: fractions.append(fraction)).distance_many(lines)
+    assert len(fractions) > 1 and fractions == sorted(fractions) and fractions[-1] == 1.0
+
+
 @pytest.mark.parametrize("scale", [1e-3, 8.0])
 def test_rigid_motion_and_scale(ball, scale):
     shift = np.array([7.0, -3.0, 5.0]) * scale

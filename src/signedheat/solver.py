@@ -12,17 +12,17 @@ from .arrays import Frozen
 from .constraints import Constraint, ZeroSet
 from .diagnostics import Diagnostics, Note
 from .discretization import Adaptable, Discretization, SourceTerm, discretize
-from .errors import InexactWarning, SignedHeatError, UnsupportedTypeError, warn_user
+from .errors import InexactWarning, UnsupportedTypeError, warn_user
 from .field_kinds import Field, to_field, warned
 from .foreign import ForeignShape, as_list, converted
 from .grids.grid import Dimension, Grid
 from .grids.grid_field import GridField
-from .jobs import Progress, Stopwatch
+from .jobs import Progress, Stopwatch, within
 from .kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
 from .memory import within_memory
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .surfaces.extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
-from .surfaces.intrinsic_discretization import Retriangulated, lowered_by_angles
+from .surfaces.intrinsic_discretization import Retriangulated, checked_intrinsic, lowered_by_angles
 from .surfaces.intrinsic_triangulation import triangle_mesh
 from .surfaces.source_segments import given_curves, one_sided
 from .surfaces.surface_curves import CurvesAndPoints
@@ -98,10 +98,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         object.__setattr__(self, "domain", converted(self.domain))
         if not isinstance(self.diffusion, Extrapolated | None):
             object.__setattr__(self, "diffusion", positive_number(self.diffusion, "diffusion"))
-        if not (isinstance(self.intrinsic, bool) or self.intrinsic == "auto"):
-            raise SignedHeatError(
-                f"intrinsic must be 'auto', True or False, not {self.intrinsic!r:.40}", element="intrinsic"
-            )
+        checked_intrinsic(self.intrinsic)
 
     @cached_property
     def discretization(self) -> Adaptable:
@@ -191,10 +188,9 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         constraint = checked(constraint)
         stopwatch = Stopwatch(self.progress, steps=5)
         with stopwatch("prepare"):
-            discretization = self.discretization
+            _ = self.discretization  # made once, and kept
         with stopwatch("sources"):
-            prepared = self._prepared(sources)
-            discretization, sources_by_time = prepared.discretization, prepared.terms
+            discretization, sources_by_time, notes = self._prepared(sources)
         with stopwatch("diffuse"):
             vectors = [diffuse(discretization, source) for source in sources_by_time]
         with stopwatch("normalize"):
@@ -203,7 +199,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             del vectors
         with stopwatch("integrate"):
             values = integrate(discretization, directions, source, constraint)
-        diagnostics = Diagnostics(timings=dict(stopwatch.seconds), time=source.time, notes=prepared.notes)
+        diagnostics = Diagnostics(timings=dict(stopwatch.seconds), time=source.time, notes=notes)
         return to_field(discretization, values, source, diagnostics)
 
     def _prepared(self, sources: Sources) -> _Prepared:
@@ -253,6 +249,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         [-0.5, 0.5]
         """
         constraint = checked(constraint)
+        report = within(self.progress, 0.4, 1.0)  # before, the domain is discretised
         fields: list[Field] = []
         for begin in range(0, len(sources), _BATCH):
             batch = map(self._prepared, sources[begin : begin + _BATCH])
@@ -272,6 +269,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
                 for source, values, each in zip(first, solved, alike, strict=True):
                     diagnostics = Diagnostics(timings=seconds, time=source.time, notes=each.notes)
                     fields.append(warned(to_field(discretization, values, source, diagnostics)))
+            if report is not None:
+                report(len(fields) / len(sources), f"{len(fields)} of {len(sources)}")
         return fields
 
 

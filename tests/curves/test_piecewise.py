@@ -354,7 +354,7 @@ def test_polylines_close_and_end_at_forks():
 
 @pytest.mark.parametrize(
     ("keywords", "error"),
-    [({"smooth": 1.0}, ValueError), ({"diffusion": 0.0}, ValueError)],
+    [({"smooth": 1.0}, ValueError), ({"diffusion": 0.0}, ValueError), ({"intrinsic": "yes"}, ValueError)],
 )
 def test_bad_options(keywords, error):
     mesh = sphere(1)
@@ -365,6 +365,9 @@ def test_bad_options(keywords, error):
 def test_bad_domain_and_source():
     with refused(TypeError, "domain"):
         sh.piecewise_distance(sh.PointCloud(np.eye(3)), [])
+    square = sh.PolygonMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+    with refused(sh.errors.GeometryError, "domain"):  # which has no intrinsic triangulation
+        sh.piecewise_distance(square, square.path([0, 2]), intrinsic=True)
     mesh = sphere(1)
     with pytest.raises(sh.errors.SourceError):
         sh.piecewise_distance(mesh, [])
@@ -483,3 +486,15 @@ def test_unoriented_curve_along_edges_of_bad_triangles():
     assert isinstance(phi.domain, sh.IntrinsicTriangulation)
     assert np.abs(phi(mesh.points_at(ids))).max() < 0.5 * mesh.edge_lengths.mean()
     assert phi(mesh.points_at((ids + 384) % 768)).min() > 1.0
+
+
+def test_arithmetic_keeps_the_triangles_on_which_the_field_is_linear():
+    """Points are given on the mesh, also for fields that are made of one on another triangulation of it."""
+    strip = sh.TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    line = strip.polyline([[4, 0, 0], [4, 1, 0]])
+    phi = sh.piecewise_distance(strip, line, intrinsic=True)
+    places = sh.SurfacePoints([0, 1], np.full((2, 3), 1 / 3))
+    for changed in (-phi, 2 * phi - phi(places)[0], phi + 0):
+        assert type(changed) is type(phi)
+    np.testing.assert_allclose((-phi)(places), -phi(places), atol=1e-12)
+    np.testing.assert_allclose((2 * phi + 1).gradient(places), 2 * phi.gradient(places), atol=1e-9)

@@ -26,9 +26,10 @@ from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs
 from ..mesh.surface_points import VERTEX, barycentric_in
 from ..method import diffuse, normalize
-from ..surfaces.intrinsic_discretization import ANGLE, COARSEST, is_spoiled, lowered
-from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
+from ..surfaces.intrinsic_discretization import ANGLE, COARSEST, checked_intrinsic, is_spoiled, lowered
+from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay, triangle_mesh
 from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.source_segments import given_curves
 from ..surfaces.surface_curves import CurveOrPoints, CurvesAndPoints
 from ..surfaces.surface_discretization import SurfaceDiscretization, lowered_mesh, lowered_polygons
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -99,6 +100,8 @@ def piecewise_distance(
         If a source does not fit the surface, or an unoriented curve was not kept by an intrinsic triangulation.
     UnsupportedTypeError
         If the domain is none of these.
+    GeometryError
+        With ``intrinsic=True``, if the domain is no triangle mesh.
     MemoryLimitError
         If the field does not fit into memory; nothing has been allocated then.
     ValueError
@@ -122,8 +125,10 @@ def piecewise_distance(
             f"{type(domain).__name__}",
             element="domain",
         )
-    smooth = flag(smooth, "smooth")
-    listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(sources)
+    smooth, intrinsic = flag(smooth, "smooth"), checked_intrinsic(intrinsic)
+    if intrinsic is True:
+        triangle_mesh(domain)  # refuses others
+    listed, left_out = given_curves(domain, as_list(sources))
     stopwatch = Stopwatch(progress, steps=5)
     with stopwatch("prepare"):
         diffusion = positive_number(diffusion, "diffusion")
@@ -157,7 +162,7 @@ def piecewise_distance(
             "anything. Pass intrinsic=True",
             InexactWarning,
         )
-    notes = (jumps_of(phi, solution, error), *discretization.notes)
+    notes = (jumps_of(phi, solution, error), *discretization.notes, *([left_out] if left_out else []))
     return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
 
 

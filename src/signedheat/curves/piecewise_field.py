@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -107,7 +107,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
 
     def _mapped(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> PiecewiseField:
         """Return the field with changed values, without the diagnostics of this one."""
-        return PiecewiseField(self.domain, self.surface, change(self.values), self.triangles, self.is_cut)
+        return replace(self, values=change(self.values), diagnostics=Diagnostics())
 
     def gradient(self, points: SurfacePoints) -> Floats:
         """∇φ in the triangles that contain the points.

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from ..diagnostics import IntrinsicTriangles
 from ..discretization import discretize
-from ..errors import GeometryError
+from ..errors import GeometryError, SignedHeatError
 from ..jobs import Progress
 from ..mesh.intrinsic_mesh import IntrinsicMesh, mollify
 from .intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
@@ -86,6 +86,13 @@ def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
         except GeometryError:
             pass
     return discretize(domain)
+
+
+def checked_intrinsic(intrinsic: bool | Literal["auto"]) -> bool | Literal["auto"]:
+    """Return the option `intrinsic` of `SignedHeatSolver`; refuse what it cannot be."""
+    if not (isinstance(intrinsic, bool) or intrinsic == "auto"):
+        raise SignedHeatError(f"intrinsic must be 'auto', True or False, not {intrinsic!r:.40}", element="intrinsic")
+    return intrinsic
 
 
 def is_spoiled(mesh: TriangleMesh) -> bool:

@@ -155,7 +155,7 @@ def curve_of_elements(triangles: Triangles, points: Sequence[tuple[int, Sequence
             )
         if kind == "face":
             faces[k] = element
-            weights[k] = (*given[:2], 1 - given[0] - given[1])
+            weights[k] = given if len(given) == 3 else (*given, 1 - given[0] - given[1])
             continue
         halfedge, share = (first_corner[element], 0.0) if kind == "vertex" else (halfedges[starts[element]], given[0])
         faces[k], side = divmod(int(halfedge), 3)
@@ -164,7 +164,11 @@ def curve_of_elements(triangles: Triangles, points: Sequence[tuple[int, Sequence
 
 
 def given_curves(domain: object, sources: list[Any]) -> tuple[list[Any], WithoutLength | None]:
-    """Make curves of lists of elements, and leave out curves without length if there are other sources."""
+    """Make curves of lists of elements, and leave out curves without length if there are other sources.
+
+    Sources on an intrinsic triangulation are given on its mesh. Other domains have no curves.
+    """
+    domain = getattr(domain, "mesh", domain)
     if not isinstance(domain, Surface):
         return sources, None
     if is_element_list(sources):
