@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 import signedheat as sh
 from refusals import refused
+from signedheat.curves.curve_distance import CurvesTaken
 from signedheat.diagnostics import WithoutLength
 from signedheat.samples import sphere
 from signedheat.surfaces.source_segments import curve_of_elements
@@ -65,8 +68,12 @@ def test_points_of_elements_lie_where_they_should():
     one = sh.signed_distance(elements, BALL, as_oriented=True)
     for same in ([elements], curve_of_elements(BALL, elements)):
         np.testing.assert_array_equal(one.values, sh.signed_distance(same, BALL, as_oriented=True).values)
+    for measure in (sh.SignedHeatSolver(BALL).distance, partial(sh.piecewise_distance, BALL)):
+        np.testing.assert_array_equal(measure(elements).values, measure(curve_of_elements(BALL, elements)).values)
     with refused(sh.errors.SourceError, "point 1"):
         sh.signed_distance([(3, []), (10**6, [0.5])], BALL)
+    with refused(sh.errors.SourceError, "point 1"):  # three coordinates that do not add up
+        sh.signed_distance([(3, []), (40, [0.2, 0.5, 0.9])], BALL)
 
 
 def test_positions_of_curves():
@@ -87,6 +94,9 @@ def test_positions_of_curves():
         lambda mesh, curves: sh.signed_distance(curves, mesh),
         lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),
         lambda mesh, curves: sh.SignedHeatSolver(mesh).distance_many([curves])[0],
+        lambda mesh, curves: sh.SignedHeatSolver(sh.intrinsic_delaunay(mesh)).distance(curves),
+        lambda mesh, curves: sh.sharpen(sh.SignedHeatSolver(mesh).distance(curves), curves),
+        lambda mesh, curves: sh.piecewise_distance(mesh, curves),
     ],
 )
 def test_a_click_among_strokes_is_left_out_with_a_note(measure, click):
@@ -96,6 +106,21 @@ def test_a_click_among_strokes_is_left_out_with_a_note(measure, click):
     assert alone.diagnostics.note(WithoutLength) is None
     with refused(sh.errors.SourceError):
         measure(BALL, click)
+
+
+def test_curves_are_named_by_their_number_among_all_that_were_given():
+    """Whatever is left out before them, or put in their place."""
+    n, click = RING.n_points, sh.Curve([0, 0], [[1, 0, 0], [1, 0, 0]])
+    parts = [slice(0, n // 3), slice(n // 3, 2 * n // 3), slice(2 * n // 3, n)]
+    first, second, third = (sh.Curve(RING.faces[part], RING.barycentric[part]) for part in parts)
+    given = [click, first, second.reversed(), third]
+    assert sh.signed_distance(given, BALL).diagnostics.note(CurvesTaken).turned == [2]
+    arcs = [np.linspace(middle - 1.4, middle + 1.4, 20) for middle in (0, np.pi)]
+    right, left = (sh.Polyline(np.stack([np.cos(arc), np.sin(arc)], axis=1)) for arc in arcs)
+    dot = sh.Polyline([[0.1, 0], [0, 0.1], [-0.1, 0]], closed=True)
+    for lines, number in (([right, left.reversed(), dot], 1), ([dot, right, left.reversed()], 2)):
+        with pytest.warns(sh.errors.InexactWarning, match=f"curve number {number}"):
+            sh.signed_distance(lines, resolution=24)
 
 
 def test_what_is_misplaced_is_named():

@@ -11,9 +11,9 @@ from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from ..arrays import Bools, Ints
+from ..arrays import Bools, Ints, mask_of
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
-from ..diagnostics import Note
+from ..diagnostics import Note, WithoutLength
 from ..errors import ConstraintError, InexactWarning, warn_user
 from ..foreign import as_list
 from ..jobs import Progress
@@ -49,8 +49,8 @@ class MeshRepaired(Note):
 class RepairedMesh:
     """A mesh on which vertices of rims at one place are one, and faces agree with their neighbours where they can."""
 
-    given: Any  # before and after. Polygons are as they were
-    mesh: Any
+    given: Any  # the mesh before: a `TriangleMesh` or a `PolygonMesh`
+    mesh: Any  # and after; of polygons only vertices are joined
     vertices: Ints  # (n,) vertex of the repaired mesh at each one of the given mesh
     faces: Ints  # (m,) triangle of the repaired mesh for each one of the given mesh, on the same vertices
     corners: Ints  # (m, 3) corner of that triangle at each corner of the given one
@@ -166,15 +166,21 @@ class CurvesTaken(Note):
 
 
 def distance_to_pieces(
-    solver: SignedHeatSolver[Surface], curves: CurvesAndPoints, constraint: Constraint | None, every_piece: bool
+    solver: SignedHeatSolver[Surface],
+    curves: CurvesAndPoints,
+    constraint: Constraint | None,
+    every_piece: bool,
+    numbers: Ints | None = None,
 ) -> tuple[VertexField[Surface], list[CurveOrPoints]]:
     """Distance to curves that may be pieces of broken ones, and the curves that it was measured to.
 
     Pieces are turned until they bound something together (`curve_orientation`), and those that do not are left out,
     unless most do not. Where faces cannot agree which side is left, pieces are taken as they are. There is an
-    `InexactWarning` where the answer is a guess.
+    `InexactWarning` where the answer is a guess. Warnings and notes name curves by `numbers`, (n,), by default their
+    places in the list.
     """
     listed = flattened(curves)
+    numbers = np.arange(len(listed)) if numbers is None else numbers
     surface_of(solver).segments(listed)  # refuses curves that do not fit
     once = triangulated_once(solver, listed)
     pieces = CurvePieces.of(surface_of(once), listed)
@@ -199,10 +205,10 @@ def distance_to_pieces(
     if turn.any() or len(left_out):
         strokes = pieces.strokes
         share = float(strokes.lengths[decision.loose].sum() / strokes.lengths.sum()) if len(left_out) else 0.0
-        note = CurvesTaken(np.flatnonzero(turn).tolist(), left_out.tolist(), share)
+        note = CurvesTaken(numbers[turn].tolist(), numbers[left_out].tolist(), share)
         field = replace(field, diagnostics=field.diagnostics.noting(note))
-    reason = reason_for_doubt(decision, field, listed)
-    loops = decision.loops_left_out() if len(left_out) else left_out
+    reason = reason_for_doubt(decision, field, listed, numbers)
+    loops = numbers[decision.loops_left_out()] if len(left_out) else left_out
     if len(loops) and not reason:
         reason = (
             f"what goes round, but bounds nothing with the others, was left out: {named(loops)}. every_piece=True "
@@ -248,10 +254,13 @@ def sheet_faces(mesh: TriangleMesh, crossed: Ints) -> Bools:
     return np.asarray(kept[part])
 
 
-def reason_for_doubt(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> str:
+def reason_for_doubt(
+    decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints], numbers: Ints
+) -> str:
     """Return a warning that says why the region that the curves bound is a guess, and what to do; "" if it is none.
 
-    `field` is the distance to those that were taken, completed by heat; `curves` are all that were given.
+    `field` is the distance to those that were taken, completed by heat; `curves` are all that were given, and
+    `numbers`, (n,), name them.
     """
     as_given = "as_oriented=True takes curves as they are"
     if decision.bounds_nothing:
@@ -259,7 +268,7 @@ def reason_for_doubt(decision: Decision, field: VertexField[Surface], curves: Se
             "most of the curves bound nothing together: which side is which away from them is a guess. Draw what is "
             f"missing, or turn curves that face the wrong way; {as_given}"
         )
-    against = decision.turned_loops()
+    against = numbers[decision.turned_loops()]
     if len(against):
         return (
             f"{named(against)} ran against about as much of the others, and {'were' if len(against) > 1 else 'was'} "
@@ -270,7 +279,7 @@ def reason_for_doubt(decision: Decision, field: VertexField[Surface], curves: Se
             "the curves bound something else as well: which of the two is meant is a guess. Draw what is missing, or "
             f"turn curves that face the wrong way; {as_given}"
         )
-    hinges = decision.worth_little(field.values)
+    hinges = numbers[decision.worth_little(field.values)]
     if len(hinges):
         return (
             f"the region depends on {named(hinges)}, and closing the gaps takes lines more than half as long: that "
@@ -290,6 +299,21 @@ def reason_for_doubt(decision: Decision, field: VertexField[Surface], curves: Se
             "surface. Draw more of them"
         )
     return ""
+
+
+def numbers_given(sources: Sequence[Any], left_out: WithoutLength | None) -> Ints:
+    """(n,) numbers that curves have among all that were given, those left out too; curves of a group count one by one.
+
+    Examples
+    --------
+    >>> numbers_given([None, [None, None]], WithoutLength([0, 2])).tolist()
+    [1, 3, 4]
+    """
+    clicks = [] if left_out is None else left_out.without_length
+    is_kept = ~mask_of(len(sources) + len(clicks), clicks)
+    counts = np.ones(len(is_kept), dtype=np.int64)
+    counts[is_kept] = [len(source) if isinstance(source, Sequence) else 1 for source in sources]
+    return np.flatnonzero(np.repeat(is_kept, counts))
 
 
 def named(numbers: Ints) -> str:
@@ -330,7 +354,7 @@ def distance_to_curves(
     def measured(by: SignedHeatSolver[Any]) -> tuple[VertexField[AnySurface], CurvesAndPoints]:
         if as_oriented:
             return distance_unwarned(by, listed, constraint), listed
-        return distance_to_pieces(by, listed, constraint, every_piece)
+        return distance_to_pieces(by, listed, constraint, every_piece, numbers_given(listed, left_out))
 
     field, taken = on_resolving_triangles(measured, solver, listed) if intrinsic == "auto" else measured(solver)
     rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))

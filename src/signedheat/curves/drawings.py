@@ -79,21 +79,22 @@ def distance_to_lines(
         return SignedHeatSolver(domain, diffusion, progress).distance(listed, constraint)
     notes: list[Note] = []
     if not as_oriented and all(isinstance(line, Polyline) for line in listed):
-        listed, filled = outlines_filled(listed, fill)
+        listed, numbers, filled = outlines_filled(listed, fill)
         notes += [filled] if filled else []
         if filled and all(line.closed for line in listed):
-            drawing = Drawing(without_seams(_segments(listed)))
+            drawing = Drawing(without_seams(segments_of_lines(listed)))
             return _field_of(drawing, domain, Diagnostics(notes=tuple(notes)), progress)
-        listed, taken = strokes_that_agree(listed, every_piece, within(progress, 0.0, 0.4))
+        listed, taken = strokes_that_agree(listed, numbers, every_piece, within(progress, 0.0, 0.4))
         notes += [taken] if taken else []
     solver = SignedHeatSolver(_grid_around(listed, domain), diffusion, within(progress, 0.4, 0.8))
     phi = cast("GridField[Literal[2]]", solver.distance(listed, constraint))
-    drawing = Drawing.completed(_segments([line for line in listed if isinstance(line, Polyline)]), phi)
+    drawing = Drawing.completed(segments_of_lines([line for line in listed if isinstance(line, Polyline)]), phi)
     diagnostics = replace(phi.diagnostics, notes=(*phi.diagnostics.notes, *notes))
     return _field_of(drawing, domain, diagnostics, progress)
 
 
 def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics, progress: Progress | None) -> GridField:
+    """Measure to a drawing at the nodes of a grid; the field holds the drawing."""
     if progress is not None:
         progress(0.8, "measure")
     begin = time.perf_counter()
@@ -118,15 +119,22 @@ class OutlinesFilled(Note):
         return self.length_inside > LEAST_SHARE
 
 
-def outlines_filled(lines: Sequence[Polyline], rule: FillRule) -> tuple[list[Polyline], OutlinesFilled | None]:
-    """Return the outlines of what closed lines fill, lines that are not closed, and a note if any are filled."""
-    closed = [line for line in lines if line.closed]
-    filled = [Polyline(points, closed=True) for points in filled_outlines([line.points for line in closed], rule)]
+def outlines_filled(
+    lines: Sequence[Polyline], rule: FillRule
+) -> tuple[list[Polyline], list[int], OutlinesFilled | None]:
+    """Return the outlines of what closed lines fill, then lines that are not closed; and a note if any are filled.
+
+    Also return numbers to name these by: open lines keep theirs, and outlines have those of closed lines, in order, or
+    higher ones if there are more of them.
+    """
+    closed, strokes = ([k for k, line in enumerate(lines) if line.closed == wanted] for wanted in (True, False))
+    filled = [Polyline(points, closed=True) for points in filled_outlines([lines[k].points for k in closed], rule)]
     if not filled:
-        return list(lines), None
-    given, left = (sum(line.length for line in outlines) for outlines in (closed, filled))
+        return list(lines), list(range(len(lines))), None
+    given, left = sum(lines[k].length for k in closed), sum(line.length for line in filled)
     note = OutlinesFilled(rule, len(closed), max(0.0, 1.0 - left / given))
-    return [*filled, *(line for line in lines if not line.closed)], note
+    numbers = [*closed, *range(len(lines), len(lines) + len(filled))][: len(filled)]
+    return [*filled, *(lines[k] for k in strokes)], [*numbers, *strokes], note
 
 
 def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
@@ -139,9 +147,12 @@ def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
 
 
 def strokes_that_agree(
-    lines: Sequence[Polyline], every_piece: bool = False, progress: Progress | None = None
+    lines: Sequence[Polyline], numbers: Sequence[int], every_piece: bool, progress: Progress | None
 ) -> tuple[list[Polyline], CurvesTaken | None]:
-    """Strokes turned and left out as by `distance_to_pieces` on a rectangle around the drawing; and what was done."""
+    """Turn strokes and leave some out, as `distance_to_pieces` does on a rectangle around the drawing; note what.
+
+    Warnings and the note name the lines by `numbers`, which differ.
+    """
     if all(line.closed for line in lines):
         return list(lines), None
     bounds = bounds_around(lines)
@@ -149,7 +160,7 @@ def strokes_that_agree(
     sheet = _triangles_around((bounds - bounds[0]) / size)
     curves = [sheet.polyline(np.pad((line.points - bounds[0]) / size, ((0, 0), (0, 1))), line.closed) for line in lines]
     field, _ = on_resolving_triangles(
-        lambda solver: distance_to_pieces(solver, curves, None, every_piece),
+        lambda solver: distance_to_pieces(solver, curves, None, every_piece, np.array(numbers)),
         SignedHeatSolver(sheet, 1.0, progress),
         curves,
     )
@@ -157,7 +168,8 @@ def strokes_that_agree(
     if note is None:
         return list(lines), None
     turned, left_out = set(note.turned), set(note.left_out)
-    return [line.reversed() if k in turned else line for k, line in enumerate(lines) if k not in left_out], note
+    taken = [(k, line) for k, line in zip(numbers, lines, strict=True) if k not in left_out]
+    return [line.reversed() if k in turned else line for k, line in taken], note
 
 
 def _triangles_around(bounds: Floats) -> TriangleMesh:
@@ -171,7 +183,8 @@ def _triangles_around(bounds: Floats) -> TriangleMesh:
     return TriangleMesh(np.pad(nodes.points.reshape(-1, 2), ((0, 0), (0, 1))), np.hstack([first, second]).T)
 
 
-def _segments(lines: Sequence[Polyline]) -> Floats:
+def segments_of_lines(lines: Sequence[Polyline]) -> Floats:
+    """(m, 2, 2) the ends of all segments, line after line."""
     return np.concatenate([np.empty((0, 2, 2)), *(line.segments for line in lines)])
 
 
@@ -189,9 +202,9 @@ class Drawing(Frozen):
     def completed(cls, lines: Floats, phi: GridField[Literal[2]]) -> Drawing:
         """Lines, and the zero set of φ where that is far from them."""
         crosses = bool((phi.values < 0).any() and (phi.values >= 0).any())
-        zero_set = _segments(phi.contour()) if crosses else np.empty((0, 2, 2))
+        zero_set = segments_of_lines(phi.contour()) if crosses else np.empty((0, 2, 2))
         if len(lines) and len(zero_set):
-            away = _tree(lines).distances(_in_space(zero_set.mean(axis=1)))
+            away = tree_of(lines).distances(_in_space(zero_set.mean(axis=1)))
             zero_set = zero_set[away > NEAR * float(phi.grid.spacing.max())]
         return cls(lines, zero_set, phi)
 
@@ -206,7 +219,7 @@ class Drawing(Frozen):
 
     @cached_property
     def _tree(self) -> FaceTree:
-        return _tree(self._segments)
+        return tree_of(self._segments)
 
     @cached_property
     def _corners(self) -> tuple[Ints, Floats, Ints]:
@@ -279,11 +292,12 @@ class Drawing(Frozen):
 
 
 def _in_space(points: Floats) -> Floats:
+    """(n, 3) points of the plane z = 0."""
     return np.pad(points, ((0, 0), (0, 1)))
 
 
-def _tree(segments: Floats) -> FaceTree:
-    """Of a triangle that stands on each segment, whose nearest place is at its foot."""
+def tree_of(segments: Floats) -> FaceTree:
+    """Make a tree of triangles that stand upright on the segments (m, 2, 2), so that their nearest places are there."""
     a, b = segments.transpose(1, 0, 2)
     corners = np.pad(np.stack([a, b, (a + b) / 2], axis=1), ((0, 0), (0, 0), (0, 1)))
     corners[:, 2, 2] = np.linalg.norm(b - a, axis=1)
