@@ -455,6 +455,14 @@ def test_what_cannot_be_done_is_said():
     for face in -1, mesh.n_faces:
         with refused(sh.errors.GeometryError, "point 0"):
             better.locate([face], [[1, 0, 0]])
+        with refused(sh.errors.GeometryError, "point 0"):
+            better.in_space([face], [[1, 0, 0]])
+    with refused(sh.errors.GeometryError, "faces"):
+        better.locate([0.7], [[1, 0, 0]])
+    heights = better.vertices[:, 0].tolist()  # lists are taken, as by the mesh
+    assert len(better.level_set(heights, 0.1)) == 1
+    with refused(sh.errors.SignedHeatError, "level"):
+        better.level_set(heights, np.nan)
 
 
 @pytest.mark.parametrize("seed", range(5))

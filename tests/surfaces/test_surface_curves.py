@@ -263,6 +263,7 @@ def test_polylines_far_away_are_refused_with_the_farthest_distance():
         (lambda m: m.path([1, 2, 99999]), "vertex 99999"),
         (lambda m: m.path([0.5, 2.0]), "vertices"),
         (lambda m: m.points_at([-1]), "vertex -1"),
+        (lambda m: sh.PolygonMesh(m.vertices[:4], [[0, 1, 2, 3]]).points_at([4]), "vertex 4"),  # a virtual one
         (lambda m: m.level_set(np.zeros(3)), "values"),
         (lambda m: m.region_boundary(np.zeros(3, dtype=bool)), "face_mask"),
         (lambda m: m.region_boundary(np.zeros(m.n_faces)), "face_mask"),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, mask_of
 from ..errors import SourceError
 from .components import grouped, members_of
 from .edges import EdgeTable
@@ -74,7 +74,7 @@ def points_at_vertices(triangles: IntrinsicMesh, vertices: Ints) -> LocatedPoint
 
 
 def corners_at(faces: Ints, vertices: Ints, n_vertices: int, name: str = "point") -> Ints:
-    """Return (k,) the first corner ``3 face + k`` at each vertex."""
+    """Return (k,) the first corner ``3 face + k`` at each vertex; only those below `n_vertices` may be asked for."""
     if not np.issubdtype(vertices.dtype, np.integer):
         if len(vertices) == 0:
             return np.empty(0, dtype=np.int64)
@@ -86,10 +86,9 @@ def corners_at(faces: Ints, vertices: Ints, n_vertices: int, name: str = "point"
             remedy="use ids of this mesh",
             element=f"vertex {vertices[outside[0]]}",
         )
-    wanted = np.zeros(n_vertices, dtype=bool)
-    wanted[vertices] = True
-    corners = np.flatnonzero(wanted[faces])[::-1]
-    first = np.full(n_vertices, -1)
+    n_all = max(n_vertices, int(faces.max(initial=-1)) + 1)  # virtual vertices of polygons have higher numbers
+    corners = np.flatnonzero(mask_of(n_all, vertices)[faces])[::-1]
+    first = np.full(n_all, -1)
     first[faces.ravel()[corners]] = corners
     alone = np.flatnonzero(first[vertices] < 0)
     if len(alone):

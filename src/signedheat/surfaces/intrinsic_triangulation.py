@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Bools, Floats, Frozen, Ints
-from ..errors import GeometryError, SourceError
+from ..errors import GeometryError
 from ..exchange import Displayed
 from ..foreign import ForeignShape, converted
 from ..jobs import Progress, Stopwatch
@@ -27,12 +27,12 @@ from ..mesh.curve_segments import CurveSegments, without_straight_nodes
 from ..mesh.gluing import flip_all, glue, lay_out
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.triangles import gradients_along
-from ..validation import finite_rows, flag, frozen
+from ..validation import finite_rows, flag, frozen, whole_numbers
 from .intrinsic_history import History
 from .intrinsic_refinement import refine_all
 from .intrinsic_transfer import ConformingRefinement, level_lines, transfer_segments
 from .source_segments import segments_of, segments_of_each
-from .surface import is_consistent, level_set, without_repeats
+from .surface import checked_levels, is_consistent, level_set, without_repeats
 from .surface_curves import Curve, CurveOrPoints, CurvesAndPoints
 from .triangle_mesh import TriangleMesh
 
@@ -106,7 +106,10 @@ class IntrinsicTriangulation(Displayed, Frozen):
     def vertices(self) -> Floats:
         """(n, 3) positions in space of the vertices, all of which lie on the mesh."""
         faces, weights = self.vertex_places
-        return frozen(self.in_space(faces, weights))
+        positions = np.concatenate([self.mesh.vertices, np.empty((len(faces) - self.mesh.n_vertices, 3))])
+        used = faces >= 0  # all that are not the mesh's own are
+        positions[used] = self.in_space(faces[used], weights[used])
+        return frozen(positions)
 
     @cached_property
     def vertex_places(self) -> tuple[Ints, Floats]:
@@ -152,7 +155,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
             f"no angle below {self.goal:g}° but in {len(self.thin_faces)} of {self.n_faces} faces: {', '.join(reasons)}"
         )
 
-    def in_space(self, faces: Ints, barycentric: Floats) -> Floats:
+    def in_space(self, faces: ArrayLike, barycentric: Floats) -> Floats:
         """Compute the positions of points that are given on the mesh.
 
         Parameters
@@ -167,6 +170,11 @@ class IntrinsicTriangulation(Displayed, Frozen):
         (p, 3) float
             Positions, in the units of the mesh.
 
+        Raises
+        ------
+        GeometryError
+            If a face does not exist.
+
         Examples
         --------
         >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
@@ -174,10 +182,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         >>> better.in_space(np.array([0]), np.array([[0.0, 0.5, 0.5]])).tolist()
         [[9.0, 0.5, 0.0]]
         """
-        positions = np.einsum("pk,pkd->pd", barycentric, self.mesh.vertices[self.mesh.faces[faces]])
-        lost = np.flatnonzero(np.asarray(faces) < 0)
-        positions[lost] = self.mesh.vertices[lost]
-        return positions
+        return np.einsum("pk,pkd->pd", barycentric, self.mesh.vertices[self.mesh.faces[self._existing(faces)]])
 
     def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[Ints, Floats]:
         """Locate points of the mesh on the triangulation.
@@ -209,15 +214,8 @@ class IntrinsicTriangulation(Displayed, Frozen):
         >>> faces.shape, float(barycentric.sum().round(9))
         ((1,), 1.0)
         """
-        barycentric = finite_rows(barycentric, "barycentric coordinates", 3)
-        faces = np.asarray(faces, dtype=np.int64)
-        wrong = np.flatnonzero((faces < 0) | (faces >= self.mesh.n_faces))
-        if len(wrong):
-            raise GeometryError(
-                f"point {wrong[0]} is in face {faces[wrong[0]]}, of {self.mesh.n_faces} faces",
-                element=f"point {wrong[0]}",
-            )
-        return self._forward(faces, barycentric, np.zeros((len(faces), 0, 3)))[:2]
+        ids, weights = self._existing(faces), finite_rows(barycentric, "barycentric coordinates", 3)
+        return self._forward(ids, weights, np.zeros((len(ids), 0, 3)))[:2]
 
     def gradient(self, values: Floats, faces: Ints, barycentric: Floats) -> Floats:
         """Compute gradients in space of a function that is linear on these triangles.
@@ -270,10 +268,22 @@ class IntrinsicTriangulation(Displayed, Frozen):
         >>> better.gradient_of_corners(corners, np.array([0]), np.array([[0.2, 0.3, 0.5]])).round(9)[:, :2].tolist()
         [[1.0, 0.0]]
         """
-        sides = np.broadcast_to([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]], (len(faces), 2, 3))
-        places, _, moves = self._forward(faces, barycentric, sides)
+        ids = self._existing(faces)
+        sides = np.broadcast_to([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]], (len(ids), 2, 3))
+        places, _, moves = self._forward(ids, barycentric, sides)
         rises = np.einsum("psk,pk->ps", moves, corners[places])
-        return gradients_along(np.einsum("psk,pkd->psd", sides, self.mesh.vertices[self.mesh.faces[faces]]), rises)
+        return gradients_along(np.einsum("psk,pkd->psd", sides, self.mesh.vertices[self.mesh.faces[ids]]), rises)
+
+    def _existing(self, faces: ArrayLike) -> Ints:
+        """(p,) faces of the mesh; those that do not exist are refused."""
+        ids = whole_numbers(faces, "faces")
+        wrong = np.flatnonzero((ids < 0) | (ids >= self.mesh.n_faces))
+        if len(wrong):
+            raise GeometryError(
+                f"point {wrong[0]} is in face {ids[wrong[0]]}, of {self.mesh.n_faces} faces",
+                element=f"point {wrong[0]}",
+            )
+        return ids
 
     def _forward(self, faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
         """Transfer points of the mesh, and vectors (p, k, 3) at them, to the triangulation."""
@@ -281,7 +291,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         faces, barycentric, vectors = self.history.forward(faces, np.maximum(barycentric, 0.0), vectors)
         return faces, barycentric / barycentric.sum(axis=1, keepdims=True), vectors
 
-    def level_set(self, values: Floats, level: float = 0.0) -> list[Curve]:
+    def level_set(self, values: ArrayLike, level: float = 0.0) -> list[Curve]:
         """Find a level set of a function that is linear on these triangles, as curves on the mesh.
 
         Larger values are to its left; values equal to the level count as larger. On inconsistently oriented meshes
@@ -312,14 +322,10 @@ class IntrinsicTriangulation(Displayed, Frozen):
         >>> strip.positions(line)[:, 0].round(9).min().item()
         4.5
         """
-        if values.shape != (self.n_vertices,):
-            raise SourceError(
-                f"a level set needs one value per vertex: {self.n_vertices}, not an array {values.shape}",
-                element="values",
-            )
+        at_vertices, height = checked_levels(values, level, self.n_vertices)
         if not is_consistent(self.mesh):
-            return level_set(self.mesh, values[: self.mesh.n_vertices], level)
-        lines = level_lines(self.history, self.refinement, values - level)
+            return level_set(self.mesh, at_vertices[: self.mesh.n_vertices], height)
+        lines = level_lines(self.history, self.refinement, at_vertices - height)
         curves = [Curve(faces, np.maximum(weights, 0.0), closed=closed) for faces, weights, closed in lines]
         return without_repeats(self.mesh, curves)
 

@@ -57,6 +57,16 @@ def level_set(mesh: Triangles, values: Floats, level: float) -> list[Curve]:
     return without_repeats(mesh, curves)
 
 
+def checked_levels(values: ArrayLike, level: float, n_vertices: int) -> tuple[Floats, float]:
+    """Return the values (n_vertices,) of a function and one of its levels as floats; refuse any other shape."""
+    at_vertices, height = numbers(values, "values", SourceError), finite_number(level, "level")
+    if at_vertices.shape != (n_vertices,):
+        raise SourceError(
+            f"a level set needs one value per vertex: {n_vertices}, not an array {at_vertices.shape}", element="values"
+        )
+    return at_vertices, height
+
+
 def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
     """Curves whose points differ: those in a row that differ by rounding alone are one, and one alone is no curve.
 
@@ -323,12 +333,7 @@ class Surface(Frozen):
         >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).level_set([0.0, 1.0, 1.0], 0.5)
         [Curve(2 points, open, oriented)]
         """
-        at_vertices, height = numbers(values, "values", SourceError), finite_number(level, "level")
-        if at_vertices.shape != (self.n_vertices,):
-            raise SourceError(
-                f"a level set needs one value per vertex: {self.n_vertices}, not an array {at_vertices.shape}",
-                element="values",
-            )
+        at_vertices, height = checked_levels(values, level, self.n_vertices)
         return level_set(self.triangulation, self.on_triangulation(at_vertices), height)
 
     def region_boundary(self, face_mask: ArrayLike) -> list[Curve]:
@@ -381,8 +386,7 @@ class Surface(Frozen):
 
     def _at_vertices(self, vertices: ArrayLike, name: str) -> tuple[Ints, Floats]:
         ids = self._triangulation_vertices(np.atleast_1d(array_of(vertices, f"vertex ids of a {name}", SourceError)))
-        mesh = self.triangulation
-        corners = corners_at(mesh.faces, ids, mesh.n_vertices, name)
+        corners = corners_at(self.triangulation.faces, ids, self.n_vertices, name)
         return corners // 3, np.eye(3)[corners % 3]
 
     def _triangulation_vertices(self, vertices: Ints) -> Ints:
