@@ -106,8 +106,9 @@ def test_boards_that_stand_on_each_other_have_no_slit():
 def test_some_faces_of_a_part_are_thickened():
     part = box((-1, -1, -1), (1, 1, 1))
     top = part.face_area_vectors[:, 2] > 0
-    for chosen in (top, np.flatnonzero(top)):
-        slab = sh.morphology.thicken(part, 0.2, side="outside", faces=chosen, resolution=32)
+    arrays = part.vertices, part.faces
+    for shape, chosen in ((part, top), (part, np.flatnonzero(top)), (arrays, top)):
+        slab = sh.morphology.thicken(shape, 0.2, side="outside", faces=chosen, resolution=32)
         np.testing.assert_allclose(slab.bounds, [[-1, -1, 1], [1, 1, 1.2]], atol=1e-3)
         assert enclosed_volume(slab) == pytest.approx(0.8, rel=1e-3)
     assert (sh.complete(part) | sh.complete(slab)).volume == pytest.approx(8.8, rel=1e-4)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from shapes.grid_cases import enclosed_volume
 from signedheat import samples
 
@@ -68,6 +69,8 @@ def test_what_is_no_map_is_refused():
     for wrong in (np.eye(3), np.diag([1, 1, 0, 1]), np.diag([1, 1, 1, 2]), np.full((3, 4), np.nan)):
         with pytest.raises(sh.errors.GeometryError):
             sh.transform(ball, wrong)
+    with refused(sh.errors.GeometryError, "points"):
+        sh.transform(sh.PointCloud([[0, 0], [1, 1]]), np.eye(4))
 
 
 @pytest.mark.parametrize("entry", [np.nan, np.inf, 1e60, 1e308, "a", None])

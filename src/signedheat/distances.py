@@ -41,6 +41,9 @@ from .tets.tet_mesh import TetMesh
 from .transforms import joined_shape
 from .validation import positive_number
 
+OF_DEFAULT_GRID = ("resolution", "spacing", "padding")
+"""Options of `signed_distance` that make the default grid, and say nothing where a domain is given."""
+
 
 @overload
 def signed_distance(
@@ -192,7 +195,7 @@ def signed_distance(
     MemoryLimitError
         If the grid does not fit in memory. Raised before anything is allocated.
     UnsupportedTypeError
-        If an option does not apply to this kind of source.
+        If an option does not apply to this kind of source, or to a domain that is given.
 
     Examples
     --------
@@ -222,6 +225,8 @@ def signed_distance(
     measure = _measure(source, domain)
     parameters = inspect.signature(measure).parameters.values()
     accepted = [parameter.name for parameter in parameters if parameter.kind is parameter.KEYWORD_ONLY]
+    if domain is not None:
+        accepted = [name for name in accepted if name not in OF_DEFAULT_GRID]
     for option in options:
         if option not in accepted:
             raise UnsupportedTypeError(

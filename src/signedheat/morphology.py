@@ -27,7 +27,7 @@ from .errors import (
 )
 from .field_arithmetic import smooth_difference, smooth_intersection, smooth_union
 from .field_kinds import Field
-from .foreign import as_list, as_shape
+from .foreign import as_list, as_shape, converted
 from .grids.grid import RESOLUTION, Grid, room_around
 from .grids.grid_field import GridField
 from .grids.polyline import Polyline
@@ -52,7 +52,7 @@ from .surfaces.triangle_mesh import TriangleMesh
 from .surfaces.vertex_field import VertexField
 from .tets.tet_mesh import TetMesh
 from .transforms import concatenated
-from .validation import finite_number, positive_number
+from .validation import finite_number, flag, positive_number
 
 __all__ = [
     "closing", "dilate", "erode", "offset", "opening", "shell", "smooth_difference", "smooth_intersection",
@@ -352,7 +352,7 @@ def shell(
         raise SignedHeatError(
             f"a shell needs inner < outer, not {inner:g} and {outer:g}", remedy="swap them, or make them different"
         )
-    if keep_outside and outer != 0:
+    if flag(keep_outside, "keep_outside") and outer != 0:
         raise SignedHeatError("the faces of the shape are at distance 0", remedy="leave out keep_outside")
     hole = None if drain is None else positive_number(drain, "drain")
     grid = _grid(_room(shape, max(abs(inner), abs(outer)), resolution) if domain is None else domain)
@@ -453,6 +453,7 @@ def thicken(
 
 def _chosen(sheet: object, faces: ArrayLike) -> TriangleMesh | PolygonMesh:
     """Return the mesh of some faces."""
+    sheet = converted(sheet)
     if not isinstance(sheet, TriangleMesh | PolygonMesh):
         raise SourceError("faces can be chosen for a single mesh only", element="faces", remedy="pass it alone")
     n = sheet.n_faces if isinstance(sheet, TriangleMesh) else sheet.n_polygons

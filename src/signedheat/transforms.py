@@ -93,11 +93,17 @@ def _(shape: PolygonMesh, linear: Floats, move: Floats) -> PolygonMesh:
 
 @transformed.register
 def _(shape: DigitalSurface, linear: Floats, move: Floats) -> PolygonMesh:
-    return transform(shape.squares, np.column_stack([linear, move]))  # type: ignore[return-value]
+    return transformed(shape.squares, linear, move)  # type: ignore[return-value]
 
 
 @transformed.register
 def _(shape: PointCloud, linear: Floats, move: Floats) -> PointCloud:
+    if shape.points.shape[1] != 3:
+        raise GeometryError(
+            f"a cloud of points with {shape.points.shape[1]} coordinates cannot be transformed by a matrix for 3",
+            remedy="multiply the points by one of your own",
+            element="points",
+        )
     # normals become those of the transformed planes, areas those of pieces of them
     normals, areas = shape.normals, shape.areas
     if normals is not None:
@@ -120,14 +126,12 @@ Body: TypeAlias = tuple[Floats, Ints]
 
 
 def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
-    """Join several meshes to one shape; return a single shape as it is, and of tets their boundary."""
-    shapes = as_shapes(shape)
+    """Join several meshes to one shape; return a single shape as it is. Tets count as their boundary."""
+    shapes = [part.boundary if isinstance(part, TetMesh) else part for part in as_shapes(shape)]
     if not shapes:
         raise SourceError("no shape was given", remedy="pass at least one")
     if len(shapes) == 1:
         whole = shapes[0]
-        if isinstance(whole, TetMesh):
-            return whole.boundary
         if not isinstance(whole, TriangleMesh | PolygonMesh | PointCloud):
             if not isinstance(whole, Curve | SurfacePoints | Polyline):
                 as_shape(cast("SurfaceShape", whole))  # which refuses paths and bare arrays

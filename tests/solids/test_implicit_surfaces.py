@@ -70,6 +70,7 @@ def test_arrays_have_edges_too():
     exact = sh.contour(values, CUBE, gradient=slopes(places).reshape(31, 31, 31, 3))
     assert away_from_corners(exact) < 1e-6
     assert exact.to_trimesh().volume == pytest.approx(true, rel=1e-4)
+    np.testing.assert_array_equal(sh.contour(values, CUBE, gradient=slopes).vertices, exact.vertices)
     sharp, cut = (sh.contour(values, CUBE, sharp=each) for each in (True, False))
     assert_closed_and_manifold(sharp)
     field = sh.GridField(sh.Grid((-1, -1, -1), 2 / 30, (31, 31, 31)), values)

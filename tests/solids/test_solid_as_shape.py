@@ -42,6 +42,24 @@ def test_a_solid_among_several_shapes_is_united_with_them():
     assert both.inside([[0, 0, 0], [2, 0, 0], [1.2, 0, 0]]).tolist() == [True, True, False]
 
 
+def test_tets_among_several_shapes_are_their_boundary():
+    tets = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+    both, same = (sh.complete([part, box((2, 0, 0), (3, 1, 1))]) for part in (tets, tets.boundary))
+    np.testing.assert_array_equal(both.triangles, same.triangles)
+
+
+def test_a_grid_that_is_given_leaves_nothing_to_choose():
+    grid = sh.Grid.around(SOLID.bounds, 8)
+    for source, domain in (
+        (BROKEN, grid),
+        (SOLID, grid),
+        (sh.Polyline([[0, 0], [1, 1]]), sh.Grid((0, 0), 1.0, (3, 3))),
+    ):
+        for option in ("resolution", "spacing", "padding"):
+            with refused(sh.UnsupportedTypeError, element=option):
+                sh.signed_distance(source, domain, **{option: 9})
+
+
 def test_methods_are_the_functions():
     np.testing.assert_array_equal(
         SOLID.offset(0.1, resolution=20).vertices, sh.offset(BROKEN, 0.1, resolution=20).vertices

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias, cast
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -161,9 +161,10 @@ def contour(
     sharp : bool
         Use dual contouring; otherwise marching cubes, which cut edges off.
     gradient : callable, or (nx, ny, nz, 3) float, optional
-        Gradients of the function: (n, 3) at (n, 3) points, or at the nodes. Differences by default.
+        Gradients: of a function at (n, 3) points; of an array at its nodes, or a function that gives those.
+        Differences by default.
     resolution : int
-        Cells along the longest side, in place of `spacing`.
+        Cells along the longest side of the box in which a function is looked at, unless there is a `spacing`.
 
     Returns
     -------
@@ -271,7 +272,8 @@ def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
 def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, level: float) -> tuple[Implicit, Grid]:
     """Make the level set of values f, (nx, ny, nz), at the nodes of a grid that fills the box, from corner to corner.
 
-    `gradient`: slopes at the nodes, (nx, ny, nz, 3); by default differences, unknown at nodes where they change much.
+    `gradient`: slopes at the nodes, (nx, ny, nz, 3), or a function that gives them at (n, 3) places; by default
+    differences, which count as unknown at nodes where they change much.
     Also return the grid to contour on, with one more node on each side: walls just outside the box close the surface.
     """
     values = array_of(f, "f").astype(np.float64)
@@ -288,7 +290,10 @@ def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, 
         known = np.linalg.norm(bends, axis=-1) <= ROUND * np.linalg.norm(slopes, axis=-1)
     else:
         known = np.ones(values.shape, dtype=bool)
-        slopes = cast("Floats", array_of(cast("ArrayLike", gradient), "gradient").astype(np.float64))
+        if callable(gradient):
+            nodes = np.stack(np.indices(values.shape), axis=-1).reshape(-1, 3)
+            gradient = _called(gradient, box[0] + nodes * steps, (3,)).reshape(*values.shape, 3)
+        slopes = array_of(gradient, "gradient").astype(np.float64)
         if slopes.shape != (*values.shape, 3) or not np.isfinite(slopes).all():
             raise GeometryError(f"gradients must be finite, of shape {(*values.shape, 3)}", element="gradient")
     planes = NodePlanes(box[0], steps, values - level, slopes, known)
