@@ -19,9 +19,10 @@ from .errors import ConstraintError
 from .linear import Factor, PardisoFactor, factorize, upper_triangle, whole
 from .linear.conjugate_gradients import conjugate_gradients
 
-_MAX_ROUNDS = 12
-_MAX_INNER = 30
-_MOST_GROWTH = 10.0
+MAX_ROUNDS, MAX_INNER = 12, 30
+"""Largest number of rounds with which exact constraints are imposed, and of conjugate gradients within one."""
+MOST_GROWTH = 10.0
+"""Growth of φ in one round above which rows contradict each other."""
 SOFTEST, STIFFEST = 1e-10, 1e10
 """Strengths of springs, relative to C, below and above which their strength makes no difference beyond rounding."""
 BATCH = 32
@@ -131,12 +132,12 @@ class DirectIntegration(Frozen):
 
         values, multipliers = np.zeros_like(forces), np.zeros_like(levels)
         gap, worst, slow = levels, np.inf, False
-        for _ in range(_MAX_ROUNDS):
+        for _ in range(MAX_ROUNDS):
             displacements = gap
             if slow:  # roughly: what remains is left to the next round
-                displacements = conjugate_gradients(lambda d: rows @ pull(d), gap, tolerance=1e-3, limit=_MAX_INNER)
+                displacements = conjugate_gradients(lambda d: rows @ pull(d), gap, tolerance=1e-3, limit=MAX_INNER)
             step = factor.solve(forces - stiffness @ values - rows.T @ multipliers) + pull(displacements)
-            if worst < np.inf and np.abs(step).max() > _MOST_GROWTH * np.abs(values).max():
+            if worst < np.inf and np.abs(step).max() > MOST_GROWTH * np.abs(values).max():
                 break
             values += step
             multipliers -= spring * (displacements - rows @ step)
@@ -202,10 +203,10 @@ def refuse_contradictions(rows: sparse.csr_matrix, levels: Floats, values: Float
     gap = np.abs(levels - rows @ values)
     worst = int(gap.argmax())
     if np.ptp(levels) > 0 and gap[worst] > allowed:
+        vertex = f"vertex {rows.indices[rows.indptr[worst]]}"
         raise ConstraintError(
-            f"the levels contradict each other near vertex {rows.indices[rows.indptr[worst]]}: "
-            "sources that meet or cross need the same level",
-            element=f"vertex {rows.indices[rows.indptr[worst]]}",
+            f"the levels contradict each other near {vertex}: sources that meet or cross need the same level",
+            element=vertex,
         )
 
 

@@ -140,6 +140,6 @@ class Levels:
 
 
 @singledispatch
-def discretize(domain: Any, **options: Any) -> Discretization:
+def discretize(domain: Any) -> Discretization:
     """Lower a domain to its discretisation; every kind of domain registers a function of its own."""
     raise UnsupportedTypeError(f"{type(domain).__name__} is not a domain", remedy=f"use a Grid, or {TAKEN}")

@@ -43,7 +43,9 @@ Trimesh = TypeVar("Trimesh")
 NAME = "signed_distance"
 """Name of the values of a field in objects of PyVista and in files."""
 _SIDES = {"triangle": 3, "quad": 4}
-_VTK_FACES = {5: "triangle", 7: "polygon", 9: "quad"}
+"""Number of sides of faces, by the type of cell of meshio; other polygons are ``polygon``."""
+_VTK_FACES = (5, 7, 9)
+"""Types of cells of VTK that are faces: triangles, polygons and quadrilaterals; `_VTK_TETRA` is that of tets."""
 _VTK_TETRA = 10
 
 
@@ -454,7 +456,7 @@ def _from_cells(thing: Any) -> Elements:
     types = np.asarray(thing.celltypes)
     offsets = np.asarray(thing.cell_offsets if hasattr(thing, "cell_offsets") else thing.offset, dtype=np.int64)
     corners = np.asarray(thing.cell_connectivity, dtype=np.int64)
-    faces = np.flatnonzero(np.isin(types, list(_VTK_FACES)))
+    faces = np.flatnonzero(np.isin(types, _VTK_FACES))
     if not len(faces) and (types == _VTK_TETRA).any():
         return Elements(np.asarray(thing.points), tets=tets_of_pyvista(thing))
     if not len(faces) and not (types <= 2).all():

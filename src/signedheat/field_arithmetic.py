@@ -243,7 +243,7 @@ def smooth_union(a: Solid, b: Solid, width: float) -> Solid:
     a, b : GridField, TetField or VertexField
         On the same domain.
     width : float
-        Of the transition, in the units of the domain; 0 gives ``a | b``.
+        Of the transition, in the units of the domain; 0 gives the smaller of the two everywhere.
 
     Returns
     -------

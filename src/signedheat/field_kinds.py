@@ -97,6 +97,7 @@ def _(discretization: TetDiscretization, values: Floats, source: TetSource, diag
 
 
 def sampled(source: GridSource) -> SampledSource:
+    """Note into how many samples a source was merged on a grid, and what that lost."""
     return SampledSource(len(source.weights), source.samples.outside, source.samples.cancelled)
 
 
@@ -137,8 +138,9 @@ def small_loops(source: SurfaceSource) -> int:
 def spread(points: Floats, values: Floats, used: Bools) -> Floats:
     """(n,) signed distances, continued from point to neighbouring point where they are NaN.
 
-    The shortest way to a point with a value adds to its absolute value; the sign stays. Points that are not used, and
-    those that no way leads to, stay NaN.
+    `used`, (n,), are the points that have a triangle. The length of the shortest way to a point with a value, from
+    neighbour to neighbour, adds to its absolute value; the sign stays. Points that are not used, and those that no way
+    leads to, stay NaN.
     """
     lacking = np.isnan(values) & used
     ids = np.flatnonzero(used)

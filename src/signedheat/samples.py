@@ -147,7 +147,7 @@ def with_duplicate_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> 
 def soup(mesh: TriangleMesh, jitter: float = 0.0, seed: int = 0) -> TriangleMesh:
     """Make a triangle soup: each face gets three vertices of its own, and is moved by about `jitter`."""
     corners = mesh.vertices[mesh.faces]
-    corners = corners + np.random.default_rng(seed).normal(scale=jitter or 0.0, size=(mesh.n_faces, 1, 3))
+    corners = corners + np.random.default_rng(seed).normal(scale=jitter, size=(mesh.n_faces, 1, 3))
     return TriangleMesh(corners.reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3))
 
 

@@ -178,7 +178,7 @@ def _library() -> ctypes.CDLL:
             return ctypes.CDLL(str(path))
         except OSError:
             continue
-    raise ImportError("the library mkl_rt was not system: install the package mkl")
+    raise ImportError("the library mkl_rt was not found: install the package mkl")
 
 
 @cache

@@ -275,11 +275,10 @@ def smoothed_corners(vertices: Floats, corners: Ints, normals: Floats) -> Floats
     return vertices + moved.reshape(n, 3)
 
 
-_STEEPEST = 0.05  # least cosine of the angle between a corrected normal and the square's own
-_WIDEST, _NARROWEST = (
-    1e3,
-    1e-3,
-)  # limits of blurs, in extents of the volume and in voxels: beyond, normals do not change
+STEEPEST = 0.05
+"""Least cosine of the angle between a corrected normal and the square's own."""
+WIDEST, NARROWEST = 1e3, 1e-3
+"""Radius in extents of the volume, and width in voxels, beyond which a blur changes no normal any more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,7 +341,7 @@ def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: 
     if radius == 0:
         return own
     extent = spacing * volume.shape
-    width = np.maximum(0.5 * min(radius, _WIDEST * float(extent.max())) / spacing, _NARROWEST)
+    width = np.maximum(0.5 * min(radius, WIDEST * float(extent.max())) / spacing, NARROWEST)
     padded = np.pad(volume, 1).astype(np.float32)
     reach = [min(int(4 * w + 0.5), n) for w, n in zip(width, padded.shape, strict=True)]  # beyond, there is nothing
     inside = tuple((surfels.voxels + 1).T)
@@ -354,7 +353,7 @@ def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: 
         gradient[:, axis] = (slope[inside].astype(np.float64) + slope[outside]) / spacing[axis]
     length = np.linalg.norm(gradient, axis=1, keepdims=True)
     normals = np.divide(-gradient, length, out=own.copy(), where=length > 0)
-    steep = _STEEPEST - (normals * own).sum(axis=1)
+    steep = STEEPEST - (normals * own).sum(axis=1)
     normals += np.maximum(steep, 0)[:, None] * own
     return normals / np.linalg.norm(normals, axis=1)[:, None]
 

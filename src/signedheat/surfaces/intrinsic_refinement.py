@@ -33,7 +33,7 @@ from ..mesh.gluing import (
 PER_FACE = ("tail", "edge", "forward", "front", "sibling")
 PER_EDGE = ("start", "length", "fixed", "flips")
 TO_GROW = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow", "group", "extent")
-
+"""Arrays of a `Gluing`, per face and per edge, and of an `Agenda`, that become longer as there are more triangles."""
 PATIENCE = 5000
 """New vertices between two progress reports, made in some hundredths of a second."""
 
@@ -130,6 +130,7 @@ DONE, GROW, FULL, PAUSED = 0, 1, 2, 3
 NARROW = np.pi / 3
 """Where segments meet at less than this, or a vertex has a smaller total angle, small angles cannot be avoided."""
 N_BINS = 256
+"""Number of lists of bad faces: two for each power of two of the circumradius."""
 
 
 class Agenda(NamedTuple):
@@ -467,6 +468,7 @@ def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool
 
 
 INSIDE, BLOCKED, LOST = 0, 1, 2
+"""Outcomes of `find_circumcenter`."""
 
 
 @kernel

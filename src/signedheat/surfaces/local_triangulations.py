@@ -53,6 +53,7 @@ NEAREST = 7
 GIVEN = 1.0
 """Weight of an estimated normal, relative to that of each of the six neighbours in the same plane."""
 _CHUNK = 65536
+"""Number of points that propose triangles at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,7 +326,9 @@ def facing(planes: TangentPlanes, normals: Floats, faces: Ints) -> Ints:
 
 
 MAX_SIDES = 64
-TOUCHING = 1e-7  # radians by which the sectors of two triangles at a corner may overlap
+"""Sides of a Voronoi cell, and triangles at a point, for which there is room."""
+TOUCHING = 1e-7
+"""Radians by which the sectors of two triangles at a corner may overlap."""
 
 
 @compiled
@@ -416,6 +419,7 @@ def accept_apart(triangles: Ints, starts: Floats, widths: Floats, n_points: int)
 
 
 MOST_SIDES = 12
+"""Holes with more sides are left open."""
 
 
 def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:

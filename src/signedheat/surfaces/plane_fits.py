@@ -36,8 +36,12 @@ ONE_SIDE = 0.02
 """Root mean square distance from a quadric, in spacings, up to which neighbours are taken for those of one side."""
 ON_QUADRIC = 24
 """Number of neighbours to which a quadric is fitted."""
+STARTS = 5
+"""Number of planes from which the fit to points on a surface starts, since it ends at the nearest of several sheets."""
 _TRIAL_HEIGHTS = (0.5, 0.5, 0.5)
+"""Heights of the planes on which it is tried whether points are noisy."""
 _TRIED = 2000
+"""Number of points on which it is tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +64,8 @@ def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
     tree = scipy.spatial.cKDTree(points)
     noisy = n_neighbors is not None
     size = n_neighbors or min(CLEAN_NEIGHBORS, len(points) - 1)
-    heights, n_starts = (NOISY_HEIGHTS, 1) if noisy else (CLEAN_HEIGHTS, 5)  # several starts: planes through the points
-    axes, centers, reaches, _ = planes_near(points, tree, np.arange(len(points)), size, heights, n_starts)
+    heights = NOISY_HEIGHTS if noisy else CLEAN_HEIGHTS
+    axes, centers, reaches, _ = planes_near(points, tree, np.arange(len(points)), size, heights, on_surface=not noisy)
     places = points - ((points - centers) * axes).sum(axis=1, keepdims=True) * axes if noisy else points
     return PlaneFits(axes, places, reaches, size, noisy)
 
@@ -79,11 +83,14 @@ def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
     if normals is not None:
         reach = float(np.median(tree.query(points[tried], k=CLEAN_NEIGHBORS + 1)[0][:, -1]))
         tree = scipy.spatial.cKDTree(np.column_stack([points, reach * normals]))
-    deviations = planes_near(points, tree, tried, CLEAN_NEIGHBORS, _TRIAL_HEIGHTS)[3]
+    deviations = planes_near(points, tree, tried, CLEAN_NEIGHBORS, _TRIAL_HEIGHTS, on_surface=True)[3]
     if np.median(deviations) < CLEAN_DEVIATION:
         return []
     sizes = [k for k in NOISY_NEIGHBORS if k <= largest]
-    errors = [2 * float(np.median(planes_near(points, tree, tried, k, (np.inf,), 1)[3])) / k**0.5 for k in sizes]
+    errors = []
+    for k in sizes:
+        deviations = planes_near(points, tree, tried, k, (np.inf,), on_surface=False)[3]
+        errors.append(2 * float(np.median(deviations)) / k**0.5)
     return [k for k, error in zip(sizes, errors, strict=True) if error < ANGLE_ERROR] or sizes[-1:]
 
 
@@ -129,16 +136,24 @@ def planes_near(
     chosen: Ints,
     n_neighbors: int,
     heights: tuple[float, ...],
-    n_starts: int = 5,
+    *,
+    on_surface: bool,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Axes, centres, reaches and deviations of planes near chosen points."""
+    """Fit planes near the `chosen` points (c,) to their neighbours in a tree of all of them.
+
+    If points lie `on_surface`, planes pass through them, and the best of several starts counts; of noisy points planes
+    move to where the neighbours are. `heights` are tried one after the other, in reaches: see `robust_planes`.
+
+    Return (c, 3) unit normals, (c, 3) centres of the neighbours, (c,) reaches, the distances to the last neighbour, and
+    (c,) root mean square heights over the planes, in reaches.
+    """
 
     def fit(ids: Ints) -> tuple[Floats, Floats, Floats, Floats]:
         distances, neighbors = tree.query(tree.data[ids], k=n_neighbors + 1)
         neighbors[:, 0] = ids
         axes, centers, deviations = np.zeros((len(ids), 3)), points[ids], np.zeros(len(ids))
         fitted = axes, centers, deviations
-        robust_planes(points, neighbors, distances, np.array(heights), n_starts > 1, n_starts, *fitted)
+        robust_planes(points, neighbors, distances, np.array(heights), on_surface, STARTS if on_surface else 1, *fitted)
         return axes, centers, distances[:, -1], deviations
 
     axes, centers, reaches, deviations = in_chunks(fit, chosen)

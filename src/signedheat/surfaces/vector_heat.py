@@ -54,7 +54,10 @@ class VectorHeat:
         return np.bincount(self.triangles.edges.face_edges.ravel(), thirds).astype(np.float64)
 
     def solve(self, sources: Sequence[csr_array], changes: int = 0) -> list[list[Complexes]]:
-        """X for each X₀, in stages, each up to a positive factor, NaN between the source and the stage's border."""
+        """X for each X₀, in stages, each up to a positive factor, NaN between the source and the stage's border.
+
+        A stage is (n_edges, 1 + `changes`): columns after the first are R X, R² X and so on, as `extrapolated` needs.
+        """
         starts = np.zeros((self.triangles.n_edges, len(sources), 1 + changes), dtype=np.complex128)
         for k, source in enumerate(sources):
             starts[source.indices, k, 0] = scaled(source.data, float(self.mass.min()))[0]
@@ -87,6 +90,7 @@ class VectorHeat:
         return solution
 
     def _solve_columns(self, columns: Complexes) -> Complexes:
+        """(n_edges, k) solutions, whether the matrix is complex or has the parts of each unknown in turn."""
         if self.factor.n == len(columns):
             return self.factor.solve(columns)
         pairs = np.stack([columns.real, columns.imag], axis=1).reshape(2 * len(columns), -1)
