@@ -196,7 +196,7 @@ def test_values_are_one_number_for_each_vertex():
     """As of fields on grids and tets: lists and whole numbers are taken, and anything else is refused."""
     mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
     phi = sh.VertexField(mesh, [0, 1, 2, 3])
-    assert phi([0.5, 0.5, 0.0]) == 1.0
+    assert phi([0.5, 0.5, 0.0]) == pytest.approx(1.0)
     assert (-phi).values.tolist() == [0, -1, -2, -3]
     assert (phi | sh.VertexField(mesh, np.arange(3, -1, -1))).values.tolist() == [0, 1, 1, 0]
     for wrong in (np.zeros(3), np.zeros(5), np.zeros((4, 1)), ["a"] * 4, [1j] * 4):
