@@ -291,7 +291,7 @@ def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, 
     else:
         known = np.ones(values.shape, dtype=bool)
         if callable(gradient):
-            nodes = np.stack(np.indices(values.shape), axis=-1).reshape(-1, 3)
+            nodes = np.indices(values.shape).reshape(3, -1).T
             gradient = _called(gradient, box[0] + nodes * steps, (3,)).reshape(*values.shape, 3)
         slopes = array_of(gradient, "gradient").astype(np.float64)
         if slopes.shape != (*values.shape, 3) or not np.isfinite(slopes).all():
