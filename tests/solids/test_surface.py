@@ -233,6 +233,18 @@ def test_faces_are_kept_where_heat_completes_them():
     assert np.mean([tuple(corners) in there for corners in given]) > 0.1
 
 
+def test_where_faces_do_not_join_the_surface_is_contoured_within_a_cell():
+    solid = complete(samples.without_faces(samples.sphere(3), 0.75), completion="heat")
+    with pytest.warns(InexactWarning):
+        surface = solid.surface(keep_faces=True, spacing=0.1)
+    assert_closed_edges(surface)
+    corners = surface.vertices[surface.faces]
+    volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    assert volume == pytest.approx(solid.volume, rel=1e-3)
+    away = np.abs(solid.distance(surface.vertices))
+    assert away.max() < 0.1 and np.mean(away < 1e-9) > 0.99
+
+
 def assert_closed_edges(surface):
     """As many faces run along each edge one way as the other."""
     tails, heads = surface.faces.ravel(), np.roll(surface.faces, -1, axis=1).ravel()
