@@ -79,7 +79,7 @@ def test_closed_shapes_come_out_clean(name, way):
     found = sh.orientation(turned(mesh, which))
     np.testing.assert_array_equal(found.turned, which)
     assert found.turned_faces == which.sum()
-    assert (found.n_parts, found.closed_parts, found.undecided_parts) == (1, 1, 0)
+    assert (found.n_parts, found.closed_parts, found.undecided_parts, found.nonmanifold_edges) == (1, 1, 0, 0)
     assert np.einsum("ij,ij->", found.shape.vertices[found.shape.faces[:, 0]], found.shape.face_area_vectors) > 0
 
 
