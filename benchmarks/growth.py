@@ -84,7 +84,7 @@ def open_boxes(n: int) -> Callable[[], object]:
 
 
 def holes_in_one_part(n: int) -> Callable[[], object]:
-    """The solid of a ball with n holes, of 200 faces each."""
+    """The solid of a ball of 200 n faces with holes around n places, some of which run together."""
     points = spiral(100 * n)
     faces = hull(points)
     away = cKDTree(points[50::100]).query(points[faces].mean(axis=1))[0]
