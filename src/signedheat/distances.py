@@ -39,10 +39,10 @@ from .surfaces.vertex_field import VertexField
 from .tets.tet_field import TetField
 from .tets.tet_mesh import TetMesh
 from .transforms import joined_shape
-from .validation import positive_number
+from .validation import positive_number, refuse_beside
 
 OF_DEFAULT_GRID = ("resolution", "spacing", "padding")
-"""Options of `signed_distance` that make the default grid, and say nothing where a domain is given."""
+"""Options of `signed_distance` that make the default grid."""
 
 
 @overload
@@ -227,6 +227,7 @@ def signed_distance(
     accepted = [parameter.name for parameter in parameters if parameter.kind is parameter.KEYWORD_ONLY]
     if domain is not None:
         accepted = [name for name in accepted if name not in OF_DEFAULT_GRID]
+        refuse_beside("a domain", **{name: options.pop(name, None) for name in OF_DEFAULT_GRID})
     for option in options:
         if option not in accepted:
             raise UnsupportedTypeError(
@@ -239,7 +240,7 @@ def distance_to_solid(
     solid: Solid,
     domain: Grid | TetMesh | None = None,
     *,
-    resolution: int = 128,
+    resolution: int | None = None,
     spacing: ArrayLike | None = None,
     padding: float | None = None,
     band: float | None = None,

@@ -52,7 +52,7 @@ from .surfaces.triangle_mesh import TriangleMesh
 from .surfaces.vertex_field import VertexField
 from .tets.tet_mesh import TetMesh
 from .transforms import concatenated
-from .validation import finite_number, flag, positive_number
+from .validation import finite_number, flag, positive_number, refuse_beside
 
 __all__ = [
     "closing", "dilate", "erode", "offset", "opening", "shell", "smooth_difference", "smooth_intersection",
@@ -83,7 +83,7 @@ class _Morphology(Protocol):
         distance: float,
         domain: Grid | TetMesh | None = ...,
         *,
-        resolution: int = ...,
+        resolution: int | None = ...,
         measure: Measure = ...,
     ) -> TriangleMesh: ...
     @overload
@@ -93,7 +93,7 @@ class _Morphology(Protocol):
         distance: float,
         domain: Grid | None = ...,
         *,
-        resolution: int = ...,
+        resolution: int | None = ...,
         measure: Measure = ...,
     ) -> list[Polyline]: ...
     @overload
@@ -103,7 +103,7 @@ class _Morphology(Protocol):
         distance: float,
         domain: SurfaceDomain,
         *,
-        resolution: int = ...,
+        resolution: int | None = ...,
         measure: Measure = ...,
     ) -> list[Curve]: ...
 
@@ -118,7 +118,7 @@ def dilate(
     distance: float,
     domain: Domain | None = None,
     *,
-    resolution: int = RESOLUTION,
+    resolution: int | None = None,
     measure: Measure = None,
 ) -> Boundary:
     """Dilate a shape: offset it outward by a distance.
@@ -131,8 +131,8 @@ def dilate(
         The offset, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
         Domain of the distance. By default, a grid around the shape with room for the result.
-    resolution : int
-        Number of nodes along the longest side of that default grid.
+    resolution : int, optional
+        Number of nodes along the longest side of that default grid; 128 by default.
     measure : callable, optional
         Called as ``measure(shape, domain)`` in place of `signed_distance`, for instance to set its options:
         ``partial(signed_distance, keep_overlaps=True)``.
@@ -148,6 +148,8 @@ def dilate(
         If the distance is not a finite nonnegative number.
     SourceError
         If the shape does not fit the domain.
+    UnsupportedTypeError
+        If a resolution is given beside a domain.
     OutsideError
         If the result is empty, or leaves the domain.
 
@@ -167,7 +169,7 @@ def erode(
     distance: float,
     domain: Domain | None = None,
     *,
-    resolution: int = RESOLUTION,
+    resolution: int | None = None,
     measure: Measure = None,
 ) -> Boundary:
     """Erode a shape: offset it inward by a distance. Parameters, result and errors are those of `dilate`.
@@ -188,7 +190,7 @@ def opening(
     distance: float,
     domain: Domain | None = None,
     *,
-    resolution: int = RESOLUTION,
+    resolution: int | None = None,
     measure: Measure = None,
 ) -> Boundary:
     """Erode, then dilate: removes parts thinner than twice the distance, rounds convex corners. See `dilate`.
@@ -209,7 +211,7 @@ def closing(
     distance: float,
     domain: Domain | None = None,
     *,
-    resolution: int = RESOLUTION,
+    resolution: int | None = None,
     measure: Measure = None,
 ) -> Boundary:
     """Dilate, then erode: fills gaps narrower than twice the distance, rounds concave corners. See `dilate`.
@@ -298,7 +300,7 @@ def shell(
     outer: float,
     domain: Grid | None = None,
     *,
-    resolution: int = RESOLUTION,
+    resolution: int | None = None,
     measure: Measure = None,
     keep_outside: bool = False,
     drain: float | None = None,
@@ -316,8 +318,8 @@ def shell(
         Signed distances of the two sides of the wall, inner < outer.
     domain : Grid, optional
         By default a grid around the shape with room for the result.
-    resolution : int
-        Number of nodes along the longest side of that default grid.
+    resolution : int, optional
+        Number of nodes along the longest side of that default grid; 128 by default.
     measure : callable, optional
         As in `dilate`.
     keep_outside : bool
@@ -338,7 +340,7 @@ def shell(
     GeometryError
         If faces are to be kept but do not join with their completion.
     UnsupportedTypeError
-        If the domain is not a grid.
+        If the domain is not a grid, or a resolution is given beside it.
 
     Examples
     --------
@@ -355,7 +357,7 @@ def shell(
     if flag(keep_outside, "keep_outside") and outer != 0:
         raise SignedHeatError("the faces of the shape are at distance 0", remedy="leave out keep_outside")
     hole = None if drain is None else positive_number(drain, "drain")
-    grid = _grid(_room(shape, max(abs(inner), abs(outer)), resolution) if domain is None else domain)
+    grid = _grid(_given_or_room(domain, shape, max(abs(inner), abs(outer)), resolution))
     _refuse_thin(grid, outer - inner)
     if keep_outside and measure is None:
         solid: object = complete(shape)
@@ -392,7 +394,7 @@ def thicken(
     *,
     side: Literal["outside", "inside", "both"] = "both",
     faces: ArrayLike | None = None,
-    resolution: int = RESOLUTION,
+    resolution: int | None = None,
 ) -> TriangleMesh:
     """Make a solid around an open surface, with upright rims and sharp edges, without completing the surface.
 
@@ -411,8 +413,9 @@ def thicken(
     faces : (k,) int or (m,) bool, optional
         Thicken these faces only. ``complete(part) | complete(thicken(part, 0.2, side="outside", faces=chosen))`` adds
         to a part.
-    resolution : int
-        Number of nodes along the longest side of that default grid. The solid should be at least two cells thick.
+    resolution : int, optional
+        Number of nodes along the longest side of that default grid; 128 by default. The solid should be at least
+        two cells thick.
 
     Returns
     -------
@@ -424,7 +427,7 @@ def thicken(
     SignedHeatError
         If a thickness is negative or not finite, both are zero, or the solid is thinner than a grid cell.
     UnsupportedTypeError
-        If the domain is not a grid.
+        If the domain is not a grid, or a resolution is given beside it.
 
     Examples
     --------
@@ -445,7 +448,7 @@ def thicken(
         raise SignedHeatError("a sheet of thickness 0 has no inside", remedy="give a thickness above 0")
     if faces is not None:
         sheet = _chosen(sheet, faces)
-    grid = _grid(_room(sheet, reach, resolution) if domain is None else domain)
+    grid = _grid(_given_or_room(domain, sheet, reach, resolution))
     _refuse_thin(grid, above + below)
     wall = SheetWall.around(sheet, grid, above, below)
     return contour(wall.depths, [grid.origin, grid.upper], grid.spacing)
@@ -565,12 +568,16 @@ def _sided(domain: Domain, shape: Sources) -> Field:
 
 
 def _offsets(
-    shape: Sources, distance: float, signs: tuple[int, ...], domain: Domain | None, resolution: int, measure: Measure
+    shape: Sources,
+    distance: float,
+    signs: tuple[int, ...],
+    domain: Domain | None,
+    resolution: int | None,
+    measure: Measure,
 ) -> Boundary:
     """Offset successively, outward for a sign of 1 and inward for −1, and compute the distance again each time."""
     distance = finite_number(distance, "the distance", least=0)
-    if domain is None:
-        domain = _room(shape, distance if 1 in signs else 0.0, resolution)
+    domain = _given_or_room(domain, shape, distance if 1 in signs else 0.0, resolution)
     for sign in signs:
         field = (measure or _field)(shape, domain)
         boundary = (field.contour if isinstance(field, VertexField) else field.offset)(sign * distance)
@@ -578,13 +585,17 @@ def _offsets(
     return boundary
 
 
-def _room(shape: Sources, reach: float, resolution: int) -> Grid:
-    """Make a grid around a shape, with room for offsets."""
+def _given_or_room(domain: Domain | None, shape: Sources, reach: float, resolution: int | None) -> Domain:
+    """Return the domain; by default, a grid around a shape, with room for offsets."""
+    if domain is not None:
+        refuse_beside("a domain", resolution=resolution)
+        return domain
     shapes: list[Source | Sequence[CurveOrPoints]] = as_list(shape)
     if any(isinstance(part, Curve) for part in shapes):
         raise SourceError("a Curve lies on a surface", remedy="pass that surface as the domain")
     bounds = bounds_around(shapes)
-    return Grid.around(bounds, resolution, room_around(bounds, reach, ROOM_FOR_OFFSETS))
+    nodes = RESOLUTION if resolution is None else resolution
+    return Grid.around(bounds, nodes, room_around(bounds, reach, ROOM_FOR_OFFSETS))
 
 
 def _grid(domain: object) -> Grid[Literal[3]]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Bools, Floats, Ints, mask_of
-from .errors import GeometryError, SignedHeatError
+from .errors import GeometryError, SignedHeatError, UnsupportedTypeError
 from .memory import within_memory
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -207,6 +207,15 @@ def flag(value: object, name: str) -> bool:
     if not isinstance(value, bool | np.bool_):
         raise SignedHeatError(f"{name} must be True or False, not {value!r:.50}", element=name)
     return bool(value)
+
+
+def refuse_beside(given: str, **options: object) -> None:
+    """Refuse options that are not None, which have no effect beside what is given."""
+    for name, value in options.items():
+        if value is not None:
+            raise UnsupportedTypeError(
+                f"{name} has no effect beside {given}", remedy="leave out one of the two", element=name
+            )
 
 
 def percentages(values: object) -> Floats:

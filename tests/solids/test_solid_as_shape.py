@@ -58,6 +58,16 @@ def test_a_grid_that_is_given_leaves_nothing_to_choose():
         for option in ("resolution", "spacing", "padding"):
             with refused(sh.UnsupportedTypeError, element=option):
                 sh.signed_distance(source, domain, **{option: 9})
+    for option in ("resolution", "spacing", "padding"):
+        with refused(sh.UnsupportedTypeError, element=option):
+            SOLID.field(grid=grid, **{option: 9})
+    for made in (
+        lambda: sh.morphology.dilate(BROKEN, 0.1, grid, resolution=9),
+        lambda: sh.morphology.shell(BROKEN, -0.1, 0.0, grid, resolution=9),
+        lambda: sh.morphology.thicken(BROKEN, 0.1, domain=grid, resolution=9),
+    ):
+        with refused(sh.UnsupportedTypeError, element="resolution"):
+            made()
 
 
 def test_methods_are_the_functions():

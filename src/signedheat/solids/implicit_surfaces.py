@@ -19,7 +19,7 @@ from ..memory import within_memory
 from ..mesh.dual_cells import dual_cells
 from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import array_of, finite_number, flag, positive_steps, whole_number
+from ..validation import array_of, finite_number, flag, positive_steps, refuse_beside, whole_number
 from .contouring import crossings_in, joined_crossings, traced
 
 Function: TypeAlias = Callable[[Floats], ArrayLike]
@@ -140,7 +140,7 @@ def contour(
     *,
     sharp: bool = True,
     gradient: Function | ArrayLike | None = None,
-    resolution: int = RESOLUTION,
+    resolution: int | None = None,
 ) -> TriangleMesh:
     """Extract the closed, manifold surface on which a function, or an array, takes a level.
 
@@ -163,8 +163,9 @@ def contour(
     gradient : callable, or (nx, ny, nz, 3) float, optional
         Gradients: of a function at (n, 3) points; of an array at its nodes, or a function that gives those.
         Differences by default.
-    resolution : int
-        Cells along the longest side of the box in which a function is looked at, unless there is a `spacing`.
+    resolution : int, optional
+        Cells along the longest side of the box in which a function is looked at, unless there is a `spacing`; 128 by
+        default.
 
     Returns
     -------
@@ -179,6 +180,8 @@ def contour(
         If the level is nowhere between the nodes.
     SignedHeatError
         If a function does not return a finite number for each point.
+    UnsupportedTypeError
+        If `spacing` or `resolution` is given with an array.
     GeometryError
         If the box or the array has another shape, or the array holds NaN or infinity.
     MemoryLimitError
@@ -197,14 +200,13 @@ def contour(
         raise GeometryError("bounds must be the lower and the upper corner of a box, (2, 3)", element="bounds")
     height, is_sharp = finite_number(level, "level"), flag(sharp, "sharp")
     if callable(f):
-        cells = whole_number(resolution, "resolution", 1)
+        cells = whole_number(RESOLUTION if resolution is None else resolution, "resolution", 1)
         steps = positive_steps(np.ptp(box, axis=0).max() / cells if spacing is None else spacing, 3)
         counts = np.ceil(np.ptp(box, axis=0) / steps - 1e-9).astype(np.int64) + 2
         grid = Grid(box[0] - 0.5 * steps, steps, counts)
         surface = _of_function(f, gradient, box, grid, height)
     else:
-        if spacing is not None:
-            raise SignedHeatError("an array has its own spacing", element="spacing", remedy="leave it out")
+        refuse_beside("an array, which has its own cells", spacing=spacing, resolution=resolution)
         surface, grid = _of_array(f, gradient, box, height)
     refuse_large_grid(grid, BYTES_PER_NODE)
     parts = []

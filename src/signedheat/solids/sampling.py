@@ -58,7 +58,8 @@ def sample(
     MemoryLimitError
         If the samples do not fit in memory.
     SignedHeatError
-        If n is not positive, the fraction is not from 0 to 1, or a width is negative.
+        If n is not positive, the fraction is not from 0 to 1, a width is negative, or there is none for points near the
+        surface.
 
     Examples
     --------
@@ -73,8 +74,12 @@ def sample(
     refuse_beyond_memory(f"{n} samples", n, lambda k: BYTES_PER_SAMPLE * k, lambda k: f"take {k} at a time")
     if not 0 <= near <= 1:
         raise SignedHeatError(f"near must be a share from 0 to 1, not {near:g}", remedy="choose it from 0 to 1")
+    if near and not len(widths):
+        raise SignedHeatError(
+            "points near the surface need a width of noise", remedy="give widths, or near=0", element="widths"
+        )
     scales = [finite_number(width, "the width of the noise", least=0) for width in widths]
-    n_near = round(near * n) if scales else 0
+    n_near = round(near * n)
     solid = shape.solid if isinstance(shape, GridField) else complete(shape)
     if solid is None or solid.triangles.shape[-1] != 3:
         raise SourceError(
@@ -90,7 +95,7 @@ def sample(
     radius = float(np.linalg.norm(triangles - center, axis=2).max())
     random = np.random.default_rng(seed)
     points = np.empty((n, 3))
-    ends = np.rint(np.linspace(0, n_near, len(scales) + 1)).astype(int) if scales else np.zeros(1, dtype=int)
+    ends = np.rint(np.linspace(0, n_near, len(scales) + 1)).astype(int)
     for start, stop, width in zip(ends[:-1], ends[1:], scales, strict=True):
         places, _ = evenly_on(triangles, stop - start, random)
         points[start:stop] = places + random.normal(scale=width * radius, size=places.shape)

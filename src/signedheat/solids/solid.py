@@ -16,7 +16,7 @@ from ..diagnostics import CompletedArea, Diagnostics, Note
 from ..errors import InexactWarning, SignedHeatError, SourceError, warn_user
 from ..exchange import Displayed
 from ..foreign import Represented
-from ..grids.grid import Grid
+from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_field import GridField
 from ..grids.solid_queries import Closest
 from ..jobs import Progress
@@ -29,7 +29,7 @@ from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
 from ..search.nearest_triangles import weights_in
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import transformed
-from ..validation import finite_number, flag, positive_number, query_points, shaped
+from ..validation import finite_number, flag, positive_number, query_points, refuse_beside, shaped
 from .contouring import announce_lost, sharp_surface
 from .kept_faces import given_surface, unjoined
 from .offsets import Offset, Reach
@@ -267,7 +267,7 @@ class Solid(Displayed, Represented, Frozen):
     @within_memory
     def field(
         self,
-        resolution: int = 128,
+        resolution: int | None = None,
         *,
         spacing: ArrayLike | None = None,
         padding: float | None = None,
@@ -281,8 +281,8 @@ class Solid(Displayed, Represented, Frozen):
 
         Parameters
         ----------
-        resolution : int
-            Nodes along the longest side of a grid around the solid.
+        resolution : int, optional
+            Nodes along the longest side of a grid around the solid; 128 by default.
         spacing : float or (3,) float, optional
             Distance between its nodes, in place of `resolution`.
         padding : float, optional
@@ -313,6 +313,8 @@ class Solid(Displayed, Represented, Frozen):
             If the store holds another field.
         SourceError
             If a store is named without a band, or a scheduler without a store.
+        UnsupportedTypeError
+            If a grid is given, and options for the one around the solid, too.
 
         Examples
         --------
@@ -322,7 +324,11 @@ class Solid(Displayed, Represented, Frozen):
         >>> field.values.shape, field([[0.0, 0.0, 0.9]]).round(2)
         ((32, 32, 32), array([-0.1]))
         """
-        where = Grid.around(self.bounds, resolution, padding, spacing) if grid is None else grid
+        if grid is None:
+            where = Grid.around(self.bounds, RESOLUTION if resolution is None else resolution, padding, spacing)
+        else:
+            refuse_beside("a grid", resolution=resolution, spacing=spacing, padding=padding)
+            where = grid
         if scheduler is not None and store is None:
             raise SourceError("a scheduler computes the tiles of a store", remedy="name a store", element="scheduler")
         if band is not None:
