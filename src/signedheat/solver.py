@@ -8,8 +8,8 @@ from functools import cached_property
 from itertools import groupby
 from typing import Any, Generic, Literal, NamedTuple, TypeVar, overload
 
-from .arrays import Frozen
-from .constraints import Constraint, ZeroSet
+from .arrays import Frozen, Ints
+from .constraints import Constraint, LevelValues, ZeroSet
 from .diagnostics import Diagnostics, Note
 from .discretization import Adaptable, Discretization, SourceTerm, discretize
 from .errors import InexactWarning, UnsupportedTypeError, warn_user
@@ -24,7 +24,7 @@ from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .surfaces.extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
 from .surfaces.intrinsic_discretization import Retriangulated, checked_intrinsic, lowered_by_angles
 from .surfaces.intrinsic_triangulation import triangle_mesh
-from .surfaces.source_segments import given_curves, one_sided
+from .surfaces.source_segments import given_curves, numbers_kept, one_sided
 from .surfaces.surface_curves import CurvesAndPoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .surfaces.vertex_field import VertexField
@@ -43,6 +43,7 @@ class _Prepared(NamedTuple):
     discretization: Discretization
     terms: Sequence[SourceTerm]  # one for each diffusion time
     notes: tuple[Note, ...]
+    constraint: Constraint
 
     @property
     def times(self) -> list[float]:
@@ -190,7 +191,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         with stopwatch("prepare"):
             _ = self.discretization  # made once, and kept
         with stopwatch("sources"):
-            discretization, sources_by_time, notes = self._prepared(sources)
+            discretization, sources_by_time, notes, constraint = self._prepared(sources, constraint)
         with stopwatch("diffuse"):
             vectors = [diffuse(discretization, source) for source in sources_by_time]
         with stopwatch("normalize"):
@@ -202,13 +203,17 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         diagnostics = Diagnostics(timings=dict(stopwatch.seconds), time=source.time, notes=notes)
         return to_field(discretization, values, source, diagnostics)
 
-    def _prepared(self, sources: Sources) -> _Prepared:
+    def _prepared(self, sources: Sources, constraint: Constraint) -> _Prepared:
         """Prepare sources for diffusion; warn of curves with one side only."""
         listed, left_out = given_curves(self.domain, as_list(sources))
-        _warn_of_one_sided_curves(self.domain, listed)
+        kept = numbers_kept(len(listed), left_out)
+        _warn_of_one_sided_curves(self.domain, listed, kept)
+        if left_out is not None and isinstance(constraint, LevelValues):
+            if len(constraint.values) == len(kept) + len(left_out.without_length):
+                constraint = replace(constraint, values=[constraint.values[k] for k in kept])
         discretization, adapted = self.discretization.adapt(listed)
         terms = lowered_for_times(discretization, adapted, self._times(discretization))
-        return _Prepared(discretization, terms, () if left_out is None else (left_out,))
+        return _Prepared(discretization, terms, () if left_out is None else (left_out,), constraint)
 
     @overload
     def distance_many(
@@ -252,8 +257,10 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         report = within(self.progress, 0.4, 1.0)  # before, the domain is discretised
         fields: list[Field] = []
         for begin in range(0, len(sources), _BATCH):
-            batch = map(self._prepared, sources[begin : begin + _BATCH])
-            for (discretization, _), run in groupby(batch, lambda each: (each.discretization, each.times)):
+            batch = (self._prepared(each, constraint) for each in sources[begin : begin + _BATCH])
+            for (discretization, _, imposed), run in groupby(
+                batch, lambda each: (each.discretization, each.times, each.constraint)
+            ):
                 alike = list(run)
                 by_time = list(zip(*(each.terms for each in alike), strict=True))
                 first = by_time[0]
@@ -264,7 +271,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
                         blended(each.terms, [normalize(discretization, vectors) for vectors in of_times])
                         for each, of_times in zip(alike, zip(*diffused, strict=True), strict=True)
                     )
-                    solved = list(integrate_many(discretization, directions, first, constraint))
+                    solved = list(integrate_many(discretization, directions, first, imposed))
                 seconds = {step: total / len(first) for step, total in stopwatch.seconds.items()}
                 for source, values, each in zip(first, solved, alike, strict=True):
                     diagnostics = Diagnostics(timings=seconds, time=source.time, notes=each.notes)
@@ -285,13 +292,13 @@ def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constrain
     return solver._distance(sources, constraint)
 
 
-def _warn_of_one_sided_curves(domain: object, curves: Sequence[Any]) -> None:
+def _warn_of_one_sided_curves(domain: object, curves: Sequence[Any], names: Ints) -> None:
     numbers = one_sided(curves, domain.intrinsic) if isinstance(domain, TriangleMesh) else []
     if numbers:
         warn_user(
-            f"curve {numbers[0]}{' and others have' if len(numbers) > 1 else ' has'} one side only: the surface around "
-            "it has no outside, so that left and right change places somewhere along it. Give it normals, or make it "
-            "unoriented",
+            f"curve {names[numbers[0]]}{' and others have' if len(numbers) > 1 else ' has'} one side only: the surface "
+            "around it has no outside, so that left and right change places somewhere along it. Give it normals, or "
+            "make it unoriented",
             InexactWarning,
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -139,5 +140,12 @@ def test_curves_with_one_side_are_announced():
             measure(strip.path(middle, closed=True), strip)
         measure(cylinder.path(middle, closed=True), cylinder)
         measure(strip.path(middle, closed=True, oriented=False), strip)
+    loop, click = strip.path(middle, closed=True), strip.path([0, 0])
+    for measure in (
+        partial(sh.signed_distance, as_oriented=True),
+        lambda c, mesh: sh.SignedHeatSolver(mesh).distance(c),
+    ):
+        with pytest.warns(InexactWarning, match="curve 1 has one side"):  # its number among those given
+            measure([click, loop], strip)
     with pytest.warns(InexactWarning, match="one side"):  # beyond its ends, which side is which is a guess
         sh.signed_distance(strip.path(middle[:20]), strip)

@@ -76,6 +76,28 @@ def test_points_of_elements_lie_where_they_should():
         sh.signed_distance([(3, []), (40, [0.2, 0.5, 0.9])], BALL)
 
 
+def test_elements_are_curves_whatever_is_done_with_them():
+    ring = [(int(face), place[:2].tolist()) for face, place in zip(RING.faces, RING.barycentric, strict=True)]
+    same, click = curve_of_elements(BALL, ring), sh.Curve([0, 0], [[1, 0, 0], [1, 0, 0]])
+    for given in (ring, [ring], [click, ring]):
+        kept, whole = sh.intrinsic_delaunay(BALL, keep=given), sh.intrinsic_delaunay(BALL, keep=same)
+        np.testing.assert_array_equal(kept.triangles.corner_vertices, whole.triangles.corner_vertices)
+        for as_oriented in (False, True):
+            closed, theirs = (sh.close_curves(BALL, each, as_oriented=as_oriented) for each in (given, same))
+            np.testing.assert_array_equal(closed[0].barycentric, theirs[0].barycentric)
+    for given in (ring, [ring], [[ring, same.reversed()]]):  # those of a group one by one
+        found = sh.curve_orientation(given, BALL)
+        assert found.turned.shape == (len(found.curves),) and all(isinstance(each, sh.Curve) for each in found.curves)
+
+
+def test_levels_are_those_of_the_curves_given():
+    low, click = BALL.level_set(BALL.vertices[:, 2], -0.4)[0], sh.Curve([0, 0], [[1, 0, 0], [1, 0, 0]])
+    solver, levels = sh.SignedHeatSolver(BALL), sh.LevelValues([9.0, 0.0, 0.5])
+    right = solver.distance([RING, low], sh.LevelValues([0.0, 0.5])).values
+    np.testing.assert_array_equal(solver.distance([click, RING, low], levels).values, right)
+    np.testing.assert_allclose(solver.distance_many([[click, RING, low]], levels)[0].values, right, atol=1e-12)
+
+
 def test_positions_of_curves():
     np.testing.assert_allclose(BALL.positions(RING)[:, 2], 0.1, atol=1e-12)
     np.testing.assert_array_equal(BALL.positions(BALL.points_at([4, 9])), BALL.vertices[[4, 9]])

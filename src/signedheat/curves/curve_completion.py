@@ -20,12 +20,13 @@ from ..memory import within_memory
 from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..solver import SignedHeatSolver, distance_unwarned
-from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, SurfacePoints
+from ..surfaces.source_segments import as_curves, given_curves
+from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList, SurfacePoints
 from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField
 from ..validation import flag
-from .curve_distance import distance_to_pieces
+from .curve_distance import distance_to_pieces, numbers_given
 from .resolution import flattened, on_resolving_triangles
 
 ZERO = 1e-7
@@ -38,7 +39,7 @@ WHOLE = 0.5
 @within_memory
 def close_curves(
     domain: SurfaceDomain | ForeignShape,
-    curves: CurvesAndPoints,
+    curves: CurvesAndPoints | ElementList | Sequence[ElementList],
     *,
     diffusion: float = 1.0,
     constraint: Constraint | None = None,
@@ -56,7 +57,8 @@ def close_curves(
     domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
         The surface.
     curves : Curve or a sequence of them
-        Oriented curves, open or closed, noisy, overlapping, crossing.
+        Oriented curves, open or closed, noisy, overlapping, crossing; or lists of (element, coordinates), as for
+        `signed_distance`. Curves without length complete nothing, and are left out if there are others.
     diffusion : float
         τ in ``t = τ h²``: larger values close gaps along rounder lines (Fig. 18). On triangle meshes h is at most half
         the length of the pieces, unless the triangles made along them are larger.
@@ -93,9 +95,10 @@ def close_curves(
     >>> whole
     [Curve(21 points, open, oriented)]
     """
-    listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
+    surface = cast("SurfaceDomain", converted(domain))
+    listed = as_curves(surface, as_list(curves))
     refuse_without_sides(listed)
-    field = conforming_distance(domain, listed, constraint, diffusion, None, as_oriented, every_piece)
+    field = conforming_distance(surface, listed, constraint, diffusion, None, as_oriented, every_piece)
     return zero_set(field, listed)
 
 
@@ -111,14 +114,16 @@ def conforming_distance(
     """Distance on triangles that have the curves along their edges, where such can be made."""
     as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
     own_levels = isinstance(constraint, EachComponent | LevelValues)
+    surface = cast("SurfaceDomain", converted(domain))
+    kept, left_out = given_curves(surface, as_list(curves))
 
     def measured(solver: SignedHeatSolver[SurfaceDomain]) -> VertexField:
         if as_oriented or own_levels:
             return distance_unwarned(solver, curves, constraint)
-        return distance_to_pieces(solver, curves, constraint, every_piece)[0]
+        field = distance_to_pieces(solver, kept, constraint, every_piece, numbers_given(kept, left_out))[0]
+        return field if left_out is None else replace(field, diagnostics=field.diagnostics.noting(left_out))
 
-    solver = SignedHeatSolver(cast("SurfaceDomain", converted(domain)), diffusion, progress)
-    return on_resolving_triangles(measured, solver, curves, always=True)
+    return on_resolving_triangles(measured, SignedHeatSolver(surface, diffusion, progress), kept, always=True)
 
 
 def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> None:
@@ -139,7 +144,8 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
     values = fine.values.copy()
     beyond_the_rim(surface.triangles, values)
     contour = replace(fine, values=values).contour(0.0)
-    given = [each for each in flattened(curves) if isinstance(each, Curve) and each.oriented]
+    kept, _ = given_curves(field.domain, as_list(curves))
+    given = [each for each in flattened(kept) if isinstance(each, Curve) and each.oriented]
     shortest = min(length(field.domain, each) for each in given)
     near = scipy.spatial.cKDTree(np.concatenate([field.domain.positions(each) for each in given]))
     whole = [

@@ -24,7 +24,7 @@ from ..mesh.welding import coincident_faces, joined_rims
 from ..sharpening import sharpen
 from ..solver import SignedHeatSolver, distance_unwarned
 from ..surfaces.polygon_mesh import PolygonMesh
-from ..surfaces.source_segments import given_curves, segments_of
+from ..surfaces.source_segments import as_curves, given_curves, segments_of
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList, SurfacePoints
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField
@@ -346,14 +346,15 @@ def distance_to_curves(
     as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
     share = None if progress is None else (lambda done, step: progress(0.7 * done, step))
     solver = SignedHeatSolver(domain, diffusion, share, intrinsic)
-    listed, left_out = given_curves(solver.domain, as_list(curves))
+    given = as_curves(solver.domain, as_list(curves))
     repaired = RepairedMesh.of(solver.domain)
     if repaired is not None:
-        solver, listed = SignedHeatSolver(repaired.mesh, diffusion, share, intrinsic), repaired.on_it(listed)
+        solver, given = SignedHeatSolver(repaired.mesh, diffusion, share, intrinsic), repaired.on_it(given)
+    listed, left_out = given_curves(solver.domain, given)
 
     def measured(by: SignedHeatSolver[Any]) -> tuple[VertexField[AnySurface], CurvesAndPoints]:
         if as_oriented:
-            return distance_unwarned(by, listed, constraint), listed
+            return distance_unwarned(by, given, constraint), listed
         return distance_to_pieces(by, listed, constraint, every_piece, numbers_given(listed, left_out))
 
     field, taken = on_resolving_triangles(measured, solver, listed) if intrinsic == "auto" else measured(solver)

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from ..arrays import Bools, Floats, Frozen, Ints, ShortRepr
 from ..errors import UnsupportedTypeError
-from ..foreign import ForeignShape, converted
+from ..foreign import ForeignShape, as_list, converted
 from ..kinds import SurfaceDomain
 from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at, joined_end_to_end, without_copies
@@ -22,11 +22,11 @@ from ..mesh.signed_graph import best_signs
 from ..parallel import n_threads
 from ..solver import SignedHeatSolver
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
-from ..surfaces.source_segments import STRAIGHT, nearest_others
+from ..surfaces.source_segments import STRAIGHT, as_curves, nearest_others
 from ..surfaces.surface import Surface
-from ..surfaces.surface_curves import Curve, CurveOrPoints
+from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from ..surfaces.surface_discretization import SurfaceDiscretization
-from .resolution import on_resolving_triangles, surface_of, triangulated_once
+from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
 from .strokes import EXPLAINED, TIE, Inside, Strokes
 
 AS_GIVEN = 0.5
@@ -364,7 +364,9 @@ class CurveOrientation(Frozen, ShortRepr):
         return [curve for curve, agreement in zip(self.curves, self.agreement, strict=True) if agreement >= least]
 
 
-def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape) -> CurveOrientation:
+def curve_orientation(
+    curves: CurvesAndPoints | ElementList | Sequence[ElementList], domain: SurfaceDomain | ForeignShape
+) -> CurveOrientation:
     """Turn the pieces of broken curves so that together they bound something.
 
     Of all sets of vertices of the surface and all directions of the pieces those are taken that have the least energy:
@@ -378,8 +380,8 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | F
 
     Parameters
     ----------
-    curves : sequence of Curve and SurfacePoints
-        The pieces.
+    curves : Curve, SurfacePoints, or a sequence of them
+        The pieces, or lists of (element, coordinates), as for `signed_distance`. Those of a group count one by one.
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
         The surface that they lie on, its faces consistently oriented, or the curves with normals.
 
@@ -406,7 +408,7 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | F
         raise UnsupportedTypeError(
             f"curves are oriented on surfaces, not on a {type(domain).__name__}", element="domain"
         )
-    listed = list(curves)
+    listed = flattened(as_curves(surface, as_list(curves)))
     turned, agreement = np.zeros(len(listed), dtype=bool), np.ones(len(listed))
 
     def seen(solver: SignedHeatSolver[SurfaceDomain]) -> CurvePieces | None:

@@ -31,9 +31,9 @@ from ..validation import finite_rows, flag, frozen, whole_numbers
 from .intrinsic_history import History
 from .intrinsic_refinement import refine_all
 from .intrinsic_transfer import ConformingRefinement, level_lines, transfer_segments
-from .source_segments import segments_of, segments_of_each
+from .source_segments import given_curves, segments_of, segments_of_each
 from .surface import checked_levels, is_consistent, level_set, without_repeats
-from .surface_curves import Curve, CurveOrPoints, CurvesAndPoints
+from .surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from .triangle_mesh import TriangleMesh
 
 if TYPE_CHECKING:
@@ -395,7 +395,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
 @within_memory
 def intrinsic_delaunay(
     mesh: TriangleMesh | ForeignShape,
-    keep: CurvesAndPoints = (),
+    keep: CurvesAndPoints | ElementList | Sequence[ElementList] = (),
     refine: bool = False,
     angle: float = 28.0,
     max_vertices: int | None = None,
@@ -413,7 +413,8 @@ def intrinsic_delaunay(
         The surface.
     keep : Curve, SurfacePoints or a sequence of them
         Curves that are to run along edges, and points that are to be vertices; of the points of curves those are where
-        lines turn, end or meet. Other sources can be used as well.
+        lines turn, end or meet. Or lists of (element, coordinates), as for `signed_distance`. Curves without length are
+        left out if there are others. Other sources can be used as well.
     refine : bool
         Insert vertices until no angle is smaller than `angle`. Smaller ones remain where boundaries or kept curves meet
         at less than 60°, at vertices with a total angle of less than 60°, and at groups of vertices that nearly
@@ -466,7 +467,7 @@ def intrinsic_delaunay(
     with stopwatch("embed curves"):
         base = mesh.intrinsic
         refuse_other_area(mesh, base)
-        listed = list(keep) if isinstance(keep, Sequence) else [keep]
+        listed, _ = given_curves(mesh, list(keep) if isinstance(keep, Sequence) else [keep])
         parts = list(chain.from_iterable(segments_of_each(listed, base, mesh.vertices)))
         parts = without_straight_nodes(base, parts) if parts else []
         refinement = ConformingRefinement.of(base, parts, (mesh.vertices - mesh.bounds[0]) @ UPWARD)

@@ -163,21 +163,33 @@ def curve_of_elements(triangles: Triangles, points: Sequence[tuple[int, Sequence
     return Curve(faces, weights) if len(points) > 1 else SurfacePoints(faces, weights)
 
 
-def given_curves(domain: object, sources: list[Any]) -> tuple[list[Any], WithoutLength | None]:
-    """Make curves of lists of elements, and leave out curves without length if there are other sources.
+def as_curves(domain: object, sources: list[Any]) -> list[Any]:
+    """Make curves of lists of elements.
 
     Sources on an intrinsic triangulation are given on its mesh. Other domains have no curves.
     """
     domain = getattr(domain, "mesh", domain)
     if not isinstance(domain, Surface):
-        return sources, None
-    if is_element_list(sources):
-        sources = [sources]
-    curves = [_converted(domain, source) for source in sources]
+        return sources
+    return [_converted(domain, source) for source in ([sources] if is_element_list(sources) else sources)]
+
+
+def given_curves(domain: object, sources: list[Any]) -> tuple[list[Any], WithoutLength | None]:
+    """Make curves of lists of elements, and leave out curves without length if there are other sources."""
+    curves = as_curves(domain, sources)
+    domain = getattr(domain, "mesh", domain)
+    if not isinstance(domain, Surface):
+        return curves, None
     lengthless = [k for k, source in enumerate(curves) if isinstance(source, Curve) and _is_point(domain, source)]
     if not lengthless or len(lengthless) == len(curves):
         return curves, None
     return [source for k, source in enumerate(curves) if k not in lengthless], WithoutLength(lengthless)
+
+
+def numbers_kept(n: int, left_out: WithoutLength | None) -> Ints:
+    """(n,) numbers of the n sources that were kept among all that were given."""
+    clicks = [] if left_out is None else left_out.without_length
+    return np.setdiff1d(np.arange(n + len(clicks)), clicks)
 
 
 def _converted(domain: Surface, source: object) -> object:
