@@ -195,8 +195,6 @@ class LeftOut(Note):
     covered_faces: int = 0  # faces, or points, that lie inside other bodies, wholly or in part
     covered_area: float = 0.0  # fraction of the area that does
     cut_faces: int = 0  # faces that lie inside in part, and were cut
-    merged_faces: int = 0  # duplicates, and small loose pieces that lie along a body, nearer than they are large
-    doubled_walls: int = 0  # faces given twice, once facing each way; they stay, unless they lie inside a body
     text: ClassVar[str] = (
         "left out: {0.covered_faces} faces, {0.covered_area:.1%} of the area, that lie inside other bodies "
         "({0.cut_faces} of them in part)"

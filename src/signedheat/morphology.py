@@ -614,7 +614,8 @@ def _grid(domain: object) -> Grid[Literal[3]]:
 def _refuse_thin(grid: Grid[Literal[3]], thickness: float) -> None:
     cell = float(grid.spacing.max())
     if thickness < cell:
+        nodes = int(np.ceil(max(grid.shape) * 2 * cell / thickness))
         raise SignedHeatError(
             f"a wall of thickness {thickness:g} is thinner than a cell of {cell:g}",
-            remedy=f"raise the resolution to {int(np.ceil(max(grid.shape) * 2 * cell / thickness))}",
+            remedy=f"raise the resolution to {nodes}, or give a grid with cells of {0.5 * thickness:g}",
         )

@@ -20,13 +20,13 @@ from ..memory import within_memory
 from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..solver import SignedHeatSolver, distance_unwarned
-from ..surfaces.source_segments import as_curves, given_curves
+from ..surfaces.source_segments import as_curves, given_curves, numbers_given
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList, SurfacePoints
 from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField
 from ..validation import flag
-from .curve_distance import distance_to_pieces, numbers_given
+from .curve_distance import distance_to_pieces
 from .resolution import flattened, on_resolving_triangles
 
 ZERO = 1e-7

@@ -11,9 +11,9 @@ from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from ..arrays import Bools, Ints, mask_of
+from ..arrays import Bools, Ints
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
-from ..diagnostics import Note, WithoutLength
+from ..diagnostics import Note
 from ..errors import ConstraintError, InexactWarning, warn_user
 from ..foreign import as_list
 from ..jobs import Progress
@@ -24,7 +24,7 @@ from ..mesh.welding import coincident_faces, joined_rims
 from ..sharpening import sharpen
 from ..solver import SignedHeatSolver, distance_unwarned
 from ..surfaces.polygon_mesh import PolygonMesh
-from ..surfaces.source_segments import as_curves, given_curves, segments_of
+from ..surfaces.source_segments import as_curves, given_curves, numbers_given, segments_of
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList, SurfacePoints
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField
@@ -299,21 +299,6 @@ def reason_for_doubt(
             "surface. Draw more of them"
         )
     return ""
-
-
-def numbers_given(sources: Sequence[Any], left_out: WithoutLength | None) -> Ints:
-    """(n,) numbers that curves have among all that were given, those left out too; curves of a group count one by one.
-
-    Examples
-    --------
-    >>> numbers_given([None, [None, None]], WithoutLength([0, 2])).tolist()
-    [1, 3, 4]
-    """
-    clicks = [] if left_out is None else left_out.without_length
-    is_kept = ~mask_of(len(sources) + len(clicks), clicks)
-    counts = np.ones(len(is_kept), dtype=np.int64)
-    counts[is_kept] = [len(source) if isinstance(source, Sequence) else 1 for source in sources]
-    return np.flatnonzero(np.repeat(is_kept, counts))
 
 
 def named(numbers: Ints) -> str:

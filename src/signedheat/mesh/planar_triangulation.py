@@ -330,23 +330,25 @@ def _edge(mesh: Planar, u: int, v: int) -> int:
 
 
 @compiled
-def _connect(mesh: Planar, a: int, b: int) -> bool:
-    """Make a segment an edge, or edges through the points that it meets, by flips (Sloan 1993)."""
+def _connect(mesh: Planar, a: int, b: int) -> None:
+    """Make a segment an edge, or edges through the points that it meets, by flips (Sloan 1993).
+
+    It stays as it is where rounding leaves no way.
+    """
     fixed = mesh.fixed
     while a != b:
         t, k, goal = _aim(mesh, a, b)
         if goal < 0:
             if t < 0:
-                return False
+                return
             goal = _clear(mesh, t, k, a, b)
             if goal < 0:
-                return False
+                return
         for tail, head in ((a, goal), (goal, a)):
             edge = _edge(mesh, tail, head)
             if edge >= 0:
                 fixed[edge // 3, edge % 3] = True
         a = goal
-    return True
 
 
 @compiled

@@ -149,7 +149,8 @@ def complete(
     ----------
     shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh; or several meshes
         A shape, broken or not; points may lack normals. Like every function that takes shapes, this takes objects of
-        trimesh, PyVista, meshio and Open3D and pairs (vertices, faces). A `Solid` is returned unchanged.
+        trimesh, PyVista, meshio and Open3D and pairs (vertices, faces). A `Solid` is returned unchanged,
+        whatever the options.
     completion : {"lids", "heat"}
         Close meshes by lids, or by the zero set of φ where no face is, as in the paper (Feng & Crane 2024).
     lids : {"bent", "flat"}

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import scipy
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, mask_of
 from ..diagnostics import WithoutLength
 from ..errors import SourceError
 from ..geodesics.shortest_paths import join
@@ -190,6 +190,20 @@ def numbers_kept(n: int, left_out: WithoutLength | None) -> Ints:
     """(n,) numbers of the n sources that were kept among all that were given."""
     clicks = [] if left_out is None else left_out.without_length
     return np.setdiff1d(np.arange(n + len(clicks)), clicks)
+
+
+def numbers_given(sources: Sequence[Any], left_out: WithoutLength | None) -> Ints:
+    """(n,) the same for n curves, of which those of a group count one by one.
+
+    Examples
+    --------
+    >>> numbers_given([None, [None, None]], WithoutLength([0, 2])).tolist()
+    [1, 3, 4]
+    """
+    kept = numbers_kept(len(sources), left_out)
+    counts = np.ones(kept.max(initial=-1) + 1, dtype=np.int64)
+    counts[kept] = [len(source) if isinstance(source, Sequence) else 1 for source in sources]
+    return np.flatnonzero(np.repeat(mask_of(len(counts), kept), counts))
 
 
 def _converted(domain: Surface, source: object) -> object:
