@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import signedheat as sh
 from shapes.bodies import finer
@@ -275,6 +276,16 @@ def test_boxes_that_overlap_by_any_depth_are_one(shift):
     points = np.random.default_rng(0).uniform(-0.5, 2.5, (2000, 3))
     whole = sh.complete(box((2.0 - shift, 1.0, 1.0), n=1))
     np.testing.assert_allclose(solid.distance(points), whole.distance(points), atol=2e-5)
+
+
+@pytest.mark.parametrize("far", [0.0, 1000.0])
+def test_an_open_box_is_a_body_whether_or_not_its_rim_joins_a_wall_that_it_goes_through(far):
+    vertices, faces = joined(
+        box((0.4, 0.4, 0.5), (-0.3, 0.1, 0.5)), box((0.5, 0.4, 0.7), (-0.2, 0.3, 0.3), without=(5,))
+    )
+    shift, turn = [far] * 3, Rotation.from_euler("zyx", [0.3, 0.5, 0.7]).as_matrix()
+    for places in (vertices + shift, vertices @ turn.T + shift):
+        assert sh.complete((places, faces)).volume == pytest.approx(0.08 + 0.14 - 0.03, rel=1e-6)
 
 
 def test_balls_that_overlap_are_cut_where_they_meet():

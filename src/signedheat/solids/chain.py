@@ -22,7 +22,10 @@ from ..mesh.edges import EdgeTable, FaceOrientation, edge_table, orient_faces, p
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import axes_across, unit
 from ..mesh.welding import coincident_faces, welded_vertices
+from ..search.winding_tree import WindingTree
 from ..surfaces.triangle_mesh import TriangleMesh
+from .overlaps import APART
+from .winding import INSIDE
 
 SAME_ANGLE = 1e-6
 """Faces around an edge coincide, to rounding, if the angle between them is at most this, in radians."""
@@ -34,10 +37,10 @@ all six walls of a cell face inwards once in 64 times."""
 def inner_walls(chain: Chain) -> Bools:
     """(m,) whether a closed cell lies on both sides of each face, where some edges have three or more faces.
 
-    A complex is what is connected by edges; a cell that lacks a wall is part of the outside. In two cases faces with a
-    cell on both sides are not inner: if along each edge of the complex as many faces run one way as the other, since it
-    is then the boundary of a solid as it is; and if the outside of the complex faces outwards and the walls of one of
-    the two cells face into it, since that cell is then a cavity.
+    A complex is what is connected by edges; a cell that lacks a wall is part of the outside. In three cases faces with
+    a cell on both sides are not inner: if along each edge of the complex as many faces run one way as the other, since
+    it is then the boundary of a solid as it is; if the outside of the complex faces outwards and the walls of one of
+    the two cells face into it, since that cell is then a cavity; and if they go on through the walls of the cells.
     """
     n, table = len(chain.faces), chain.edges
     if not (table.face_counts > 2).any():
@@ -74,7 +77,24 @@ def inner_walls(chain: Chain) -> Bools:
     volumes = np.where(front != back, volumes, 0.0)  # surface that is open has one shell around it
     inside = np.bincount(shells.ravel(), np.stack([-volumes, volumes], axis=1).ravel()) > 0
     cavities = _cavities(shells, inside, np.where(chosen, chain.areas, 0.0))
-    return chosen & inside[front] & inside[back] & (cavities[front] == cavities[back])
+    inner = chosen & inside[front] & inside[back] & (cavities[front] == cavities[back])
+    return inner & ~_reaching_out(chain, inner, chosen & (inside[front] != inside[back]), inside[front])
+
+
+def _reaching_out(chain: Chain, inner: Bools, outer: Bools, turned: Bools) -> Bools:
+    """(m,) whether the inner faces that each is connected with lie outside the cells, by more than `APART`.
+
+    `outer`, (m,), are the faces around all cells; those that are `turned` face into them.
+    """
+    result, rows = np.zeros(len(inner), dtype=bool), np.flatnonzero(inner)
+    if not len(rows):
+        return result
+    around = np.where((turned & outer)[:, None, None], chain.triangles[:, ::-1], chain.triangles)[outer]
+    outside = WindingTree.of(around).numbers(chain.triangles[rows].mean(axis=1)) < INSIDE
+    parts = element_components(chain.edges.face_edges[rows])
+    beyond, total = (np.bincount(parts, chain.areas[rows] * share) for share in (outside, 1.0))
+    result[rows] = (beyond > APART * total)[parts]
+    return result
 
 
 def _angles(positions: Floats, tails: Ints, heads: Ints, forward: Bools, normals: Floats) -> Floats:
