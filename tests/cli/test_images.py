@@ -34,6 +34,23 @@ def test_info_lists_labels_and_tells_where_the_image_is(mask, capsys):
     assert np.allclose(np.reshape(told["axes"], (3, 3)).T, TURN) and told["origin"] == ORIGIN.tolist()
 
 
+@pytest.mark.parametrize("ending", [".nrrd", ".npy"])
+def test_labels_along_the_axes_are_labels_too(ending, tmp_path, capsys):
+    path = tmp_path / f"labels{ending}"
+    labels = np.pad(np.full((4, 4, 4), 2, dtype=np.uint8), 2)
+    labels[3, 3, 3] = 3
+    if ending == ".npy":
+        np.save(path, labels)
+    else:
+        write_nrrd(path, labels, np.eye(3), np.zeros(3), None)
+    assert main(["info", str(path), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["kind"] == "image of labels" and told["labels"] == [0, 2, 3] and told["voxels"] == [448, 63, 1]
+    assert main(["view", str(path), "-o", str(tmp_path / "labels.png")]) == 0
+    assert main(["contour", str(path), "1", "-o", str(tmp_path / "labels.stl")]) == 0
+    assert sh.read(tmp_path / "labels.stl").bounds == pytest.approx(np.array([[1.5] * 3, [5.5] * 3]), abs=0.5)
+
+
 def test_fields_of_images_are_contoured_in_the_world(mask, tmp_path, capsys):
     field = str(tmp_path / "distance.nrrd")
     assert main(["volume", str(mask), "--label", "3", "-o", field]) == 0

@@ -288,24 +288,23 @@ def on_tets(arguments: Namespace) -> tuple[Any, TetField]:
 
 
 def field_or_image(path: str) -> Any:
-    """Return the field in a file; the image in it, if its axes are not x, y, z; None if the file holds neither."""
-    if extension(path) in NIFTI:
-        return read_labels(path)
-    if extension(path) == ".npz" and holds_solid(path):
+    """Return the field in a file; the image in it, of labels or with turned axes; None if the file holds neither."""
+    ending = extension(path)
+    alone = ending == ".npy" and not Path(path).with_suffix(".json").is_file()
+    if ending in NIFTI or alone:
+        image = read_labels(path)
+        labels = labels_of(image) if alone else None
+        return None if labels and set(labels) <= {0, 1} else image  # a set of voxels is a shape
+    if ending not in FIELD_FORMATS or (ending == ".npz" and holds_solid(path)):
         return None
-    if extension(path) not in FIELD_FORMATS or (
-        extension(path) == ".npy" and not Path(path).with_suffix(".json").is_file()
-    ):
-        return None  # an array alone holds voxels
-    try:
+    if ending not in IMAGES:
         return load_field(path)
-    except FileFormatError as error:
-        if extension(path) == ".nrrd":
-            try:
-                return read_labels(path)
-            except FileFormatError:
-                raise error from None
-        raise
+    try:
+        image = read_labels(path)
+    except FileFormatError:  # a field in the plane, or none
+        return load_field(path)
+    along = np.array_equal(image.axes, np.diag(image.spacing))
+    return load_field(path) if along and image.labels.dtype.kind == "f" else image
 
 
 def image_of(arguments: Namespace) -> LabelImage | None:

@@ -367,7 +367,7 @@ def sample(arguments: Namespace) -> Summary:
     "contour",
     "surface of equal distance in a field",
     "The closed surface, the curves on a surface or the lines in the plane, on which a field takes a level.",
-    option("field", metavar="FIELD", help=".npz .vti .nrrd .npy"),
+    option("field", metavar="FIELD", help=".npz .vti .nrrd .npy .nii .nii.gz .ply .vtp .vtu .vtk .msh"),
     option("level", metavar="LEVEL", type=finite, help="in the units of the field"),
     output(f"{SURFACES}; of a field on a surface, curves: .obj .json; in the plane, lines: .svg .csv"),
     format_option("stl"),
