@@ -121,6 +121,17 @@ def test_small_arrays(values, distances):
     np.testing.assert_allclose(sh.redistance(values), distances, atol=1e-15)
 
 
+@pytest.mark.parametrize("dimension", [1, 2, 3, 4])
+def test_a_zero_among_positive_values_is_a_point_of_the_zero_set(dimension):
+    values = np.ones((9,) * dimension)
+    values[(2,) * dimension] = 0
+    exact = np.sqrt(((nodes(9, dimension) + 2.0) ** 2).sum(axis=0))  # from the middle of the array
+    np.testing.assert_allclose(sh.redistance(values), exact, atol=1e-12)
+    values[(7,) * dimension] = -1  # far away
+    near = exact < 3
+    np.testing.assert_allclose(sh.redistance(values)[near], exact[near], atol=1e-12)
+
+
 def test_a_periodic_axis_has_no_end():
     exact = ball(nodes(20, 2), 4.3)
     for shift in (0, 7, 11):

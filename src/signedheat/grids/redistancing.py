@@ -188,7 +188,7 @@ class Contour(NamedTuple):
     vertices: Floats
     faces: Ints
     numbers: Ints  # (v,) the crossing at each vertex; −1 at vertices on no edge of the array
-    zeros: Floats  # (k, 3) nodes that are zero, without a negative neighbour
+    zeros: Floats  # (k, 4) nodes that are zero, without a negative neighbour
     curved: Floats  # (c, 18) crossings, normals and shape operators of the cubic interpolant: see `crossings_at`
     # (c, 4) the crossings: where smooth on the zero set of the cubic interpolant, else of values linear along edges
     points: Floats
@@ -208,11 +208,13 @@ def zero_contour(values: Floats, steps: Floats) -> Contour:
     unused = 4 - values.ndim
     field = np.ascontiguousarray(values).reshape(padded_shape(values.shape))
     reach = float(np.linalg.norm(steps[unused:]))
+    around = scipy.ndimage.generate_binary_structure(4, 1)
+    zeros = np.argwhere((field == 0) & ~scipy.ndimage.binary_dilation(field < 0, around)) * steps
     if values.ndim == 4:
         curved = crossings_at(field, crossed_edges(field), steps)
         smooth, none = np.ones(len(curved), dtype=np.bool_), np.empty((0, 3))
         ids = none.astype(np.int64)
-        return Contour(none, ids, ids[:, 0], none, curved, curved[:, :4].copy(), smooth, 0.0, reach)
+        return Contour(none, ids, ids[:, 0], zeros, curved, curved[:, :4].copy(), smooth, 0.0, reach)
     vertices, faces, edges, first, numbers = _marched(values)
     vertices *= steps[1:]
     curved = crossings_at(field, edges, steps)
@@ -224,19 +226,16 @@ def zero_contour(values: Floats, steps: Floats) -> Contour:
     least = UNEVEN * float(steps[unused:].min())
     smooth = uneven <= least
     points = np.where(smooth[:, None], curved[:, :4], linear)
-    around = scipy.ndimage.generate_binary_structure(values.ndim, 1)
-    lone = np.argwhere((values == 0) & ~scipy.ndimage.binary_dilation(values < 0, around))
-    zeros = np.pad(lone, ((0, 0), (3 - values.ndim, 0))) * steps[1:]
     return Contour(vertices, faces, numbers, zeros, curved, points, smooth, least, reach)
 
 
 def distances_to(contour: Contour, places: Floats) -> Floats:
     """Return (n,) unsigned distances of (n, 4) places to the zero set."""
+    distances = np.full(len(places), np.inf)
     if not len(contour.vertices) and len(contour.points):  # four axes
         nearest = scipy.spatial.cKDTree(contour.points).query(places, workers=-1)[1]
-        return _around_crossings(contour, nearest, places)
-    distances = np.full(len(places), np.inf)
-    if len(contour.faces):
+        distances = _around_crossings(contour, nearest, places)
+    elif len(contour.faces):
         features = FaceFeatures.of(contour.vertices, contour.faces)
         tree, corners = FaceTree.of(features), contour.numbers[contour.faces[features.ids]]
 
@@ -246,7 +245,7 @@ def distances_to(contour: Contour, places: Floats) -> Floats:
 
         distances = in_chunks(measured, places)[0]
     if len(contour.zeros):
-        to_zeros = scipy.spatial.cKDTree(contour.zeros).query(places[:, 1:], workers=-1)[0]
+        to_zeros = scipy.spatial.cKDTree(contour.zeros).query(places, workers=-1)[0]
         distances = np.minimum(distances, to_zeros)
     return distances
 
