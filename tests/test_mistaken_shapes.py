@@ -35,6 +35,13 @@ def test_arrays_that_are_no_shape_say_what_is_wrong(name, call):
         assert "int" in str(caught.value)
 
 
+@pytest.mark.parametrize("lines", [1, 2])
+def test_lines_in_the_plane_are_no_solid(lines):
+    with refused(sh.SourceError) as caught:
+        sh.complete([sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True)] * lines)
+    assert "lines in the plane" in str(caught.value)
+
+
 @pytest.mark.parametrize("source", [BALL, sh.complete(BALL), (V, F)], ids=["mesh", "solid", "pair"])
 def test_grids_of_another_dimension(source):
     with refused(sh.SourceError, element="source 0") as caught:

@@ -137,7 +137,8 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
                 as_shape(cast("SurfaceShape", whole))  # which refuses paths and bare arrays
             raise SourceError(
                 f"distance in space is measured to meshes and points, not to a {type(whole).__name__}",
-                remedy="pass a mesh, or a point cloud; curves are measured on their surface",
+                remedy="pass a mesh, or a point cloud; curves are measured on their surface, and lines in the plane to "
+                "grids in it, by signed_distance",
                 element="source 0",
             )
         return whole
@@ -146,7 +147,9 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
     for index, part in enumerate(shapes):
         if not isinstance(part, TriangleMesh | PolygonMesh):
             raise SourceError(
-                f"only meshes can be joined, and shape {index} is a {type(part).__name__}", element=f"shape {index}"
+                f"only meshes can be joined, and shape {index} is a {type(part).__name__}",
+                remedy="join faces and points in one cloud; distance to lines in the plane is signed_distance's",
+                element=f"shape {index}",
             )
         meshes.append(part)
     return TriangleMesh(*joined_triangles(meshes))

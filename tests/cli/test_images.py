@@ -63,6 +63,13 @@ def test_fields_of_images_are_contoured_in_the_world(mask, tmp_path, capsys):
     assert surface.to_trimesh().volume > 0  # outside is outside, though the axes are mirrored
 
 
+def test_masks_are_contoured(tmp_path, capsys):
+    """Halfway between the nodes of voxels inside and outside."""
+    np.save(tmp_path / "mask.npy", np.pad(np.ones((4, 4, 4), bool), 2))
+    assert main(["contour", str(tmp_path / "mask.npy"), "0.5", "-o", str(tmp_path / "out.ply")]) == 0
+    np.testing.assert_allclose(sh.read(tmp_path / "out.ply").bounds, [[1.5] * 3, [5.5] * 3])
+
+
 def test_masks_and_fields_of_images_are_looked_at(mask, tmp_path):
     for name in ("mask.png", "mask.pdf"):
         assert main(["view", str(mask), "-o", str(tmp_path / name)]) == 0

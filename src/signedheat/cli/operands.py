@@ -73,14 +73,16 @@ def prefix_errors(path: Any) -> Iterator[None]:
         raise error.at(path) from error
 
 
-def read_source(arguments: Namespace, path: str | None = None) -> Any:
-    """Read the source, of another file or that of the command: a placed shape in space, or polylines in the plane."""
-    path = arguments.shape if path is None else path
-    if is_planar(path):
-        if arguments.transform is not None:
-            raise SourceError("a matrix moves shapes in space, not drawings", element="--transform", path=path)
-        scale = 1.0 if arguments.units is None else unit_scale(arguments, path)
-        return [Polyline(scale * line.points, line.closed) for line in read_polylines(path)]
+def read_lines(arguments: Namespace) -> list[Polyline]:
+    """Read the polylines in the plane that a command measures distance to."""
+    if arguments.transform is not None:
+        raise SourceError("a matrix moves shapes in space, not drawings", element="--transform", path=arguments.shape)
+    scale = 1.0 if arguments.units is None else unit_scale(arguments, arguments.shape)
+    return [Polyline(scale * line.points, line.closed) for line in read_polylines(arguments.shape)]
+
+
+def read_shape(arguments: Namespace, path: str) -> Any:
+    """Read a shape in space, and place it."""
     shape = read(path)
     if isinstance(shape, DigitalSurface):
         shape = shape.smooth_surface
@@ -116,7 +118,7 @@ def solid_of(arguments: Namespace, path: str) -> Any:
     """Complete the shape in a file as the options say, and print important notes on standard error."""
     repair = {name: getattr(arguments, name) for name in ("as_oriented", "keep_overlaps", "lids", "nested")}
     with prefix_errors(path), ProgressBar(is_quiet(arguments)) as progress:
-        solid = complete(read_source(arguments, path), **repair, progress=progress)
+        solid = complete(read_shape(arguments, path), **repair, progress=progress)
     say_important(arguments, solid.diagnostics, path)
     return solid
 
@@ -202,7 +204,10 @@ def measured(
 ) -> tuple[Any, GridField]:
     """Return the shape of a command, from a file or an image, and the distance to it, with room for offsets."""
     with prefix_errors(arguments.shape):
-        shape = read_source(arguments) if image is None else image.surface(arguments.label)
+        if image is not None:
+            shape = image.surface(arguments.label)
+        else:
+            shape = read_lines(arguments) if is_planar(arguments.shape) else read_shape(arguments, arguments.shape)
         return shape, compute(shape, grid_for(shape, arguments, reach, image), arguments)
 
 
@@ -267,7 +272,7 @@ def range_in_words(summary: dict[str, Any], unit: str | None) -> str:
 
 def on_tets(arguments: Namespace) -> tuple[Any, TetField]:
     """Return the shape of a command, and the distance to it on tets from a file or around the shape."""
-    shape, mesh = read_source(arguments), read(arguments.tets) if arguments.tets else None
+    shape, mesh = read_shape(arguments, arguments.shape), read(arguments.tets) if arguments.tets else None
     if mesh is not None and not isinstance(mesh, TetMesh):
         raise GeometryError(
             f"{arguments.tets} holds no tets, but a {type(mesh).__name__}",

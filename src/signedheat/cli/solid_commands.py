@@ -6,6 +6,7 @@ import operator
 from argparse import Namespace
 from collections.abc import Callable
 from functools import partial, reduce
+from pathlib import Path
 from typing import Any
 
 import signedheat as sh
@@ -227,7 +228,7 @@ def check_morph(arguments: Namespace) -> None:
 def morph(arguments: Namespace) -> Summary:
     """Read, check that the result can be written, compute, write."""
     shapes.ensure_surface_writable(arguments.output)
-    shape = shapes.read_source(arguments)
+    shape = shapes.read_shape(arguments, arguments.shape)
     fields: list[sh.GridField] = []
 
     def measure(part: Any, grid: sh.Grid) -> sh.GridField:
@@ -352,8 +353,9 @@ union, intersect, subtract = map(combining, COMBINED)
 def sample(arguments: Namespace) -> Summary:
     """Check that the result can be written, read, compute, sample, write."""
     sh.io.ensure_writable(arguments.output, sh.io.SAMPLE_FORMATS, "samples")
-    _, field = shapes.measured(arguments)
+    shape = shapes.read_shape(arguments, arguments.shape)
     with shapes.prefix_errors(arguments.shape):
+        field = shapes.compute(shape, shapes.grid_for(shape, arguments), arguments)
         samples = sh.sample(field, arguments.samples, near=arguments.near, widths=arguments.widths, seed=arguments.seed)
     (samples.normalized() if arguments.normalize else samples).save(arguments.output, arguments.layout)
     figures = samples.figures
@@ -379,8 +381,8 @@ def contour(arguments: Namespace) -> Summary:
     sh.io.ensure_writable(path, formats, "a surface, curves or lines")
     image: sh.io.LabelImage | None = None
     field = shapes.field_or_image(arguments.field)
-    if field is None:
-        field = sh.load_field(arguments.field)  # on tets, or refused
+    if field is None:  # a set of voxels, or a field on tets, or refused
+        field = (sh.io.read_labels if Path(arguments.field).suffix == ".npy" else sh.load_field)(arguments.field)
     if isinstance(field, sh.io.LabelImage):
         image = field
         field = shapes.field_of(field)

@@ -18,7 +18,20 @@ from ..errors import FileFormatError, MissingPackageError, SignedHeatError, prin
 from ..jobs import run_limited
 from .late_imports import inputs, inspection, reports, samples
 from .late_imports import operands as shapes
-from .options import PLACE, REPAIR, UNITS_OPTION, UP, Option, Summary, command, is_quiet, option, positive, whole_number
+from .options import (
+    PLACE,
+    REPAIR,
+    UNITS_OPTION,
+    UP,
+    Option,
+    Summary,
+    command,
+    is_planar,
+    is_quiet,
+    option,
+    positive,
+    whole_number,
+)
 from .terminal import ProgressBar, say, say_error
 
 PATIENCE = 5.0
@@ -93,8 +106,8 @@ def _without_folders(names: list[str]) -> Iterator[str]:
     "view",
     "show a shape or a field in a window, or as a picture",
     "Opens a window if there is a display and PyVista. Otherwise, or with --output, writes a picture: slices through a "
-    "field, or a shape with yellow outsides and red insides.",
-    option("file", metavar="FILE", help="a shape or a field"),
+    "field, a shape with yellow outsides and red insides, or the lines of a drawing.",
+    option("file", metavar="FILE", help="a shape, a field, or a drawing (.svg .csv)"),
     UP,
     option("-o", "--output", metavar="FILE", help="picture: .png .pdf .svg .jpg (a window, or FILE.png here)"),
 )
@@ -103,7 +116,7 @@ def view(arguments: Namespace) -> Summary:
     output, up = arguments.output, "xyz".index(arguments.up)
     if output is None and has_window():
         with shapes.prefix_errors(arguments.file):
-            shape_or_field(arguments.file).plot()
+            sh.view.windows.plotter_of(shape_or_field(arguments.file)).show()
         return {"input": arguments.file, "output": None}, ""
     if output is None:
         output = str(Path(Path(arguments.file).name).with_suffix(".png"))
@@ -114,6 +127,8 @@ def view(arguments: Namespace) -> Summary:
             sh.view.save_surface(thing, output, up=up)
         elif isinstance(thing, sh.GridField | sh.TetField):
             sh.view.save_slices(thing, output)
+        elif isinstance(thing, list):
+            sh.view.save_row(output, (Path(arguments.file).name, thing))
         else:
             sh.view.save_scene(thing, output, up)
     return {"input": arguments.file, "output": output}, output
@@ -147,6 +162,8 @@ def display_answers() -> bool:
 
 def shape_or_field(path: str) -> Any:
     """Read the shape or field in a file."""
+    if is_planar(path):
+        return sh.io.read_polylines(path)
     field = shapes.field_or_image(path)
     if isinstance(field, sh.io.LabelImage):
         with shapes.prefix_errors(path):
@@ -216,7 +233,7 @@ def deviation(arguments: Namespace) -> Summary:
     for output in arguments.output:
         sh.io.ensure_writable(output, sh.view.DEVIATION_FORMATS, "deviations")
     unit = shapes.unit_in_use(arguments, arguments.scan, arguments.nominal)
-    scan, nominal = (shapes.read_source(arguments, path) for path in (arguments.scan, arguments.nominal))
+    scan, nominal = (shapes.read_shape(arguments, path) for path in (arguments.scan, arguments.nominal))
     with shapes.prefix_errors(arguments.nominal), ProgressBar(is_quiet(arguments)) as progress:
         deviations = sh.deviation(scan, nominal, progress)
     low, median, high = deviations.percentiles((1, 50, 99))

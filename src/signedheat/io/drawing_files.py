@@ -51,7 +51,7 @@ def read_svg(path: PathLike) -> list[tuple[Floats, bool]]:
     lines = [line for part in drawing.drawn(root, np.eye(3)) for line in part]
     if not lines:
         raise FileFormatError("the drawing contains no lines", remedy="convert text and images to paths first")
-    return [(points * (1.0, -1.0), closed) for points, closed in lines]
+    return [(points * (1.0, -1.0) + 0.0, closed) for points, closed in lines]  # −0 is 0
 
 
 @dataclass

@@ -18,6 +18,7 @@ from ..solids.solid import Solid
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
+from .drawing_files import POLYLINE_FORMATS
 from .field_files import CONVENTION, load_field
 from .files import PathLike, ensure_writable, extension, format_for, reading, replacing
 from .mesh_files import read_obj, read_off, read_stl, write_obj, write_off, write_pc, write_stl
@@ -119,6 +120,13 @@ def read(path: PathLike) -> Shape | Solid:
     ...     sh.read(f"{folder}/one.ply")
     TriangleMesh(3 vertices, 1 faces)
     """
+    if extension(path) in POLYLINE_FORMATS:
+        raise FileFormatError(
+            "a drawing is no shape in space",
+            remedy="measure distance to its lines by `volume` or `offset`, in Python by `read_polylines` and "
+            "`signed_distance`",
+            path=path,
+        )
     read_shape = format_for(path, READERS, "a shape")
     with reading(path):
         found = read_shape(path)

@@ -86,8 +86,10 @@ def html_of(thing: object) -> str:
 
 @singledispatch
 def draw(thing: Any, axes: Any, **options: Any) -> bool:
-    """Draw something into axes, with the options of `save_row`; return whether there was anything to draw."""
+    """Draw something, or each of a list, into axes, with the options of `save_row`; return whether it can be drawn."""
     shape = converted(thing)
+    if isinstance(shape, list):
+        return all([draw(part, axes, **options) for part in shape])
     return shape is not thing and draw(shape, axes, **options)
 
 

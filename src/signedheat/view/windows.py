@@ -51,6 +51,12 @@ def _(line: Polyline, plotter: Any) -> None:
     plotter.view_xy()
 
 
+@add.register(list)
+def _(lines: list[Polyline], plotter: Any) -> None:
+    for line in lines:
+        add(line, plotter)
+
+
 @add.register
 def _(grid: Grid, plotter: Any) -> None:
     plotter.add_mesh(grid.to_pyvista().outline(), color=LINE)
