@@ -6,7 +6,7 @@ A scene is made of parts of which it is known whether they bound a solid, and of
 if it is taken for a sheet though it bounds, the other way round, or if it faces inwards. Printed are the share of the
 area that is wrong in each scene, and, for each number, the scenes where that changes by more than a hundredth. Of
 shares above a half, twice is half of the way to one. The number that decides between lids and heat is swept over the
-volume that shapes enclose.
+volume that shapes enclose, that of seams of surfaces over seams that were rounded, and slits.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from signedheat import TriangleMesh, complete, orientation, samples
+from signedheat.mesh import welding
 from signedheat.mesh.components import element_components
 from signedheat.mesh.triangles import area_vectors
 from signedheat.solids import bounding, completion, gauss, overlaps
@@ -225,6 +226,53 @@ def enclosed(seeds: int) -> dict[str, float]:
     }
 
 
+def torn(mesh: TriangleMesh, moved: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> tuple[TriangleMesh, int]:
+    """A surface in two halves, one of them moved, and the number of vertices that are there twice."""
+    half = mesh.vertices[mesh.faces].mean(axis=1)[:, 0] > 0.03
+    low, high = (part_of(mesh, lambda _, side=side: half == side) for side in (False, True))
+    first, second = (np.unique(part.faces) for part in (low, high))
+    faces = [np.searchsorted(first, low.faces), len(first) + np.searchsorted(second, high.faces)]
+    points = np.concatenate([low.vertices[first], moved(high.vertices[second])])
+    return TriangleMesh(points, np.concatenate(faces)), len(np.intersect1d(first, second))
+
+
+def single(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    return points.astype(np.float32).astype(np.float64)
+
+
+def turned_in_single(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Through six turns, there and back, about a place ten times as far away."""
+    x, turns = points.astype(np.float32), [np.linalg.qr(np.eye(3) + 0.3 * k)[0].astype(np.float32) for k in range(6)]
+    for turn in [*turns, *(turn.T for turn in turns[::-1])]:
+        x = (x - np.float32(10)) @ turn + np.float32(10)
+    return x.astype(np.float64)
+
+
+SEAMS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
+    "exact": lambda points: points,
+    "single precision": single,
+    "single precision, moved far away": lambda points: single(points + 10) - 10,
+    "six decimals": lambda points: points.round(6),
+    "turned in single precision": turned_in_single,
+    "six decimals, in single precision": lambda points: single(points.round(6)),
+    "slit of 1e-4": lambda points: points + 1e-4 * np.eye(3)[0],
+    "slit of 1e-3": lambda points: points + 1e-3 * np.eye(3)[0],
+}
+
+
+def joined(units: float) -> dict[str, float]:
+    """Share of the vertices that are there twice and joined, of each of the seams."""
+    result = {}
+    for shape, mesh in (("ball", samples.sphere(4)), ("torus", samples.torus(n_around=96, n_across=48))):
+        for name, moved in SEAMS.items():
+            surface, twice = torn(mesh, moved)
+            halfedges = surface.faces.ravel(), np.roll(surface.faces, -1, axis=1).ravel()
+            places = [welding.joined_rims(offset + surface.vertices, *halfedges, units) for offset in (0.0, 1e6)]
+            alone = [surface.n_vertices - len(np.unique(each)) for each in places]
+            result[f"{shape}, {name}"], result[f"{shape}, {name}, 1e6 away"] = (count / twice for count in alone)
+    return result
+
+
 def main(seeds: int = 2) -> None:
     usual = table(seeds)
     for name, share in usual.items():
@@ -249,6 +297,11 @@ def main(seeds: int = 2) -> None:
     print("error of the volume with completion.TORN " + ", ".join(f"{changed:g}" for changed in errors))
     for name in errors[value]:
         print(f"{name:36s} " + " ".join(f"{row[name]:6.4f}" for row in errors.values()))
+
+    shares = {units: joined(units) for units in (welding.SEAM / 2, welding.SEAM, 2 * welding.SEAM, welding.GAP)}
+    print("share of seams that is joined with welding.SEAM " + ", ".join(f"{units:g}" for units in shares))
+    for name in shares[welding.SEAM]:
+        print(f"{name:54s} " + " ".join(f"{row[name]:4.0%}" for row in shares.values()))
 
 
 if __name__ == "__main__":

@@ -1,5 +1,7 @@
 """Distance to curves on meshes with seams, copies, fins, turned faces, and parts that cannot be oriented."""
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -81,6 +83,54 @@ def test_strokes_are_repaired_on_broken_meshes(name, whole):
     on_ball = away < 1e-9
     np.testing.assert_allclose(field.values[on_ball], whole[same[on_ball]], atol=1e-3 if "tents" not in name else 0.02)
     assert (field.diagnostics.note(MeshRepaired) is None) == name.startswith("fin")
+
+
+def with_rounded_seam(units, seed):
+    """The ball with a seam, all vertices moved at random by up to some units of single precision of its size."""
+    mesh = with_seam()
+    random = np.random.default_rng(seed)
+    noise = units * 2.0**-23 * random.uniform(-1, 1, mesh.vertices.shape)
+    return sh.TriangleMesh((mesh.vertices + noise).astype(np.float32), mesh.faces)
+
+
+def moved(mesh, scale, offset, order):
+    vertices = np.empty_like(mesh.vertices)
+    vertices[order] = scale * mesh.vertices + offset
+    return sh.TriangleMesh(vertices, order[mesh.faces])
+
+
+@pytest.mark.parametrize("units", [1, 4, 16])
+@pytest.mark.parametrize(("scale", "offset"), [(1.0, 0.0), (1 / 3, 0.0), (1e-3, 0.0), (1.0, 1e6), (7e4, 1e6)])
+def test_seams_are_joined_whatever_rounded_them(units, scale, offset, whole):
+    mesh = with_rounded_seam(units, units)
+    order = np.random.default_rng(0).permutation(mesh.n_vertices)
+    given = moved(mesh, scale, offset, order)
+    # places on faces, which do not depend on how far away the surface is
+    curves = [sh.Curve(curve.faces, curve.barycentric) for curve in strokes(mesh)]
+    field = sh.signed_distance(curves, given)
+    same = cKDTree(BALL.vertices).query(mesh.vertices)[1]
+    np.testing.assert_allclose(field.values[order] / scale, whole[same], atol=1e-3)
+    assert field.diagnostics.note(MeshRepaired).vertices_joined == mesh.n_vertices - BALL.n_vertices
+
+
+@pytest.mark.parametrize("units", [36, 100, 300])
+def test_seams_that_are_not_joined_wholly_are_announced(units):
+    mesh = with_rounded_seam(units, 0)
+    with pytest.warns(InexactWarning, match="distance goes round the gap"):
+        sh.signed_distance(mesh.level_set(mesh.vertices[:, 2], 0.1), mesh)
+
+
+def test_narrow_strips_stay():
+    """Edges across the strip are as long as rounding of seams is wide."""
+    along, width = np.linspace(0, 1, 5), 2e-6
+    points = np.array([[x, y, 0] for x in along for y in (0, width)])
+    at = 2 * np.arange(4)[:, None]
+    strip = sh.TriangleMesh(points, np.concatenate([at + np.array([0, 2, 1]), at + np.arange(1, 4)]))
+    end = strip.path([0, 1])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        values = sh.signed_distance(end, strip).values
+    np.testing.assert_allclose(np.abs(values), np.repeat(along, 2), atol=1e-9)
 
 
 def test_parts_with_one_side_do_not_matter_elsewhere(whole):

@@ -20,7 +20,7 @@ from ..jobs import Progress
 from ..kinds import AnySurface, SurfaceDomain
 from ..mesh.components import connected_components, grouped
 from ..mesh.edges import orient_faces, pair_halfedges
-from ..mesh.welding import coincident_faces, joined_rims
+from ..mesh.welding import GAP, SEAM, coincident_faces, joined_rims
 from ..sharpening import sharpen
 from ..solver import SignedHeatSolver, distance_unwarned
 from ..surfaces.polygon_mesh import PolygonMesh
@@ -61,11 +61,7 @@ class RepairedMesh:
         """Repair a mesh; None if there is nothing to do, or it is none."""
         if not isinstance(given, TriangleMesh | PolygonMesh):
             return None
-        if isinstance(given, TriangleMesh):
-            tails, heads = given.faces.ravel(), np.roll(given.faces, -1, axis=1).ravel()
-        else:
-            tails, heads = given.corners, given.next_corners
-        places = joined_rims(given.vertices, tails, heads)
+        places = joined_rims(given.vertices, *_halfedges(given))
         used, vertices = np.unique(places, return_inverse=True)
         joined = given.n_vertices - len(used)
         if isinstance(given, PolygonMesh):
@@ -108,6 +104,27 @@ class RepairedMesh:
         values = field.values[self.vertices]
         diagnostics = replace(field.diagnostics, unreached=np.flatnonzero(np.isnan(values))).noting(self.note)
         return VertexField(self.given, values, diagnostics)
+
+
+def warn_of_gaps(mesh: object) -> None:
+    """Warn of vertices of rims that are nearly, but not, at the place of others."""
+    if not isinstance(mesh, TriangleMesh | PolygonMesh):
+        return
+    joined, nearly = (joined_rims(mesh.vertices, *_halfedges(mesh), units) for units in (SEAM, GAP))
+    gaps = np.flatnonzero((nearly != joined) & (joined == np.arange(len(joined))))
+    if len(gaps):
+        warn_user(
+            f"rims of the surface run along each other, less than {GAP * 2.0**-24:.0e} of its size apart, at "
+            f"{len(gaps)} vertices, the first of them number {gaps[0]}: distance goes round the gap. Merge these "
+            "vertices with those beside them if they are one",
+            InexactWarning,
+        )
+
+
+def _halfedges(mesh: TriangleMesh | PolygonMesh) -> tuple[Ints, Ints]:
+    if isinstance(mesh, PolygonMesh):
+        return mesh.corners, mesh.next_corners
+    return mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
 
 
 def copied_faces(faces: Ints, n_vertices: int) -> Ints:
@@ -332,6 +349,7 @@ def distance_to_curves(
     share = None if progress is None else (lambda done, step: progress(0.7 * done, step))
     solver = SignedHeatSolver(domain, diffusion, share, intrinsic)
     given = as_curves(solver.domain, as_list(curves))
+    warn_of_gaps(solver.domain)
     repaired = RepairedMesh.of(solver.domain)
     if repaired is not None:
         solver, given = SignedHeatSolver(repaired.mesh, diffusion, share, intrinsic), repaired.on_it(given)

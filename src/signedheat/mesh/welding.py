@@ -14,6 +14,12 @@ SINGLE, DOUBLE = 2.0**-22, 2.0**-46
 precision."""
 SHORT_EDGES = 0.1
 """Share of the open edges that may be so short that welding collapses them."""
+SEAM, GAP = 64.0, 1024.0
+"""Largest difference of coordinates of one vertex of a seam, and of two that are announced as nearly one, in units of
+single precision of the size of the surface. Halved, a vertex in a hundred is missed on two of twelve seams; doubled,
+nothing changes (`benchmarks/deciding_numbers.py`)."""
+COLLAPSE = 0.25
+"""Vertices farther apart than this share of the shortest edge at them are not joined as those of a seam."""
 _HALF = 0xFFFFFFFF
 
 
@@ -42,13 +48,29 @@ def welded_vertices(points: Floats, tails: Ints, heads: Ints) -> Ints:
     return same
 
 
-def joined_rims(points: Floats, tails: Ints, heads: Ints) -> Ints:
-    """Return (n,) the first vertex at the place of each that is on a rim, as of a seam; all others stay."""
+def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float = SEAM) -> Ints:
+    """Return (n,) the first vertex at the place of each that is on a rim, as of a seam; all others stay.
+
+    Places are one if they differ by `units` of single precision of the size of what is given, or of the last places of
+    its coordinates if these are larger, but never so that an edge collapses. So seams of single precision are joined
+    wherever a transformation in double precision took them.
+    """
     edges, _, counts, _, _ = find_edges(read_only(tails), read_only(heads), tails != heads, len(points))
     is_open = (edges >= 0) & (np.append(counts, 0)[edges] == 1)
-    rims, ends = np.unique(np.stack([tails[is_open], heads[is_open]]), return_inverse=True)
+    rims = np.unique([tails[is_open], heads[is_open]])
     places = np.arange(len(points))
-    places[rims] = rims[welded_vertices(points[rims], *ends.reshape(2, -1))]
+    if not len(rims):
+        return places
+    first, used = rims[same_positions(points[rims])], points[tails]
+    places[rims] = first
+    lengths, shortest = np.abs(points[heads] - points[tails]).max(axis=1), np.full(len(points), np.inf)
+    for ends in (tails, heads):
+        np.minimum.at(shortest, places[ends], np.where(lengths > 0, lengths, np.inf))
+    last_place = float(np.abs(used).max()) * (2.0**-24 if _is_single(used) else 2.0**-53)
+    unit = max(2.0**-24 * float(np.ptp(used, axis=0).max()), last_place)
+    near = first[np.searchsorted(rims, rims[welded(points[rims], units * unit)])]
+    apart = np.abs(points[first] - points[near]).max(axis=1)
+    places[rims] = np.where(apart <= COLLAPSE * np.minimum(shortest[first], shortest[near]), near, first)
     return places
 
 
