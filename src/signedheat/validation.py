@@ -189,7 +189,7 @@ def whole_number(value: object, name: str, least: int, error: type[SignedHeatErr
     number = finite_number(value, name, error=error)
     if number % 1 or number < least:
         raise error(f"{name} must be a whole number of at least {least}, not {number:g}", element=name)
-    return int(number)
+    return int(value)  # type: ignore[call-overload]  # exact, however large
 
 
 def boolean(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Bools:

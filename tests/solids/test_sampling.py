@@ -128,7 +128,18 @@ def test_what_cannot_be_sampled_says_so(tmp_path, box):
     with pytest.raises(sh.errors.SourceError) as caught:
         sh.sample(plain, 10)
     assert "signed_distance" in caught.value.remedy
-    for wrong in ({"n": 0}, {"near": 1.5}, {"widths": [-0.1]}, {"widths": [np.nan]}, {"widths": []}):
+    for wrong in (
+        {"n": 0},
+        {"near": 1.5},
+        {"widths": [-0.1]},
+        {"widths": [np.nan]},
+        {"widths": []},
+        {"widths": None},
+        {"near": "most"},
+        {"seed": -1},
+        {"seed": 1.5},
+        {"seed": "one"},
+    ):
         with pytest.raises(sh.errors.SignedHeatError):
             sh.sample(box, **{"n": 10, **wrong})
     assert not sh.sample(box, 10, near=0, widths=[]).near.any()

@@ -70,8 +70,11 @@ def test_points_of_elements_lie_where_they_should():
         np.testing.assert_array_equal(one.values, sh.signed_distance(same, BALL, as_oriented=True).values)
     for measure in (sh.SignedHeatSolver(BALL).distance, partial(sh.piecewise_distance, BALL)):
         np.testing.assert_array_equal(measure(elements).values, measure(curve_of_elements(BALL, elements)).values)
-    with refused(sh.errors.SourceError, "point 1"):
-        sh.signed_distance([(3, []), (10**6, [0.5])], BALL)
+    for missing in ((10**6, []), (10**6, [0.5]), (10**6, [0.2, 0.3]), (-1, [])):
+        kind = ("vertex", "edge", "face")[len(missing[1])]
+        with refused(sh.errors.SourceError, f"{kind} {missing[0]}") as caught:
+            sh.signed_distance([(3, []), missing], BALL)
+        assert "point 1" in str(caught.value)
     with refused(sh.errors.SourceError, "point 1"):  # three coordinates that do not add up
         sh.signed_distance([(3, []), (40, [0.2, 0.5, 0.9])], BALL)
 
@@ -80,6 +83,8 @@ def test_elements_are_curves_whatever_is_done_with_them():
     ring = [(int(face), place[:2].tolist()) for face, place in zip(RING.faces, RING.barycentric, strict=True)]
     same, click = curve_of_elements(BALL, ring), sh.Curve([0, 0], [[1, 0, 0], [1, 0, 0]])
     for given in (ring, [ring], [click, ring]):
+        same_segments = sh.intrinsic_delaunay(BALL).transfer(ring), sh.intrinsic_delaunay(BALL).transfer([same])[0]
+        np.testing.assert_array_equal(*(segments.vectors for segments in same_segments))
         kept, whole = sh.intrinsic_delaunay(BALL, keep=given), sh.intrinsic_delaunay(BALL, keep=same)
         np.testing.assert_array_equal(kept.triangles.corner_vertices, whole.triangles.corner_vertices)
         for as_oriented in (False, True):
@@ -88,6 +93,37 @@ def test_elements_are_curves_whatever_is_done_with_them():
     for given in (ring, [ring], [[ring, same.reversed()]]):  # those of a group one by one
         found = sh.curve_orientation(given, BALL)
         assert found.turned.shape == (len(found.curves),) and all(isinstance(each, sh.Curve) for each in found.curves)
+
+
+@pytest.mark.parametrize("faces", [[0, 9999], [-1, 0]])
+def test_a_missing_face_is_one_error_wherever_it_is_met(faces, tmp_path):
+    """Curves are numbered as they were given, whatever is left out."""
+    wrong, click = sh.Curve(faces, np.eye(3)[:2]), sh.Curve([0, 0], [[1, 0, 0], [1, 0, 0]])
+    phi, better = sh.signed_distance(RING, BALL), sh.intrinsic_delaunay(BALL)
+    cut, finer = sh.piecewise_distance(BALL, RING), sh.piecewise_distance(better, RING)
+    of_sources = [
+        lambda given: sh.signed_distance(given, BALL),
+        lambda given: sh.signed_distance(given, better),
+        sh.SignedHeatSolver(BALL).distance,
+        lambda given: sh.SignedHeatSolver(BALL).distance_many([given]),
+        partial(sh.piecewise_distance, BALL),
+        partial(sh.close_curves, BALL),
+        partial(sh.intrinsic_delaunay, BALL),
+        partial(sh.sharpen, phi),
+    ]
+    of_points = [
+        BALL.positions, phi, phi.gradient, cut, cut.gradient, finer, finer.gradient, better.transfer,
+        lambda given: sh.io.write_curves(tmp_path / "a.json", given, BALL),
+        lambda given: sh.io.write_curves(tmp_path / "a.obj", given, BALL),
+        lambda given: better.in_space(given.faces, given.barycentric),
+    ]  # fmt: skip
+    for measure in of_sources:
+        with refused(sh.SourceError, f"face {faces[0] or faces[1]}") as caught:
+            measure([click, RING, wrong])
+        assert "curve 2: point" in str(caught.value)
+    for evaluate in of_points:
+        with refused(sh.SourceError, f"face {faces[0] or faces[1]}"):
+            evaluate(wrong)
 
 
 def test_levels_are_those_of_the_curves_given():
@@ -103,8 +139,6 @@ def test_positions_of_curves():
     np.testing.assert_array_equal(BALL.positions(BALL.points_at([4, 9])), BALL.vertices[[4, 9]])
     cloud = sh.PointCloud(BALL.vertices)
     np.testing.assert_array_equal(cloud.positions(cloud.path([4, 9])), BALL.vertices[[4, 9]])
-    with refused(sh.errors.SourceError, "point 0"):
-        BALL.positions(sh.SurfacePoints([10**6], [[1, 0, 0]]))
 
 
 @pytest.mark.parametrize("click", [

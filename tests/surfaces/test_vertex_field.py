@@ -24,7 +24,7 @@ def test_values_between_vertices_are_linear():
     assert phi(curve) == pytest.approx(exact, abs=1e-14)
     assert phi(positions(mesh, curve) + np.array([0, 0, 0.1])) == pytest.approx(exact, abs=1e-14)
     assert np.abs(phi.gradient(curve) - [2, -1, 0]).max() < 1e-12
-    with refused(sh.errors.OutsideError, "point 0"):
+    with refused(sh.errors.SourceError, "face 9999"):
         phi(sh.SurfacePoints([9999], [[1, 0, 0]]))
 
 

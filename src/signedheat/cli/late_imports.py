@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ..curves import curve_distance as curve_distance
     from ..io import files as files
     from ..surfaces import surface_discretization as surface_discretization
+    from ..view import windows as windows
     from . import kernel_runs as kernel_runs
     from . import operands as operands
     from . import reports as reports
@@ -30,7 +31,7 @@ else:
         **{"inputs": "batches.inputs", "pool": "batches.pool"},
         **{"inspection": "inspection", "files": "io.files"},
         **{"curve_completion": "curves.curve_completion", "curve_distance": "curves.curve_distance"},
-        **{"surface_discretization": "surfaces.surface_discretization"},
+        **{"surface_discretization": "surfaces.surface_discretization", "windows": "view.windows"},
         **{"kernel_runs": "cli.kernel_runs", "reports": "cli.reports", "operands": "cli.operands"},
     }
     globals().update({name: lazy_module(f"signedheat.{path}", "commands") for name, path in PARTS.items()})

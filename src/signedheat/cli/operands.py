@@ -205,7 +205,7 @@ def measured(
     """Return the shape of a command, from a file or an image, and the distance to it, with room for offsets."""
     with prefix_errors(arguments.shape):
         if image is not None:
-            shape = image.surface(arguments.label)
+            shape: Any = image.surface(arguments.label)
         else:
             shape = read_lines(arguments) if is_planar(arguments.shape) else read_shape(arguments, arguments.shape)
         return shape, compute(shape, grid_for(shape, arguments, reach, image), arguments)

@@ -16,7 +16,7 @@ import signedheat as sh
 
 from ..errors import FileFormatError, MissingPackageError, SignedHeatError, printable
 from ..jobs import run_limited
-from .late_imports import inputs, inspection, reports, samples
+from .late_imports import inputs, inspection, reports, samples, windows
 from .late_imports import operands as shapes
 from .options import (
     PLACE,
@@ -116,7 +116,7 @@ def view(arguments: Namespace) -> Summary:
     output, up = arguments.output, "xyz".index(arguments.up)
     if output is None and has_window():
         with shapes.prefix_errors(arguments.file):
-            sh.view.windows.plotter_of(shape_or_field(arguments.file)).show()
+            windows.plotter_of(shape_or_field(arguments.file)).show()
         return {"input": arguments.file, "output": None}, ""
     if output is None:
         output = str(Path(Path(arguments.file).name).with_suffix(".png"))

@@ -15,7 +15,7 @@ from ..geodesics.shortest_paths import gaps
 from ..kinds import EmbeddedSurface
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.polylines import assemble_polylines
-from ..mesh.surface_points import locate_points
+from ..mesh.surface_points import locate_points, refuse_missing
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
@@ -292,6 +292,7 @@ def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]
 
 def nodes_of(faces: Ints, weights: Floats, domain: EmbeddedSurface) -> list[Node]:
     """Express points on faces as nodes."""
+    refuse_missing("face", faces, domain.triangulation.n_faces)
     corners = domain.triangulation.faces[faces]
     return [
         Node(tuple(v for v, w in zip(c, b, strict=True) if w > 0), tuple(w for w in b if w > 0))

@@ -38,15 +38,21 @@ class LocatedPoints:
         )
 
 
+def refuse_missing(kind: str, ids: Ints, n: int, name: str = "point") -> None:
+    """Refuse points at vertices, on edges or in faces of which there is none with their id, 0 to n - 1."""
+    missing = np.flatnonzero((ids < 0) | (ids >= n))
+    if len(missing):
+        first = ids[missing[0]]
+        raise SourceError(
+            f"{name} {missing[0]} names {kind} {first}, but {kind} ids go from 0 to {n - 1}",
+            remedy="make it for this mesh, if it was made for another mesh",
+            element=f"{kind} {first}",
+        )
+
+
 def locate_points(triangles: IntrinsicMesh, faces: Ints, barycentric: Floats, name: str = "point") -> LocatedPoints:
     """Find the vertex, edge or face that contains each point, given by its face and barycentric coordinates."""
-    outside = np.flatnonzero((faces < 0) | (faces >= triangles.n_faces))
-    if len(outside):
-        raise SourceError(
-            f"{name} {outside[0]} lies in face {faces[outside[0]]}, but face ids go from 0 to {triangles.n_faces - 1}",
-            remedy="make it for this mesh, if it was made for another mesh",
-            element=f"face {faces[outside[0]]}",
-        )
+    refuse_missing("face", faces, triangles.n_faces, name)
     inside = np.where(barycentric < SNAP, 0.0, barycentric)
     inside /= inside.sum(axis=1, keepdims=True)
     positive = inside > 0
@@ -79,13 +85,7 @@ def corners_at(faces: Ints, vertices: Ints, n_vertices: int, name: str = "point"
         if len(vertices) == 0:
             return np.empty(0, dtype=np.int64)
         raise SourceError(f"{name}s are given by integer vertex ids, not {vertices.dtype}", element="vertices")
-    outside = np.flatnonzero((vertices < 0) | (vertices >= n_vertices))
-    if len(outside):
-        raise SourceError(
-            f"{name} {outside[0]} is vertex {vertices[outside[0]]}, but vertex ids go from 0 to {n_vertices - 1}",
-            remedy="use ids of this mesh",
-            element=f"vertex {vertices[outside[0]]}",
-        )
+    refuse_missing("vertex", vertices, n_vertices, name)
     n_all = max(n_vertices, int(faces.max(initial=-1)) + 1)  # virtual vertices of polygons have higher numbers
     corners = np.flatnonzero(mask_of(n_all, vertices)[faces])[::-1]
     first = np.full(n_all, -1)

@@ -58,8 +58,8 @@ def sample(
     MemoryLimitError
         If the samples do not fit in memory.
     SignedHeatError
-        If n is not positive, the fraction is not from 0 to 1, a width is negative, or there is none for points near the
-        surface.
+        If n is not positive, the seed or a width is negative, the fraction is not from 0 to 1, or there is no width for
+        points near the surface.
 
     Examples
     --------
@@ -72,13 +72,14 @@ def sample(
     """
     n = whole_number(n, "the number of samples", 1, SignedHeatError)
     refuse_beyond_memory(f"{n} samples", n, lambda k: BYTES_PER_SAMPLE * k, lambda k: f"take {k} at a time")
-    if not 0 <= near <= 1:
-        raise SignedHeatError(f"near must be a share from 0 to 1, not {near:g}", remedy="choose it from 0 to 1")
-    if near and not len(widths):
+    seed = whole_number(seed, "the seed", 0, SignedHeatError)
+    if not 0 <= finite_number(near, "near") <= 1:
+        raise SignedHeatError(f"near must be a share from 0 to 1, not {near:g}", element="near")
+    if near and not np.size(widths):
         raise SignedHeatError(
             "points near the surface need a width of noise", remedy="give widths, or near=0", element="widths"
         )
-    scales = [finite_number(width, "the width of the noise", least=0) for width in widths]
+    scales = [finite_number(width, "the width of the noise", least=0) for width in np.atleast_1d(widths)]
     n_near = round(near * n)
     solid = shape.solid if isinstance(shape, GridField) else complete(shape)
     if solid is None or solid.triangles.shape[-1] != 3:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
 from numbers import Real
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,12 +26,13 @@ from ..memory import within_memory
 from ..mesh.curve_segments import CurveSegments, without_straight_nodes
 from ..mesh.gluing import flip_all, glue, lay_out
 from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.surface_points import refuse_missing
 from ..mesh.triangles import gradients_along
 from ..validation import finite_rows, flag, frozen, whole_numbers
 from .intrinsic_history import History
 from .intrinsic_refinement import refine_all
 from .intrinsic_transfer import ConformingRefinement, level_lines, transfer_segments
-from .source_segments import given_curves, segments_of, segments_of_each
+from .source_segments import curve_of_elements, given_curves, is_element_list, segments_of, segments_of_each
 from .surface import checked_levels, is_consistent, level_set, without_repeats
 from .surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from .triangle_mesh import TriangleMesh
@@ -172,7 +173,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
 
         Raises
         ------
-        GeometryError
+        SourceError
             If a face does not exist.
 
         Examples
@@ -203,8 +204,10 @@ class IntrinsicTriangulation(Displayed, Frozen):
 
         Raises
         ------
+        SourceError
+            If a face does not exist.
         GeometryError
-            If a face does not exist, or a coordinate is NaN or infinite.
+            If a coordinate is NaN or infinite.
 
         Examples
         --------
@@ -277,12 +280,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
     def _existing(self, faces: ArrayLike) -> Ints:
         """(p,) faces of the mesh; those that do not exist are refused."""
         ids = whole_numbers(faces, "faces")
-        wrong = np.flatnonzero((ids < 0) | (ids >= self.mesh.n_faces))
-        if len(wrong):
-            raise GeometryError(
-                f"point {wrong[0]} is in face {ids[wrong[0]]}, of {self.mesh.n_faces} faces",
-                element=f"point {wrong[0]}",
-            )
+        refuse_missing("face", ids, self.mesh.n_faces)
         return ids
 
     def _forward(self, faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
@@ -352,18 +350,19 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return lines.owners, starts, self.in_space(*self.refinement.pull_back(lines.faces, lines.ends))
 
     @overload
-    def transfer(self, source: CurveOrPoints | CurveSegments) -> CurveSegments: ...
+    def transfer(self, source: CurveOrPoints | CurveSegments | ElementList) -> CurveSegments: ...
     @overload
-    def transfer(self, source: Sequence[CurveOrPoints | CurveSegments]) -> list[CurveSegments]: ...
+    def transfer(self, source: Sequence[CurveOrPoints | CurveSegments | ElementList]) -> list[CurveSegments]: ...
     def transfer(
-        self, source: CurveOrPoints | CurveSegments | Sequence[CurveOrPoints | CurveSegments]
+        self,
+        source: CurveOrPoints | CurveSegments | ElementList | Sequence[CurveOrPoints | CurveSegments | ElementList],
     ) -> CurveSegments | list[CurveSegments]:
         """Transfer a source that is given on the mesh to these triangles.
 
         Parameters
         ----------
         source : Curve, SurfacePoints, CurveSegments, or sequence of them
-            On the mesh.
+            On the mesh. Or lists of (element, coordinates), as for `signed_distance`.
 
         Returns
         -------
@@ -378,10 +377,11 @@ class IntrinsicTriangulation(Displayed, Frozen):
         >>> len(better.transfer([line]))
         1
         """
-        if isinstance(source, Sequence):
-            return [self.transfer(part) for part in source]
-        seen = segments_of(source, self.base, self.mesh.vertices)
-        if isinstance(source, CurveSegments):
+        given: Any = curve_of_elements(self.mesh, source) if is_element_list(source) else source
+        if isinstance(given, Sequence):
+            return [self.transfer(part) for part in given]
+        seen = segments_of(given, self.base, self.mesh.vertices)
+        if isinstance(given, CurveSegments):
             return seen
         return transfer_segments(seen, self.refinement, self.history, self.base)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import singledispatch
 from numbers import Integral
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeGuard
 
 import numpy as np
 import scipy
@@ -18,10 +18,21 @@ from ..geodesics.shortest_paths import join
 from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, carried_left, given_directions, loses_orientation
 from ..mesh.intrinsic_mesh import IntrinsicMesh
-from ..mesh.surface_points import barycentric_in, edges_between, locate_points, shared_faces, unique_points
+from ..mesh.surface_points import (
+    EDGE,
+    FACE,
+    VERTEX,
+    barycentric_in,
+    corners_at,
+    edges_between,
+    locate_points,
+    refuse_missing,
+    shared_faces,
+    unique_points,
+)
 from ..mesh.triangles import Triangles
 from .surface import Surface
-from .surface_curves import Curve, CurveOrPoints, SurfacePoints
+from .surface_curves import Curve, CurveOrPoints, ElementList, SurfacePoints
 from .triangle_mesh import TriangleMesh
 
 Positions: TypeAlias = Floats | None
@@ -120,7 +131,7 @@ def one_sided(sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]], triang
     return numbers
 
 
-def is_element_list(source: object) -> bool:
+def is_element_list(source: object) -> TypeGuard[ElementList]:
     """Whether something is a curve in the format of potpourri3d: a list of (element, barycentric coordinates)."""
     return (
         isinstance(source, Sequence)
@@ -136,30 +147,29 @@ def is_element_list(source: object) -> bool:
     )
 
 
-def curve_of_elements(triangles: Triangles, points: Sequence[tuple[int, Sequence[float]]]) -> Curve | SurfacePoints:
+def curve_of_elements(triangles: Triangles, points: ElementList) -> Curve | SurfacePoints:
     """Make the curve through points, each a vertex, an edge and a fraction of it, or a face and its coordinates.
 
     Edges are numbered and directed as they first occur in the sides of the faces. A single point is a point source.
     """
+    kinds = np.array([min(len(given), FACE) for _, given in points])
+    vertices, edges, faces = (
+        np.array([element if kind == wanted else least for (element, _), kind in zip(points, kinds, strict=True)])
+        for wanted, least in ((VERTEX, triangles.faces.min()), (EDGE, 0), (FACE, 0))
+    )
     starts, halfedges = triangles.edges.halfedges
-    first_corner = np.full(triangles.n_vertices, -1)
-    first_corner[triangles.faces.ravel()[::-1]] = np.arange(triangles.faces.size)[::-1]
-    faces, weights = np.zeros(len(points), dtype=np.int64), np.zeros((len(points), 3))
-    for k, (element, given) in enumerate(points):
-        kind, count = (
-            ("vertex", triangles.n_vertices), ("edge", len(starts) - 1), ("face", triangles.n_faces)
-        )[min(len(given), 2)]  # fmt: skip
-        if not 0 <= element < count or (kind == "vertex" and first_corner[element] < 0):
-            raise SourceError(
-                f"point {k} of a curve is on {kind} {element}, which does not exist", element=f"point {k}"
-            )
-        if kind == "face":
-            faces[k] = element
+    refuse_missing("edge", edges, len(starts) - 1, "list of elements: point")
+    refuse_missing("face", faces, triangles.n_faces, "list of elements: point")
+    corners = corners_at(triangles.faces, vertices, triangles.n_vertices, "list of elements: point")
+    begin = np.where(kinds == VERTEX, corners, halfedges[starts[edges]])
+    faces, sides = np.where(kinds == FACE, faces, begin // 3), begin % 3
+    weights = np.zeros((len(points), 3))
+    for k, (_, given) in enumerate(points):
+        if kinds[k] == FACE:
             weights[k] = given if len(given) == 3 else (*given, 1 - given[0] - given[1])
-            continue
-        halfedge, share = (first_corner[element], 0.0) if kind == "vertex" else (halfedges[starts[element]], given[0])
-        faces[k], side = divmod(int(halfedge), 3)
-        weights[k, [side, (side + 1) % 3]] = 1 - share, share
+        else:
+            share = given[0] if kinds[k] == EDGE else 0.0
+            weights[k, [sides[k], (sides[k] + 1) % 3]] = 1 - share, share
     return Curve(faces, weights) if len(points) > 1 else SurfacePoints(faces, weights)
 
 
@@ -180,6 +190,10 @@ def given_curves(domain: object, sources: list[Any]) -> tuple[list[Any], Without
     domain = getattr(domain, "mesh", domain)
     if not isinstance(domain, Surface):
         return curves, None
+    for k, source in enumerate(curves):  # by its number, before others are left out
+        if isinstance(source, Curve | SurfacePoints):
+            name = f"{'curve' if isinstance(source, Curve) else 'source'} {k}: point"
+            refuse_missing("face", source.faces, domain.triangulation.n_faces, name)
     lengthless = [k for k, source in enumerate(curves) if isinstance(source, Curve) and _is_point(domain, source)]
     if not lengthless or len(lengthless) == len(curves):
         return curves, None
@@ -208,16 +222,16 @@ def numbers_given(sources: Sequence[Any], left_out: WithoutLength | None) -> Int
 
 def _converted(domain: Surface, source: object) -> object:
     if is_element_list(source):
-        return curve_of_elements(domain.triangulation, source)  # type: ignore[arg-type]
+        return curve_of_elements(domain.triangulation, source)
     if isinstance(source, Sequence) and not isinstance(source, str | bytes):
         return [_converted(domain, part) for part in source]
     return source
 
 
 def _is_point(domain: Surface, curve: Curve) -> bool:
-    """Whether all points of a curve coincide; faces that do not exist are refused later."""
+    """Whether all points of a curve coincide."""
     triangles = domain.triangulation
-    if not hasattr(triangles, "vertices") or not ((curve.faces >= 0) & (curve.faces < triangles.n_faces)).all():
+    if not hasattr(triangles, "vertices"):
         return False
     extent = np.ptp(domain.positions(curve), axis=0).max()
     return bool(extent <= ONE_POINT * np.ptp(triangles.bounds, axis=0).max())

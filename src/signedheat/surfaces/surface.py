@@ -13,7 +13,7 @@ from ..errors import SourceError
 from ..geodesics.shortest_paths import join
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.polylines import assemble_polylines, leaving
-from ..mesh.surface_points import SNAP, barycentric_on_edges, corners_at, crossed_sides, locate_points
+from ..mesh.surface_points import SNAP, barycentric_on_edges, corners_at, crossed_sides, locate_points, refuse_missing
 from ..mesh.triangles import Triangles, area_vectors
 from ..search.nearest_triangles import TriangleTree
 from ..validation import array_of, coordinates, finite_number, flag, numbers
@@ -262,12 +262,7 @@ class Surface(Frozen):
         [[0.0, 0.5, 0.0], [0.5, 0.0, 0.0]]
         """
         triangles = self.triangulation
-        wrong = np.flatnonzero((points.faces < 0) | (points.faces >= triangles.n_faces))
-        if len(wrong):
-            raise SourceError(
-                f"point {wrong[0]} lies in face {points.faces[wrong[0]]}, and there are {triangles.n_faces}",
-                element=f"point {wrong[0]}",
-            )
+        refuse_missing("face", points.faces, triangles.n_faces)
         corners = triangles.vertices[triangles.faces[points.faces]]
         return np.einsum("nk,nkd->nd", points.barycentric, corners)
 

@@ -18,6 +18,7 @@ from ..exchange import Displayed, with_values
 from ..field_arithmetic import Combinable, Rule
 from ..foreign import SurfaceShape
 from ..kinds import EmbeddedSurface, SurfaceDomain
+from ..mesh.surface_points import refuse_missing
 from ..mesh.triangles import gradients_along
 from ..packages import lazy_module
 from ..validation import contiguous, finite_number, query_points, shaped
@@ -329,14 +330,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         """(n,) faces of points and (n, 3) barycentric coordinates in them, and the shape that the points have."""
         mesh = self._embedded.domain.triangulation
         if isinstance(points, (Curve, SurfacePoints)):
-            outside = np.flatnonzero((points.faces < 0) | (points.faces >= mesh.n_faces))
-            if len(outside):
-                raise OutsideError(
-                    f"point {outside[0]} lies in face {points.faces[outside[0]]}, but face ids go from 0 to "
-                    f"{mesh.n_faces - 1}",
-                    remedy="make it for this surface",
-                    element=f"point {outside[0]}",
-                )
+            refuse_missing("face", points.faces, mesh.n_faces)
             return points.faces, points.barycentric, points.faces.shape
         places, shape = query_points(points, 3)
         faces, weights, _ = closest_points(mesh, places)
