@@ -165,3 +165,14 @@ def test_a_rim_with_mirror_images_has_one_lid_in_every_order_of_faces():
         for seed in range(4)
     ]
     np.testing.assert_allclose(volumes, volumes[0], rtol=1e-9)
+
+
+def test_rims_that_a_wall_closes_may_have_a_vertex_in_common():
+    """Strips had triangles on two vertices there, which were loops of one."""
+    angles = 2 * np.pi * np.arange(24) / 24
+    circle = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    places = np.concatenate([circle, 0.9 * circle[1:], [[0, 0, -1], [0, 0, -0.8]]])
+    outer, inner = np.arange(24), np.append(0, np.arange(24, 47))
+    bowl = np.stack([np.full(24, 47), np.roll(outer, -1), outer], axis=1)
+    cavity = np.stack([np.full(24, 48), inner, np.roll(inner, -1)], axis=1)
+    assert 0 < volume(places, np.concatenate([bowl, cavity])) < 1

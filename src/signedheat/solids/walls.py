@@ -100,8 +100,7 @@ def seams(rims: list[Rim]) -> list[Ints]:
             continue
         points = [rim.corners[ids_around] for rim, ids_around in zip(chosen, places, strict=True)]
         ids = [rim.ids[ids_around] for rim, ids_around in zip(chosen, places, strict=True)]
-        faces = _zipped(ids[0], points[0], ids[1][::-1], points[1][::-1])
-        strips.append(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
+        strips.append(_zipped(ids[0], points[0], ids[1][::-1], points[1][::-1]))
     return strips
 
 
@@ -192,7 +191,7 @@ def _way(rim: Rim, other: Rim) -> tuple[float, float]:
 
 
 def strip(one: Rim, other: Rim) -> Ints:
-    """(n + m, 3) vertices of triangles between rims that run opposite ways, from their nearest two corners on."""
+    """(k, 3) vertices of triangles between rims that run opposite ways, from their nearest two corners on."""
     away, nearest = scipy.spatial.cKDTree(other.corners).query(one.corners)
     start = int(np.argmin(away))
     i = (start + np.arange(len(one.ids) + 1)) % len(one.ids)
@@ -201,15 +200,19 @@ def strip(one: Rim, other: Rim) -> Ints:
 
 
 def _zipped(one: Ints, points: Floats, other: Ints, across: Floats) -> Ints:
-    """Triangles between two chains, along the first and against the other: the shorter diagonal that comes next."""
-    a, b, faces = 0, 0, []
+    """Triangles between two chains, along the first and against the other: the shorter diagonal that comes next.
+
+    Chains may have vertices in common.
+    """
+    a, b, rows = 0, 0, []
     while a < len(one) - 1 or b < len(other) - 1:
         if b == len(other) - 1 or (
             a < len(one) - 1 and np.linalg.norm(points[a + 1] - across[b]) <= np.linalg.norm(points[a] - across[b + 1])
         ):
-            faces.append((one[a], one[a + 1], other[b]))
+            rows.append((one[a], one[a + 1], other[b]))
             a += 1
         else:
-            faces.append((one[a], other[b + 1], other[b]))
+            rows.append((one[a], other[b + 1], other[b]))
             b += 1
-    return np.array(faces)
+    faces = np.array(rows)
+    return np.asarray(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
