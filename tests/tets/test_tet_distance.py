@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
+from scipy.spatial import Delaunay, cKDTree
 
 import signedheat as sh
 from refusals import refused
@@ -43,6 +43,18 @@ def test_distance_from_a_plane_is_exact(cube, constraint):
     phi = distance(cube, shape, constraint)
     assert np.abs(phi.values - exact(cube.vertices)).max() < 5e-6  # of a cube of side 2; hard rows are near dependent
     assert phi.diagnostics.note(OutsideMesh).sources_outside == [0]
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-15, 1e-13, 1e-7, 1e-4])
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_shaken_lattices_are_as_good_as_lattices(noise, when):
+    """Delaunay's tets of a shaken lattice have long flat tets along its sides; shaken later, tets are inside out."""
+    side = np.linspace(-1, 1, 8)
+    points = np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3)
+    shaken = points + noise * np.random.default_rng(3).normal(size=points.shape)
+    mesh = sh.TetMesh(shaken, Delaunay(shaken if when == "before" else points).simplices)
+    phi = distance(mesh, sh.samples.sphere(4, radius=0.5))
+    assert np.abs(phi.values - (np.linalg.norm(shaken, axis=1) - 0.5)).max() < 0.06  # a fifth of an edge
 
 
 @pytest.mark.parametrize("sizes", [(0, 0), (10**9, 10**9)], ids=["conjugate gradients", "direct"])

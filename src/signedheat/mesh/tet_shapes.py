@@ -13,9 +13,9 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from .box_tree import BoxTree
-from .components import grouped, sums_of
+from .components import connected_components, grouped, sums_of
 from .triangles import area_vectors
 from .welding import distinct_rows
 
@@ -96,6 +96,21 @@ class TetShapes:
         return BoxTree.around(corners)
 
 
+def inside_out(mesh: TetShapes) -> Bools:
+    """Return (m,) whether rounding turned each tet over, so that it lies on the side of a face where another does."""
+    faces, m = mesh.faces, len(mesh.tets)
+    a, b, c = np.moveaxis(mesh.tets[:, FACE_CORNERS], 2, 0)
+    way = np.sign(a - b) * np.sign(b - c) * np.sign(c - a)  # of the same three corners, as seen from outside
+    disagree = np.bincount(faces.tet_faces.ravel(), way.ravel(), len(faces.vertices)) != 0
+    tet, k = np.nonzero(faces.tet_counts[faces.tet_faces] == 2)
+    other = np.where(disagree[faces.tet_faces[tet, k]], m, 0) + faces.neighbors[tet, k]
+    as_given, turned = connected_components(
+        2 * m, np.append(tet, tet + m), np.append(other, (other + m) % (2 * m))
+    ).reshape(2, m)
+    volumes = np.bincount(as_given, mesh.volumes, 2 * m) - np.bincount(turned, mesh.volumes, 2 * m)
+    return np.asarray(volumes[as_given] < 0)
+
+
 def signed_volumes(vertices: Floats, tets: Ints) -> Floats:
     """Return (m,) volumes, negative for inverted tets."""
     a, b, c, d = (vertices[tets[:, k]] for k in range(4))
@@ -106,6 +121,8 @@ THIN = 1e-2
 """Volume, relative to the cube of the longest edge, below which a tet has a reduced weight; regular tets have 0.118."""
 FLAT = 1e-6
 """Volume, relative to the cube of the longest edge, below which a tet counts as flat."""
+TIE = 1e-4
+"""Stiffness between the faces or vertices of flat tets, relative to the longest edge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,10 +145,19 @@ class Tetrahedra(TetShapes):
         return np.minimum(self.thickness / THIN, 1)
 
     @cached_property
+    def fading(self) -> Floats:
+        """(m,) factor of w in step 3, so that the stiffness of flat tets is zero.
+
+        φ is curved, and its linear interpolant has a gradient in a flat tet that grows without bound. With a stiffness
+        that is merely bounded, long flat tets along the sides of a Delaunay mesh make φ linear there.
+        """
+        return self.weights**2
+
+    @cached_property
     def ties(self) -> Floats:
-        """(m,) extra stiffness between any two faces of a flat tet, whose own stiffness is nearly zero."""
+        """(m,) extra stiffness between any two faces or vertices of a flat tet, since some belong to no other."""
         lengths = np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
-        return lengths * (1 - np.minimum(self.thickness / FLAT, 1))
+        return TIE * lengths * (1 - np.minimum(self.thickness / FLAT, 1))
 
     def face_mass(self) -> Floats:
         """Return (f,) M of Eq. 12, lumped: a quarter of the volume of each tet at each of its faces.
@@ -146,7 +172,7 @@ class Tetrahedra(TetShapes):
         """Return (f, f) the Laplacian of faces (Eq. 20, Eq. 21): L_ab = Σ_T N_a·N_b / |T| = −(3/2) Σ |e| cot θ.
 
         Here e is the edge that the two faces share, and θ the dihedral angle of the tet there. `ties` couple the faces
-        of flat tets besides, so that directions pass through these unchanged.
+        of flat tets besides.
         """
         faces = self.faces
         return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.tet_faces, len(faces.vertices))
@@ -154,17 +180,17 @@ class Tetrahedra(TetShapes):
     def vertex_laplacian(self, corners: Ints, n: int) -> sparse.csr_matrix:
         """Return (n, n) the cotan Laplacian, Eq. 10 in tets: C_ij = Σ_T N_i·N_j / (9|T|) = −(1/6) Σ |e| cot θ.
 
-        Here e is the edge of the tet opposite edge ij, and θ the dihedral angle there. Weak `ties` couple the vertices
-        of flat tets besides, since some belong to no other tet.
+        Here e is the edge of the tet opposite edge ij, and θ the dihedral angle there. `ties` couple the vertices of
+        flat tets besides.
         """
-        return _assemble(self.area_vectors, self.stiffness_factors / 9, 1e-4 * self.ties, corners, n)
+        return _assemble(self.area_vectors, self.fading * self.stiffness_factors / 9, self.ties, corners, n)
 
     def divergence(self, directions: Floats, corners: Ints, n: int) -> Floats:
         """Return (n,) b of Eq. 13 for one vector Y per tet: the divergence of Eq. 22, ``∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T``.
 
         Eq. 22 is printed without the ⅓, and with the opposite sign, as the paper's Laplacian is negative semidefinite.
         """
-        parts = np.einsum("mki,mi->mk", self.area_vectors, directions) * (self.weights / -3)[:, None]
+        parts = np.einsum("mki,mi->mk", self.area_vectors, directions) * (self.fading * self.weights / -3)[:, None]
         return np.asarray(np.bincount(corners.ravel(), parts.ravel(), n), np.float64)
 
     def gradients(self, corner_values: Floats) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..mesh.tet_shapes import TetShapes
+from ..mesh.tet_shapes import TetShapes, inside_out
 from ..parallel import CHUNK, in_chunks
 
 FLAT = 1e-10
@@ -60,10 +60,9 @@ class Planes(NamedTuple):
         twice_area = np.linalg.norm(normals, axis=1)
         normals /= np.where(twice_area > 0, twice_area, 1)[:, None]
         signs = np.sign(np.einsum("mki,mki->mk", normals[faces.tet_faces], mesh.area_vectors))
-        solid = mesh.thickness > FLAT
-        # rounding turns flat tets inside out: their faces look away from the tets beside them, so that lines pass
-        beside = np.bincount(faces.tet_faces[solid].ravel(), signs[solid].ravel(), len(normals))[faces.tet_faces]
-        signs[~solid & ((signs * beside).sum(axis=1) > 0)] *= -1
+        turned = inside_out(mesh)
+        signs[turned] *= -1  # so that lines pass
+        solid = (mesh.thickness > FLAT) & ~turned
         counts = np.bincount(faces.tet_faces[solid].ravel(), minlength=len(normals))
         return cls(
             tet_faces=np.ascontiguousarray(faces.tet_faces),
