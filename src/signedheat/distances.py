@@ -10,10 +10,10 @@ from typing import Any, Literal, cast, get_args, overload
 from numpy.typing import ArrayLike
 
 from .area_elements import bounds_around
-from .constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
+from .constraints import Constraint, Free, Soft, ZeroSet
 from .curves.curve_distance import distance_to_curves
 from .curves.drawings import distance_to_lines
-from .errors import ConstraintError, SourceError, UnsupportedTypeError
+from .errors import SourceError, UnsupportedTypeError
 from .field_kinds import Field
 from .foreign import ForeignShape, as_list, as_shapes, converted
 from .grids.grid import Dimension, Grid, room_around
@@ -326,11 +326,6 @@ def distance_to_shapes(
     On tets, distance is along paths around walls, with the signs of the solid: where none is in between, it is the
     solid's.
     """
-    if isinstance(constraint, EachComponent | LevelValues):
-        raise ConstraintError(
-            f"distance to a shape is zero on all of it, which {constraint!r} denies",
-            remedy="use SignedHeatSolver.distance",
-        )
     options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
     method = Heat(checked(constraint), positive_number(diffusion, "diffusion"))
     joined = joined_shape(shape)

@@ -26,9 +26,9 @@ NUMBERS = {
     "offset": ["--resolution", "--spacing", "--padding", "--diffusion"],
     "morph": ["--resolution", "--spacing", "--padding", "--diffusion"],
     "fill": ["--largest", "--rims"],
-    "sample": ["--samples", "--resolution"],
+    "sample": ["--samples", "--diffusion"],
     "surface": ["--contours", "--diffusion"],
-    "close": ["--diffusion", "--up"],
+    "close": ["--diffusion"],
     "info": ["--resolution"],
     "demo": ["--resolution"],
 }

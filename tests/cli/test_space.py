@@ -313,7 +313,7 @@ def test_archives_of_solids_and_fields_are_taken_for_shapes(tmp_path, ball, caps
         assert "turned" not in capsys.readouterr().err
         assert np.abs(np.linalg.norm(sh.read(output).vertices, axis=1) - 1.2).max() < 0.05
     moved = str(tmp_path / "moved.npz")
-    assert main(["sample", names[0], "-n", "50", "-o", moved, "--resolution", "12", "--units", "m:cm"]) == 0
+    assert main(["sample", names[0], "-n", "50", "-o", moved, "--units", "m:cm"]) == 0
     assert np.load(moved)["radius"] > 100
     assert "Solid" in succeed(capsys, "info", names[0])
     assert main(["batch", *names, "-o", str(tmp_path / "out"), "--info", "--workers", "1"]) == 0

@@ -310,6 +310,8 @@ class Watertight:
         if extension(path) in LABEL_FORMATS:
             image = read_labels(path)
             shape: ShapeLike = image.to_world(image.surface(self.label))
+        elif self.label is not None:
+            raise SourceError("only images have labels", element="label", remedy="leave it out", path=path)
         else:
             shape = read(path)
         scale = 1.0 if self.units is None else scale_to(path, self.units)

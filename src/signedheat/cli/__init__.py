@@ -16,7 +16,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import SignedHeatError, printable
-from .options import parser_of, refuse_output_over_input, without_exponents
+from .options import parser_of, refuse_output_over_input, refuse_unused_formats, without_exponents
 from .terminal import Signals, open_standard_streams, say, standard_files, write_out
 
 FAILED, BUG = 1, 70
@@ -51,6 +51,7 @@ def _run(argv: Sequence[str] | None) -> int:
         return 0
     if arguments.check is not None:
         arguments.check(arguments)
+    refuse_unused_formats(arguments)
     refuse_output_over_input(arguments)
     public = import_module("signedheat.public")
     if arguments.preview is not None:

@@ -34,6 +34,7 @@ from .options import (
     output,
     positive,
     refuse_together,
+    refuse_without,
     whole_number,
     workers,
 )
@@ -66,16 +67,11 @@ RUNNING = group(
 )
 
 
-def refuse_without_samples(arguments: Namespace) -> None:
-    """Exit with an error if samples are to be normalized, and there are none."""
-    if arguments.normalize and arguments.sample is None:
-        arguments.parser.error("--normalize goes with --sample")
-
-
 def check_batch(arguments: Namespace) -> None:
     """Reject a batch without results, and options that contradict each other."""
     check_grid(arguments)
-    refuse_without_samples(arguments)
+    refuse_without(arguments, "--sample", "--near", "--widths", "--seed", "--normalize", "--layout")
+    refuse_without(arguments, "--offset", "--surface")
     try:
         job_of(arguments)
     except SignedHeatError as problem:
@@ -123,7 +119,7 @@ def names_surface(output: str) -> bool:
 def check_watertight(arguments: Namespace) -> None:
     """Reject options that contradict each other, and take the format from the name of the output."""
     refuse_together(arguments, "--spacing", "--resolution")
-    refuse_without_samples(arguments)
+    refuse_without(arguments, "--sample", "--normalize")
     if names_surface(arguments.output):
         ending = Path(arguments.output).suffix.lower().lstrip(".")
         if arguments.surface not in (None, ending):

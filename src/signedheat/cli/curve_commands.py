@@ -23,6 +23,8 @@ from .options import (
     option,
     output,
     positive,
+    refuse_together,
+    refuse_without,
     surface_constraint,
     whole_number,
 )
@@ -70,8 +72,17 @@ def about_curves(written: str) -> tuple[Option, ...]:
     )
 
 
+def check_close(arguments: Namespace) -> None:
+    """Reject options without effect beside others."""
+    refuse_together(arguments, "--plain", "--as-oriented", "--every-piece")
+    refuse_without(arguments, "--preview", "--up")
+
+
 def check_surface(arguments: Namespace) -> None:
-    """Reject isolines next to standard output."""
+    """Reject options without effect beside others, and isolines next to standard output."""
+    check_close(arguments)
+    if arguments.constraint.partition(":")[0] in ("each-component", "levels"):  # curves are taken as they are
+        refuse_together(arguments, "--constraint", "--as-oriented", "--every-piece")
     if arguments.output == "-" and arguments.contours:
         arguments.parser.error("--contours writes a file next to the output: name a file instead of standard output")
 
@@ -143,6 +154,7 @@ def surface(arguments: Namespace) -> Summary:
     *about_curves("completed curves: .obj .json"),
     option("--preview", metavar="PNG", help="draw the distance, with the completed curves"),
     *(UP, format_option("json")),
+    check=check_close,
     diffusion=None,
 )
 def close(arguments: Namespace) -> Summary:

@@ -116,9 +116,11 @@ def place(coordinates: Iterable[float]) -> str:
 
 def solid_of(arguments: Namespace, path: str) -> Any:
     """Complete the shape in a file as the options say, and print important notes on standard error."""
-    repair = {name: getattr(arguments, name) for name in ("as_oriented", "keep_overlaps", "lids", "nested")}
+    names = ("as_oriented", "keep_overlaps", "lids", "nested", "diffusion")
+    options = {name: getattr(arguments, name) for name in names}
+    options["constraint"] = constraint_of(arguments.constraint)
     with prefix_errors(path), ProgressBar(is_quiet(arguments)) as progress:
-        solid = complete(read_shape(arguments, path), **repair, progress=progress)
+        solid = complete(read_shape(arguments, path), **options, progress=progress)
     say_important(arguments, solid.diagnostics, path)
     return solid
 

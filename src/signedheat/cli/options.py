@@ -186,6 +186,15 @@ def refuse_output_over_input(arguments: Namespace) -> None:
                 raise FileFormatError("the output would replace the input", remedy="name another file", path=written)
 
 
+def refuse_unused_formats(arguments: Namespace) -> None:
+    """Exit with an error if a format of standard input or output is given, and neither is read or written."""
+    streams = (("--from", ("shape", "mesh", "field", "file", "files"), "input"), ("--format", ("output",), "output"))
+    for option, names, stream in streams:
+        named = [path for name in names for path in _names(getattr(arguments, name, None))]
+        if is_given(arguments, option) and "-" not in named:
+            arguments.parser.error(f"{option} is the format of standard {stream}: name it -")
+
+
 def _names(value: Any) -> list[str]:
     """Return the valid names of files in the value of an argument."""
     values = value if isinstance(value, list) else [value]
@@ -357,7 +366,7 @@ LIDS = option(
 )
 REPAIR = group(
     "steps (all taken by default)",
-    option("--as-oriented", action="store_true", help="turn no faces, normals or lines, and restore no faces"),
+    option("--as-oriented", action="store_true", help="turn no faces, normals or lines, and leave out no lines"),
     option("--keep-overlaps", action="store_true", help="keep surfaces that lie inside other bodies"),
     LIDS,
     option(
@@ -373,7 +382,7 @@ STEPS = group(
     option("--plain", action="store_true", help="the method's own field, not measured to the shape itself"),
 )
 METHOD = group(
-    "method",
+    "method (completes points and triangles that scatter; lids complete other shapes, unless with --plain)",
     option(
         "--constraint",
         type=constraint,
@@ -430,16 +439,24 @@ def is_planar(path: Any) -> bool:
     return Path(path).suffix.lower() in PLANAR
 
 
+def is_given(arguments: Namespace, option: str) -> bool:
+    """Whether an option has another value than its default."""
+    name = {"--shape": "grid_shape", "--from": "input_format"}.get(option, option.lstrip("-").replace("-", "_"))
+    return getattr(arguments, name, None) is not arguments.parser.get_default(name)
+
+
 def refuse_together(arguments: Namespace, first: str, *others: str) -> None:
     """Exit with an error if an option is given together with one of some others."""
-
-    def is_given(option: str) -> bool:
-        name = "grid_shape" if option == "--shape" else option.lstrip("-").replace("-", "_")
-        return not any(getattr(arguments, name, None) is absent for absent in (None, False))
-
     for other in others:
-        if is_given(first) and is_given(other):
+        if is_given(arguments, first) and is_given(arguments, other):
             arguments.parser.error(f"{other} and {first} do not go together: give one of them")
+
+
+def refuse_without(arguments: Namespace, needed: str, *others: str) -> None:
+    """Exit with an error if some options are given without the one that they belong to."""
+    for other in others:
+        if is_given(arguments, other) and not is_given(arguments, needed):
+            arguments.parser.error(f"{other} goes with {needed}")
 
 
 def refuse_of_solids(arguments: Namespace, what: str, *others: str) -> None:
@@ -475,7 +492,5 @@ def check_grid(arguments: Namespace) -> None:
 def check_tiles(arguments: Namespace) -> None:
     """Reject what `check_grid` does, tiles without a band, and workers without tiles."""
     check_grid(arguments)
-    if arguments.tiles is not None and arguments.band is None:
-        arguments.parser.error("--tiles goes with --band")
-    if arguments.tiles is None and (arguments.workers, arguments.scheduler) != (None, None):
-        arguments.parser.error("--workers and --scheduler go with --tiles")
+    refuse_without(arguments, "--band", "--tiles")
+    refuse_without(arguments, "--tiles", "--workers", "--scheduler")

@@ -186,7 +186,7 @@ def check_morph(arguments: Namespace) -> None:
     """Reject a wrong number of distances, and options that contradict each other."""
     check_grid(arguments)
     if arguments.operation == "thicken":
-        refuse_of_solids(arguments, "thicken", "as_oriented", "plain")
+        refuse_of_solids(arguments, "thicken", "as_oriented", "plain", "constraint", "diffusion")
     if arguments.operation != "shell" and (arguments.keep_outside or arguments.drain is not None):
         arguments.parser.error("--keep-outside and --drain are for shells")
     if arguments.operation != "thicken" and (arguments.side != "both" or arguments.faces):
@@ -346,20 +346,18 @@ union, intersect, subtract = map(combining, COMBINED)
     shape_option(),
     output("samples: .npz"),
     option("-n", "--samples", type=whole_number(1), default=250_000, metavar="N", help="points (250000)"),
-    *(SAMPLING, PLACE, ROOM, REPAIR, METHOD, format_option("npz")),
-    check=check_grid,
+    *(SAMPLING, PLACE, REPAIR, METHOD, format_option("npz")),
     usage="SHAPE -o OUT.npz [options]",
 )
 def sample(arguments: Namespace) -> Summary:
-    """Check that the result can be written, read, compute, sample, write."""
+    """Check that the result can be written, read, complete, sample, write."""
     sh.io.ensure_writable(arguments.output, sh.io.SAMPLE_FORMATS, "samples")
-    shape = shapes.read_shape(arguments, arguments.shape)
+    solid = shapes.solid_of(arguments, arguments.shape)
     with shapes.prefix_errors(arguments.shape):
-        field = shapes.compute(shape, shapes.grid_for(shape, arguments), arguments)
-        samples = sh.sample(field, arguments.samples, near=arguments.near, widths=arguments.widths, seed=arguments.seed)
+        samples = sh.sample(solid, arguments.samples, near=arguments.near, widths=arguments.widths, seed=arguments.seed)
     (samples.normalized() if arguments.normalize else samples).save(arguments.output, arguments.layout)
     figures = samples.figures
-    summary = {"input": arguments.shape, "output": arguments.output, **figures, "field": shapes.describe(field)}
+    summary = {"input": arguments.shape, "output": arguments.output, **figures}
     inside = figures["inside_share"]
     counts = f"{len(samples.points)} points, {figures['near']} near the surface, {inside:.1%} inside"
     return summary, f"{printable(arguments.output)}: {counts}"

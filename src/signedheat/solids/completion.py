@@ -14,9 +14,9 @@ import numpy as np
 import scipy
 
 from ..arrays import Floats, Ints
-from ..constraints import Constraint
+from ..constraints import Constraint, EachComponent, LevelValues
 from ..diagnostics import Diagnostics, FacesRestored, Note, OrientedPoints
-from ..errors import SignedHeatError, SourceError
+from ..errors import ConstraintError, SignedHeatError, SourceError
 from ..foreign import SurfaceShape
 from ..jobs import Progress, Stopwatch
 from ..kinds import ShapeLike
@@ -176,6 +176,8 @@ def complete(
     ------
     SourceError
         If no face has an area, or points have no normals and none are to be fitted.
+    ConstraintError
+        If the constraint denies that distance is zero on all of the shape.
     MemoryLimitError
         If completing does not fit in memory. Raised before anything is allocated.
 
@@ -195,6 +197,11 @@ def completed(
     shape: ShapeLike | Sequence[ShapeLike], options: Completion, method: Heat, progress: Progress | None = None
 ) -> Solid:
     """Complete a shape, see `complete`; a solid is returned as it is."""
+    if isinstance(method.constraint, EachComponent | LevelValues):
+        raise ConstraintError(
+            f"distance to a shape is zero on all of it, which {method.constraint!r} denies",
+            remedy="use SignedHeatSolver.distance",
+        )
     if isinstance(shape, Solid):
         return shape
     joined = joined_shape(shape)
