@@ -30,6 +30,7 @@ NUMBERS: list[tuple[ModuleType, str]] = [
     (lids, "MOST_RUNS"),
     (closing, "REACH"),
     (closing, "SHARP"),
+    (closing, "MOST"),
     (closing, "STIFF"),
     (closing, "AGREEMENT"),
     (lids, "SMOOTH"),

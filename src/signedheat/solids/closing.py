@@ -33,11 +33,9 @@ SHARP = 0.7
 """Edges are sharp if the cosine between the normals of their faces is below this."""
 SAMPLES = 16
 """Number of samples across that strip."""
-MOST = 32768
-"""Largest number of samples around a rim, roughly."""
-DIVIDED = 1 << 20
-"""Largest number of triangles that division makes behind a rim, before `MOST` of them are taken. A flat side behind
-slots .0012 to .1 as wide as they are long has 140,000 to 430,000."""
+MOST = 16384
+"""Number of samples around a rim: where faces would be divided into more, they are not; where more were given, every
+second, third or so is taken."""
 STIFF = 0.03
 """The bending of a wall of this depth, relative to the strip's, counts half."""
 AGREEMENT = 0.35
@@ -77,20 +75,20 @@ def smooth_patches(triangles: Floats, ids: Ints) -> Ints:
 def samples_near(
     triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spatial.cKDTree, reach: float
 ) -> RimSamples:
-    """Sample the triangles within reach of a rim, at most reach / `SAMPLES` apart unless that makes too many."""
+    """Sample the triangles within reach of a rim, at most reach / `SAMPLES` apart unless these are too many."""
     size = reach / SAMPLES
     near_rim = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
     triangles, patches = triangles[near_rim], patches[near_rim]
-    near, labels, divided = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)], 0
+    near, labels, count = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)], 0
     while len(triangles):
         centres = triangles.mean(axis=1)
         radii = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
         away = rim.query(centres)[0]
         triangles, patches, radii, away = (values[away < reach + radii] for values in (triangles, patches, radii, away))
         fine = radii <= size
-        divided += 4 * int((~fine).sum())
-        fine |= divided > DIVIDED
+        fine |= count + 4 * int((~fine).sum()) > MOST
         chosen = fine & (away < reach)
+        count += int(chosen.sum())
         near.append(triangles[chosen])
         labels.append(patches[chosen])
         a, b, c = triangles[~fine].transpose(1, 0, 2)
