@@ -246,10 +246,10 @@ def distance_to_solid(
     band: float | None = None,
     progress: Progress | None = None,
 ) -> GridField | TetField:
-    """Compute the signed distance to a solid, on tets to its boundary: see `signed_distance`."""
+    """Compute the signed distance to a solid: see `signed_distance`."""
     if domain is None or isinstance(domain, Grid):
         return solid.field(resolution, spacing=spacing, padding=padding, grid=domain, band=band, progress=progress)
-    return distance_to_shapes(solid.boundary, domain, band=band, as_oriented=True, progress=progress)
+    return completed_distance(solid, domain, Completion(), Heat(), band, progress)
 
 
 def plain_distance(

@@ -32,6 +32,14 @@ def test_a_cube_is_exact_at_its_edges_too(tets):
     assert np.array_equal(sh.sharpen(field, source=[cube(0.83)]).values, sharp.values)
 
 
+def test_a_solid_is_on_tets_what_its_shape_is(tets):
+    """With the notes on what was completed, as on grids."""
+    shape = samples.without_faces(samples.sphere(2, radius=0.8), 0.2)
+    of_shape, of_solid = (sh.signed_distance(source, tets) for source in (shape, sh.complete(shape)))
+    np.testing.assert_array_equal(of_solid.values, of_shape.values)
+    assert of_solid.diagnostics.notes == of_shape.diagnostics.notes
+
+
 def test_solids_on_tets_are_measured_to_the_shape(tets):
     """Whichever way its faces look, and though one was lost."""
     shape = cube(0.83)
