@@ -1,5 +1,6 @@
 """The commonest mistakes in passing a shape: what is wrong is said, and what to pass instead."""
 
+import numpy as np
 import pytest
 
 import signedheat as sh
@@ -40,6 +41,16 @@ def test_lines_in_the_plane_are_no_solid(lines):
     with refused(sh.SourceError) as caught:
         sh.complete([sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True)] * lines)
     assert "lines in the plane" in str(caught.value)
+
+
+@pytest.mark.parametrize("take", [
+    sh.complete, lambda voxels: sh.complete([BALL, voxels]), lambda voxels: sh.deviation(voxels, BALL),
+    lambda voxels: sh.morphology.dilate(voxels, 0.1), sh.SignedHeatSolver(sh.Grid.around(BALL.bounds, 8)).distance,
+])  # fmt: skip
+def test_voxels_are_measured_to_by_their_smooth_surface(take):
+    with refused(sh.SourceError) as caught:
+        take(sh.DigitalSurface(np.pad(np.ones((2, 2, 2), bool), 1)))
+    assert "smooth_surface" in str(caught.value)
 
 
 @pytest.mark.parametrize("source", [BALL, sh.complete(BALL), (V, F)], ids=["mesh", "solid", "pair"])

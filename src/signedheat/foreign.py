@@ -87,6 +87,8 @@ def what_to_pass(thing: object) -> str:
     """Suggest what to pass in place of something that is no shape."""
     if isinstance(thing, str | PathLike):
         return f'pass sh.read("{fspath(thing)!s}")'
+    if isinstance(thing, DigitalSurface):
+        return "pass its smooth_surface, or its squares"
     if isinstance(thing, np.ndarray) and thing.ndim == 2:
         return f"for points alone pass sh.PointCloud(points), otherwise {TAKEN}"
     return f"pass {TAKEN}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import singledispatch
-from typing import TypeAlias, cast
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -130,26 +130,20 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
     shapes = [part.boundary if isinstance(part, TetMesh) else part for part in as_shapes(shape)]
     if not shapes:
         raise SourceError("no shape was given", remedy="pass at least one")
-    if len(shapes) == 1:
-        whole = shapes[0]
-        if not isinstance(whole, TriangleMesh | PolygonMesh | PointCloud):
-            if not isinstance(whole, Curve | SurfacePoints | Polyline):
-                as_shape(cast("SurfaceShape", whole))  # which refuses paths and bare arrays
-            raise SourceError(
-                f"distance in space is measured to meshes and points, not to a {type(whole).__name__}",
-                remedy="pass a mesh, or a point cloud; curves are measured on their surface, and lines in the plane to "
-                "grids in it, by signed_distance",
-                element="source 0",
-            )
-        return whole
+    if len(shapes) == 1 and isinstance(shapes[0], TriangleMesh | PolygonMesh | PointCloud):
+        return shapes[0]
     refuse_arrays(shapes)
     meshes = []
     for index, part in enumerate(shapes):
         if not isinstance(part, TriangleMesh | PolygonMesh):
+            if not isinstance(part, Curve | SurfacePoints | Polyline):
+                as_shape(cast("SurfaceShape", part))  # which refuses paths and bare arrays
             raise SourceError(
-                f"only meshes can be joined, and shape {index} is a {type(part).__name__}",
-                remedy="join faces and points in one cloud; distance to lines in the plane is signed_distance's",
-                element=f"shape {index}",
+                f"distance in space is measured to meshes or to one point cloud, and source {index} is a "
+                f"{type(part).__name__}",
+                remedy="join points to one cloud, pass the smooth_surface of voxels, and measure to curves on their "
+                "surface, to lines in the plane on a grid in it",
+                element=f"source {index}",
             )
         meshes.append(part)
     return TriangleMesh(*joined_triangles(meshes))

@@ -171,7 +171,7 @@ def test_polygons_points_and_several_meshes():
     cloud = samples.oriented_points(samples.sphere(3), 1000)
     points = signed_distance(cloud, resolution=24)
     assert error(points, np.linalg.norm(points.grid.points, axis=-1) - 1) < 0.7
-    with refused(SourceError, "shape 1"):
+    with refused(SourceError, "source 1"):
         signed_distance([cube, cloud], resolution=32)
 
 

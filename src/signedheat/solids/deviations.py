@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..errors import SourceError
-from ..foreign import SurfaceShape, as_shape
+from ..foreign import SurfaceShape, as_shape, what_to_pass
 from ..jobs import Progress
 from ..kinds import ShapeLike
 from ..memory import within_memory
@@ -299,7 +299,7 @@ def deviation(
     if isinstance(shape, TetMesh):
         shape = shape.boundary
     if not isinstance(shape, PointCloud | TriangleMesh | PolygonMesh):
-        raise SourceError(f"a {type(shape).__name__} is not a scan", remedy="pass a mesh or points", element="scan")
+        raise SourceError(f"a {type(shape).__name__} is not a scan", remedy=what_to_pass(shape), element="scan")
     solid = complete(nominal, progress=progress)
     points = shape.points if isinstance(shape, PointCloud) else shape.vertices
     if points.shape[1] != 3:
