@@ -20,6 +20,7 @@ from ..arrays import Floats, Frozen, Ints
 from ..compiled import compiled
 from ..errors import SourceError
 from ..kinds import ShapeLike
+from ..memory import refuse_beyond_memory
 from ..mesh.box_tree import LEAF
 from ..mesh.components import connected_components, sums_of
 from ..mesh.edges import edge_table
@@ -197,6 +198,10 @@ class Thickness(Frozen):
         return f"Thickness({len(self.values)} faces, {low:.3g} to {high:.3g}, median {median:.3g})"
 
 
+BYTES_PER_PIECE = 400.0
+"""Peak memory per piece of a face, measured on a ball cut into 240,000."""
+
+
 def thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
     """Measure the thickness of a solid behind each of its faces.
 
@@ -220,6 +225,8 @@ def thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
     ------
     SourceError
         If the shape bounds nothing.
+    MemoryLimitError
+        If so many faces do not fit in memory.
 
     Examples
     --------
@@ -234,6 +241,14 @@ def thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
     if not solid.bounding.any():
         raise SourceError("the shape is a sheet, which has no thickness", remedy="thicken it, or close it")
     largest = float(np.ptp(solid.bounds, axis=0).max()) / parts
+    halvings = np.log2(np.maximum(2.0 * face_areas(solid.outward), np.finfo(float).tiny)) - 2.0 * np.log2(largest)
+    pieces = int(np.exp2(np.clip(np.ceil(halvings), 0.0, 100.0)).sum())
+    refuse_beyond_memory(
+        f"thickness at {pieces:,} places",
+        pieces,
+        lambda n: BYTES_PER_PIECE * n,
+        lambda fits: f"lower the resolution from {parts} to {int(parts * np.sqrt(fits / pieces))}",
+    )
     triangles, owners = _cut(solid.outward, largest)
     places = triangles.mean(axis=1)
     walls = solid.bounding[solid.features.ids]
