@@ -7,7 +7,7 @@ one side only.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Literal, Protocol, TypeAlias, cast, overload
+from typing import Any, Literal, Protocol, TypeAlias, cast, overload
 
 import numpy as np
 import scipy
@@ -291,6 +291,18 @@ def offset(
         bounds = solid.bounds + sides * LIMITS[corners] * max(largest, 0.0)
         grid = Grid.around(bounds, padding=2 * float(grid.spacing.max()), spacing=grid.spacing)
     return sharp_surface(Offset(solid, reach, LIMITS[corners]), grid, progress)
+
+
+def offset_of(field: Any, distance: float) -> Any:
+    """Return the boundary at a distance from what a field measures: `sharp_surface` if it holds the whole of a solid.
+
+    Other fields, and those in bands, are contoured.
+    """
+    if isinstance(field, GridField) and isinstance(field.solid, Solid) and field.blocks is None:
+        distance = finite_number(distance, "the distance")
+        if np.nanmin(field.values) < distance < field.least_at_walls:
+            return sharp_surface(Offset(field.solid, distance), field.grid)
+    return field.contour(distance) if isinstance(field, VertexField) else field.offset(distance)
 
 
 @within_memory
@@ -580,8 +592,7 @@ def _offsets(
     domain = _given_or_room(domain, shape, distance if 1 in signs else 0.0, resolution)
     for sign in signs:
         field = (measure or _field)(shape, domain)
-        boundary = (field.contour if isinstance(field, VertexField) else field.offset)(sign * distance)
-        shape = boundary
+        shape = boundary = offset_of(field, sign * distance)
     return boundary
 
 

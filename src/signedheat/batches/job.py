@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, cast
+from typing import cast
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from ..mesh.components import element_components
 from ..mesh.edges import edge_table
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import face_areas, part_volumes
+from ..morphology import offset_of
 from ..search.face_tree import FaceTree
 from ..solids.completion import Completion, Lids, complete
 from ..solids.heat_surfaces import Heat
@@ -222,7 +223,7 @@ class Job:
             phi.save(f"{stem}{self.volume}")
         surfaces = []
         for distance, name in zip(self.offsets, distinct_names(self.offsets), strict=True):
-            surface = cast("GridField[Literal[3]]", phi).offset(distance)
+            surface = offset_of(phi, distance)
             save(surface, f"{stem}_{name}{self.surfaces}")
             surfaces.append({"distance": distance, "vertices": surface.n_vertices, "faces": surface.n_faces})
         if surfaces:

@@ -420,10 +420,19 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         [Polyline(32 points, closed)]
         """
         distance = finite_number(distance, "distance")
-        walls = np.concatenate([self.whole.values.take([0, -1], axis).ravel() for axis in range(self.grid.dimension)])
         padding = f"use a padding of more than {abs(distance):g}, or a larger diffusion where wide gaps stay open"
-        refuse_beyond_walls(walls, distance, "grid", padding)
+        refuse_beyond_walls(self._walls, distance, "grid", padding)
         return self.contour(distance)
+
+    @property
+    def least_at_walls(self) -> float:
+        """The least value at the boundary of the grid."""
+        return float(np.fmin.reduce(self._walls))
+
+    @property
+    def _walls(self) -> Floats:
+        """Values at the boundary of the grid."""
+        return np.concatenate([self.whole.values.take([0, -1], axis).ravel() for axis in range(self.grid.dimension)])
 
     def combined_with(self, other: GridField[Dimension], rule: Rule) -> GridField[Dimension]:
         if self.blocks is None and other.blocks is None:

@@ -449,7 +449,7 @@ def blocks_at(offset: Offset, grid: Grid) -> Ints:
         cell = float(grid.spacing.max())
         raise MemoryLimitError(
             f"a surface in cells of {cell:.3g} needs more than the {(free or 0) / 1e9:.2g} GB that are free",
-            remedy=f"use cells of {1.5 * times * cell:.3g}",
+            remedy=f"use a spacing of {1.5 * times * cell:.3g}",
         )
     if not len(places):
         raise OutsideError(f"the distance reaches {offset.named} nowhere on the grid", remedy="choose another level")
