@@ -61,7 +61,10 @@ class RepairedMesh:
         """Repair a mesh; None if there is nothing to do, or it is none."""
         if not isinstance(given, TriangleMesh | PolygonMesh):
             return None
-        places = joined_rims(given.vertices, *_halfedges(given))
+        once = given
+        if isinstance(given, TriangleMesh):  # beside a copy of its face, a rim looks like an edge of two faces
+            once = TriangleMesh(given.vertices, given.faces[np.unique(copied_faces(given.faces, given.n_vertices))])
+        places = joined_rims(given.vertices, *_halfedges(once))
         used, vertices = np.unique(places, return_inverse=True)
         joined = given.n_vertices - len(used)
         if isinstance(given, PolygonMesh):
@@ -128,9 +131,9 @@ def _halfedges(mesh: TriangleMesh | PolygonMesh) -> tuple[Ints, Ints]:
 
 
 def copied_faces(faces: Ints, n_vertices: int) -> Ints:
-    """(m,) first face on the vertices of each, where edges have more faces than two; elsewhere the face itself."""
+    """(m,) first face on the vertices of each, where an edge has more faces than two; elsewhere the face itself."""
     first = np.arange(len(faces))
-    crowded = np.flatnonzero((_pairs(faces, n_vertices).around > 2).reshape(-1, 3).all(axis=1))
+    crowded = np.flatnonzero((_pairs(faces, n_vertices).around > 2).reshape(-1, 3).any(axis=1))
     if len(crowded):
         copies, _ = coincident_faces(faces[crowded].ravel(), np.arange(0, 3 * len(crowded) + 1, 3))
         first[crowded] = np.where(copies < 0, crowded, crowded[copies])
