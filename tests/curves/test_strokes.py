@@ -154,9 +154,9 @@ def test_a_wide_gap_of_a_single_stroke_is_told(gone, guessed):
     assert bool(told) == guessed
 
 
-@pytest.mark.parametrize("seed", [4004, 4011, 4016])
+@pytest.mark.parametrize("seed", [4003, 4013, 4016])
 def test_a_loop_of_which_most_is_gone_is_a_guess(seed):
-    """What is left bounds something with a line nearly half as long as itself."""
+    """What is left bounds something with a line nearly as long as itself."""
     random = np.random.default_rng(seed)
     drawn = strokes.whole(strokes.surface(random), random, most=1)
     begin = random.random()
@@ -199,3 +199,23 @@ def test_a_stray_arc_that_heat_closes_by_a_large_bulge_is_announced():
     drawing = strokes.drawing(random, "long_strays")
     with pytest.warns(sh.InexactWarning, match="depends on curve number 6"):
         sh.signed_distance(drawing.given, drawing.mesh)
+
+
+@pytest.mark.parametrize(
+    ("damage", "seed", "guessed"),
+    [
+        ("loop_turned", 9003, True),  # one of two loops, .36 of the length: the wrong one
+        ("loop_turned", 9043, True),
+        ("pieces_turned", 9009, False),  # two of ten strokes, .44 of the length
+        ("pieces_turned", 9016, False),
+        ("gap", 9013, False),  # three tenths of a loop, which nothing else explains
+        ("scribbles", 9029, False),  # a scribble whose ends are near to each other, which bounds nothing
+    ],
+)
+def test_what_is_a_guess_is_announced_and_nothing_else(damage, seed, guessed):
+    drawing = strokes.drawing(np.random.default_rng([seed, list(strokes.DAMAGES).index(damage)]), damage)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        values = sh.signed_distance(drawing.given, drawing.mesh).values
+    assert bool(told) == guessed
+    assert (strokes.wrong_share(drawing, values) > 0.06) == guessed

@@ -45,17 +45,22 @@ ROUNDS = 20
 SINGLY = 16
 """Number of strokes, the longest first, that are turned or left out one by one where they explain nothing; limited for
 speed. Halved and doubled, none of 46 drawings changes."""
-TURNED = 0.399
-"""Turning a loop is a guess if it turns more than this share of the loop's length and of that of all strokes: less than
-two of five pieces. Of 515 drawings (`benchmarks/strokes.py`, seeds 0 to 51) none is wrong in silence and 12 are right
-with a warning; at .36 0 and 17, at .45 1 and 9, at .5 3 and 8."""
-WORTH = 0.5
-"""The inside is a guess if it depends on a stroke worth less than this, relative to its length. Of 350 drawings, 140 of
-them with long strays, 9 are wrong in silence and 10 right with a warning; halved 15 and 5, doubled 4 and 56."""
+TURNED = 0.34
+"""Turning whole loops is a guess if they make up more than this share of the length; a loop is turned as a whole if no
+more than this share of it is not. Of 530 drawings (`benchmarks/strokes.py`, seeds 9000 to 9052) 4 are wrong in silence
+and 13 right with a warning; at .3 4 and 16, at .36 5 and 12, at .4 7 and 12."""
+HALF = 0.45
+"""Turning a part of a loop is a guess if it is more than this share, by length and by number of strokes. Without this,
+4 and 12 of the same drawings; at .34, of 283 drawings with turned strokes nine more are right with a warning."""
+WORTH, CLOSED = 0.5, 0.25
+"""The inside is a guess if it depends on a stroke worth less than this, relative to its length; the second if the
+stroke is likely to be a whole closed curve. At .4 5 and 13 of the same drawings, at .6 2 and 16, but then circles in
+three pieces, a third of them gone, are guesses, too. Of 30 closed curves none is worth less than .41 if three tenths
+are gone, and none of those is wrong; of those of which six tenths are gone, three of the seven nearly closed ones are
+wrong, and worth at most .17."""
 OTHERWISE = 0.05
-"""The inside depends on a stroke if this share of the area changes sides without it. Halved, 5 and 20 of the same
-drawings; doubled, 15 and 6. Of 315 others (seeds from 6012 on) 5 and 7 with heat's bulges, 5 and 6 without; halved 4
-and 11, doubled 5 and 6."""
+"""The inside depends on a stroke if this share of the area changes sides without it. By shortest lines alone 4 and 13
+of the same drawings, but of 320 others two more are wrong in silence, and one fewer is right with a warning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +127,14 @@ class Decision:
         return movable & ~explained & explained.any()
 
     def loops_left_out(self) -> Ints:
-        """Numbers of the curves that are left out although they are likely to be a closed curve."""
-        return self.pieces.curves(self.pieces.strokes.whole_loops(self.loose)[self.pieces.strokes.group])
+        """Numbers of the curves left out although they are likely to be a closed curve, and bound something alone."""
+        strokes = self.pieces.strokes
+        found = np.zeros(len(self.loose), dtype=bool)
+        for loop in np.flatnonzero(strokes.whole_loops(self.loose)).tolist():
+            chosen = strokes.group == loop
+            alone = strokes.inside(np.where(chosen, self.best.signs, 0.0))
+            found |= chosen & bool((alone.explained[chosen] >= EXPLAINED).any())
+        return self.pieces.curves(found)
 
     @property
     def all_bound(self) -> bool:
@@ -144,13 +155,18 @@ class Decision:
         pairs = nearby.row[chosen], loop[nearby.col[chosen]]
         count = sparse.csr_matrix((np.ones(len(pairs[0])), pairs), shape=(len(best.signs), triangles.n_vertices))
         own = np.asarray(count.argmax(axis=1)).ravel()
-        explained = np.where(best.explained >= EXPLAINED, strokes.lengths, 0.0)
-        total = np.bincount(own, explained, triangles.n_vertices)
-        turned = np.bincount(own, explained * (best.signs < 0), triangles.n_vertices)
-        mostly = turned[own] > TURNED * total[own]
-        against = mostly & (best.signs < 0) & (explained > 0)
+        bounds = best.explained >= EXPLAINED
+        lengths = np.where(bounds, strokes.lengths, 0.0)
+
+        def share_turned(weights: Floats) -> Floats:
+            turned, total = (np.bincount(own, weights * way, triangles.n_vertices) for way in (best.signs < 0, 1))
+            return np.asarray(turned[own] / np.where(total[own] > 0, total[own], 1.0))
+
+        by_length, by_number = share_turned(lengths), share_turned(bounds.astype(np.float64))
+        mostly = (by_length > 1 - TURNED) | (np.minimum(by_length, by_number) > HALF)
+        against = mostly & (best.signs < 0) & bounds
         # others turned prove nothing
-        few = explained[against].sum() < TURNED * explained[against | (best.signs > 0)].sum()
+        few = lengths[against].sum() < TURNED * lengths[against | (best.signs > 0)].sum()
         return self.pieces.curves(against & (not few))
 
     def worth_little(self, values: Floats) -> Ints:
@@ -161,8 +177,10 @@ class Decision:
         arc by a larger bulge than lines do.
         """
         strokes, best, own = self.pieces.strokes, self.best, self.pieces.strokes.own
+        closed = (strokes.is_loop & (np.bincount(strokes.group) == 1))[strokes.group]
+        least = np.where(closed, CLOSED, WORTH) * strokes.lengths
         missing = cost(strokes, best) + strokes.lengths.sum()  # a stroke is worth its length less this, or more
-        chosen = longest_of(strokes, np.flatnonzero((1 - WORTH) * strokes.lengths < missing))
+        chosen = longest_of(strokes, np.flatnonzero(strokes.lengths - least < missing))
         without = settled_from(strokes, [altered(best.signs, [k], 0.0) for k in chosen.tolist()], self.pieces.movable)
         worth = np.array([cost(strokes, rival) - cost(strokes, best) for rival in without])
         areas, away = strokes.areas[own], np.diff(strokes.means.tocsc().indptr)[own] == 0
@@ -173,9 +191,8 @@ class Decision:
             return float(areas[by_lines | by_heat].sum()) if by_lines.any() else 0.0
 
         share = np.array([depending(rival) for rival in without]) / areas.sum()
-        little = (worth < WORTH * strokes.lengths[chosen]) & (share > OTHERWISE)
         found = np.zeros(len(best.signs), dtype=bool)
-        found[chosen[little]] = True
+        found[chosen[(worth < least[chosen]) & (share > OTHERWISE)]] = True
         return self.pieces.curves(found)
 
 
