@@ -121,16 +121,6 @@ def _(shape: TetMesh, linear: Floats, move: Floats) -> TetMesh:
     return TetMesh(shape.vertices @ linear.T + move, tets)
 
 
-def far_middle(bounds: Floats) -> Floats:
-    """(3,) middle of a box, along the axes along which that is farther from the origin than the box is wide; else 0.
-
-    Nothing is rounded where it is subtracted from points in the box, nor where it is added again.
-    """
-    extents = bounds[1] - bounds[0]
-    middle: Floats = bounds[0] + 0.5 * extents
-    return np.where(np.abs(middle) > extents, middle, 0.0)
-
-
 Body: TypeAlias = tuple[Floats, Ints]
 """(n, 3) vertices and (m, 3) faces."""
 

@@ -148,7 +148,6 @@ CHANGES = {
     "faces beyond": {"origins": lambda a: a + 7},
     "no confidence": {"confidence": lambda a: a * np.nan},
     "too confident": {"confidence": lambda a: a + 7},
-    "one bounds nothing": {"bounding": lambda a: a & (np.arange(len(a)) != np.flatnonzero(a)[0])},
     "numbers that bound": {"bounding": lambda a: a.astype(float)},
     "a single number": {"triangles": lambda a: np.float64(1.0)},
     "vertices": {"source_vertices": lambda a: np.where(a > 0.5, np.inf, a)},

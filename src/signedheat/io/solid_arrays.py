@@ -55,7 +55,6 @@ def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
         if all(name in arrays for name in SOURCE):
             source = TriangleMesh(*(arrays[name] for name in SOURCE))
         windings = Windings(np.ascontiguousarray(closing, dtype=np.float64))
-        Windings(triangles[bounding])  # closed, or refused
     except GeometryError as error:
         raise FileFormatError(error.cause, remedy=error.remedy, element=error.element) from error
     last = int(origins.max()) if source is None else source.n_faces - 1

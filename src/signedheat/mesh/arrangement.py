@@ -19,13 +19,13 @@ from .edges import EdgeTable, edge_table
 from .planar_triangulation import triangulate_faces
 from .self_intersections import overlapping_faces
 from .triangles import face_areas
-from .welding import DOUBLE, distinct_rows, welded
+from .welding import distinct_rows, welded
 
-TOUCHING = 1e-12
-"""Distance, relative to the size of a shape, below which points are one, besides what rounds their coordinates."""
+TOUCHING = 1e-8
+"""Distance, relative to the size of a shape, below which points are one, since coordinates are rounded."""
 STRAIGHT = 4.0
-"""Distance from a line within which common points of two faces, or of edges, lie on it, relative to that below which
-points are one."""
+"""Distance from a line within which common points of two faces lie on it, relative to that below which points are
+one."""
 PARALLEL = 1e-9
 """Sine of the angle between edges below which they are parallel."""
 ALIKE = 1e-4
@@ -80,14 +80,9 @@ class Incidence(NamedTuple):
         return Incidence(self.owners, self.points[order])
 
 
-def slack_of(points: Floats) -> float:
-    """Distance below which points are one, since coordinates are rounded."""
-    return TOUCHING * float(np.ptp(points, axis=0).max()) + DOUBLE * float(np.abs(points).max())
-
-
 def meeting_faces(points: Floats, faces: Ints) -> Ints:
     """Return (k, 2) pairs of faces that cross, cover each other in one plane, or touch without a common vertex."""
-    slack = slack_of(points)
+    slack = TOUCHING * float(np.ptp(points, axis=0).max())
     return overlapping_faces(points, faces, slack, -slack)
 
 
@@ -97,7 +92,7 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None) -> Arrangem
     Points nearer than rounding become one, points this near to an edge or face lie on it; thinner triangles are
     dropped.
     """
-    slack = slack_of(points)
+    slack = TOUCHING * float(np.ptp(points, axis=0).max())
     pairs = meeting_faces(points, faces) if pairs is None else pairs
     busy = np.unique(faces[pairs.ravel()])
     faces = _welded(points, busy, slack)[faces]
@@ -108,6 +103,7 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None) -> Arrangem
     faces, pairs = faces[proper], number[pairs]
     pairs = pairs[(pairs >= 0).all(axis=1)]
     table = edge_table(faces)
+    on_open = _on_open_edges(points, table, slack)
 
     meetings, places = _meet(points, faces, table.vertices, table.face_edges, pairs, slack)
     kinds, owners, others = meetings.T
@@ -116,14 +112,12 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None) -> Arrangem
     along = on_edge | edges | pierced
     lines = Lines(
         table.vertices,
-        Incidence.of((owners[along], ids[along]), (others[edges], ids[edges])),
+        Incidence.of(on_open, (owners[along], ids[along]), (others[edges], ids[edges])),
         Incidence.of((owners[in_face], ids[in_face]), (others[pierced], ids[pierced])),
     )
     lines = lines.renamed(_welded(points, np.concatenate([busy, np.unique(ids)]), slack))
-    lines = _along_open_edges(points, table, lines, slack)
     lines, records = _with_segments(points, faces, table, pairs, lines, slack)
     points, lines, records = _with_crossings(points, lines, records, slack, busy)
-    lines = _along_open_edges(points, table, lines, slack)
     return _with_copies_alike(_divided(points, faces, proper, table, lines, records))
 
 
@@ -165,22 +159,22 @@ def _with_new(points: Floats, names: Ints, places: Floats, new: Bools, ids: Ints
     return np.concatenate([points, places[new][first]]), ids
 
 
-def _along_open_edges(points: Floats, table: EdgeTable, lines: Lines, slack: float) -> Lines:
-    """Put what lies on edges that do not cancel, and their ends, on all such edges that run along these."""
+def _on_open_edges(points: Floats, table: EdgeTable, slack: float) -> tuple[Ints, Ints]:
+    """Return edges that do not cancel, and ends of others that lie on them."""
     edges = np.flatnonzero(table.balance != 0)
     if not len(edges):
-        return lines
-    ends = lines.ends[edges]
+        return edges, edges
+    ends = table.vertices[edges]
     tails, heads = points[ends].swapaxes(0, 1)
     tree = BoxTree.of(np.minimum(tails, heads), np.maximum(tails, heads))
-    rim = np.unique(np.append(ends, lines.on.points[np.isin(lines.on.owners, edges)]))
-    starts, near = tree.meeting(np.repeat(points[rim][:, None], 3, axis=1), STRAIGHT * slack)
+    rim = np.unique(ends)
+    starts, near = tree.meeting(np.repeat(points[rim][:, None], 3, axis=1), slack)
     vertex = np.repeat(rim, np.diff(starts))
     away, way = points[vertex] - tails[near], (heads - tails)[near]
     share = (away * way).sum(axis=1) / np.maximum((way * way).sum(axis=1), 1e-300)
-    on = (np.linalg.norm(away - share[:, None] * way, axis=1) <= STRAIGHT * slack) & (share > 0) & (share < 1)
+    on = (np.linalg.norm(away - share[:, None] * way, axis=1) <= slack) & (share > 0) & (share < 1)
     on &= (vertex[:, None] != ends[near]).all(axis=1)
-    return lines._replace(on=Incidence.of(lines.on, (edges[near[on]], vertex[on])))
+    return edges[near[on]], vertex[on]
 
 
 def _members(faces: Ints, table: EdgeTable, lines: Lines, chosen: Ints) -> Incidence:

@@ -7,8 +7,6 @@ are subtracted, across which such a sum passes ½; a box around both, turned ins
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..arrays import Floats
@@ -17,10 +15,9 @@ from ..errors import SourceError
 from ..mesh.arrangement import arranged
 from ..mesh.welding import indexed
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..transforms import concatenated, far_middle
-from .closing import gap_fans
+from ..transforms import concatenated
 from .regions import Regions
-from .solid import Solid, moved, still_true
+from .solid import Solid, still_true
 from .winding import Windings
 
 BOX = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
@@ -53,28 +50,22 @@ def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None)
     triangles = np.concatenate([first, second[:, ::-1] if turned else second])
     if not len(triangles):
         raise SourceError("neither shape encloses anything", remedy="combine solids, not sheets", element="solid")
-    middle = far_middle(np.stack([triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))]))
-    triangles = triangles - middle
-    chain = triangles if around is None else np.concatenate([triangles, around - middle])
+    chain = triangles if around is None else np.concatenate([triangles, around])
     cut = arranged(*indexed(triangles))
     windings = Windings(chain)
     regions = Regions.of(cut, windings)
     kept = regions.behind & ~regions.ahead & ~regions.doubled
     if not kept.any():
         raise SourceError("nothing is inside the result", remedy="check that the solids overlap", element="solid")
-    lost = gap_fans(cut.points, cut.faces[kept])
-    pieces = cut.points[np.concatenate([cut.faces[kept], lost])]
+    pieces, parents = cut.points[cut.faces[kept]], cut.origins[kept]
     count = a.source.n_faces if a.source is not None else int(a.origins.max()) + 1
     origins = np.concatenate(
         [a.origins[of_first], np.where(b.origins[of_second] < 0, -1, b.origins[of_second] + count)]
     )
-    origins = np.append(origins[cut.origins[kept]], np.full(len(lost), -1))
     confidence = np.concatenate([a.confidence[of_first], b.confidence[of_second]])
-    confidence = np.append(confidence[cut.origins[kept]], np.full(len(lost), 0.5, dtype=np.float32))
     source = None
     if a.source is not None and b.source is not None:
         source = TriangleMesh(*concatenated([(mesh.vertices, mesh.faces) for mesh in (a.source, b.source)]))
-    notes = still_true((*a.diagnostics.notes, *b.diagnostics.notes), pieces, origins < 0)
+    notes = still_true((*a.diagnostics.notes, *b.diagnostics.notes), pieces, origins[parents] < 0)
     bounding = np.ones(len(pieces), dtype=np.bool_)
-    solid = Solid(pieces, origins, confidence, bounding, windings, None, Diagnostics(notes=notes))
-    return replace(moved(solid, middle), source=source)
+    return Solid(pieces, origins[parents], confidence[parents], bounding, windings, source, Diagnostics(notes=notes))

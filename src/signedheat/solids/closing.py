@@ -430,12 +430,6 @@ def fan(points: Ints) -> Ints:
     return np.stack([np.full(len(points) - 2, points[0]), points[1:-1], points[2:]], axis=1)
 
 
-def gap_fans(vertices: Floats, faces: Ints, most: int | None = None) -> Ints:
-    """(k, 3) triangles that fill the gaps of faces, by default of any number of sides, between their vertices."""
-    around = loops(vertices, faces, boundary(faces))
-    return np.concatenate([NONE.reshape(0, 3), *(fan(loop) for loop in around if most is None or len(loop) <= most)])
-
-
 def strips(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
     """(k, 3) triangles between rims that run along each other, in part or all around."""
     surface = _Surface(vertices, faces, outlines)

@@ -26,17 +26,17 @@ from ..mesh.unit_vectors import axes_across
 from ..search.face_tree import FaceTree
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..transforms import far_middle, joined_shape
+from ..transforms import joined_shape
 from ..validation import flag
 from .bounding import Bounding, bounding
 from .chain import Chain
-from .closing import closed_by, gap_fans, small_lids
+from .closing import closed_by, fan, small_lids
 from .heat_surfaces import Heat, heat_surface
 from .mesh_orientation import oriented_as, owners_of
 from .overlaps import Nesting
 from .point_orientation import mean_gap, orient_points
-from .rims import boundary, open_edges
-from .solid import Solid, moved
+from .rims import boundary, loops, open_edges
+from .solid import Solid
 from .union import TriangleGroup, united
 
 SIDES = 16
@@ -75,6 +75,12 @@ def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) ->
     )
     a, b, c = strip.T
     return points, np.concatenate([slivers, strip[(a != b) & (b != c) & (c != a)]])
+
+
+def small_gaps(vertices: Floats, faces: Ints) -> Ints:
+    """(k, 3) triangles that fill the small gaps that seams leave."""
+    around = [loop for loop in loops(vertices, faces, boundary(faces)) if len(loop) <= SIDES]
+    return np.concatenate([np.empty((0, 3), dtype=np.int64), *map(fan, around)])
 
 
 STEPS = 2
@@ -207,12 +213,10 @@ def completed(
         lambda n: bytes_to_complete(joined, n),
         lambda n: f"simplify it to {n} {parts}, or free memory",
     )
-    middle = far_middle(joined.bounds)  # about which all is done, so that it is the same everywhere
     stopwatch = Stopwatch(progress, STEPS)
     if isinstance(joined, PointCloud):
         with stopwatch("orient") as run:
             cloud, notes = (joined, ()) if options.as_oriented else run(partial(oriented_points, joined))
-            cloud = PointCloud(cloud.points - middle, cloud.normals, cloud.areas, cloud.n_neighbors)
         with stopwatch("complete") as run:
             solid = run(partial(_from_points, cloud, method))
     else:
@@ -224,10 +228,9 @@ def completed(
             raise SourceError("all faces of the shape have zero area", element="shape")
         chain = replace(chain)  # without what deciding needed
         with stopwatch("complete") as run:
-            solid = run(partial(_from_mesh, joined.triangulation.vertices - middle, chain, decided, options, method))
+            solid = run(partial(_from_mesh, joined.triangulation, chain, decided, options, method))
             owners = owners_of(joined)
             solid = replace(solid, origins=np.where(solid.origins >= 0, owners[solid.origins], -1))
-    solid = moved(solid, middle)
     source = joined if isinstance(joined, TriangleMesh) else None
     diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
     return replace(solid, source=source, diagnostics=diagnostics)
@@ -249,12 +252,13 @@ def oriented_points(cloud: PointCloud) -> tuple[PointCloud, tuple[Note, ...]]:
     return points.cloud, (OrientedPoints(points.n_fitted, points.n_turned),)
 
 
-def _from_mesh(vertices: Floats, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
+def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
     """Make the solid of a mesh, given its distinct triangles (`chain`) and what each of them bounds (`decided`).
 
     Bodies of which little is left are completed by heat, all other triangles that bound something by lids; those that
     bound nothing are kept as sheets. Origins of the solid are ids of triangles of the mesh.
     """
+    vertices = mesh.vertices
     counts = np.abs(decided.counts)
     faces = np.where((decided.counts < 0)[:, None], chain.faces[:, ::-1], chain.faces)
     torn, surfaces, notes = np.zeros(len(faces), dtype=bool), list[TriangleGroup](), list[Note]()
@@ -316,7 +320,7 @@ def _completed_by_heat(
     others = made[1][away] + len(vertices)
     points, joins = seam_triangles(places, faces, others, cell)
     places, whole = np.concatenate([places, points]), np.concatenate([faces, others, joins])
-    whole = np.concatenate([whole, gap_fans(places, whole, SIDES)])
+    whole = np.concatenate([whole, small_gaps(places, whole)])
     places, added = closed_by(places, whole)
     return [_made_from(places, whole, added, origins)]
 

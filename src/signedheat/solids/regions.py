@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..mesh.arrangement import Arrangement, slack_of
+from ..mesh.arrangement import TOUCHING, Arrangement
 from ..mesh.components import sums_of
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.triangles import area_vectors, face_areas
@@ -162,7 +162,7 @@ def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints]:
 
 def _slack(points: Floats) -> float:
     """Least distance from faces at which their sides are probed."""
-    return NEAR * slack_of(points)
+    return NEAR * TOUCHING * float(np.ptp(points, axis=0).max())
 
 
 def widest(pieces: Arrangement) -> Floats:

@@ -637,18 +637,13 @@ def completed_area(triangles: Floats, made: Bools) -> list[Note]:
         return []
     areas, corners = face_areas(triangles), triangles[made].reshape(-1, 3)
     area, box = float(areas[made].sum()), np.stack([corners.min(axis=0), corners.max(axis=0)])
-    return [CompletedArea(area, area / max(float(areas.sum()), np.finfo(float).tiny), [box.tolist()])]
+    return [CompletedArea(area, area / float(areas.sum()), [box.tolist()])]
 
 
 def still_true(notes: Sequence[Note], triangles: Floats, made: Bools) -> tuple[Note, ...]:
     """Return the notes on solids that were moved or combined, the one on their completion made anew."""
     others = [note for note in notes if not isinstance(note, CompletedArea)]
     return (*others, *completed_area(triangles, made))
-
-
-def moved(solid: Solid, move: Floats) -> Solid:
-    """Return a solid moved by a vector, (3,)."""
-    return cast("Solid", transformed(solid, np.eye(3), move)) if move.any() else solid
 
 
 def _mesh(triangles: Floats) -> TriangleMesh:
@@ -662,12 +657,12 @@ def _mesh(triangles: Floats) -> TriangleMesh:
 def _(shape: Solid, linear: Floats, move: Floats) -> Solid:
     corners = slice(None, None, 1 if np.linalg.det(linear) > 0 else -1)
 
-    def image(triangles: Floats) -> Floats:
+    def moved(triangles: Floats) -> Floats:
         """Each corner by itself, so that corners at the same place stay at the same one to the last bit."""
         places = sum((triangles[..., k, None] * linear[:, k] for k in range(3)), start=np.zeros(3)) + move
         return np.ascontiguousarray(places[:, corners])
 
-    triangles, closing = image(shape.triangles), image(shape.windings.triangles)
+    triangles, closing = moved(shape.triangles), moved(shape.windings.triangles)
     source = None if shape.source is None else cast("TriangleMesh", transformed(shape.source, linear, move))
     notes = still_true(shape.diagnostics.notes, triangles, shape.origins < 0)
     diagnostics = replace(shape.diagnostics, notes=notes)

@@ -14,7 +14,6 @@ from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
 from ..mesh.arrangement import Arrangement, arranged, meeting_faces
 from ..mesh.triangles import face_areas
 from ..mesh.welding import same_positions
-from .closing import gap_fans
 from .regions import Regions
 from .solid import Solid, completed_area
 from .winding import Windings
@@ -62,16 +61,15 @@ def united(
     buried = behind & ahead
     doubled = regions.doubled | (~closes & given & (behind != ahead))  # sheets that lie on walls
     bounds = (behind != ahead) & ~doubled
-    lost = gap_fans(pieces.points, pieces.faces[bounds & behind])
     kept = np.where(given, (~buried & ~doubled) | keep_overlaps, bounds | ~closes)
     if not kept.any():
         kept[:] = True
+    confidence = _confidence(triangles[kept], given[kept], whole, points)
     diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds)))
-    triangles = triangles if kept.all() and not len(lost) else np.concatenate([triangles[kept], pieces.points[lost]])
-    origins = np.append(origins[kept], np.full(len(lost), -1))
-    bounding = np.append((bounds & behind)[kept], np.ones(len(lost), dtype=np.bool_))
-    confidence = _confidence(triangles, origins >= 0, whole, points)
-    return Solid(triangles, origins, confidence, bounding, windings, None, diagnostics)
+    bounding = (bounds & behind)[kept]
+    return Solid(
+        triangles if kept.all() else triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics
+    )
 
 
 def _cut(whole: TriangleGroup, closing: Bools) -> Arrangement:
