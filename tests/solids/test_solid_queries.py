@@ -102,27 +102,31 @@ def test_no_solid_is_made_of_what_is_open():
         Windings(ball.vertices[ball.faces[1:]])
 
 
-@pytest.mark.parametrize("rounding", [1e-9, 1e-10, 1e-11, 1e-13])
-@pytest.mark.parametrize("kind", ["row", "shared sides"])
+@pytest.mark.parametrize("rounding", [1e-6, 3e-7, 1e-7, 3e-8, 1e-8, 1e-9, 1e-11, 1e-13])
+@pytest.mark.parametrize("kind", ["row", "shared sides", "cells"])
 def test_boxes_whose_common_sides_rounding_parts_are_one_solid(kind, rounding):
-    """As files with nine to eleven digits make them, turned so that no coordinate is round."""
+    """As files with six to thirteen digits make them, turned so that no coordinate is round."""
     rng = np.random.default_rng(3)
     if kind == "row":
         sizes = rng.uniform(0.3, 1.0, (4, 3))
         starts = np.column_stack([np.cumsum(sizes[:, 0]) - sizes[:, 0], rng.uniform(-0.1, 0.1, (4, 2))])
         volume = float(sizes.prod(axis=1).sum())
-    else:
+    elif kind == "shared sides":
         sizes, starts, volume = np.ones((2, 3)), np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.0]]), 1.4
+    else:
+        starts = 0.5 * np.array(list(np.ndindex(2, 2, 2)))[[0, 1, 2, 4, 5, 7]]
+        sizes, volume = np.full((6, 3), 0.5), 0.75
     boxes = [trimesh.creation.box(bounds=[start, start + size]) for start, size in zip(starts, sizes, strict=True)]
     mesh = trimesh.util.concatenate(boxes)
     turned = mesh.vertices @ Rotation.from_rotvec([0.3, 0.5, 0.7]).as_matrix().T
     vertices = turned + rounding * rng.uniform(-0.5, 0.5, turned.shape)
     solid = sh.complete((vertices, mesh.faces))
     points = rng.uniform(vertices.min(axis=0) - 0.1, vertices.max(axis=0) + 0.1, (4000, 3))
-    assert solid.volume == pytest.approx(volume, rel=1e-7)
+    assert solid.volume == pytest.approx(volume, rel=20 * rounding + 1e-9)
     assert (solid.inside(points) == (solid.distance(points) < 0)).all()
-    kept = solid.surface(keep_faces=True)
-    assert trimesh.Trimesh(kept.vertices, kept.faces).volume == pytest.approx(volume, rel=1e-7)
+    if rounding <= 1e-8:  # beyond, slits between them are kept or contoured, with a warning
+        kept = solid.surface(keep_faces=True)
+        assert trimesh.Trimesh(kept.vertices, kept.faces).volume == pytest.approx(volume, rel=20 * rounding + 1e-9)
 
 
 def test_vertices_at_which_cones_touch_are_not_regular():

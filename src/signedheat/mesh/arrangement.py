@@ -80,20 +80,20 @@ class Incidence(NamedTuple):
         return Incidence(self.owners, self.points[order])
 
 
-def meeting_faces(points: Floats, faces: Ints) -> Ints:
+def meeting_faces(points: Floats, faces: Ints, touching: float = TOUCHING) -> Ints:
     """Return (k, 2) pairs of faces that cross, cover each other in one plane, or touch without a common vertex."""
-    slack = TOUCHING * float(np.ptp(points, axis=0).max())
+    slack = touching * float(np.ptp(points, axis=0).max())
     return overlapping_faces(points, faces, slack, -slack)
 
 
-def arranged(points: Floats, faces: Ints, pairs: Ints | None = None) -> Arrangement:
+def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, touching: float = TOUCHING) -> Arrangement:
     """Divide faces where pairs of them, (k, 2), by default all, meet, and where edges that do not cancel end on others.
 
-    Points nearer than rounding become one, points this near to an edge or face lie on it; thinner triangles are
-    dropped.
+    Points nearer than `touching`, relative to the size of the shape, become one, points this near to an edge or face
+    lie on it; thinner triangles are dropped.
     """
-    slack = TOUCHING * float(np.ptp(points, axis=0).max())
-    pairs = meeting_faces(points, faces) if pairs is None else pairs
+    slack = touching * float(np.ptp(points, axis=0).max())
+    pairs = meeting_faces(points, faces, touching) if pairs is None else pairs
     busy = np.unique(faces[pairs.ravel()])
     faces = _welded(points, busy, slack)[faces]
     proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))

@@ -7,6 +7,8 @@ are subtracted, across which such a sum passes ½; a box around both, turned ins
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ..arrays import Floats
@@ -16,7 +18,7 @@ from ..mesh.arrangement import arranged
 from ..mesh.welding import indexed
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import concatenated
-from .regions import Regions
+from .regions import cut_and_sided
 from .solid import Solid, still_true
 from .winding import Windings
 
@@ -51,10 +53,11 @@ def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None)
     if not len(triangles):
         raise SourceError("neither shape encloses anything", remedy="combine solids, not sheets", element="solid")
     chain = triangles if around is None else np.concatenate([triangles, around])
-    cut = arranged(*indexed(triangles))
     windings = Windings(chain)
-    regions = Regions.of(cut, windings)
-    kept = regions.behind & ~regions.ahead & ~regions.doubled
+    cut, regions = cut_and_sided(
+        partial(arranged, *indexed(triangles), None), np.ones(len(triangles), dtype=bool), windings
+    )
+    kept = regions.bounds
     if not kept.any():
         raise SourceError("nothing is inside the result", remedy="check that the solids overlap", element="solid")
     pieces, parents = cut.points[cut.faces[kept]], cut.origins[kept]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from ..mesh.unit_vectors import axes_across
 from ..mesh.welding import coincident_faces, indexed
 from ..search.face_tree import FaceTree
 from ..surfaces.triangle_mesh import TriangleMesh
-from .regions import Regions, widest
+from .regions import cut_and_sided, widest
 from .tiles import Evaluated
 from .winding import Windings
 
@@ -119,11 +119,9 @@ def given_surface(solid: Evaluated, contour: Callable[[], TriangleMesh], cell: f
 
 def _conforming(whole: Joined, windings: Windings) -> Joined:
     """Triangles divided where they end on each other or cross, without those that are inside then or there twice."""
-    points, faces = whole.points, whole.faces
-    pieces = arranged(points, faces)
-    regions = Regions.of(pieces, windings)
-    faces = pieces.faces[regions.behind & ~regions.ahead & ~regions.doubled]
-    return Joined.of(pieces.points, _without_doubles(faces))
+    cut = partial(arranged, whole.points, whole.faces, None)
+    pieces, regions = cut_and_sided(cut, np.ones(len(whole.faces), dtype=bool), windings)
+    return Joined.of(pieces.points, _without_doubles(pieces.faces[regions.bounds]))
 
 
 def _without_doubles(faces: Ints) -> Ints:

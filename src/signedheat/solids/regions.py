@@ -7,6 +7,7 @@ constant that samples determine. So the inside does not depend on places between
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,8 @@ from ..mesh.unit_vectors import axes_across, unit
 from ..mesh.welding import coincident_faces
 from .winding import DEPTH, INSIDE, Windings
 
+TOLERANCES = TOUCHING, 10 * TOUCHING, 100 * TOUCHING
+"""Distances below which points are one, relative to the size of a shape: the first with which what bounds is closed."""
 SAMPLES = 3
 """Number of faces of each component on both sides of which winding numbers are computed; their median counts."""
 NEAR = 4.0
@@ -34,10 +37,19 @@ class Regions:
     behind: Bools  # (m,) each: whether it is inside behind the face, and in front of it
     ahead: Bools
     doubled: Bools  # (m,) whether another face on the same corners stands for it
+    contradictions: int  # number of sides that face each other, and should have other winding numbers
+
+    @property
+    def bounds(self) -> Bools:
+        """(m,) which faces bound the inside, and face outwards."""
+        return self.behind & ~self.ahead & ~self.doubled
 
     @classmethod
-    def of(cls, pieces: Arrangement, windings: Windings) -> Regions:
-        """Find the regions of pieces that meet in whole edges and contain the cycle with these winding numbers."""
+    def of(cls, pieces: Arrangement, windings: Windings, touching: float) -> Regions:
+        """Find the regions of pieces that meet in whole edges and contain the cycle with these winding numbers.
+
+        Points within `touching` of each other are one, relative to the size of the shape.
+        """
         first, reverse = coincident_faces(pieces.faces.ravel(), np.arange(0, pieces.faces.size + 1, 3))
         first = np.where(first < 0, np.arange(len(first)), first)  # triangles on fewer than three points
         distinct, groups = np.unique(first, return_inverse=True)
@@ -45,8 +57,9 @@ class Regions:
         vectors = area_vectors(pieces.points[pieces.faces])
         parents = unit(sums_of(vectors, pieces.origins, int(pieces.origins.max(initial=-1)) + 1))
         normals = parents[pieces.origins[distinct]]
-        inside = _windings(pieces.points, pieces.faces[distinct], normals, times, windings) > INSIDE
-        behind, ahead = inside.T
+        step = NEAR * touching * float(np.ptp(pieces.points, axis=0).max())
+        numbers, contradictions = _windings(pieces.points, pieces.faces[distinct], normals, times, windings, step)
+        behind, ahead = (numbers > INSIDE).T
         behind, ahead = (
             np.where(reverse, *pair) for pair in ((ahead[groups], behind[groups]), (behind[groups], ahead[groups]))
         )
@@ -54,30 +67,56 @@ class Regions:
         order = np.lexsort((~behind | ahead, groups))
         doubled = np.ones(len(groups), dtype=bool)
         doubled[order[np.unique(groups[order], return_index=True)[1]]] = False
-        return cls(behind, ahead, doubled)
+        return cls(behind, ahead, doubled, contradictions)
 
 
-def _windings(points: Floats, faces: Ints, normals: Floats, times: Ints, windings: Windings) -> Floats:
-    """(m, 2) winding numbers behind and in front of each distinct face, given its multiplicity."""
+def cut_and_sided(
+    cut: Callable[[float], Arrangement], closing: Bools, windings: Windings
+) -> tuple[Arrangement, Regions]:
+    """Cut faces with a tolerance, and find the regions beside them: those that bound the inside are closed.
+
+    Where corners that should coincide are apart by about the tolerance they are not, or sides contradict each other:
+    then larger ones are tried, and that with the fewest faults is taken. `closing` tells which of the faces that were
+    given count in the winding numbers.
+    """
+    tried: list[tuple[Arrangement, Regions]] = []
+    faults: list[int] = []
+    for touching in TOLERANCES:
+        pieces = cut(touching)
+        regions = Regions.of(pieces, windings, touching)
+        bounds = pieces.faces[regions.bounds & closing[pieces.origins]]
+        tried.append((pieces, regions))
+        uncut = len(pieces.origins) == len(closing)
+        faults.append(0 if uncut else regions.contradictions + int((edge_table(bounds).balance != 0).sum()))
+        if not faults[-1]:
+            break
+    return tried[int(np.argmin(faults))]
+
+
+def _windings(
+    points: Floats, faces: Ints, normals: Floats, times: Ints, windings: Windings, step: float
+) -> tuple[Floats, int]:
+    """(m, 2) winding numbers behind and in front of each distinct face, given its multiplicity; contradictions.
+
+    Sides of wide faces are probed at least a step away.
+    """
     n = len(faces)
     sides, facing_sides = _around_edges(points, faces, normals, times)
-    levels, labels = (values.reshape(-1, 2) for values in _levels(times, sides, facing_sides))
-    labels = labels[:, 0]
+    levels, labels, contradictions = _levels(times, sides, facing_sides)
+    levels, labels = levels.reshape(-1, 2), labels[::2]
     # the widest faces of each part
     order = np.lexsort((-_widths(points, faces), labels))
     starts = np.searchsorted(labels[order], np.arange(int(labels.max(initial=-1)) + 1))
     chosen = order[np.arange(n) - starts[labels[order]] < SAMPLES]
     corners = points[faces[chosen]]
-    away = np.minimum(
-        np.maximum(DEPTH * np.sqrt(face_areas(corners)), _slack(points)), 0.1 * _widths(points, faces[chosen])
-    )
+    away = np.minimum(np.maximum(DEPTH * np.sqrt(face_areas(corners)), step), 0.1 * _widths(points, faces[chosen]))
     away, centres = away[:, None] * normals[chosen], corners.mean(axis=1)
     sampled = windings.numbers_once(np.concatenate([centres - away, centres + away]))
     offsets, owners = sampled - levels[chosen].T.ravel(), np.tile(labels[chosen], 2)
     order = np.lexsort((offsets, owners))
     counts = np.bincount(owners)
     medians = offsets[order[np.cumsum(counts) - counts + counts // 2]]
-    return levels + np.round(medians)[labels, None]
+    return levels + np.round(medians)[labels, None], contradictions
 
 
 def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> tuple[Ints, Ints]:
@@ -124,12 +163,12 @@ def _facing(table: EdgeTable, turning: Ints, reached: Ints) -> tuple[Ints, Ints]
 
 
 @compiled
-def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints]:
-    """Levels of the sides of faces, equal for sides that face each other; and their components.
+def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints, int]:
+    """Levels of the sides of faces, equal for sides that face each other; their components; number of contradictions.
 
-    In front of a face it is less than behind it by how often the face is there; later contradictions do not count.
+    In front of a face it is less than behind it by how often the face is there; later contradictions change nothing.
     """
-    n = 2 * len(times)
+    n, contradictions = 2 * len(times), 0
     parents, rises = np.arange(n), np.zeros(n, dtype=np.int64)  # from the parent of each
     for face in range(len(times)):
         parents[2 * face + 1], rises[2 * face + 1] = 2 * face, -times[face]
@@ -149,6 +188,8 @@ def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints]:
             parents[b], rises[b] = a, -rise
         elif b < a:
             parents[a], rises[a] = b, rise
+        elif rise != 0:
+            contradictions += 1
     labels, count = np.empty(n, dtype=np.int64), 0
     for node in range(n):  # those above it have their levels already
         if parents[node] == node:
@@ -157,12 +198,7 @@ def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints]:
         else:
             rises[node] += rises[parents[node]]
             labels[node] = labels[parents[node]]
-    return rises, labels
-
-
-def _slack(points: Floats) -> float:
-    """Least distance from faces at which their sides are probed."""
-    return NEAR * TOUCHING * float(np.ptp(points, axis=0).max())
+    return rises, labels, contradictions
 
 
 def widest(pieces: Arrangement) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
@@ -14,7 +15,7 @@ from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
 from ..mesh.arrangement import Arrangement, arranged, meeting_faces
 from ..mesh.triangles import face_areas
 from ..mesh.welding import same_positions
-from .regions import Regions
+from .regions import cut_and_sided
 from .solid import Solid, completed_area
 from .winding import Windings
 
@@ -48,8 +49,7 @@ def united(
     whole = joined_surfaces(surfaces)
     closing = np.concatenate([np.full(len(surface.triangles), surface.closing) for surface in surfaces])
     windings = Windings(whole.triangles if closing.all() else whole.triangles[closing])
-    pieces = _cut(whole, closing)
-    regions = Regions.of(pieces, windings)
+    pieces, regions = cut_and_sided(partial(_cut, whole, closing), closing, windings)
     uncut = np.array_equal(pieces.origins, np.arange(len(whole.triangles)))
     triangles = whole.triangles if uncut else pieces.points[pieces.faces]
     behind, ahead = regions.behind.copy(), regions.ahead.copy()
@@ -72,18 +72,18 @@ def united(
     )
 
 
-def _cut(whole: TriangleGroup, closing: Bools) -> Arrangement:
+def _cut(whole: TriangleGroup, closing: Bools, touching: float) -> Arrangement:
     """Faces divided where they meet: those that close by each other, all others by these."""
     ids = whole.ids
     first = np.full(int(ids.max()) + 1, -1)
     first[ids.ravel()[::-1]] = np.arange(ids.size)[::-1]
     points = whole.triangles.reshape(-1, 3)[first]
     faces = same_positions(points)[ids]
-    pairs = meeting_faces(points, faces)
+    pairs = meeting_faces(points, faces, touching)
     both = closing[pairs].all(axis=1)
     closed = np.flatnonzero(closing)
     number = np.cumsum(closing) - 1
-    pieces = _arranged(points, faces, closed, number[pairs[both]])
+    pieces = _arranged(points, faces, closed, number[pairs[both]], touching)
     if closing.all():
         return pieces
     across = pairs[closing[pairs].any(axis=1) & ~both]
@@ -92,7 +92,7 @@ def _cut(whole: TriangleGroup, closing: Bools) -> Arrangement:
     used = np.flatnonzero(asked)
     number = np.full(len(faces), -1)
     number[used] = np.arange(len(used))
-    others = _arranged(points, faces, used, number[across])
+    others = _arranged(points, faces, used, number[across], touching)
     sheets = ~closing[others.origins]
     return Arrangement(
         np.concatenate([pieces.points, others.points]),
@@ -102,11 +102,11 @@ def _cut(whole: TriangleGroup, closing: Bools) -> Arrangement:
     )
 
 
-def _arranged(points: Floats, faces: Ints, chosen: Ints, pairs: Ints) -> Arrangement:
+def _arranged(points: Floats, faces: Ints, chosen: Ints, pairs: Ints, touching: float) -> Arrangement:
     """Return some faces, divided where pairs of them meet."""
     if not len(pairs):
         return Arrangement(points, faces[chosen], chosen, np.arange(len(chosen)))
-    pieces = arranged(points, faces[chosen], pairs)
+    pieces = arranged(points, faces[chosen], pairs, touching)
     return pieces._replace(origins=chosen[pieces.origins])
 
 
