@@ -121,6 +121,8 @@ THIN = 1e-2
 """Volume, relative to the cube of the longest edge, below which a tet has a reduced weight; regular tets have 0.118."""
 FLAT = 1e-6
 """Volume, relative to the cube of the longest edge, below which a tet counts as flat."""
+LEAST_MASS = 1e-9
+"""Least mass of a face, relative to the mean of all."""
 TIE = 1e-4
 """Stiffness between the faces or vertices of flat tets, relative to the longest edge."""
 
@@ -163,10 +165,12 @@ class Tetrahedra(TetShapes):
         """Return (f,) M of Eq. 12, lumped: a quarter of the volume of each tet at each of its faces.
 
         These are the row sums of the consistent mass of Eq. 23, with 2/5 of the volume on its diagonal and −1/20
-        between two faces of a tet, and they are as accurate.
+        between two faces of a tet, and they are as accurate. Faces of flat tets have at least a little, so that M + tL is
+        positive definite.
         """
         quarter = np.repeat(self.weights * self.volumes / 4, 4)
-        return np.asarray(np.bincount(self.faces.tet_faces.ravel(), quarter, len(self.faces.vertices)), np.float64)
+        mass = np.bincount(self.faces.tet_faces.ravel(), quarter, len(self.faces.vertices)).astype(np.float64)
+        return np.maximum(mass, LEAST_MASS * mass.mean())
 
     def face_laplacian(self) -> sparse.csr_matrix:
         """Return (f, f) the Laplacian of faces (Eq. 20, Eq. 21): L_ab = Σ_T N_a·N_b / |T| = −(3/2) Σ |e| cot θ.
