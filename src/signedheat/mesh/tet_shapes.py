@@ -165,8 +165,8 @@ class Tetrahedra(TetShapes):
         """Return (f,) M of Eq. 12, lumped: a quarter of the volume of each tet at each of its faces.
 
         These are the row sums of the consistent mass of Eq. 23, with 2/5 of the volume on its diagonal and −1/20
-        between two faces of a tet, and they are as accurate. Faces of flat tets have at least a little, so that M + tL is
-        positive definite.
+        between two faces of a tet, and they are as accurate. Faces of flat tets have at least a little, so that M + tL
+        is positive definite.
         """
         quarter = np.repeat(self.weights * self.volumes / 4, 4)
         mass = np.bincount(self.faces.tet_faces.ravel(), quarter, len(self.faces.vertices)).astype(np.float64)
