@@ -145,6 +145,24 @@ def test_signals_at_many_moments(tmp_path, number):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_a_library_calls_python_is_not_lost(tmp_path, number):
+    """As the one that compiles kernels does: exceptions in what it calls go nowhere."""
+    code = f"""
+import ctypes, os, sys, time
+from signedheat.cli import main, reports
+def signalled():
+    os.kill(os.getpid(), {int(number)})
+def waiting(path):
+    ctypes.CFUNCTYPE(None)(signalled)()
+    time.sleep(20)
+reports.read = waiting
+sys.exit(main(["info", "ball.stl"]))
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ready(tmp_path / "run"), capture_output=True, text=True)
+    assert done.returncode == 128 + number and done.stderr.count("\n") == 1, done.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_while_a_file_is_written(tmp_path, number):
     code = f"""
 import os, sys

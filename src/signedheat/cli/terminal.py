@@ -41,6 +41,8 @@ PLAIN = str.maketrans(
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 CLEAR = "\r\x1b[2K"
 """Clears the current line of a terminal."""
+SHORTLY = 0.05
+"""Seconds after which a signal that was lost is sent again."""
 APART = 1.0
 """Seconds within which further signals are ignored."""
 
@@ -165,15 +167,18 @@ class Signals:
         self.caught: int | None = None
         self._last = -APART
         self._before: dict[int, Any] = {}
+        self._hook = sys.unraisablehook
 
     def __enter__(self) -> Signals:
         if threading.current_thread() is threading.main_thread():
             for number in SIGNALS:
                 if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
                     self._before[number] = signal.signal(number, self._raise)
+        self._hook, sys.unraisablehook = sys.unraisablehook, self._again
         return self
 
     def __exit__(self, *_: object) -> None:
+        sys.unraisablehook = self._hook
         for number, before in self._before.items():
             signal.signal(number, before)
 
@@ -183,6 +188,13 @@ class Signals:
             return
         self.caught, self._last = number, now
         raise Stopped
+
+    def _again(self, lost: sys.UnraisableHookArgs) -> None:
+        """Send a signal again that came while a library called Python, which loses exceptions; report all others."""
+        if self.caught is None or not isinstance(lost.exc_value, Stopped):
+            return self._hook(lost)
+        self._last = -APART
+        threading.Timer(SHORTLY, signal.raise_signal, [self.caught]).start()
 
 
 INPUTS = ("shape", "mesh", "field", "file")
