@@ -6,7 +6,8 @@ A scene is made of parts of which it is known whether they bound a solid, and of
 if it is taken for a sheet though it bounds, the other way round, or if it faces inwards. Printed are the share of the
 area that is wrong in each scene, and, for each number, the scenes where that changes by more than a hundredth. Of
 shares above a half, twice is half of the way to one. The number that decides between lids and heat is swept over the
-volume that shapes enclose, that of seams of surfaces over seams that were rounded, and slits.
+volume that shapes enclose, that of seams of surfaces over seams that were rounded, and slits; those within which
+points are one over boxes that touch.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from signedheat import TriangleMesh, complete, orientation, samples
 from signedheat.mesh import welding
 from signedheat.mesh.components import element_components
 from signedheat.mesh.triangles import area_vectors
-from signedheat.solids import bounding, completion, gauss, overlaps
+from signedheat.solids import bounding, completion, gauss, overlaps, regions
 
 MODULES = (bounding, gauss, overlaps)
 NUMBERS = ("SHEET", "COHERENT", "CHANCE", "ALONG", "REACH", "HINT", "APART", "HELD", "AGREEMENT", "MANY", "SLENDER")
@@ -273,6 +274,30 @@ def joined(units: float) -> dict[str, float]:
     return result
 
 
+def parted(tolerances: tuple[float, ...], seeds: int) -> dict[str, float]:
+    """Share of assemblies of touching boxes whose volume is wrong, by how far rounding moves their corners."""
+    box = sides((1.0, 1.0, 1.0))
+    corners, numbers = np.unique(box.vertices.round(9), axis=0, return_inverse=True)
+    faces = numbers.reshape(-1)[box.faces]
+    before = regions.TOLERANCES
+    regions.TOLERANCES = tolerances
+    result = {}
+    for rounding in (1e-11, 1e-9, 1e-8, 3e-8, 1e-7, 3e-7, 1e-6, 1e-5):
+        wrong = 0
+        for seed in range(10 * seeds):
+            rng = np.random.default_rng([seed, 11])
+            cells = np.argwhere(rng.random((2, 2, 2)) < 0.7) if seed % 2 else np.array([[0, 0, 0], [0.4, 0, 0]])
+            size = rng.uniform(0.3, 1.0, 3)
+            volume = float(size.prod() * (len(cells) if seed % 2 else 1.4))
+            points = (cells[:, None] + corners[None]).reshape(-1, 3) * size
+            points = points @ np.linalg.qr(rng.normal(size=(3, 3)))[0] + rounding * rng.normal(size=points.shape)
+            many = (faces + len(corners) * np.arange(len(cells))[:, None, None]).reshape(-1, 3)
+            wrong += abs(complete((points, many)).volume / volume - 1) > 1e-9 + 20 * rounding
+        result[f"{rounding:g}"] = wrong / (10 * seeds)
+    regions.TOLERANCES = before
+    return result
+
+
 def main(seeds: int = 2) -> None:
     usual = table(seeds)
     for name, share in usual.items():
@@ -302,6 +327,11 @@ def main(seeds: int = 2) -> None:
     print("share of seams that is joined with welding.SEAM " + ", ".join(f"{units:g}" for units in shares))
     for name in shares[welding.SEAM]:
         print(f"{name:54s} " + " ".join(f"{row[name]:4.0%}" for row in shares.values()))
+
+    for most in range(1, len(regions.TOLERANCES) + 1):
+        wrong = parted(regions.TOLERANCES[:most], seeds)
+        listed = ", ".join(f"{rounding} {share:.0%}" for rounding, share in wrong.items())
+        print(f"assemblies wrong with {most} of regions.TOLERANCES, by rounding: {listed}", flush=True)
 
 
 if __name__ == "__main__":
