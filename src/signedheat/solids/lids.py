@@ -121,6 +121,10 @@ def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:
     )
 
 
+EVEN = 1e-3
+"""Share to which points around a disc are as far apart as if all sides of the loop were of one length."""
+
+
 def _around_disc(shares: Floats) -> Floats:
     return np.stack([np.cos(2 * np.pi * shares), np.sin(2 * np.pi * shares)], axis=1)
 
@@ -133,7 +137,8 @@ def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tup
     n, ways = over.n_rim, np.roll(loop, -1, axis=0) - loop
     edges, shares = cut_to_pieces(loop)
     if frame is None:
-        flat = _around_disc(starts[edges] + shares * np.diff(starts)[edges])
+        even = np.arange(len(edges)) / len(edges)  # no two are at one place, where sides are as short as rounding
+        flat = _around_disc((1 - EVEN) * (starts[edges] + shares * np.diff(starts)[edges]) + EVEN * even)
         inner = np.arange(n, len(over.plane))
     else:
         rim = (loop[edges] + shares[:, None] * ways[edges] - frame[0]) @ frame[1]
