@@ -29,7 +29,7 @@ from .field_arithmetic import smooth_difference, smooth_intersection, smooth_uni
 from .field_kinds import Field
 from .foreign import as_list, as_shape, converted
 from .grids.grid import RESOLUTION, Grid, room_around
-from .grids.grid_field import GridField
+from .grids.grid_field import GridField, values_at_walls
 from .grids.polyline import Polyline
 from .jobs import Progress
 from .kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
@@ -294,13 +294,13 @@ def offset(
 
 
 def offset_of(field: Any, distance: float) -> Any:
-    """Return the boundary at a distance from what a field measures: `sharp_surface` if it holds the whole of a solid.
+    """Return the boundary at a distance from what a field measures, with edges if the field holds a solid.
 
-    Other fields, and those in bands, are contoured.
+    It is contoured, without edges, from other fields, from those in bands, and where the grid does not hold all of it.
     """
     if isinstance(field, GridField) and isinstance(field.solid, Solid) and field.blocks is None:
         distance = finite_number(distance, "the distance")
-        if np.nanmin(field.values) < distance < field.least_at_walls:
+        if np.nanmin(field.values) < distance < np.nanmin(values_at_walls(field)):
             return sharp_surface(Offset(field.solid, distance), field.grid)
     return field.contour(distance) if isinstance(field, VertexField) else field.offset(distance)
 

@@ -421,18 +421,8 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         """
         distance = finite_number(distance, "distance")
         padding = f"use a padding of more than {abs(distance):g}, or a larger diffusion where wide gaps stay open"
-        refuse_beyond_walls(self._walls, distance, "grid", padding)
+        refuse_beyond_walls(values_at_walls(self), distance, "grid", padding)
         return self.contour(distance)
-
-    @property
-    def least_at_walls(self) -> float:
-        """The least value at the boundary of the grid."""
-        return float(np.fmin.reduce(self._walls))
-
-    @property
-    def _walls(self) -> Floats:
-        """Values at the boundary of the grid."""
-        return np.concatenate([self.whole.values.take([0, -1], axis).ravel() for axis in range(self.grid.dimension)])
 
     def combined_with(self, other: GridField[Dimension], rule: Rule) -> GridField[Dimension]:
         if self.blocks is None and other.blocks is None:
@@ -584,3 +574,8 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             return f"GridField({how} between nodes, {self.grid!r}, {band})"
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
         return f"GridField({how} between nodes, {self.grid!r}, values from {low:.4g} to {high:.4g})"
+
+
+def values_at_walls(field: GridField[Dimension]) -> Floats:
+    """Return the values at the boundary of the grid of a field, in no order."""
+    return np.concatenate([field.whole.values.take([0, -1], axis).ravel() for axis in range(field.grid.dimension)])

@@ -637,7 +637,8 @@ def completed_area(triangles: Floats, made: Bools) -> list[Note]:
         return []
     areas, corners = face_areas(triangles), triangles[made].reshape(-1, 3)
     area, box = float(areas[made].sum()), np.stack([corners.min(axis=0), corners.max(axis=0)])
-    return [CompletedArea(area, area / float(areas.sum()), [box.tolist()])]
+    total = max(float(areas.sum()), np.finfo(float).tiny)  # of points alone, nothing
+    return [CompletedArea(area, area / total, [box.tolist()])]
 
 
 def still_true(notes: Sequence[Note], triangles: Floats, made: Bools) -> tuple[Note, ...]:
