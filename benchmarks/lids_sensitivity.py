@@ -36,6 +36,7 @@ NUMBERS: list[tuple[ModuleType, str]] = [
     (lids, "SMOOTH"),
     (lids, "PIECES"),
     (lids, "CLOSE"),
+    (lids, "EVEN"),
     (spanning, "GROWTH"),
 ]
 Shape = tuple[NDArray[np.float64], NDArray[np.int64]]

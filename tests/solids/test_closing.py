@@ -10,6 +10,7 @@ import signedheat as sh
 from shapes.bodies import finer
 from signedheat import samples
 from signedheat.mesh.edges import edge_table
+from signedheat.solids import lids
 from signedheat.solids.closing import closed_by
 from signedheat.solids.rims import boundary, loops
 
@@ -176,3 +177,12 @@ def test_rims_that_a_wall_closes_may_have_a_vertex_in_common():
     bowl = np.stack([np.full(24, 47), np.roll(outer, -1), outer], axis=1)
     cavity = np.stack([np.full(24, 48), inner, np.roll(inner, -1)], axis=1)
     assert 0 < volume(places, np.concatenate([bowl, cavity])) < 1
+
+
+def test_a_disc_has_room_for_sides_as_short_as_rounding():
+    angles = 2 * np.pi * np.arange(40) / 40
+    loop = np.stack([np.cos(angles), np.sin(angles), 0.3 * np.cos(5 * angles)], axis=1)
+    loop[10:30] = loop[10] + 1e-13 * loop[10:30]
+    rim = lids.SmoothRim.of(loop)
+    points, faces = lids.draped(loop, rim.starts, None, lids.film(lids.pattern(rim, None)))
+    assert set(range(len(loop))) <= set(faces.ravel().tolist()) and faces.max() == len(loop) + len(points) - 1

@@ -122,7 +122,7 @@ THIN = 1e-2
 FLAT = 1e-6
 """Volume, relative to the cube of the longest edge, below which a tet counts as flat."""
 LEAST_MASS = 1e-9
-"""Least mass of a face, relative to the mean of all."""
+"""Least mass of a face, relative to the mean of all; from 1e-12 to 1e-4 no test of tets changes."""
 TIE = 1e-4
 """Stiffness between the faces or vertices of flat tets, relative to the longest edge."""
 
