@@ -27,12 +27,9 @@ import numpy as np
 import scan_files
 import signedheat as sh
 from fuzz.cases_files import KINDS, Files
+from fuzz.forked import forked
 from fuzz.frame import _peak
 
-ISOLATED = frozenset("dae step las laz e57 mesh meshb vtk msh node ele nii nii.gz".split())
-"""Formats whose parsers run in a process of their own, which takes .1 to 1 s a file: fewer are tried."""
-EVERY, FEW = 1 << 20, 40
-"""Places of a file that are attacked: every byte, or a few in formats that are isolated."""
 LIES_TOLD = 1000
 """Lies that are told in place of the sizes of a file, at most."""
 SECONDS, MEMORY = 10.0, 600_000_000
@@ -44,7 +41,7 @@ SECRET = 777.125
 NUMBER = re.compile(rb"[-+]?\d+(\.\d*)?(e[-+]?\d+)?")
 LIES = [b"0", b"-1", b"2147483647", b"4294967296", b"1000000000000", b"999999999999999999", b"1e400", b"1" * 5000]
 WORDS = [struct.pack("<I", 2**31 - 1), b"\xff" * 4, struct.pack("<Q", 2**40), struct.pack("<Q", 2**62), b"\xff" * 8]
-Attack = Callable[[Files, int, Path], Iterator[Files]]
+Attack = Callable[[Files, Path], Iterator[Files]]
 
 
 def first_of(files: Files, data: bytes) -> Files:
@@ -77,33 +74,33 @@ def zipped(members: dict[str, bytes]) -> bytes:
     return file.getvalue()
 
 
-def truncated(files: Files, places: int, _: Path) -> Iterator[Files]:
+def truncated(files: Files, _: Path) -> Iterator[Files]:
     """The beginning alone."""
     data = next(iter(files.values()))
-    for end in np.unique(np.linspace(0, len(data) - 1, min(places, len(data))).astype(int)):
+    for end in range(len(data)):
         yield first_of(files, data[:end])
 
 
-def changed(files: Files, places: int, _: Path) -> Iterator[Files]:
+def changed(files: Files, _: Path) -> Iterator[Files]:
     """One byte is another."""
     random = np.random.default_rng(0)
     for data, packed in contents(files):
-        for at in np.unique(np.linspace(0, len(data) - 1, min(places, len(data))).astype(int)):
+        for at in range(len(data)):
             yield packed(data[:at] + bytes([data[at] ^ int(random.integers(1, 256))]) + data[at + 1 :])
 
 
-def lying(files: Files, places: int, _: Path) -> Iterator[Files]:
+def lying(files: Files, _: Path) -> Iterator[Files]:
     """Counts, sizes and indices are others: the first numbers of a text, and words of four and eight bytes."""
     for data, packed in contents(files):
         changes = [data[: found.start()] + lie + data[found.end() :]
                    for found in NUMBER.finditer(data[:4000]) for lie in LIES]  # fmt: skip
         if not data[:4000].isascii() or b"\0" in data[:4000]:
             changes += [data[:at] + word + data[at + len(word) :] for at in range(0, 400, 2) for word in WORDS]
-        for k in np.unique(np.linspace(0, len(changes) - 1, min(places, LIES_TOLD, len(changes))).astype(int)):
+        for k in np.unique(np.linspace(0, len(changes) - 1, min(LIES_TOLD, len(changes))).astype(int)):
             yield packed(changes[k])
 
 
-def bombs(files: Files, _: int, __: Path) -> Iterator[Files]:
+def bombs(files: Files, _: Path) -> Iterator[Files]:
     """Files that become large: packed zeros, entities of entities, nesting, numbers and lines of any length."""
     zeros = bytes(LARGE)
     for data, packed in contents(files):
@@ -124,7 +121,7 @@ def bombs(files: Files, _: int, __: Path) -> Iterator[Files]:
             yield packed(data[: found.start()] + b"1" * 1_000_000 + data[found.end() :])
 
 
-def entities(files: Files, _: int, outside: Path) -> Iterator[Files]:
+def entities(files: Files, outside: Path) -> Iterator[Files]:
     """Descriptions that refer to other files: entities, document types, inclusions."""
     for data, packed in contents(files):
         if is_xml(data):
@@ -137,7 +134,7 @@ def entities(files: Files, _: int, outside: Path) -> Iterator[Files]:
             yield packed(data[:end] + include + data[end:])
 
 
-def traversal(files: Files, _: int, outside: Path) -> Iterator[Files]:
+def traversal(files: Files, outside: Path) -> Iterator[Files]:
     """Names of files outside the folder, wherever a format names files."""
     data = next(iter(files.values()))
     for name in (f"../{outside.name}", str(outside), outside.as_uri()):
@@ -233,7 +230,7 @@ def main(wanted: list[str]) -> int:
     for ending, variants in formats().items():
         if wanted and ending not in wanted:
             continue
-        cells, places = [], FEW if ending in ISOLATED else EVERY
+        cells = []
         for name, attack in ATTACKS.items():
             kinds: Counter[str] = Counter()
             for read, files in variants:
@@ -241,7 +238,7 @@ def main(wanted: list[str]) -> int:
                     folder, outside = Path(root) / "in", Path(root) / "outside.bin"
                     folder.mkdir()
                     outside.write_text(f"{SECRET} {SECRET} {SECRET}\n")
-                    for attacked in attack(files, places, outside):
+                    for attacked in attack(files, outside):
                         kind = outcome(read, attacked, folder, opened)
                         if kind not in ("read", "refused"):  # again: it may have been kernels that were compiled
                             kind = outcome(read, attacked, folder, opened)
@@ -257,4 +254,6 @@ def main(wanted: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    with forked():
+        status = main(sys.argv[1:])
+    sys.exit(status)

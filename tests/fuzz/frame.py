@@ -22,8 +22,9 @@ What becomes of a case:
 * it takes longer than the limit (30 s of a processor), ends its process, or takes more memory than the family's limit:
   a failure.
 
-Everything that is random comes from the generator that `build` is given, which is made of the family's name, a seed and
-the number of the case: a failure is told with the command that runs it again, in the foreground::
+In workers, parsers of other packages are forked, which is faster. Everything that is random comes from the generator
+that `build` is given, which is made of the family's name, a seed and the number of the case: a failure is told with the
+command that runs it again, in the foreground::
 
     cd tests
     python -m fuzz                                  # 10,000 cases of every family (make fuzz)
@@ -58,6 +59,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from fuzz.forked import forked
 from signedheat.errors import SignedHeatError
 
 LIMIT = 30.0
@@ -202,12 +204,10 @@ def _work(pipe: Connection, modules: Sequence[str]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     known = families(modules)
     pipe.send(None)
-    while True:
-        try:
+    with forked(), suppress(EOFError):
+        while True:
             name, seed, number = pipe.recv()
-        except EOFError:
-            return
-        pipe.send(run_case(known[name], seed, number))
+            pipe.send(run_case(known[name], seed, number))
 
 
 class Worker:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
 
 from fuzz.cases_files import KINDS
+from fuzz.forked import forked
 from fuzz.frame import families, run
+from signedheat import SignedHeatError
 
 CASES = 12
 
@@ -27,3 +31,22 @@ def test_a_short_run_on_damaged_files():
     assert not tally.failures, "\n".join(map(str, tally.failures))
     assert sum(sum(kinds.values()) for kinds in tally.counts.values()) == CASES * len(names)
     assert all(any(kind.startswith("refused") for kind in kinds) for kinds in tally.counts.values())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="parsers are forked on Linux alone")
+def test_parsers_that_are_forked_say_what_those_that_are_started_say(tmp_path):
+    read, variants = KINDS["labels"]
+    path, data = tmp_path / "labels.nii.gz", next(f["labels.nii.gz"] for f in variants() if "labels.nii.gz" in f)
+
+    def said(part):
+        path.write_bytes(part)
+        try:
+            return repr(read(path))
+        except SignedHeatError as error:
+            return str(error)
+
+    parts = data, data[:-9], data[:20], b""
+    started = [said(part) for part in parts]
+    with forked():
+        assert [said(part) for part in parts] == started
+    assert len(set(started)) > 2
