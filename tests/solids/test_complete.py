@@ -12,6 +12,8 @@ import signedheat as sh
 from shapes.bodies import finer
 from signedheat import samples
 from signedheat.diagnostics import BoundsNothing, LeftOut
+from signedheat.solids.completion import seam_triangles
+from signedheat.solids.overlaps import FEW, levels_within
 from signedheat.solids.winding import open_edges_of
 
 
@@ -623,3 +625,27 @@ def test_loose_noisy_strips_and_sectors_are_the_cylinder_that_they_scatter_aroun
     noisy = triangles + 0.01 * np.random.default_rng(0).normal(size=triangles.shape)
     solid = sh.complete(sh.TriangleMesh(noisy.reshape(-1, 3), np.arange(3 * len(noisy)).reshape(-1, 3)))
     assert solid.volume == pytest.approx(3 * 24 * np.sin(np.pi / 24), rel=0.02)
+
+
+@pytest.mark.parametrize(("step", "parts"), [(0.34, [3, 4, 5]), (0.5, [2, 3, 4]), (2.0, [1, 1, 1])])
+def test_points_on_rims_are_at_most_a_step_apart_and_no_more_than_that_takes(step, parts):
+    """Sides of 1, 1.2 and 1.562, beside a patch far away."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1.2, 0], [0, 0, 9], [1, 0, 9], [0, 1, 9.0]])
+    points, _ = seam_triangles(corners, np.array([[0, 1, 2]]), np.array([[3, 4, 5]]), step)
+    on_sides = [points[:, 1] == 0, points[:, 0] == 0, (points[:, 0] > 0) & (points[:, 1] > 0)]
+    assert [int(on_side.sum()) + 1 for on_side in on_sides] == parts
+    for on_side, (a, b) in zip(on_sides, [(0, 1), (0, 2), (1, 2)], strict=True):
+        along = np.sort(np.linalg.norm(np.concatenate([corners[[a, b]], points[on_side]]) - corners[a], axis=1))
+        np.testing.assert_allclose(np.diff(along), along[-1] / (on_side.sum() + 1))
+
+
+def test_levels_of_few_faces_are_those_of_many():
+    """Faces that count twice, turned over, or not, in two groups: summed one by one, or by a tree."""
+    ball = samples.union(samples.sphere(2), samples.sphere(2, 0.5, (0.3, 0.2, 0)))
+    triangles, groups = ball.vertices[ball.faces], 3 + 4 * (np.arange(ball.n_faces) >= ball.n_faces // 2)
+    ways, faces = np.where(groups == 3, 2, -1), np.arange(0, ball.n_faces, 5)
+    counts = np.where(np.arange(ball.n_faces) % 40 == 7, 0, ways)
+    few = [levels_within(triangles, groups, counts, batch) for batch in np.array_split(faces, len(faces) // FEW + 1)]
+    many = levels_within(triangles, groups, counts, faces)
+    np.testing.assert_allclose(many, np.concatenate(few), rtol=0, atol=0.05)  # farther faces are summed together
+    np.testing.assert_allclose(many, 0.5 * ways[faces], rtol=0, atol=0.15)

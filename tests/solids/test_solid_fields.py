@@ -174,12 +174,22 @@ def test_contours_of_bands_are_those_of_whole_grids():
         band.contour(1.1 * band.width)
 
 
+def test_grids_are_as_asked_for_or_have_128_nodes_along_the_longest_side():
+    solid = complete(SHAPES["brick"]())
+    assert max(solid.field().grid.shape) == 128 and max(solid.field(resolution=9).grid.shape) == 9
+    padded = solid.field(spacing=0.15, padding=0.4).grid
+    assert (padded.spacing == 0.15).all() and (padded.origin <= solid.bounds[0] - 0.4).all()
+    for name, value in (("resolution", 9), ("spacing", 0.1), ("padding", 1.0)):
+        with refused(sh.errors.UnsupportedTypeError, element=name):
+            solid.field(grid=padded, **{name: value})
+
+
 def test_stores_hold_the_same_bits_whoever_computes_them(tmp_path):
     solid = complete(SHAPES["two bodies"]())
     options = {"resolution": 90, "band": 0.05}
     band = solid.field(**options)
     assert band.n_nodes < 0.4 * band.grid.n_nodes
-    by_threads = solid.field(**options, store=tmp_path / "threads")
+    by_threads = solid.field(**options, store=tmp_path / "new" / "threads")
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
         by_processes = solid.field(**options, store=tmp_path / "processes", scheduler=pool)
     for stored in (by_threads, by_processes):

@@ -91,6 +91,8 @@ def test_a_slab_is_as_thick_everywhere_up_to_its_edges():
 def test_balls_converge_to_their_diameter():
     errors = [np.abs(sh.thickness(samples.sphere(k), resolution=16).values - 2).max() for k in (3, 4)]
     assert errors[0] < 0.02 and errors[1] < 0.3 * errors[0]  # of the second order in the size of faces
+    plate = sh.thickness(box((0, 0, 0), (4, 4, 1)), resolution=8)
+    assert repr(plate) == f"Thickness({len(plate.values)} faces, 1 to 4, median 1)"
 
 
 def test_a_tube_has_its_wall_and_a_wedge_tapers():

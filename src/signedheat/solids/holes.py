@@ -158,15 +158,14 @@ def fill_holes(
 
 def _holes(around: Rims, lengths: Floats, faces: Ints, decided: Bounding, used: Ints) -> Bools:
     """(l,) whether loops are holes: those along bounding faces, and all of a sheet but its longest."""
-    n = int(faces.max(initial=-1)) + 1
-    keys = (faces * n + np.roll(faces, -1, axis=1)).ravel()
+    keys = (faces << 32 | np.roll(faces, -1, axis=1)).ravel()
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
     bounds, scraps = decided.counts != 0, decided.loose >= 0
     longest: dict[int, int] = {}
     chosen, single = np.zeros(len(around), dtype=bool), np.full(len(around), -1)
     for k, loop in enumerate(around):
-        behind = used[order[np.searchsorted(keys, np.roll(loop, -1) * n + loop)] // 3]
+        behind = used[order[np.searchsorted(keys, np.roll(loop, -1) << 32 | loop)] // 3]
         pieces = np.unique(decided.pieces[behind]).tolist()
         chosen[k] = bounds[behind].all() and not scraps[behind].all()
         single[k] = pieces[0] if len(pieces) == 1 else -1

@@ -22,6 +22,7 @@ from scipy import sparse
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.box_tree import BoxTree
+from ..mesh.components import grouped
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import unit
 from ..search.winding_tree import WindingTree, mean_angle
@@ -43,14 +44,11 @@ def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) ->
     >>> levels_within(tet, np.zeros(4, dtype=int), np.ones(4, dtype=int), np.arange(2)).round(6).tolist()
     [0.5, 0.5]
     """
-    _, labels = np.unique(groups, return_inverse=True)
-    order = np.argsort(labels, kind="stable")
-    sizes = np.bincount(labels)
-    starts = np.concatenate([[0], np.cumsum(sizes)])
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
+    names, labels = np.unique(groups, return_inverse=True)
+    starts, order = grouped(labels, len(names))
+    rank = np.argsort(order)
     corners = np.ascontiguousarray(triangles[order]).reshape(-1, 9)
-    wanted = np.bincount(labels[faces], minlength=len(sizes))[labels[faces]]
+    wanted = np.bincount(labels[faces])[labels[faces]]
     levels, few = np.zeros(len(faces)), np.flatnonzero(wanted <= FEW)
     levels[few] = _among_few(corners, starts, counts[order], rank[faces[few]], labels[faces[few]])
     for group in np.unique(labels[faces][wanted > FEW]):

@@ -9,6 +9,8 @@ import scipy
 
 from ..arrays import Floats, Ints, ShortRepr
 from ..errors import GeometryError
+from ..mesh.unit_vectors import unit
+from ..parallel import in_chunks
 from ..surfaces.point_cloud import PointCloud, outward_normals
 
 
@@ -77,8 +79,6 @@ WIDTH = 2.0
 """Width of the fit on both sides of the zero set, in cells, as a cubic interpolant needs."""
 REACH = 1.5
 """The fit has full weight within this distance of points, in mean gaps; one gap farther it has none."""
-CHUNK = 50_000
-"""Batch size for nodes."""
 
 
 def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats) -> Floats:
@@ -108,14 +108,14 @@ def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats
     gap = mean_gap(points)
     result = np.array(phi, dtype=np.float64)
     nodes = np.argwhere(np.abs(phi) < WIDTH * float(steps.max()))
-    for begin in range(0, len(nodes), CHUNK):
-        batch = tuple(nodes[begin : begin + CHUNK].T)
-        places = np.stack(batch, axis=1) * steps
-        ahead = _slopes(phi, nodes[begin : begin + CHUNK], steps)
-        ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), np.finfo(float).tiny)  # along ∇φ
-        reach, near = tree.query(places, k=[*range(1, n_neighbours + 1)], workers=-1)
-        heights, share = _fit(places, ahead, reach, points[near], normals[near], gap)
-        result[batch] += share * (heights - phi[batch])
+
+    def moves(rows: Ints) -> tuple[Floats]:
+        places, along = rows * steps, unit(_slopes(phi, rows, steps))
+        reach, near = tree.query(places, k=[*range(1, n_neighbours + 1)])
+        heights, share = _fit(places, along, reach, points[near], normals[near], gap)
+        return (share * (heights - phi[tuple(rows.T)]),)
+
+    result[tuple(nodes.T)] += in_chunks(moves, nodes)[0]
     return result
 
 
@@ -148,8 +148,7 @@ def _fit(
     bell = np.maximum(1.0 - (reach / radius[:, None]) ** 2, 0.0) ** 2
     weights = np.where(facing, bell * cosines**2, 0.0)
     total = weights.sum(axis=1)
-    mean = np.einsum("pk,pki->pi", weights, normals)
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), np.finfo(float).tiny)
+    mean = unit(np.einsum("pk,pki->pi", weights, normals))
     planes = 0.5 * (normals + mean[:, None])
     heights = np.einsum("pk,pki,pki->p", weights, planes, places[:, None] - points)
     heights /= np.where(total > 0, total, 1.0)

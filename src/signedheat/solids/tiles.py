@@ -219,7 +219,7 @@ def blocks_that_fit(store: str | PathLike[str] | None) -> int:
         return max(blocks_held(folder), int(shutil.disk_usage(existing).free / (NODES * BYTES_IN_BAND)))
     available = available_memory()
     left = math.inf if available is None else available - libraries() - BYTES_AT_WORK
-    return int(min(max(left, 0) / (NODES * BYTES_IN_BAND), 2**40))
+    return int(min(left / (NODES * BYTES_IN_BAND), 2**40))  # the coarse grid has had room
 
 
 def refuse_plane_grid(grid: Grid) -> None:
