@@ -47,9 +47,8 @@ def distance_to_zero_line(
 ) -> tuple[Floats, int]:
     """Return the distance of every vertex to the zero set of a function linear in faces, and the number of windows.
 
-    Any surface will do. Faces with a NaN corner contain no part of the zero set. Windows are merged where that changes
-    distances by less than `tolerance` of the edge; 0 is exact. Distances are inf where nothing is connected. If there
-    are `window_limit` windows the search was cut short, and some distances are lengths of paths along edges.
+    Windows are merged where that changes distances by less than `tolerance` of the edge. If there are `window_limit`,
+    the search was cut short.
     """
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
     return distance_to_segments(triangles, [zero_line(triangles, values)], tolerance, report)
@@ -73,11 +72,7 @@ def distance_to_segments(
 
 
 def cleared(triangles: IntrinsicMesh, values: Floats, least: float) -> Floats:
-    """Move values away from zero by `least`, so that the zero set crosses edges and passes no vertex.
-
-    A vertex with value zero gets the sign that fewer of its neighbours have: where both sides of a source have the same
-    sign, the zero set then runs around the source.
-    """
+    """Move values near zero to ±`least`, whichever fewer neighbours have, so that the zero set passes no vertex."""
     near = np.abs(values) < least
     signs = np.where(near | np.isnan(values), 0.0, np.sign(values))
     tail, head = triangles.edges.vertices.T
@@ -176,10 +171,7 @@ FLIPPED = 0.05
 def in_delaunay_triangles(
     triangles: IntrinsicMesh, placed: Sequence[PlacedSegments]
 ) -> tuple[IntrinsicMesh, list[PlacedSegments]] | None:
-    """Return the surface in Delaunay triangles along whose edges the sources run; None if there is nothing to gain.
-
-    Distances are those on the triangles given, whose vertices come first.
-    """
+    """Return the surface in Delaunay triangles, with sources along edges; None if there is nothing to gain."""
     if not triangles.agree_on_lengths or share_to_flip(triangles) < FLIPPED:
         return None
     parts = [as_curve(triangles, segments) for segments in placed]
@@ -216,11 +208,7 @@ def _reach(distance: Floats, pseudosources: Bools, queue: Queue, first: int, v: 
 def _collect(
     search: Search, halfedge: int, at_tail: float, at_head: float, length: float, slack: float, tolerance: float
 ) -> tuple[Floats, int]:
-    """Return the windows queued for a halfedge, in order along it, trimmed against each other and merged if possible.
-
-    Only what is nearer than the windows that crossed the halfedge before is left: without this, waves multiply without
-    end where many faces share edges.
-    """
+    """Return the windows queued for a halfedge, in order, without what is behind others, and merged if possible."""
     _, _, _, queued, settled, windows, following, counts = search
     count, row = 0, queued[halfedge]
     while row >= 0:
@@ -594,8 +582,8 @@ class Faces(NamedTuple):
 class Search(NamedTuple):
     """The state of a search: distances so far, and windows in lists by halfedge, queued to go on or settled.
 
-    Windows are rows of one array; `following` links those of a list, and those that are free. Row 0 is for scratch. The
-    queue holds halfedges, followed by vertices that paths bend around. `counts` are those at `USED`, `FREE`, ….
+    Windows are rows of one array; `following` links those of a list, and the free ones. Row 0 is for scratch. The queue
+    holds halfedges, then vertices that paths bend around; `counts` are those at `USED`, `FREE`, ….
     """
 
     distance: Floats
@@ -676,10 +664,9 @@ def propagate_across(
     sigma: float,
     slack: float,
 ) -> None:
-    """Propagate distance across a side of a face, from within, to the faces beyond; do nothing where there is no room.
+    """Propagate a wave across fractions t0 to t1 of a side of a face to the faces beyond, if there is room.
 
-    In the layout of the face, the interval of the side from fraction t0 to t1 sees the source, which is a point whose
-    own distance is σ, or a beam along a normal whose distance at a point is σ.
+    σ is the distance of the `point` that it comes from, or, of a beam along a `normal`, the distance at that point.
     """
     edge = faces.edges[face, side]
     length = faces.lengths[edge]

@@ -144,10 +144,10 @@ class PlacedSegments:
         return np.concatenate([home, faces]), np.concatenate([points, across]), firsts, seconds
 
     def _directions(self, triangles: IntrinsicMesh) -> tuple[Complexes, Complexes]:
-        """Return (s,) directions away from each node of the first and of the last segment that ends there, 0 for none.
+        """(s,) directions from each node along the first and the last segment there, in its face or the frame of its
+        edge.
 
-        They are complex numbers in the layout of the node's face, or in the frame of its edge. At an edge of three
-        faces or more, segments inside faces count as none: how they go on there is ambiguous.
+        0 stands for none; at an edge of three faces or more, how segments in faces go on is ambiguous.
         """
         nodes, kinds = self.nodes, self.nodes.kinds
         steps = self.positions[:, 1] - self.positions[:, 0]
@@ -216,10 +216,7 @@ def fractions_along_edges(triangles: IntrinsicMesh, located: LocatedPoints, edge
 
 
 def best_match(triangles: IntrinsicMesh, face: int, nodes: LocatedPoints, ends: Ints, length: float) -> Complexes:
-    """Return (2,) the positions of two nodes in a face that are closest to a given distance apart.
-
-    In intrinsic triangulations a vertex may be two corners of one face, and an edge two of its sides.
-    """
+    """Return (2,) the positions of two nodes in a face, which may have several, nearest to a length apart."""
     places = []
     for node in ends:
         kind, element = nodes.kinds[node], nodes.elements[node]

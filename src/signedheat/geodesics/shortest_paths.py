@@ -33,10 +33,9 @@ from .heap_kernels import Queue, pop, push
 def join(
     triangles: IntrinsicMesh, located: LocatedPoints, start: Ints, end: Ints, name: str
 ) -> tuple[LocatedPoints, Ints, Ints, Ints]:
-    """Join pairs of points by segments that lie in one face each: by geodesic paths where the two share no face.
+    """Join pairs of points by segments in one face each, along geodesic paths where the two share no face.
 
-    Returns all points, the given ones first; the two that each segment (s,) joins, in order; and the pair that it
-    belongs to. `name` is the source of the points, for messages.
+    Returns all points, the given ones first; the two ends of each segment (s,), in order; and the pair it belongs to.
     """
     apart = np.flatnonzero(shared_faces(triangles, located[start], located[end]) < 0)
     added = np.zeros(len(start), dtype=np.int64)
@@ -60,11 +59,7 @@ def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> Ints
 def geodesic_paths(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
 ) -> tuple[LocatedPoints, Ints]:
-    """Return the points at which locally shortest paths cross edges or pass vertices, and how many each path has.
-
-    The first guess is the shortest path through midpoints of edges; its faces are unfolded, the shortest path inside
-    them is found (funnel algorithm), and wherever it bends around a vertex the other side is tried.
-    """
+    """Return the points at which locally shortest paths cross edges or pass vertices, and how many each path has."""
     starts, ends = Places.of(triangles, start), Places.of(triangles, end)
     sides, fractions, counts = _shortest_lines(Faces.of(triangles), Routes.of(triangles.n_edges), starts, ends)
     located = locate_points(triangles, sides // 3, barycentric_on_sides(sides % 3, fractions), name)
@@ -168,11 +163,7 @@ def toll(e: int) -> float:
 
 @compiled
 def _find_sleeve(faces: Faces, routes: Routes, starts: Places, ends: Places, pair: int) -> tuple[Ints, Ints]:
-    """Find the faces between the ends of a pair on the shortest path through midpoints of edges (Dijkstra).
-
-    Returns the halfedges through which all faces but the last are left, and those through which all but the first are
-    entered; empty if there is no path.
-    """
+    """Find halfedges by which faces are left and entered on the shortest path through midpoints (Dijkstra)."""
     cost, leave, enter, queue = routes
     edge_of, touched = faces.edges.ravel(), [0]
     touched.pop()
@@ -255,10 +246,7 @@ def turns(a: complex, b: complex) -> float:
 
 @compiled
 def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tuple[list[int], list[int], float]:
-    """Find the shortest path inside an unfolded sleeve, by the simple stupid funnel algorithm.
-
-    Returns the portals at which the path bends, whether it bends at their tail (0) or head (1), and its length.
-    """
+    """Return the portals at which the shortest path in a sleeve bends, at which end (0: tail), and its length."""
     bends, ends = [0], [0]
     bends.pop()
     ends.pop()
@@ -363,10 +351,7 @@ def _path_in(
 def _straighten(
     faces: Faces, left: Ints, entered: Ints, starts: Places, ends: Places, pair: int
 ) -> tuple[Ints, Floats]:
-    """Improve the shortest path in a sleeve as long as passing a vertex on its other side makes it shorter.
-
-    Returns the halfedges crossed and the fraction along each.
-    """
+    """Return the halfedges that a shortest path crosses, and where; bends try the other side of their vertex."""
     portals, begin, end, bends, bend_ends, length = _path_in(faces, left, entered, starts, ends, pair)
     k = 0
     while k < len(bends):

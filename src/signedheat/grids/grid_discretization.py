@@ -213,20 +213,14 @@ class GridIntegration(SolvesEach):
         return phi
 
     def fit(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
-        """Subtract from φ a smooth function that takes φ's error at the samples (in place of Eq. 14).
-
-        It is the mean of the errors, weighted by area and nearness: both are diffused as the normals were, and divided.
-        """
+        """Subtract φ's error at the samples, spread by diffusion as the normals were (in place of Eq. 14)."""
         phi = self.solve(divergence, source)
         excess = deviation(source.at_samples(phi), source, levels)
         phi -= diffused_mean(source, excess)
         return phi
 
     def penalize(self, divergence: Floats, source: GridSource, strength: float) -> Floats:
-        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas of the samples.
-
-        A negligible λ imposes nothing; beyond `STIFFEST` the level is imposed exactly.
-        """
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas; λ beyond `STIFFEST` is exact."""
         levels = Levels(np.zeros(len(source.weights)))
         if strength < LEAST**2 * self.soft_weight:
             return self.solve(divergence, source)
@@ -236,11 +230,7 @@ class GridIntegration(SolvesEach):
         return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
 
     def fit_exactly(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
-        """Solve Eq. 14 by an augmented Lagrangian, then by the least correction at the nodes around the samples.
-
-        Multipliers leave a small part that nearly dependent rows hide. Contradictions are met in the least-squares
-        sense.
-        """
+        """Solve Eq. 14 by an augmented Lagrangian; the least correction near samples takes its rest."""
         refuse_beyond_memory(
             f"the zero set imposed exactly on {self.grid.n_nodes:,} nodes",
             self.grid.n_nodes,
@@ -303,10 +293,7 @@ def deviation(values: Floats, source: GridSource, levels: Levels) -> Floats:
 
 
 def diffused_mean(source: GridSource, values: Floats) -> NDArray[np.float32]:
-    """Return means of values at the samples over the grid, weighted by area and by heat, diffused as the normals are.
-
-    They vary slowly, so the finest level of the hierarchy is skipped.
-    """
+    """Return means of values at the samples over the grid, weighted by area and by heat, without the finest level."""
     largest = np.abs(values).max()
     if largest == 0.0:
         return np.zeros(source.grid.shape, dtype=np.float32)

@@ -29,11 +29,7 @@ LARGEST = 1e30
 def closed_surface(
     values: Floats, origin: Floats, spacing: Floats, level: float, refine: Callable[[Floats], Floats] | None = None
 ) -> tuple[Floats, Ints]:
-    """Extract a closed, manifold, outward-oriented surface from any values, by marching cubes (Lewiner et al. 2003).
-
-    Values are those at ``origin + (i, j, k) * spacing``. `refine` moves (n, 3) points of the level set along the edges
-    of the grid.
-    """
+    """Extract a closed, manifold, outward surface by marching cubes; `refine` moves its (n, 3) points along edges."""
     if values.ndim != 3:
         raise GeometryError(
             f"fields are contoured in 2 and 3 dimensions, and this grid has {values.ndim}", element="field"
@@ -122,12 +118,7 @@ Refine = Callable[[Floats], Floats]
 def block_contour(
     values: BlockValues, spacing: Floats, level: float, refine: Refine | None = None
 ) -> tuple[Floats, Ints]:
-    """Extract the level set in the cells whose nodes all have a value, closed where the values around it are.
-
-    Neighbouring windows share nodes, and so find the same points on the edges between them; these become one. Where the
-    level set leaves the grid it is closed `CAP` cells outside. `refine` moves (n, 3) points, in cells, along edges of
-    the grid. Faces are counter-clockwise as seen from the side of greater values.
-    """
+    """Extract the level set in cells with values, facing greater ones, and closed `CAP` cells out of the grid."""
     vertices, faces = zip(*contour_parts(values, spacing, level, refine), strict=True)
     return np.concatenate(vertices), np.concatenate(faces)
 

@@ -70,10 +70,7 @@ Guess = tuple[NDArray[np.float32], Bools]
 def diffuse_multilevel(
     sources: NodeSources, time: Callable[[float], float], finest: int = 0, rounds: int = ROUNDS
 ) -> list[Level]:
-    """Solve ``(1 − tΔ) X = B``, Eq. 12 on a grid, on every level from `finest` (0: the sources' grid) to the coarsest.
-
-    `time` gives t on a grid of a mean spacing; each combination of sweep directions is used for so many rounds.
-    """
+    """Solve ``(1 − tΔ) X = B``, Eq. 12, on levels from `finest` on; `time` gives t by mean spacing."""
     levels: list[Level] = []
     guess = None
     while True:
@@ -315,11 +312,10 @@ TINY = np.float32(1e-34)
 def diffuse_by_sweeps(
     sources: NodeSources, active: Bools, ratios: Floats, rounds: int, given: NDArray[np.float32] | None = None
 ) -> NDArray[np.float32]:
-    """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j``, Eq. 12, with no flux through the walls.
+    """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j``, Eq. 12, in `active` stretches; a = t / h²,
+    (4,).
 
-    It is solved in the `active` stretches, (l₀, l₁, l₂, ⌈n / STRETCH⌉), of a grid of (l₀, l₁, l₂, n) nodes, whose
-    `ratios`, (4,), are a = t / h². Elsewhere X, (l₀, l₁, l₂, n, 4), is `given`, and overwritten; by default it is zero
-    there, and its memory never touched, so that it costs nothing.
+    Elsewhere X, (l₀, l₁, l₂, n, 4), is `given`, and overwritten; by default it is zero, in memory never touched.
     """
     shape = sources.shape
     vectors = untouched_zeros((*shape, 4), np.float32) if given is None else given
@@ -333,10 +329,10 @@ def diffuse_by_sweeps(
 
 
 def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int, *arguments: Any) -> None:
-    """Run ``kernel(*arguments, tiles)`` over all lines along the last axis, in every combination of directions.
+    """Run ``kernel(*arguments, tiles)`` over lines of the last axis, in all directions; tiles are (begin, end, step) ·
+    3.
 
-    A tile is (begin, end, step) for each of the first three axes of `shape`; the tiles of one call run in order. Tiles
-    on one diagonal do not depend on each other, so results do not depend on the number of threads.
+    Tiles on one diagonal do not depend on each other, so results do not depend on the number of threads.
     """
     steps = [(1, -1) if n > 1 else (1,) for n in shape[:3]]
     threads = 1 if np.prod(shape) < FEW_NODES else n_threads()

@@ -83,11 +83,10 @@ class Simplices(NamedTuple):
 def merge_in_cells(
     simplices: Simplices, order: Ints, shape: Ints, size: float, sources: NodeSources, scale: float
 ) -> tuple[tuple[Floats, Floats, Floats, Ints], NodeSources]:
-    """Merge simplices to one sample for each cell of a grid of `shape` nodes and each component.
+    """Merge simplices to one sample for each cell, of a grid of `shape` nodes, and component; add vectors to nodes.
 
-    Simplices are bisected at their longest edge until it is at most `size` cells long. `order` lists them component by
-    component. The vectors of all parts, over `scale`, are added to the `sources` at the nodes around them, with
-    multilinear weights. Returns positions, vectors, weights and components of the samples, and the sources.
+    `order` lists simplices by component; parts are at most `size` cells long. Returns positions, vectors, weights and
+    components of the samples; and the sources, with multilinear shares of all vectors over `scale`.
     """
     slots = untouched_zeros((int(np.prod(shape - 1)),), np.int32)
     dimension = simplices.corners.shape[2]

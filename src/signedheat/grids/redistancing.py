@@ -107,10 +107,7 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
 
 @sharpen_field.register
 def _(field: GridField, source: object, method: Method | None, progress: Progress | None) -> GridField:
-    """Measure the distance of every node to the zero set by `redistance`; signs stay as they are.
-
-    A field that holds its solid is that distance already, up to a factor.
-    """
+    """Measure the distance of every node to the zero set; that of a field with its solid is known, up to a factor."""
     if source is not None or method is not None:
         raise UnsupportedTypeError(
             "fields on grids are measured to their zero set", remedy="leave out source and method", element="method"
@@ -294,8 +291,7 @@ def _around_crossings(contour: Contour, nearest: Ints, places: Floats) -> Floats
 def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Ints]:
     """Return vertices, in cells, and triangles; crossed edges, and a vertex on each; the edge of each vertex, or −1.
 
-    Marching cubes (Lewiner et al. 2003) decides how crossings are connected, by values that are compressed, so that the
-    edge of every crossing can be read off. Arrays with fewer than three axes are repeated along axes before theirs.
+    Marching cubes joins crossings of compressed values, so that the edge of each can be read off.
     """
     unused = 3 - values.ndim
     if not ((values < 0).any() and (values >= 0).any()):
@@ -481,11 +477,7 @@ def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> Floa
 
 @compiled
 def circle_distance(crossing: Floats, away: Floats, across: Floats, reach: float) -> float:
-    """Return the distance to the touching circle in the plane of a point, `away` from a crossing, and the normal there.
-
-    With s along the normal, r across it and bending k in the direction of r, the distance to the circle of radius 1/k
-    is ``(√((1 + ks)² + k²r²) − 1) / k``, computed here without cancellation. `across` is work space.
-    """
+    """Return the distance to the circle that touches the zero set at a crossing, in the plane of its normal."""
     s, square = 0.0, 0.0
     for d in range(4):
         s += away[d] * crossing[4 + d]

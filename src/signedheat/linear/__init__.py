@@ -64,12 +64,9 @@ def factorize(
 ) -> Factor:
     """Factorise a sparse Hermitian positive definite matrix, float64 or complex128; only its upper triangle is read.
 
-    The back end is one of `available_backends`, by default the environment variable ``SIGNEDHEAT_BACKEND``, or else the
-    fastest. A fill-reducing `order` can be given: ``order[k]`` is the unknown eliminated k-th. If many systems will be
-    solved (`reused`), PARDISO finds an order of its own, with which it solves on all cores.
-
-    For a matrix with entries at the same places as that of the factor `like`, PARDISO takes half the time or less. Then
-    only the factor that solved last is in memory; the other is computed anew when it is to solve.
+    The back end is by default that of the environment variable ``SIGNEDHEAT_BACKEND``, or the fastest. ``order[k]`` is
+    eliminated k-th; if many systems will be solved (`reused`), PARDISO finds an order with which it uses all cores. A
+    factor `like` that of a matrix with entries at the same places halves its time; only the last of both is in memory.
     """
     name = chosen_backend(backend)
     upper = upper_triangle(matrix)

@@ -20,13 +20,11 @@ def conjugate_gradients(
     limit: int = 500,
     converged: Callable[[Floats, Floats], bool] | None = None,
 ) -> Floats:
-    """Solve ``A x = b``, A symmetric and positive definite; or semidefinite, with b within its range.
+    """Solve ``A x = b`` for each column of b, (n,) or (n, k), A symmetric and positive definite, or b within its
+    range.
 
-    Preconditioned conjugate gradients (Hestenes & Stiefel 1952; Saad, *Iterative Methods for Sparse Linear Systems*,
-    2nd ed., Alg. 9.1). `operator` is A, `precondition` P, about A⁻¹ and positive definite, by default the identity;
-    each column of `rhs`, (n,) or (n, k), is a system of its own. A column is done once ``rᵀ P r ≤ tolerance² · max(r₀ᵀ
-    P r₀, bᵀ P b)``, r the residual of the recurrence, or once A has no curvature left along the search direction; all
-    columns after `limit` steps, or once ``converged(x, r)``.
+    Preconditioned conjugate gradients (Hestenes & Stiefel 1952), `precondition` P about A⁻¹. A column is done once ``rᵀ
+    P r ≤ tolerance² · max(r₀ᵀ P r₀, bᵀ P b)``, or without curvature; all are after `limit` steps, or once `converged`.
     """
     apply_p = precondition or np.copy
     x = np.zeros_like(rhs) if start is None else start.copy()

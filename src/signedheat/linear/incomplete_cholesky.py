@@ -44,12 +44,11 @@ class IncompleteCholesky:
             shift = max(1e-3, 2 * shift)
 
     def solve(self, rhs: ArrayLike, relative: float = 1e-10, componentwise: float = 0.0) -> Floats:
-        """Solve for one right-hand side (n,) or several (n, k), by conjugate gradients on all columns at once.
+        """Solve for columns b, (n,) or (n, k), until ``‖r‖ ≤ relative · ‖b‖`` or ``|r_i| ≤ componentwise · A_ii
+        |x_i|``.
 
-        They stop once ``‖r‖ ≤ relative · ‖b‖``, or once ``|r_i| ≤ componentwise · A_ii |x_i|`` in every row (an
-        entrywise backward error, Oettli & Prager 1964): the second keeps solutions accurate that fall by hundreds of
-        orders of magnitude. In `order` by distance from where b is not zero, errors travel outward with the solution
-        and shrink with it.
+        The second keeps solutions accurate that fall by hundreds of orders of magnitude, if `order` is that of the
+        fall.
         """
         b = np.asarray(rhs, dtype=np.float64)
         x = np.zeros((self.n, b[0].size))

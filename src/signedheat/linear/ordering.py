@@ -13,11 +13,10 @@ from ..compiled import compiled
 
 
 def elimination_order(upper: Any) -> Ints:
-    """Order the unknowns of a sparse symmetric matrix, given its upper triangle, by nested dissection.
+    """Order the unknowns of a sparse symmetric matrix by nested dissection: ``order[k]`` is eliminated k-th.
 
-    ``order[k]`` is eliminated k-th. On surfaces the fill is that of METIS on even meshes, up to twice as much on very
-    uneven ones, in a fifth of the time; the time is n log n times the number of levels of a breadth-first search. For
-    unknowns in a volume METIS, which PARDISO runs by itself, is better.
+    On even surfaces the fill is that of METIS, in a fifth of the time; for unknowns in a volume PARDISO's METIS is
+    better.
     """
     graph = whole(upper)
     return _dissect(graph.indptr, graph.indices)
@@ -25,11 +24,9 @@ def elimination_order(upper: Any) -> Ints:
 
 @compiled
 def _dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32]) -> Ints:
-    """Order both sides of a small separator, each in the same way, then the separator.
+    """Order both sides of a small separator, each in the same way, then the separator, in one partitioned array.
 
-    A separator is the smallest level near the middle of a breadth-first search from the end of a long path, without the
-    unknowns that have no neighbour in the level after it (George 1973). `order` is partitioned in place; a region is a
-    range of it.
+    It is the smallest level near the middle of a breadth-first search from the end of a long path (George 1973).
     """
     n = len(starts) - 1
     order = np.arange(n)

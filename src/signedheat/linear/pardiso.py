@@ -46,10 +46,7 @@ class PardisoFactor:
             analysis.factorize(self._values)
 
     def like_this(self, upper: sparse.csr_matrix) -> PardisoFactor | None:
-        """Factorise another matrix with entries at the same places, for half the time; None if they are elsewhere.
-
-        The new factor takes the memory of this one, which is factorised again when it is to solve.
-        """
+        """Factorise a matrix with entries at the same places in the memory of this factor, or return None."""
         return self._again(upper) if self._analysis.fits(upper) and _makes_factors_anew() else None
 
     def _again(self, upper: sparse.csr_matrix) -> PardisoFactor:

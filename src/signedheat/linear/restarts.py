@@ -31,20 +31,14 @@ class Stage(NamedTuple):
 def solve_with_restarts(solve: Solve, border_forces: Forces, loads: NDArray[Any], size: float = 1.0) -> list[Stage]:
     """Solve ``A x = loads`` for columns that decay exponentially away from the loads; return the stages of x.
 
-    `border_forces` couples faint rows to the others: `matrix_forces` makes it from A. Loads are scaled to `size`, about
-    that of A's diagonal, so that the largest x is about one. Each stage covers the rows on which those before are too
-    small.
+    Loads are scaled to `size`, about that of the diagonal; each stage has the rows on which those before are too small.
     """
     loads, logarithm = scaled(loads, size)
     return restart(solve, border_forces, loads, Stage(solve(loads), logarithm), size)
 
 
 def restart(solve: Solve, border_forces: Forces, loads: NDArray[Any], first: Stage, size: float = 1.0) -> list[Stage]:
-    """Return all stages of a solution, given the first one; `loads` are scaled as they were for the first.
-
-    On the faint rows x satisfies the same equation with a right-hand side along their border, where x is still
-    accurate. Scaled up, that is the next right-hand side for the same solver, so the result is exact.
-    """
+    """Return all stages, given the first: on faint rows x solves the same equation with a load along their border."""
     stages, unknown = [first], np.ones(len(loads), dtype=bool)
     while True:
         values, logarithm = stages[-1]

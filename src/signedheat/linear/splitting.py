@@ -26,11 +26,10 @@ class Round(NamedTuple):
 def split_rounds(
     proximal: Map, solve: Map, apply: Map, image: NDArray[Any], split: NDArray[Any], relaxation: float = RELAXATION
 ) -> Iterator[Round]:
-    """Yield the state after each round, without end.
+    """Yield the state after each round, without end; `image` and `split` are K x and z to begin with.
 
-    `image` and `split` are K x and z to begin with. Given v = K x + u, `proximal` returns the z that minimises
-    f(z) + ρ/2 |z − v|²; given v = z − u, `solve` returns the x that minimises g(x) + ρ/2 |K x − v|². `apply` maps x to
-    K x. The duals u are multipliers over the penalty ρ, which both functions know.
+    Given v = K x + u, `proximal` minimises f(z) + ρ/2 |z − v|²; given v = z − u, `solve` minimises g(x) + ρ/2 |K x −
+    v|².
     """
     relaxed, dual = image, np.zeros_like(image)
     while True:

@@ -21,11 +21,7 @@ from .ordering import elimination_order, whole
 
 
 class SuperLUFactor:
-    """Factor ``L D Lᴴ`` without pivoting of a Hermitian positive definite matrix, from its upper triangle.
-
-    ``order[k]`` is the unknown eliminated k-th; without it, nested dissection finds an order: with SuperLU's own
-    minimum degree, surfaces of 100 000 unknowns take minutes instead of a second.
-    """
+    """Factor ``L D Lᴴ`` of a Hermitian positive definite matrix, in an order: SuperLU's own takes minutes."""
 
     backend = "superlu"
 

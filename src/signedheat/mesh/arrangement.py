@@ -87,10 +87,9 @@ def meeting_faces(points: Floats, faces: Ints, touching: float = TOUCHING) -> In
 
 
 def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, touching: float = TOUCHING) -> Arrangement:
-    """Divide faces where pairs of them, (k, 2), by default all, meet, and where edges that do not cancel end on others.
+    """Divide faces where pairs, (k, 2), by default all, meet, and where edges that do not cancel end on others.
 
-    Points nearer than `touching`, relative to the size of the shape, become one, points this near to an edge or face
-    lie on it; thinner triangles are dropped.
+    Points nearer than `touching`, relative to the size of the shape, become one; thinner triangles are dropped.
     """
     slack = touching * float(np.ptp(points, axis=0).max())
     pairs = meeting_faces(points, faces, touching) if pairs is None else pairs

@@ -51,10 +51,7 @@ class BoxTree(NamedTuple):
 
     @classmethod
     def in_order(cls, lower: Floats, upper: Floats, order: Ints, groups: Ints | None = None) -> BoxTree:
-        """Build the tree over boxes in a given order, in which boxes near each other in space should be neighbours.
-
-        Boxes of a group, named by (n,) numbers from 0, should follow each other; −1 is no group.
-        """
+        """Build the tree over boxes in an order in which neighbours, and boxes of a group (−1: none), are together."""
         n = len(lower)
         leaves = 1 << max(int(np.ceil(np.log2(max(n, 1) / LEAF))), 0)
         items = np.full(leaves * LEAF, -1, dtype=np.int64)
@@ -91,9 +88,8 @@ class BoxTree(NamedTuple):
     ) -> tuple[Ints, Ints]:
         """Find boxes near each of (n, 3, 3) triangles: (n + 1,) where those of each begin, and (k,) their numbers.
 
-        A box is near if the triangle's box, plane and prism all meet the nodes around it, with some slack, along each
-        axis or along all. Nodes that are all of the triangle's own group, (n,), are passed over. With `leaves`, (n,),
-        the search of each triangle begins at that leaf of the tree and goes on to its right.
+        Nodes that are all of the triangle's own group, (n,), are passed over; a search begins at its leaf, (n,), and
+        goes right.
         """
         corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(3, slack)
         own = np.full(len(corners), -1) if groups is None else np.ascontiguousarray(groups, dtype=np.int64)
@@ -207,10 +203,7 @@ def _is_beyond(triangle: Floats, lower: Floats, upper: Floats, ways: Floats, end
 
 
 def boxes_around(corners: Floats) -> tuple[Floats, Floats]:
-    """Return (n, 3) lower and upper corners of the boxes around (n, k, 3) corners, k small.
-
-    NumPy takes three times as long to reduce a short axis that is not the first.
-    """
+    """Return lower and upper corners of the boxes around (n, k, 3) corners: NumPy is slow along short axes."""
     columns = corners.swapaxes(0, 1)
     return reduce(np.minimum, columns), reduce(np.maximum, columns)
 

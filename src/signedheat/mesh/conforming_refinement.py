@@ -187,10 +187,9 @@ class Triangulation:
         return met, None if met >= 0 else crossed
 
     def clear(self, a: int, b: int, edge: Edge, line: _Line) -> int:
-        """Flip the edges that the segment from a to b crosses, up to the point that it meets first (Sloan 1993).
+        """Flip the edges that the segment from a to b crosses (Sloan 1993); return the point that it meets first.
 
-        Returns that point; where rounding is in the way, a point near the segment; or −1 where the segment crosses
-        another one, at a new point.
+        Where rounding is in the way that is one near the segment; where it crosses another segment, at a new point, −1.
         """
         points, apex = self.points, self.apex
         p, q = points[a], line.end
@@ -245,11 +244,7 @@ class Triangulation:
 def refine_to_conform(
     triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
 ) -> tuple[IntrinsicMesh, list[list[CurveSegments]]]:
-    """Cut faces wherever an unoriented curve crosses them, and put vertices at isolated points.
-
-    Returns the mesh, the old vertices first, and the sources on it. All segments in a face that is cut, or on an edge
-    that is split, become edges too. Other edges of the cut faces are then flipped to Delaunay, which removes slivers.
-    """
+    """Cut faces where unoriented curves cross them, with vertices at isolated points; return mesh and sources."""
     parts = [part for group in groups for part in group]
     if all(part.is_conforming for part in parts):
         return triangles, [list(group) for group in groups]
@@ -267,8 +262,7 @@ def cut_along(
 ) -> tuple[IntrinsicMesh, MergedSources, Bools, Ints]:
     """Cut faces so that sources run along edges; return triangles, sources, which faces are new, and parents of all.
 
-    Only `unfit` sources, by default all, must run along edges. Others are cut only in faces, and at edges, that these
-    cut. The triangles into which a face is cut depend on the corner at which it begins, `begin` (m,).
+    Only `unfit` sources, by default all, must; others are cut where these are. Faces begin at a corner, `begin` (m,).
     """
     merged = MergedSources.of(parts)
     faces, edges = affected_elements(triangles, merged, [True] * len(parts) if unfit is None else unfit)
@@ -302,12 +296,7 @@ def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Se
 
 
 class FaceCutter:
-    """An intrinsic mesh while some of its faces are cut.
-
-    `vertex_of` has the vertex of each node of the sources, −1 where it has none, and `node_at` the node at a vertex;
-    `on_edge` and `in_face` the nodes on each edge that is split, in order, and in each face that is cut; `sub_edges`
-    the parts of each such edge; `faces` and `pieces` what has been made of faces and segments so far.
-    """
+    """An intrinsic mesh while some of its faces are cut along segments."""
 
     def __init__(self, triangles: IntrinsicMesh, merged: MergedSources, faces: Ints, edges: Ints, begin: Ints) -> None:
         self.triangles, self.merged, self.begin = triangles, merged, begin
@@ -529,10 +518,7 @@ def points_on_elements(
 def flip_new_faces(
     triangles: IntrinsicMesh, merged: MergedSources, is_new: Bools
 ) -> tuple[IntrinsicMesh, MergedSources]:
-    """Flip edges of new faces to Delaunay, except those that a segment uses and those of faces with one inside.
-
-    Where neighbouring faces do not agree on the length of their edge, no edge is flipped.
-    """
+    """Flip edges of new faces to Delaunay, except those of segments, and of faces with one inside."""
     if not triangles.agree_on_lengths:
         return triangles, merged
     on_edge, nodes = merged.edges >= 0, merged.nodes

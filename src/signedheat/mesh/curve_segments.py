@@ -111,8 +111,7 @@ class MergedSources:
 def without_copies(parts: Sequence[CurveSegments], by_points: Bools) -> tuple[Ints, Ints]:
     """Find curves that repeat others: (u,) the first curve of each kind, and (k,) which of these each curve repeats.
 
-    Curves that join the same points in the same directions are of one kind if both are marked in `by_points`, (k,); all
-    others are of a kind of their own, since normals tell them apart.
+    Only those marked in `by_points` (k,), which join the same points in the same directions, do: normals may differ.
     """
     merged = MergedSources.of(parts)
     bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
@@ -126,10 +125,7 @@ def without_copies(parts: Sequence[CurveSegments], by_points: Bools) -> tuple[In
 
 
 def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple[list[CurveSegments], Ints]:
-    """Join curves into lines where one goes on in the next and no third one ends; return lines, and the line of each.
-
-    A curve that runs back along the one before it is a copy of that. Only those marked in `may_go_on` (k,) are joined.
-    """
+    """Join curves that `may_go_on` (k,), where no third ends, into lines; return lines, and the line of each curve."""
     merged = MergedSources.of(parts)
     bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
     (tails, second), (last, heads) = merged.ends[bounds[:-1]].T, merged.ends[bounds[1:] - 1].T
@@ -220,10 +216,7 @@ def _runs(k: int, before: Ints, after: Ints) -> tuple[Ints, Ints, Ints]:
 def given_directions(
     triangles: IntrinsicMesh, positions: Floats, faces: Ints, edges: Ints, normals: Floats, name: str
 ) -> Complexes:
-    """Return unit vectors along given normals: in the layout of the face, or in the frame of the edge.
-
-    On an edge this is the mean of the normal's projections into the planes of the edge's faces.
-    """
+    """Return unit vectors along normals projected into a face's layout, or, as a mean, the frame of an edge."""
     largest = np.abs(normals).max(axis=1, initial=0.0)
     extreme = (largest > 1e100) | ((largest > 0) & (largest < 1e-100))  # their squares overflow or underflow
     normals = normals / np.where(extreme, largest, 1.0)[:, None]
@@ -253,11 +246,7 @@ def given_directions(
 
 
 def carried_left(triangles: IntrinsicMesh, faces: Ints, edges: Ints, lengths: Floats) -> Floats:
-    """Return −1 where the face that decides a segment's left is turned against those of most of the curve, else 1.
-
-    Faces are compared across the edges around the curve, so that left stays on one side of it however faces are turned.
-    On a segment along an edge (`edges`, else −1) the first face at the edge decides.
-    """
+    """Return −1 where the face that decides a segment's left is turned against those of most of the curve, else 1."""
     telling, links, number = _agreement_around(triangles, faces, edges)
     signs = signs_of(links, int(number.max(initial=-1)) + 1)[number[telling]]
     most = float(np.sign(signs @ lengths)) or signs[0]

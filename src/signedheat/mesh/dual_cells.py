@@ -58,11 +58,7 @@ class DualCells:
 
 
 def cells_around(crossings: Crossings, shape: tuple[int, ...]) -> tuple[Ints, Ints, Ints, Ints]:
-    """Find the cells around crossed edges, none of which may be on a wall of the grid of this shape.
-
-    Returns their first nodes (c, 3); the crossed edges (c, 12) of each, or −1; and the cells around each edge (e, 4),
-    as in `AROUND`, with which of their edges it is.
-    """
+    """Find cells around crossed edges: first nodes (c, 3), edges (c, 12); cells and sides at each edge (e, 4)."""
     axes, crossed_edges = crossings.axes, np.arange(len(crossings.axes))[:, None]
     around = np.repeat(crossings.nodes[:, None], 4, axis=1)
     around[crossed_edges, np.arange(4), AFTER[axes, 1][:, None]] -= AROUND[:, 0]
@@ -128,10 +124,9 @@ def _crossed_faces(edges: Ints) -> Ints:
 
 
 def _pieces(edges: Ints, ways: Bools) -> Ints:
-    """Return (c, 12) the piece that each crossed edge of each cell belongs to, counted over all cells; −1 elsewhere.
+    """Return (c, 12) the piece of each crossed edge, over all cells, or −1.
 
-    Of a face with four crossed edges, in order around it from the first corner, way 0 links the first with the last and
-    the second with the third; way 1 links the first two and the last two.
+    Of the four around a face, way 0 links the first with the last and the second with the third, way 1 the others.
     """
     crossed, around = edges >= 0, _face_edges(np.arange(6))
     of_faces = crossed[:, around]
@@ -152,11 +147,10 @@ SLACK = 1e-6
 def dual_triangles(
     cells: DualCells, crossings: Crossings, vertices: Floats, fanned: Bools
 ) -> tuple[Floats, Ints, Ints]:
-    """Join the vertices of pieces, (v, 3) in cells, to triangles (m, 3), counter-clockwise as seen from outside.
+    """Join the vertices of pieces, (v, 3) in cells, to outward triangles (m, 3), by the diagonal nearer to each
+    crossing.
 
-    Of two possible diagonals around an edge, the one nearer to the crossing is taken, then the shorter. The crossings
-    of `fanned` edges, (e,), and of those with no possible diagonal become vertices; their edges (k,) are returned as
-    well.
+    Crossings of `fanned` edges, (e,), and without a possible diagonal, become vertices; these edges (k,) are returned.
     """
     quads, axes, shares = cells.quads, crossings.axes, crossings.shares
     around = vertices[quads] - crossings.nodes[:, None]
@@ -185,10 +179,9 @@ def dual_triangles(
 
 
 def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) -> tuple[Floats, Ints]:
-    """Return vertices and triangles as `dual_triangles` does, none of which pass through each other wherever possible.
+    """Return vertices and triangles that do not pass through each other, if possible, with edges along creases.
 
-    Edges are flipped to run along creases. Vertices of triangles that pass through each other go from one of three
-    `choices`, (3, v, 3), to the next: from the best to one inside the cells, where nothing passes through.
+    Vertices of those that do move from one of three `choices`, (3, v, 3), to the next, up to one inside the cells.
     """
     count = choices.shape[1]
     chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(cells.quads), dtype=bool)
@@ -207,11 +200,7 @@ def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) 
 
 
 def _safe(flat: Floats, height: Floats) -> tuple[Bools, Floats]:
-    """Return (n,) whether the diagonal from the first to the third of four corners (n, 4, 2) stays in the tetrahedra.
-
-    It must pass between the edge, from 0 to 1 above the origin, and the corner that is left; the triangle on the other
-    side must cross the edge, at the height that is returned.
-    """
+    """Return (n,) whether the diagonal from corner 0 to 2 of (n, 4, 2) stays in the tetrahedra, and its crossing."""
     p, r = flat[:, 0], flat[:, 2]
     side = _cross(p, r) > 0  # the origin is to the left of the diagonal, with the fourth corner
     rows = np.arange(len(flat))

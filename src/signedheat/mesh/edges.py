@@ -56,10 +56,7 @@ def pair_halfedges(tails: Ints, heads: Ints, n_vertices: int, used: Bools | None
 
 
 def orient_faces(pairs: HalfedgePairs, tails: Ints, owners: NDArray[np.integer], weights: Floats) -> FaceOrientation:
-    """Make faces agree with their neighbours across edges of two faces; in each part the majority by weight stays.
-
-    The weights, (n_faces,), are the areas of the faces; negative where a face is rather to be turned.
-    """
+    """Make faces agree with their neighbours across edges of two faces; in each part the majority by weight stays."""
     two = pairs.counts == 2
     first, second = pairs.first[two], pairs.second[two]
     (f, g), n, disagree = (owners[first], owners[second]), len(weights), tails[first] == tails[second]
@@ -80,11 +77,7 @@ def orient_faces(pairs: HalfedgePairs, tails: Ints, owners: NDArray[np.integer],
 
 
 def may_coincide(pairs: HalfedgePairs, tails: Ints, following: NDArray[np.integer]) -> bool:
-    """Return whether two faces may be on the same corners; if not, `coincident_faces` has nothing to look for.
-
-    `tails` (c,) has the vertex at each corner, `following` (c,) the corner after it around its face. Faces on the same
-    corners share an edge and the corner beyond it; edges of more than two faces are not examined, and count as True.
-    """
+    """Return whether faces may be on the same corners; tails and following corners are (c,)."""
     two = pairs.counts == 2
     first, second = pairs.first[two], pairs.second[two]
     preceding = np.empty_like(following)
@@ -135,11 +128,7 @@ class EdgeTable(Frozen):
         return read_only(np.stack([first, self.mates[first]], axis=1))
 
     def elimination_order(self, vertex_order: NDArray[np.integer]) -> Ints:
-        """Order unknowns at edges to reduce fill, given an order of the vertices: ``order[k]`` is eliminated k-th.
-
-        An edge is eliminated with its first end: separators of vertices separate edges as well, which is a nested
-        dissection.
-        """
+        """Order unknowns at edges by their ends' order, ``order[k]`` k-th: separators of vertices separate edges."""
         rank = np.empty(len(vertex_order), dtype=np.int64)
         rank[vertex_order] = np.arange(len(vertex_order))
         a, b = rank[self.vertices].T
@@ -163,10 +152,9 @@ def edge_keys(tails: NDArray[np.integer], heads: NDArray[np.integer]) -> Ints:
 
 @compiled
 def find_edges(tails: Ints, heads: Ints, used: Bools, n_vertices: int) -> tuple[Ints, Bools, Ints, Ints, Ints]:
-    """Find the edges of halfedges (h,), in order of first appearance; halfedges that are not used have none.
+    """Find edges of the used halfedges (h,): the edge of each, or −1, and whether it runs as the first along it does.
 
-    Returns the edge of each halfedge, or −1, and whether it runs as the first along its edge does; and of each edge
-    (e,) the number of halfedges, the first, and the second, or −1.
+    Also (e,) the number of halfedges of each edge, the first, and the second, or −1.
     """
     degrees, last = np.zeros(n_vertices, dtype=np.int64), np.full(n_vertices, -1)
     for h in range(len(tails)):

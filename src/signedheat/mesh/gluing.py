@@ -157,8 +157,7 @@ def turn_over(g: Gluing, face: int) -> None:
 def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
     """Unfold the two faces at an edge into one plane: ``h: i → j`` with apex a, its twin with apex b.
 
-    Returns the signed areas of jab and iab, the areas of the twin's face and of h's face, and the length of ab. The
-    areas are the affine dependency of the four corners: area_jab·i + area_iab·j = area_twin·a + area_h·b.
+    Returns the areas of jab, iab, twin and h, of which area_jab·i + area_iab·j = area_twin·a + area_h·b, and |ab|.
     """
     t = g.sibling[h]
     mirrored = g.forward[h] == g.forward[t]
@@ -183,10 +182,7 @@ def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
 
 @kernel
 def flip(g: Gluing, h: int) -> bool:
-    """Flip an interior edge, if its two faces form a strictly convex quadrilateral; return whether it was flipped.
-
-    ``h: i → j`` and its twin become ``h: b → a``, ``t: a → b``. Ids stay, so that a history can be run backwards.
-    """
+    """Flip an interior edge of a strictly convex quadrilateral: h and its twin are then ``b → a``, ``a → b``."""
     t = g.sibling[h]
     if g.forward[h] == g.forward[t]:
         turn_over(g, t // 3)
@@ -208,10 +204,7 @@ def flip(g: Gluing, h: int) -> bool:
 
 @kernel
 def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
-    """Flip until every edge that is not fixed is Delaunay; return False if the history is full before that.
-
-    `stack` holds the ``counts[4]`` edges that are still to be checked; `stacked` marks them.
-    """
+    """Flip stacked edges until all that are not fixed are Delaunay; return False if the history is full before."""
     while g.counts[4] > 0:
         if g.counts[3] + 2 > len(g.steps):
             return False
@@ -281,10 +274,9 @@ def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
 
 @kernel
 def split_edge(g: Gluing, h: int, fraction: float) -> int:
-    """Insert a vertex on an edge, `fraction` of the way along halfedge h, splitting all its faces; return the vertex.
+    """Insert a vertex on an edge, `fraction` of the way along halfedge h, and split all its faces; return the vertex.
 
-    Face (tail, head, apex) becomes (tail, x, apex) and a new face (x, head, apex). No face may have the edge twice. The
-    half at the edge's own tail keeps its id.
+    Face (tail, head, apex) becomes (tail, x, apex) and a new (x, head, apex). No face may have the edge twice.
     """
     count = sibling_count(g, h)
     around, seconds = np.empty(count, np.int64), np.empty(count, np.int64)
@@ -375,11 +367,7 @@ def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
 
 
 def flip_all(gluing: Gluing) -> Gluing:
-    """Flip edges, in place, until the two angles opposite every edge sum to at most π.
-
-    Boundary, nonmanifold and fixed edges keep their ids; faces are turned over where neighbours have opposite
-    orientations. Returns the gluing, with arrays long enough for its history.
-    """
+    """Flip all edges that are not fixed to Delaunay, in place; return the gluing, with room for its history."""
     n_edges = int(gluing.counts[1])
     gluing.counts[4] = n_edges
     stack, stacked = np.arange(n_edges)[::-1].copy(), np.ones(n_edges, dtype=bool)

@@ -39,11 +39,7 @@ class IntrinsicMesh(Frozen):
     def from_lengths(
         cls, corner_vertices: Ints, lengths: Floats, n_vertices: int, edges: EdgeTable | None = None
     ) -> IntrinsicMesh:
-        """Lay out triangles of given edge lengths; ``lengths[:, k]`` runs from corner k to corner k + 1.
-
-        Corner 0 is at the origin, corner 1 on the positive real axis, corner 2 above it. The height comes from
-        Kahan's stable form of Heron's formula, so that needles keep their shape.
-        """
+        """Lay out triangles by lengths (m, 3), corner 0 at the origin, by Kahan's stable form of Heron's formula."""
         base, right, left = lengths.T
         a, b, c = np.sort(lengths, axis=1)[:, ::-1].T
         product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))
@@ -115,10 +111,7 @@ class IntrinsicMesh(Frozen):
 
     @cached_property
     def edge_directions(self) -> Complexes:
-        """(m, 3) z_fe: unit vector of edge k, tail to head, in the face's layout.
-
-        Two edges e, g of a face differ by the rotation ``conj(z_fe) z_fg``, which is r of Eq. 8.
-        """
+        """(m, 3) z_fe: unit vector of edge k, tail to head, in the face's layout; Eq. 8 has ``conj(z_fe) z_fg``."""
         lengths = np.where(self.edge_lengths > 0, self.edge_lengths, 1.0)  # edges without length have no direction
         return np.where(self.edges.forward, 1.0, -1.0) * self.edge_vectors / lengths
 
@@ -126,10 +119,8 @@ class IntrinsicMesh(Frozen):
     def reflected(self) -> Bools:
         """(m, 3) where the frame of edge k is a reflection, not a rotation, of the layout of the face.
 
-        The second axis of an edge's frame points into the first face of the edge and out of all others. The direction
-        of the edge, turned by 90° in a face, points into the faces that run along the edge in its direction and out of
-        the others. Where the two disagree, vectors are conjugated between frame and layout. On a consistently oriented
-        manifold mesh they never do.
+        Its second axis points into the first face of the edge and out of all others; where a face runs along the edge
+        the other way than that needs, vectors are conjugated.
         """
         is_first = np.zeros(3 * self.n_faces, dtype=bool)
         is_first[self.first_halfedges] = True
@@ -154,11 +145,7 @@ class IntrinsicMesh(Frozen):
         return element_components(self.edges.face_edges)
 
     def in_edge_frames(self, vectors: Complexes, faces: Index = slice(None), sides: Index = slice(None)) -> Complexes:
-        """Express vectors in the layouts of faces in the frames of their edges.
-
-        Without `sides` there is a vector for each side of the faces, (k, 3), or one for all three, (k, 1); with `sides`
-        there is one for that side of each face.
-        """
+        """Express vectors of faces, (k, 3) or (k, 1), or (k,) on one of their sides, in frames of edges."""
         turned = np.conj(self.edge_directions[faces, sides]) * vectors
         return np.where(self.reflected[faces, sides], np.conj(turned), turned)
 
@@ -190,11 +177,7 @@ MARGIN = 1e-14
 
 
 def mollify(lengths: Floats, margin: float) -> tuple[Floats, float]:
-    """Add one length δ to all edges, (m, 3), the smallest for which every triangle inequality holds with a margin.
-
-    The margin is the least ``a + b − c`` in every triangle, as a fraction of the mean length. Returns the new lengths,
-    the given array itself if δ is zero, and δ.
-    """
+    """Add the least length to all edges, (m, 3), for which ``a + b − c ≥ margin · mean``; return it, too."""
     longest = lengths.max(axis=1)
     slack = float((lengths.sum(axis=1) - 2.0 * longest).min())
     added = margin * float(lengths.mean()) - slack
@@ -219,11 +202,7 @@ def laid_out(mesh: Triangles, margin: float) -> tuple[IntrinsicMesh, float]:
 
 @dataclass(frozen=True, eq=False)
 class FacePairs:
-    """Pairs of faces that meet at an edge.
-
-    Around an edge with three or more faces each is paired with the next, cyclically, with weight ½, so that separating
-    one face from all others costs as much as at a manifold edge.
-    """
+    """Pairs of faces that meet at an edge; of three or more, each is paired with the next, with weight ½."""
 
     faces: Ints  # (p, 2) the two faces
     sides: Ints  # (p, 2) the side of each face that is the edge: side k runs from corner k to corner k + 1
@@ -234,9 +213,8 @@ class FacePairs:
     shares: Floats  # (p,) weight of each pair: 1, or ½ where three or more faces meet
 
     def ends(self, corner_values: Floats) -> Floats:
-        """Return (p, 2) differences, first face less second, of (m, 3) corner values at the edge's tail and head.
-
-        Of the values that a face field Y integrates to, the two differ by the edge's length times its curl (Eq. 15).
+        """Return (p, 2) differences of (m, 3) corner values at the edge's tail and head, first face less second (Eq.
+        15).
         """
         flat = corner_values.ravel()
         at_tail, at_head = flat[self.tails], flat[self.heads]

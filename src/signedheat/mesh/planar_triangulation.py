@@ -36,11 +36,9 @@ def triangulate_faces(
 ) -> tuple[Ints, Ints, Ints]:
     """Triangulate faces, each with points on its rim and within, so that segments between these become edges.
 
-    The `members` of each face, from ``starts[f]`` on, are those of the `points` (n, 3) on its rim, in order from the
-    first corner on, then those within. `corners`, (m, 3), are the indices of the second and third corner among them,
-    and the number of points on the rim; `segments`, (t, 2), from ``segment_starts[f]`` on, join two such indices each.
-    Returns triangles (k, 3), the face of each, ascending, and its cell: triangles connected without a segment between
-    have the same.
+    From ``starts[f]`` on, `members` are the points of a face, those on its rim first and in order; `corners`, (m, 3),
+    are the places of the second and third corner and the number on the rim; `segments`, (t, 2), join places. Returns
+    triangles (k, 3), the face of each, ascending, and its cell, which has no segment within.
     """
     m = len(corners)
     total = np.int64(0)
@@ -331,10 +329,7 @@ def _edge(mesh: Planar, u: int, v: int) -> int:
 
 @compiled
 def _connect(mesh: Planar, a: int, b: int) -> None:
-    """Make a segment an edge, or edges through the points that it meets, by flips (Sloan 1993).
-
-    It stays as it is where rounding leaves no way.
-    """
+    """Make a segment edges through the points that it meets, by flips (Sloan 1993), unless rounding leaves no way."""
     fixed = mesh.fixed
     while a != b:
         t, k, goal = _aim(mesh, a, b)

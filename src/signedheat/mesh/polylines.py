@@ -23,10 +23,9 @@ LEAST_SHARE = 1e-9
 
 
 def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[tuple[Ints, Bools, bool]]:
-    """Join segments end to end into polylines, which end at nodes where not exactly two segments meet.
+    """Join segments end to end into polylines, which end at nodes where not exactly two meet; others may be reversed.
 
-    Segments join nodes; undirected ones are reversed where needed. Returns the segments of each polyline in order,
-    which of them run from head to tail, and whether it is closed.
+    Returns the segments of each in order, which of them run from head to tail, and whether it is closed.
     """
     nodes, ends = np.unique(np.concatenate([tails, heads]), return_inverse=True)
     (tails, heads), n = ends.reshape(2, -1), len(nodes)
@@ -75,9 +74,7 @@ def leaving(points: Floats, closed: bool, room: Floats) -> Ints:
 def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
     """Return the outlines, (n, 2) each, of the region that outlines fill: clockwise, those of holes counter-clockwise.
 
-    The result does not cross itself, but may touch itself at vertices; parts without area are left out. By the rule
-    "nonzero" an outline within another one is a hole where it runs the other way; otherwise directions do not matter,
-    so that outlines that cross are united.
+    By "nonzero" one within another is a hole where it runs the other way; directions do not matter otherwise.
     """
     if rule not in ("nonzero", "evenodd"):
         raise SignedHeatError(f'fill must be "nonzero" or "evenodd", not {rule!r}', element="fill")

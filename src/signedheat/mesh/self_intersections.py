@@ -22,10 +22,7 @@ CROWD = 64
 
 
 def self_intersections(vertices: Floats, faces: Ints, asked: Bools | None = None) -> Ints:
-    """Return (k, 2) pairs of faces that intersect or overlap; without a common vertex they must not touch, either.
-
-    If only some faces are `asked` about, (m,), the pairs are those with one of them.
-    """
+    """Return (k, 2) pairs of faces that intersect, overlap, or touch without a common vertex; one is `asked` for."""
     slack = TOUCHING * float(np.ptp(vertices, axis=0).max(initial=0.0))
     return overlapping_faces(vertices, same_positions(vertices)[faces], slack, -slack, asked)
 
@@ -33,8 +30,7 @@ def self_intersections(vertices: Floats, faces: Ints, asked: Bools | None = None
 def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float, asked: Bools | None = None) -> Ints:
     """Return (k, 2) pairs of faces that overlap by more than `depth`, or `slack` if they have a common vertex.
 
-    Along their normals they may be apart by `slack`. Faces with a common edge overlap if they are folded. Faces on
-    fewer than three vertices overlap nothing.
+    Along normals they may be `slack` apart; those with a common edge overlap if they are folded.
     """
     proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
     if len(proper) < len(faces):
@@ -81,10 +77,7 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float,
 
 
 def _hubs(faces: Ints, n_vertices: int) -> Ints:
-    """Return (m,) the corner of each face at which most faces meet, if these are more than `CROWD`; else −1.
-
-    Faces around one vertex meet elsewhere only where their arcs meet, as seen from that vertex.
-    """
+    """Return (m,) the corner at which most faces meet, if more than `CROWD`, else −1: there only their arcs meet."""
     valences = np.bincount(faces.ravel(), minlength=n_vertices)[faces]
     hubs = np.take_along_axis(faces, valences.argmax(axis=1)[:, None], axis=1)[:, 0]
     return np.where(valences.max(axis=1) > CROWD, hubs, -1)
@@ -150,11 +143,7 @@ def _is_folded(p: Floats, q: Floats, apex: int, beyond: int) -> bool:
 
 @compiled
 def overlap(p: Floats, q: Floats, slack: float, depth: float, ways: Floats) -> bool:
-    """Return whether two triangles, (9,) each, overlap by more than a depth along every axis that may separate them.
-
-    Along their normals they may be apart by a slack. `ways` is room for ten vectors: their sides, normals and unit
-    normals.
-    """
+    """Return whether triangles, (9,), overlap by a depth along all axes, but a slack along normals; `ways` is room."""
     for d in range(3):
         if min(p[d], p[3 + d], p[6 + d]) > max(q[d], q[3 + d], q[6 + d]) + slack:
             return False

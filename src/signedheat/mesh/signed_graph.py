@@ -50,9 +50,8 @@ class Links:
 def signs_of(links: Links, n_nodes: int) -> Floats:
     """Return (n,) signs s that make Σ w s_tail s_head large: turning no sign, and hardly any group, increases it.
 
-    Groups with the strongest links merge first, and their links to third groups add up (greedy additive contraction,
-    Keuper et al. 2015, for signs instead of cuts), until no link is left. Then groups are taken apart in reverse, and
-    each part turns if that agrees better with the rest.
+    Groups with the strongest links merge first (Keuper et al. 2015); taken apart in reverse, parts turn if that is
+    better.
     """
     levels = _contractions(_weights(links, n_nodes))
     result = np.ones(int(levels[-1][1].max()) + 1 if levels else n_nodes)
@@ -63,11 +62,7 @@ def signs_of(links: Links, n_nodes: int) -> Floats:
 
 
 def best_signs(weights: Floats, first: Floats) -> Floats:
-    """Return (n,) signs s that make ``sᵀ W s`` large, of a dense symmetric matrix, more thoroughly than `signs_of`.
-
-    From several starts (`first`, the result of `signs_of`, and the first two eigenvectors), groups of nodes on all
-    levels of merging are turned as long as that gains; the best result is returned. The diagonal of W does not matter.
-    """
+    """Return (n,) signs that make ``sᵀ W s`` large, W dense: from several starts, groups turn while that gains."""
     n = len(weights)
     weights = np.where(np.eye(n, dtype=bool), 0.0, weights)
     tails, heads = np.triu_indices(n, 1)

@@ -133,10 +133,7 @@ class Tetrahedra(TetShapes):
 
     @cached_property
     def stiffness_factors(self) -> Floats:
-        """(m,) w / |T|, w the `weights`, by which every term of thin tets is reduced.
-
-        The equations stay consistent with any positive weights. These keep the stiffness of flat tets bounded.
-        """
+        """(m,) w / |T|, w the `weights`, by which every term of thin tets is reduced: the stiffness stays bounded."""
         thick = self.thickness >= THIN
         cubes = np.where(self.longest_edges > 0, self.longest_edges, 1) ** 3
         return 1 / np.where(thick, np.maximum(self.volumes, np.finfo(float).tiny), THIN * cubes)
@@ -148,11 +145,7 @@ class Tetrahedra(TetShapes):
 
     @cached_property
     def fading(self) -> Floats:
-        """(m,) factor of w in step 3, so that the stiffness of flat tets is zero.
-
-        φ is curved, and its linear interpolant has a gradient in a flat tet that grows without bound. With a stiffness
-        that is merely bounded, long flat tets along the sides of a Delaunay mesh make φ linear there.
-        """
+        """(m,) factor of w in step 3, zero on flat tets: a curved φ has gradients without bound in them."""
         return self.weights**2
 
     @cached_property
@@ -162,38 +155,22 @@ class Tetrahedra(TetShapes):
         return TIE * lengths * (1 - np.minimum(self.thickness / FLAT, 1))
 
     def face_mass(self) -> Floats:
-        """Return (f,) M of Eq. 12, lumped: a quarter of the volume of each tet at each of its faces.
-
-        These are the row sums of the consistent mass of Eq. 23, with 2/5 of the volume on its diagonal and −1/20
-        between two faces of a tet, and they are as accurate. Faces of flat tets have at least a little, so that M + tL
-        is positive definite.
-        """
+        """Return (f,) M of Eq. 12, row sums of Eq. 23, with a least value so that M + tL is positive definite."""
         quarter = np.repeat(self.weights * self.volumes / 4, 4)
         mass = np.bincount(self.faces.tet_faces.ravel(), quarter, len(self.faces.vertices)).astype(np.float64)
         return np.maximum(mass, LEAST_MASS * mass.mean())
 
     def face_laplacian(self) -> sparse.csr_matrix:
-        """Return (f, f) the Laplacian of faces (Eq. 20, Eq. 21): L_ab = Σ_T N_a·N_b / |T| = −(3/2) Σ |e| cot θ.
-
-        Here e is the edge that the two faces share, and θ the dihedral angle of the tet there. `ties` couple the faces
-        of flat tets besides.
-        """
+        """Return (f, f) the Laplacian of faces (Eq. 20, Eq. 21): L_ab = Σ_T N_a·N_b / |T|, plus `ties`."""
         faces = self.faces
         return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.tet_faces, len(faces.vertices))
 
     def vertex_laplacian(self, corners: Ints, n: int) -> sparse.csr_matrix:
-        """Return (n, n) the cotan Laplacian, Eq. 10 in tets: C_ij = Σ_T N_i·N_j / (9|T|) = −(1/6) Σ |e| cot θ.
-
-        Here e is the edge of the tet opposite edge ij, and θ the dihedral angle there. `ties` couple the vertices of
-        flat tets besides.
-        """
+        """Return (n, n) the cotan Laplacian, Eq. 10 in tets: C_ij = Σ_T N_i·N_j / (9|T|), plus `ties`."""
         return _assemble(self.area_vectors, self.fading * self.stiffness_factors / 9, self.ties, corners, n)
 
     def divergence(self, directions: Floats, corners: Ints, n: int) -> Floats:
-        """Return (n,) b of Eq. 13 for one vector Y per tet: the divergence of Eq. 22, ``∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T``.
-
-        Eq. 22 is printed without the ⅓, and with the opposite sign, as the paper's Laplacian is negative semidefinite.
-        """
+        """Return (n,) b of Eq. 13 for one Y per tet, ``∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T`` (Eq. 22 lacks the ⅓)."""
         parts = np.einsum("mki,mi->mk", self.area_vectors, directions) * (self.fading * self.weights / -3)[:, None]
         return np.asarray(np.bincount(corners.ravel(), parts.ravel(), n), np.float64)
 

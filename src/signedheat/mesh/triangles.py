@@ -82,11 +82,7 @@ def gradients_along(sides: Floats, rises: Floats) -> Floats:
 
 @compiled
 def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[Floats, Bools]:
-    """Return (p,) areas of polygons, and which are degenerate: without area, to roundoff, or with a repeated vertex.
-
-    An area counts as none if moving the corners by a few units in the last place of the coordinates could make it.
-    Polygon f has the corners from ``offsets[f]`` to ``offsets[f + 1]``.
-    """
+    """Return (p,) areas, and which polygons are degenerate: without area, to roundoff, or with a repeated vertex."""
     n = len(offsets) - 1
     areas, degenerate = np.empty(n), np.zeros(n, dtype=np.bool_)
     seen = np.full(len(vertices), -1)
@@ -114,11 +110,7 @@ def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[F
 
 
 def cut_into_ears(polygon: Floats, normal: Floats, allowed: Callable[[int, int], bool] | None = None) -> Ints:
-    """Cut a simple polygon along diagonals, best-shaped ears first: (k − 2, 3) corners; empty if it runs out of ears.
-
-    The polygon is counter-clockwise as seen from the normal. `allowed` tells whether a diagonal may join two corners;
-    by default all may. The time is cubic in the number of corners.
-    """
+    """Cut a simple polygon, counter-clockwise around its normal, into ears: (k − 2, 3), best first."""
     upright = np.eye(3)[np.abs(normal).argmin()]
     first = np.cross(upright, normal)
     second = np.cross(normal, first)
@@ -156,10 +148,7 @@ MOST = 4_000_000
 
 
 def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = None) -> Ints:
-    """Return (m, 3) faces on the same vertices, with edges flipped wherever that makes the surface bend less.
-
-    No edge may have more than two faces, and these agree. Nothing is flipped around vertices that are `held`, (n,).
-    """
+    """Return (m, 3) faces with edges flipped where the surface then bends less, but not at `held` vertices (n,)."""
     if not 0 < len(faces) <= MOST:
         return faces
     _, _, sharp = _creases(vertices, faces)
@@ -186,11 +175,10 @@ def _creases(vertices: Floats, faces: Ints) -> tuple[EdgeTable, Floats, Ints]:
 
 
 def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> tuple[Ints, Ints, Ints]:
-    """Return (k,) faces to replace, in pairs no two of which are neighbours; (k, 3) their replacements; and vertices.
+    """Return (k,) faces to replace, no two pairs of which are neighbours; (k, 3) replacements; and vertices of gainful
+    pairs.
 
-    The vertices are those of all pairs whose flip would gain something, (h, 4), whether they are flipped now or not.
-    The edge from a to b has c and d across; it is replaced by the edge from c to d, unless there is one already. a, b
-    and one of these must be `whole`: all of their faces are given.
+    An edge ab becomes cd unless there is one; all faces of a, b and one of c, d must be given (`whole`).
     """
     table, normals, creases = _creases(vertices, faces)
     (first, second), (i, j) = (creases // 3).T, (creases % 3).T

@@ -14,11 +14,7 @@ from ..parallel import n_threads
 
 
 def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
-    """Scale vectors to length one: complex numbers as vectors in the plane, rows of a real array as vectors in space.
-
-    Divides by the largest component first, because X falls like exp(−r/√t), and its square underflows long before it.
-    With `overwrite` the memory of a real array is used for the result.
-    """
+    """Scale vectors to length one, by the largest component first: X's square underflows long before X."""
     if np.iscomplexobj(vectors):
         length = np.abs(vectors)  # np.abs of complex numbers neither overflows nor underflows
         return vectors / np.where(length > 0, length, 1)

@@ -259,14 +259,6 @@ def search_from(features: FaceFeatures, points: Floats, candidates: NDArray[np.i
 def _nearest_of_candidates(
     features: FaceFeatures, points: Floats, candidates: NDArray[np.int32]
 ) -> tuple[NDArray[np.int32], Floats, Floats, NDArray[np.int8], NDArray[np.float32], Bools]:
-    """Go from the nearest of some faces, and the nearest place on it, to nearer faces, across their rims.
-
-    Nearer places beyond an edge, if any, lie on the side of the point: the place is the nearest of the edge, so the
-    point must be in front of the plane that the edge divides from the other face's apex. Around a vertex the side along
-    which distance shrinks fastest leads on; where it grows along all of them no place is nearer.
-
-    All points are done in one call, since a call costs more than the way of one point.
-    """
     n = len(points)
     out_faces, out_distances, out_places = np.empty(n, dtype=np.int32), np.empty(n), np.empty((n, 3))
     out_features, out_cosines = np.empty(n, dtype=np.int8), np.empty(n, dtype=np.float32)

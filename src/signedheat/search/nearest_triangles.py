@@ -24,11 +24,10 @@ again."""
 
 
 def triangle_rows(corners: Floats) -> Floats:
-    """Return (m, 16) the numbers that `foot_on_triangle` needs of (m, 9) corners: each triangle in a plane of its own.
+    """Return (m, 16) what `foot_on_triangle` needs of (m, 9) corners, each in a plane of its own, from its first
+    corner.
 
-    They are a corner; the directions of two axes, along the first side and perpendicular to it; the length of this
-    side; and the directions in the plane, and the lengths, of the sides from the first corner to the third and from the
-    second to the third.
+    That corner; two axes, along the first side and across; its length; direction and length of sides 0–2 and 1–2.
     """
     (rows,) = in_chunks(lambda chunk: (_rows(chunk),), corners)
     return rows
@@ -106,10 +105,9 @@ def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tupl
 
 @compiled
 def away_from_triangle(rows: Floats, f: int, places: Floats, at: int, out: Floats) -> None:
-    """Write squared distances of (3, n) places to triangle f, and the ways from their feet, to ``out[at]``, (4, n).
+    """Write squared distances of (3, n) places to a triangle, and ways from their feet, to ``out[at]``, (4, n).
 
-    This is `foot_on_triangle` without branches, so that processors do several places at once; the compiler must not
-    know their number, or it does them one by one.
+    This is `foot_on_triangle` without branches, for several places at once, if the compiler does not know their number.
     """
     ax, ay, az = rows[f, 0], rows[f, 1], rows[f, 2]
     ux, uy, uz = rows[f, 3], rows[f, 4], rows[f, 5]
@@ -222,11 +220,11 @@ def nearest_faces(
 def _descend(
     rows: Floats, tree: BoxTree, discs: Floats, points: Floats, run: int, best: Floats
 ) -> tuple[NDArray[np.int32], Floats]:
-    """Find the nearest face of each point (n, 3), and the square of its distance, down a tree of boxes.
+    """Find the nearest face of each point (n, 3), and the square of its distance, by descending a tree of boxes and
+    discs.
 
-    Consecutive points descend together, so that processors do several at once. Every `run` points the search starts
-    again, in between from the face before. A disc (`FaceTree.discs`) that is farther than its box counts. `best` has an
-    entry for each point that descends with others: its length must be unknown to the compiler.
+    Consecutive points descend together, as many as `best` is long, which the compiler must not know; every `run` points
+    the search starts again, in between from the face before.
     """
     bounds, items = tree.bounds, tree.items
     out_faces, out_squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))

@@ -56,10 +56,7 @@ class WindingTree:
         return sides
 
     def behind(self, faces: NDArray[np.integer], places: Floats) -> Floats:
-        """Return (n,) winding numbers just behind places (n, 3) in faces (n,): 1 more than in front of single faces.
-
-        The places must not be on the rims of faces, where other faces meet them.
-        """
+        """Return (n,) winding numbers just behind places (n, 3) in faces (n,), away from their rims."""
         corners = self.triangles[faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         areas = np.linalg.norm(normals, axis=1)
@@ -72,15 +69,7 @@ class WindingTree:
 
 
 def winding_sums(triangles: Floats, points: Floats) -> Floats:
-    """Return (n,) winding numbers around few points, triangle by triangle (van Oosterom & Strackee 1983).
-
-    Examples
-    --------
-    >>> from signedheat import samples
-    >>> ball = samples.sphere(2)
-    >>> winding_sums(ball.vertices[ball.faces], np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])).round(9).tolist()
-    [1.0, 0.0]
-    """
+    """Return (n,) winding numbers around few points, triangle by triangle (van Oosterom & Strackee 1983)."""
     numbers = np.zeros(len(points))
     for begin in range(0, len(triangles), BLOCK):
         block = triangles[begin : begin + BLOCK]
@@ -95,11 +84,7 @@ def winding_sums(triangles: Floats, points: Floats) -> Floats:
 
 @compiled
 def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> Floats:
-    """Return (n,) winding numbers around points, down the tree.
-
-    Far from a node the first three terms of the expansion about its centre replace its triangles (see `moments_of` for
-    the columns of `moments`); in leaves solid angles are summed.
-    """
+    """Return (n,) winding numbers by solid angles in leaves, and far away by moments (`moments_of`)."""
     leaves = len(moments) // 2
     stack = np.empty(64, dtype=np.int64)
     result = np.zeros(len(points))
@@ -176,11 +161,7 @@ CUBES = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 0, 1), (0, 0, 2), (0, 1, 1), (1, 1
 
 
 def moments_of(triangles: Floats, tree: BoxTree, opening: float) -> Floats:
-    """Return (2 · leaves, 23) moments of the triangles below each node of a tree.
-
-    The columns are area vector, centre, the square of `opening` times the radius around it, and the coefficients of M
-    and S.
-    """
+    """Return (2 · leaves, 23) area vector, centre, (`opening` · radius)², and coefficients of M and S."""
     leaves = len(tree.bounds) // 2
     grouped = tree.items.reshape(leaves, LEAF)
     blocks = [_of_leaves(triangles, grouped[start : start + BLOCK]) for start in range(0, leaves, BLOCK)]

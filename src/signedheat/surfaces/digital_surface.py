@@ -191,11 +191,7 @@ MOVED = 1e-4
 
 
 def surface_net(volume: Bools) -> tuple[Floats, Ints]:
-    """Make a smooth surface between the voxels of a set and all others: vertices, in voxels, and outward triangles.
-
-    It is closed and manifold, and passes between the centres of any two neighbours of which one is in the set. Voxels
-    that touch along an edge are connected. Everything beyond the array is outside. The centre of the first voxel is 0.
-    """
+    """Make a smooth closed surface between voxels inside and outside: vertices, in voxels, and triangles."""
     padded = np.pad(volume, 2)
     nodes = [np.argwhere(np.diff(padded, axis=axis)) for axis in range(3)]
     first, along = np.concatenate(nodes), np.repeat(np.arange(3), [len(part) for part in nodes])
@@ -223,10 +219,7 @@ def _rooms(cells: DualCells, crossings: Crossings) -> tuple[Floats, Floats]:
 
 
 def _relaxed(quads: Ints, middles: Floats, room: Floats) -> Floats:
-    """(v, 3) places at which a net bends least, by projected accelerated gradients (Beck & Teboulle 2009).
-
-    Where a step goes back, acceleration starts again (O'Donoghue & Candès 2015).
-    """
+    """(v, 3) places at which a net bends least, by accelerated gradients that restart (O'Donoghue & Candès 2015)."""
     count = len(middles)
     tails, heads = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
     links = sparse.coo_array((np.ones(len(tails)), (tails, heads)), shape=(count, count)).tocsr()
@@ -256,9 +249,7 @@ ATTACHMENT = 0.1
 def smoothed_corners(vertices: Floats, corners: Ints, normals: Floats) -> Floats:
     """(n, 3) corners p of least ``Σ (n_f · (p_j − p_i))² + ATTACHMENT Σ |p_i − v_i|²``, for the sides ij of squares f.
 
-    The sides become orthogonal to the normals, while corners stay near where they were (after Coeurjolly, Lachaud &
-    Gueth, *Digital surface regularization with guarantees*, 2021). The squares then have the lengths of the surface
-    that was digitised, and neighbours agree on them, which they would not if projected one by one.
+    After Coeurjolly, Lachaud & Gueth, *Digital surface regularization with guarantees*, 2021.
     """
     m, n = len(corners), len(vertices)
     row, tails, heads = np.arange(4 * m), corners.ravel(), np.roll(corners, -1, axis=1).ravel()
@@ -332,10 +323,7 @@ def count_surfels(volume: Bools) -> int:
 
 
 def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: float) -> Floats:
-    """(m, 3) unit normals: mean area vectors around each surfel, by a Gaussian of standard deviation radius/2.
-
-    By the divergence theorem that is the negative gradient of the blurred volume; with radius 0 the surfels' own.
-    """
+    """(m, 3) unit normals: the negative gradient of the volume after a blur of standard deviation radius/2."""
     own = np.zeros((len(surfels.axes), 3))
     own[np.arange(len(own)), surfels.axes] = surfels.signs
     if radius == 0:
@@ -359,11 +347,7 @@ def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: 
 
 
 def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:
-    """Replace each edge along which two voxels touch by two, in the edges of the triangles of surfels.
-
-    Four surfels meet there. Surfels that face the same voxel outside share an edge, so that the surface connects the
-    two voxels inside. There are four triangles per surfel; edge 0 of each is a side of the surfel.
-    """
+    """Replace each edge along which two voxels touch by two, each of surfels that face the same voxel outside."""
     triangles = np.flatnonzero(edges.face_counts[edges.face_edges[:, 0]] > 2)
     surfel = triangles // 4
     step = np.zeros((len(surfel), 3), dtype=np.int64)

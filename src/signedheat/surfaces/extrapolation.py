@@ -70,10 +70,8 @@ Diffusion = float | Extrapolated
 def default_diffusion(discretization: Discretization) -> Diffusion:
     """`Extrapolated` on surfaces, where directions limit the accuracy; 1 in space.
 
-    Two errors remain. Of h²/t, extrapolation leaves about 1/τ², which does not fall with h. And Y is smoothed over a
-    width of √t = h √τ where it turns back, at equal distance from two parts of the source. On fine surfaces τ grows
-    like h^(−2/5), so that both stay alike and their sum falls like h^(4/5). On scans, whose distance has many such
-    places, the second error is the larger one up to 100,000 vertices and more.
+    Of h²/t extrapolation leaves about 1/τ²; Y is smoothed over h √τ where it turns back. With τ like h^(−2/5) both fall
+    like h^(4/5).
     """
     if not isinstance(discretization, SurfaceDiscretization):
         return 1.0

@@ -58,11 +58,7 @@ class Retriangulated:
 
 
 class RetriangulatedForZeroSet(Retriangulated):
-    """`Retriangulated` for the zero set alone: h suits the pieces of curves, not triangles far away.
-
-    With the t of large triangles, the pieces of a curve smaller than these would be one blot of heat, without the
-    curve's course between them. Gaps are about as long as pieces, or shorter. Of several curves the smallest counts.
-    """
+    """`Retriangulated` for the zero set alone: large triangles would blur small pieces of curves."""
 
     coarsest: ClassVar[float] = np.inf
 
@@ -121,10 +117,7 @@ def refined(
 
 
 def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDiscretization:
-    """Discretise an intrinsic triangulation; if triangles are nearly degenerate, all edges are first made longer.
-
-    All become longer by the same length (`mollify`). Options override fields of the result.
-    """
+    """Discretise an intrinsic triangulation, with longer edges if triangles are flat; options override fields."""
     triangles = triangulation.triangles
     lengths, added = mollify(triangles.edge_lengths, THICKNESS)
     if added:

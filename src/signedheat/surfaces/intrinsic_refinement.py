@@ -43,9 +43,8 @@ def refine_all(
 ) -> tuple[Gluing, Ints, Bools, bool]:
     """Refine a Delaunay triangulation, in place, until no face is thin, and then none large: see `intrinsic_delaunay`.
 
-    `angle` is in radians; `progress` is called now and then with the estimated fraction done, and may raise to cancel.
-    Return the triangulation; the fixed edge of the input that each edge (e,) is part of, or −1; which faces (m,) lie at
-    vertices that nearly coincide, and may be thin; and whether it ended before the limit on the number of vertices.
+    Returns it; the fixed edge of the input that each edge (e,) is part of, or −1; which faces (m,) `close_faces` finds;
+    and whether it ended before the limit on the number of vertices. `progress` gets the fraction done.
     """
     segments, agenda = agenda_of(gluing)
     goal = Goal(np.tan(angle / 2) ** 2, np.inf, max_vertices)
@@ -235,11 +234,10 @@ def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
 
 @kernel
 def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
-    """Try to remove bad face f by one new vertex: at its circumcentre, or on a segment that is in the way of that.
+    """Insert a vertex at the circumcentre of bad face f, or on a segment in the way; return False without room for it.
 
-    Return False if the arrays have no room for the vertex, so that f must be tried again; else True, even if f stays.
-    A face whose shortest side joins vertices that nearly coincide stays, unless an angle above 150° makes its
-    circumcircle large and no segment is in the way: grading faces towards such vertices would take hundreds more.
+    A face whose shortest side joins vertices that nearly coincide stays, unless it is a cap without a segment in the
+    way.
     """
     h = is_bad(g, f, goal)[1]
     close = coincide(g, agenda, h)
@@ -428,10 +426,8 @@ def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
 def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool:
     """Split a segment that keeps face f from being removed; return False if the arrays have no room for it.
 
-    The segment is split in the middle, with two exceptions: next to a vertex that nearly lies on it; and, near an end
-    where segments meet at a small angle, at a distance from that end that is a power of two, so that the parts of both
-    segments have equal lengths and stop splitting each other (Ruppert 1995). Tiny parts are not split. If two sides of
-    a face are the segment, that face is split in its place.
+    That is in the middle, or beside a vertex that nearly lies on it, or, near an end where segments meet at a small
+    angle, a power of two from there (Ruppert 1995). A face with two sides on the segment is split instead.
     """
     e = g.edge[h]
     segment, length, step = agenda.segment[e], g.length[e], g.counts[3]
@@ -493,11 +489,7 @@ def cross(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> f
 
 @kernel
 def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, float, float]:
-    """Walk straight from the barycentre of a face to its circumcentre.
-
-    Return INSIDE with the face that contains it and its position there (first halfedge along x), BLOCKED with a
-    halfedge of the segment in between, or LOST where the face is flat.
-    """
+    """Walk from the barycentre of a face to its circumcentre: INSIDE a face, BLOCKED by a halfedge, or LOST if flat."""
     x, y = np.zeros(3), np.zeros(3)
     x[1] = g.length[g.edge[3 * f]]
     x[2], y[2] = apex_position(g, 3 * f)
@@ -593,11 +585,10 @@ def root(parent: Ints, a: int) -> int:
 
 @kernel
 def coinciding(tail: Ints, head: Ints, length: Floats, order: Ints, n_vertices: int) -> tuple[Ints, Floats]:
-    """Group vertices that nearly coincide; return the first vertex of the group of each, or −1, and the group's extent.
+    """Group vertices that nearly coincide; return the first vertex of the group of each, or −1, and there its extent.
 
-    Edges join vertices into ever larger groups, from short to long ones (Kruskal). A group is kept if its extent, the
-    sum of the lengths of the edges that made it, is less than `NEARNESS` times the length of the next edge that leaves
-    it; of nested groups the largest is kept. The extent is given at the first vertex of the group.
+    From short to long edges (Kruskal), a group is kept whose extent, the sum of the lengths that made it, is less than
+    `NEARNESS` times the next edge that leaves it; of nested ones the largest is.
     """
     parent, node = np.arange(n_vertices), np.arange(n_vertices)
     first, second = np.full(2 * n_vertices, -1), np.full(2 * n_vertices, -1)

@@ -72,10 +72,7 @@ class ConformingRefinement(Frozen):
 
 
 def in_order(triangles: IntrinsicMesh, heights: Floats) -> tuple[IntrinsicMesh, Ints, Ints, Ints]:
-    """Sort faces, their corners and edges by the heights (m, 3) of the corners; each face begins at its lowest corner.
-
-    Return the triangles, and the number that each edge (e,), face (m,) and corner (m, 3) had.
-    """
+    """Sort faces, corners and edges by heights (m, 3), and return (e,), (m,) and (m, 3) the number that each had."""
     faces = np.argsort(heights.sum(axis=1), kind="stable")
     turns = (heights[faces].argmin(axis=1)[:, None] + np.arange(3)) % 3
     old = triangles.edges
@@ -185,10 +182,7 @@ def _joined(triangles: IntrinsicMesh, points: LocatedPoints, faces: Ints, owners
 
 
 def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[Ints, Floats, Floats, Complexes]:
-    """Return the face of every segment, its barycentric start and end, and its normal in the layout of the face.
-
-    For a segment along an edge it is the face of the edge with the largest area.
-    """
+    """Return the face of every segment, the larger at an edge, its barycentric ends, and its normal in the layout."""
     faces = source.faces.copy()
     on_edge = np.flatnonzero(source.edges >= 0)
     flat, used = triangles.edges.face_edges.ravel(), np.zeros(triangles.n_edges, dtype=bool)
@@ -223,10 +217,9 @@ LEAST = 1e-12
 
 
 def level_lines(history: History, refinement: ConformingRefinement, values: Floats) -> list[tuple[Ints, Floats, bool]]:
-    """Trace the zero set of a function that is linear on the triangles after a history, on those before the refinement.
+    """Trace the zero set of a function linear on triangles after a history, consistently oriented, on those before.
 
-    The triangles must be consistently oriented. Return the faces and barycentric coordinates of the points of each
-    polyline, in order, with larger values to its left, and whether it is closed.
+    Returns faces and barycentric coordinates of each polyline, larger values to its left, and whether it is closed.
     """
     least = LEAST * max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-300)
     line = zero_line(history.after, cleared(history.after, values, least))

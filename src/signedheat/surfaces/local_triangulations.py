@@ -67,11 +67,7 @@ class LocalTriangulations:
 def local_triangulations(
     points: Floats, normals: Floats, n_neighbors: int = 30, given: Floats | None = None
 ) -> LocalTriangulations:
-    """Triangulate points (n, 3) with normals, some of them given, in O(n log n) time.
-
-    Where the local triangulations disagree, triangles are split at points that all proposals have left out, and small
-    holes are filled.
-    """
+    """Triangulate points (n, 3) with normals, some of them given, in O(n log n) time."""
     planes = TangentPlanes.of(points, normals, n_neighbors)
     faces, candidates = joined_triangles(planes)
     alone = islands(planes, faces)
@@ -167,11 +163,10 @@ class TangentPlanes:
         return in_chunks(found, np.column_stack([here, there]))[0]
 
     def unfolded(self, here: Ints, there: Ints) -> Floats:
-        """(m, 2) places of points (m,) in the planes of others (m,).
+        """(m, 2) places of points (m,) in the planes of others (m,), along the mean of both normals, turned into the
+        plane.
 
-        A point is projected along the mean of both normals, and its projection is turned into the plane. For points on
-        the other side of a plate the directions in which both sides end take the place of the normals, and distance
-        along them leads away over the edge.
+        On the other side of a plate, the directions in which both sides end take the place of the normals.
         """
 
         def places(pairs: Ints) -> tuple[Floats]:
@@ -189,10 +184,9 @@ class TangentPlanes:
 
 
 def turned_alike(offsets: Floats, normal: Floats, others: Floats, flat: Floats) -> tuple[Floats, Bools]:
-    """Turn normals (…, 3) of other points on the same side back; return also which points lie on the other side.
+    """Turn mistaken normals (…, 3) back; return also which points lie on the other side of a plate.
 
-    A contrary normal is a mistake where the other point lies in the tangent plane, or is below the point and the point
-    above it; otherwise the other point lies on the other side of a plate.
+    A contrary normal is a mistake in the tangent plane, or if of both points only one is above the other.
     """
     contrary = dot(normal, others) < OPPOSITE
     over, under = dot(offsets, normal), -dot(offsets, others)
@@ -217,11 +211,7 @@ def principal_axes(offsets: Floats, weights: Floats, normals: Floats, reach: Flo
 
 
 def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, allowed: Bools) -> tuple[Ints, Ints]:
-    """(m, 3) distinct triangles, with sorted corners, that points propose; and (m,) votes: how many propose each.
-
-    Points `centers` (c,) propose their Delaunay triangles among those of their `neighbors` (c, k) that are `allowed`
-    (c, k), unfolded into their tangent planes.
-    """
+    """(m, 3) distinct triangles that `centers` (c,) propose of `allowed` neighbours (c, k), and (m,) votes."""
     triangles = [np.empty((0, 3), dtype=np.int64)]
     k = neighbors.shape[1]
     for begin in range(0, len(centers), _CHUNK):
@@ -297,11 +287,7 @@ def split_at_points_left(points: Floats, faces: Ints, candidates: Ints) -> Ints:
 
 
 def aligned(axes: Floats, faces: Ints, normals: Floats, given: Floats) -> Ints:
-    """(n,) signs that orient normals of planes alike across edges, and towards estimated normals.
-
-    Node n of the graph stands for the side of the estimates. Each connected component is then turned as a whole if the
-    sum of its cosines with the given normals is negative.
-    """
+    """(n,) signs that orient normals alike across edges and as estimated (node n), and each component as given."""
     n = len(axes)
     tail, head = edge_table(faces).vertices.T
     parts = connected_components(n, tail, head)
@@ -335,9 +321,8 @@ TOUCHING = 1e-7
 def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
     """(n, MAX_SIDES) Delaunay neighbours of the origin among places (n, k, 2), counter-clockwise; (n,) sides.
 
-    The Voronoi cell of the origin starts as a square, to ±1, and is cut by the bisectors of its neighbours, nearest
-    first. Two neighbours whose sides of the cell meet span a Delaunay triangle with the origin, and the corner between
-    them is its circumcentre: no circumradius exceeds the square's. Sides of the square that remain are −1, and count.
+    The Voronoi cell, a square to ±1, is cut by the bisectors of neighbours, nearest first; sides left are −1, and
+    count.
     """
     n, k = places.shape[:2]
     neighbours = np.full((n, MAX_SIDES), -1, dtype=np.int64)
@@ -390,10 +375,7 @@ def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
 
 @compiled
 def accept_apart(triangles: Ints, starts: Floats, widths: Floats, n_points: int) -> Bools:
-    """(m,) triangles whose sector overlaps that of no triangle accepted earlier, at any of their three corners.
-
-    At corner k of triangle f the sector goes from angle ``starts[f, k]`` counter-clockwise by ``widths[f, k]``.
-    """
+    """(m,) triangles whose sectors, from starts (m, 3) counter-clockwise by widths, overlap none accepted earlier."""
     accepted = np.zeros(len(triangles), dtype=np.bool_)
     sectors = np.zeros((n_points, MAX_SIDES, 2))
     count = np.zeros(n_points, dtype=np.int64)
@@ -441,9 +423,7 @@ def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
 
 
 def next_around_gap(points: Floats, normals: Floats, tails: Ints, heads: Ints) -> Ints:
-    """(b,) boundary edge that follows each one around the gap to its right, or −1: the first one counter-clockwise from
-    the reversed edge.
-    """
+    """(b,) boundary edge that follows each one around the gap to its right, the first counter-clockwise, or −1."""
     arriving, onward = members_of(*grouped(tails, len(points)), heads)
     vertices = heads[arriving]
     back, forth = points[tails[arriving]] - points[vertices], points[heads[onward]] - points[vertices]
@@ -472,10 +452,7 @@ def _loop_from(start: int, following: Ints) -> list[int]:
 def _ears(
     points: Floats, normals: Floats, loop: list[int], existing: set[tuple[int, int]]
 ) -> list[tuple[int, int, int]]:
-    """Triangles that fill a loop of vertices, counter-clockwise around the hole; none if it is not a hole.
-
-    Edges of the new triangles are added to `existing`.
-    """
+    """Triangles that fill a loop of vertices, counter-clockwise around a hole; their edges are added to `existing`."""
     if len(set(loop)) < max(len(loop), 3):
         return []
     corners = points[loop]

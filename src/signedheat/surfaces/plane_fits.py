@@ -56,11 +56,7 @@ class PlaneFits:
 
 
 def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
-    """Fit a plane near each of (n, 3) distinct points.
-
-    Without noise the neighbourhoods are small, and sheets that lie close together, or meet in an edge, stay apart: the
-    plane that explains most neighbours is taken. A number of neighbours says that points are noisy: that many are used.
-    """
+    """Fit a plane near each of (n, 3) distinct points; of noisy ones to `n_neighbors`, otherwise to few."""
     tree = scipy.spatial.cKDTree(points)
     noisy = n_neighbors is not None
     size = n_neighbors or min(CLEAN_NEIGHBORS, len(points) - 1)
@@ -71,10 +67,7 @@ def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
 
 
 def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
-    """Sizes of neighbourhoods in which planes can be fitted in spite of noise, from the least; without noise none.
-
-    Estimated from at most 2,000 of the points. If normals are given, the other side of a thin plate is no noise.
-    """
+    """Sizes of neighbourhoods in which noise lets planes be fitted, from the least; without noise none."""
     largest = (len(points) - 1) // 4
     if largest < CLEAN_NEIGHBORS:
         return []
@@ -106,9 +99,7 @@ def point_spacing(distances: Floats, k: int) -> Floats:
 
 
 def share_of_two_sides(points: Floats, normals: Floats) -> float:
-    """Share of points whose neighbours lie at two heights over a quadric, as on both sides of a plate thinner than the
-    spacing. Estimated from at most 2,000 points.
-    """
+    """Share of points whose neighbours lie at two heights over a quadric, as on plates thinner than the spacing."""
     k = min(ON_QUADRIC, len(points) - 1)
     tree = scipy.spatial.cKDTree(points)
 
@@ -139,13 +130,9 @@ def planes_near(
     *,
     on_surface: bool,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Fit planes near the `chosen` points (c,) to their neighbours in a tree of all of them.
+    """Fit planes near `chosen` points (c,): through them, if `on_surface`, else where their neighbours are.
 
-    If points lie `on_surface`, planes pass through them, and the best of several starts counts; of noisy points planes
-    move to where the neighbours are. `heights` are tried one after the other, in reaches: see `robust_planes`.
-
-    Return (c, 3) unit normals, (c, 3) centres of the neighbours, (c,) reaches, the distances to the last neighbour, and
-    (c,) root mean square heights over the planes, in reaches.
+    Returns (c, 3) normals, (c, 3) centres, (c,) reaches and (c,) root mean square heights, in reaches as `heights` are.
     """
 
     def fit(ids: Ints) -> tuple[Floats, Floats, Floats, Floats]:
@@ -162,10 +149,7 @@ def planes_near(
 
 @compiled
 def least_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float, axis: Floats) -> float:
-    """Write the unit eigenvector of the least eigenvalue of a symmetric 3×3 matrix; return that eigenvalue.
-
-    Eigenvalues in closed form by the angle of their cubic (Smith 1961), the vector as a product of two rows.
-    """
+    """Write the unit eigenvector of the least eigenvalue of a symmetric 3×3 matrix; return the value (Smith 1961)."""
     mean = (xx + yy + zz) / 3.0
     ax, ay, az = xx - mean, yy - mean, zz - mean
     p = ((ax * ax + ay * ay + az * az + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0) ** 0.5
@@ -261,10 +245,11 @@ def robust_planes(
     centers: Floats,
     deviations: Floats,
 ) -> None:
-    """Fit a plane near each point, its first neighbour, to those of its neighbours that lie within a height of it.
+    """Fit a plane near each point, its first neighbour, to neighbours within `heights`, in reaches, one after the
+    other.
 
-    Heights are in reaches, one after the other: over the plane through the point, if `on_surface`, else through the
-    centre of the last fit. Of several starts the plane with most neighbours within the last height is kept.
+    They are over the plane through the point, if `on_surface`, else the last centre; of several starts the best is
+    kept.
     """
     n, k = neighbors.shape
     offsets, near, weights = np.empty((k, 3)), np.empty(k), np.empty(k)

@@ -213,10 +213,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
 
 def edges_turned(points: Floats, normals: Floats, faces: Ints) -> int:
-    """Count edges next to another side across which triangles face opposite ways.
-
-    Surfaces with one side have such edges, too, but no other side is near.
-    """
+    """Count edges next to another side across which triangles face opposite ways."""
     halfedges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     edges, uses = np.unique(halfedges, axis=0, return_counts=True)
     twice = edges[uses > 1]
@@ -284,11 +281,9 @@ def outward_normals(points: Floats, given: Floats | None = None) -> tuple[Floats
 
 
 def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
-    """Keep the signs of given normals (n, 3) on thin sheets, if the normals fit each other there.
+    """Keep the signs of given normals (n, 3) on sheets thinner than the spacing, where balls are no evidence.
 
-    Balls between the sides of a sheet thinner than the spacing are flat, and no evidence. Normals fit each other if of
-    two near points with opposite ones each is below the other, all over the cloud; or above it, where all are inverted,
-    or lie on both sides of a gap: then most of the other points decide.
+    That is if all over the cloud, of two near points with opposite normals, each is below the other, or each above.
     """
     k = min(NEARBY, len(points) - 1)
     distances, near = scipy.spatial.cKDTree(points).query(points, k=k + 1)
@@ -304,11 +299,7 @@ def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
 
 
 def fitted_outward(points: Floats) -> tuple[PlaneFits, OutwardSigns]:
-    """Fit planes near (n, 3) distinct points, and find signs that turn their normals outwards.
-
-    Too small neighbourhoods fit planes to noise, and too large ones to several sheets at once: either way the points
-    contradict each other. The size with which they do so least is taken.
-    """
+    """Fit planes of the size at which (n, 3) distinct points contradict each other least, with outward signs."""
     tried: list[tuple[PlaneFits, OutwardSigns]] = []
     for size in noisy_sizes(points) or (None,):
         fits = fit_planes(points, size)
@@ -436,10 +427,7 @@ def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
 
 
 def spread_out(points: Floats, radii: Floats) -> Ints:
-    """Ids, ascending, of points (n, d) that are kept: in order, all but those too near to one kept before.
-
-    Too near means within the radius (n,) of the point kept before, so that points left out are near a kept one.
-    """
+    """Ids, ascending, of points (n, d) that are kept: in order, all not within the radius (n,) of one kept before."""
     tree = scipy.spatial.cKDTree(points)
     kept = np.ones(len(points), dtype=bool)
     for begin in range(0, len(points), _CHUNK):

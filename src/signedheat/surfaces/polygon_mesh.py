@@ -179,11 +179,7 @@ class VirtualRefinement:
 
 
 def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> VirtualRefinement:
-    """Subdivide polygons into triangles; polygon k has the vertices ``corners[offsets[k]:offsets[k + 1]]``.
-
-    Triangles are not subdivided. A polygon so far from convex that a triangle of its fan would turn over is cut along
-    diagonals instead. A corner that equals the one before it is skipped.
-    """
+    """Subdivide polygons into fans, or by diagonals where fan triangles turn over."""
     before = np.roll(corners, 1)
     before[offsets[:-1]] = corners[offsets[1:] - 1]
     differs = corners != before
@@ -235,8 +231,7 @@ def virtual_vertices(
 ) -> tuple[Floats, Floats]:
     """Find the points that minimise Σ |fan triangle|², and their affine weights of least norm.
 
-    Twice the area vector of the triangle of side ``a → b`` and apex x is ``a × b + (b − a) × x``, linear in x: three
-    equations for each polygon. Side k runs from vertex ``tails[k]`` to ``heads[k]`` of polygon ``polygons[k]``.
+    Twice the area vector of side ``a → b`` and apex x is ``a × b + (b − a) × x``: three equations for each polygon.
     """
     count = np.bincount(polygons, minlength=n_polygons)
     mean = sums_of(vertices[tails], polygons, n_polygons) / count[:, None]

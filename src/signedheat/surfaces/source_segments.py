@@ -44,11 +44,10 @@ ONE_POINT = 1e-14
 def segments_of(
     source: CurveOrPoints | CurveSegments, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0
 ) -> CurveSegments:
-    """Cut a source, whose faces are those of the triangles, into segments; return `CurveSegments` as they are.
+    """Cut source `number`, whose faces are those of the triangles, into segments; return `CurveSegments` as they are.
 
-    Consecutive points of a curve that share no face are joined by a geodesic path. Curves with given normals need the
-    `positions` in space of vertices or, if every face lies in a plane of its own, of corners. `number` is the index of
-    the source, for messages.
+    Points that share no face are joined by geodesics. Given normals need `positions` in space of vertices or of
+    corners.
     """
     raise SourceError(
         f"source {number} is a {type(source).__name__}: on a surface, distance is measured to a "
@@ -148,10 +147,7 @@ def is_element_list(source: object) -> TypeGuard[ElementList]:
 
 
 def curve_of_elements(triangles: Triangles, points: ElementList) -> Curve | SurfacePoints:
-    """Make the curve through points, each a vertex, an edge and a fraction of it, or a face and its coordinates.
-
-    Edges are numbered and directed as they first occur in the sides of the faces. A single point is a point source.
-    """
+    """Make the curve, or point source, of vertices, edges with a fraction, and faces with coordinates."""
     kinds = np.array([min(len(given), FACE) for _, given in points])
     vertices, edges, faces = (
         np.array([element if kind == wanted else least for (element, _), kind in zip(points, kinds, strict=True)])
@@ -174,10 +170,7 @@ def curve_of_elements(triangles: Triangles, points: ElementList) -> Curve | Surf
 
 
 def as_curves(domain: object, sources: list[Any]) -> list[Any]:
-    """Make curves of lists of elements.
-
-    Sources on an intrinsic triangulation are given on its mesh. Other domains have no curves.
-    """
+    """Make curves of lists of elements on surfaces, those of an intrinsic triangulation on its mesh."""
     domain = getattr(domain, "mesh", domain)
     if not isinstance(domain, Surface):
         return sources
@@ -270,10 +263,7 @@ class CurveGroups:
 
 
 def nearest_others(ends: Floats) -> Ints:
-    """(2 k, 2) for each of the two ends of k pieces: its piece, and the piece with the nearest end.
-
-    An end that is nearer to the other end of its own piece than to any other piece is linked to its own piece.
-    """
+    """(2 k, 2) for each end of k pieces its piece, and that with the nearest end, perhaps its own."""
     rows = np.arange(len(ends))
     piece = rows // 2
     distances, near = scipy.spatial.cKDTree(ends).query(ends, k=min(3, len(ends)))

@@ -70,10 +70,7 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
 
 
 def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], Ints, LocatedPoints]:
-    """Find the polygons, the triangle of each, and the points at which edges of the mesh cross intrinsic edges.
-
-    Corners of polygons are vertices of the triangulation, or, from n_vertices on, crossings in order.
-    """
+    """Find the polygons, the triangle of each, and crossings of edges: corners from n_vertices on."""
     triangles, n = triangulation.triangles, triangulation.n_vertices
     lines = triangulation.history.edges_after()
     lost = misplaced_lines(triangles, lines, triangulation.history.before.lengths_of_edges)
@@ -113,10 +110,7 @@ def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], 
 
 
 def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
-    """Cut a convex polygon along chords between its corners; of chords that cross each other, along the shorter.
-
-    Short chords come first, so that each cuts off what others have left between its ends: in linear time.
-    """
+    """Cut a convex polygon along chords between its corners, the shorter first, in linear time."""
     if not chords:
         return [outline]
     places = defaultdict(list)

@@ -26,12 +26,9 @@ between 3e-6 and 3e-5, and 15 between 3e-5 and 1e-3."""
 
 
 def level_set(mesh: Triangles, values: Floats, level: float) -> list[Curve]:
-    """Level set of a piecewise linear function by marching triangles, with larger values to the left.
+    """Level set of a piecewise linear function by marching triangles, with larger values, and equal ones, to the left.
 
-    Values equal to the level count as larger, so that every face is crossed along one segment or not at all; loops that
-    degenerate to a point are dropped, and faces with a NaN corner skipped. Where the faces are not consistently
-    oriented, the curves get normals along the gradient. What differs from the level by less than `SNAP` of the step to
-    a neighbour equals it, so that rounding moves no curve to the other side of a vertex.
+    Faces with a NaN corner are skipped; where faces are not consistently oriented, curves have normals.
     """
     faces, edges = mesh.faces, mesh.edges
     values = snapped(values, edges.vertices, level)
@@ -68,10 +65,7 @@ def checked_levels(values: ArrayLike, level: float, n_vertices: int) -> tuple[Fl
 
 
 def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
-    """Curves whose points differ: those in a row that differ by rounding alone are one, and one alone is no curve.
-
-    Of points less than `SAME` of a face's least height apart the last stays, whose face holds what follows.
-    """
+    """Curves without points closer than `SAME` of a face's least height to the next one; one point is no curve."""
     kept_curves = []
     for curve in curves:
         corners = mesh.vertices[mesh.faces[curve.faces]]

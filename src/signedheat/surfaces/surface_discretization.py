@@ -179,10 +179,7 @@ def memory_estimate(n_triangles: int) -> float:
 
 
 def refuse_too_many(triangles: int, count: int, elements: str, more: float = 0.0) -> None:
-    """Raise `MemoryLimitError` if distance on triangles, and `more` bytes, do not fit into memory.
-
-    The triangles stand for `count` elements of the domain, which the message names.
-    """
+    """Raise `MemoryLimitError` if triangles for `count` elements, and `more` bytes, do not fit into memory."""
     each = triangles / max(count, 1)
     refuse_beyond_memory(
         f"distance on {count:,} {elements}",
@@ -212,10 +209,7 @@ class SurfaceIntegration(SpringIntegration):
         return self._pulled_factor(source.interpolation, DirectIntegration.springs(self, source))
 
     def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, Floats]:
-        """Put springs at the two Gauss points of each segment, so that more points on it change nothing, and at points.
-
-        The integral of the square of a linear function along a segment is exact there.
-        """
+        """Put springs at the two Gauss points of each segment, which are exact for linear functions, and at points."""
         assert isinstance(source, SurfaceSource)
         n, springs = len(source.weights), self.springs(source)
         ends, lengths = ends_among(source.parts, np.arange(n)), np.concatenate([p.lengths for p in source.parts])
@@ -250,12 +244,10 @@ def _(domain: PolygonMesh) -> SurfaceDiscretization:
 
 
 def lowered_polygons(domain: PolygonMesh) -> SurfaceDiscretization:
-    """Discretise polygons, whose memory the caller has checked.
+    """Discretise polygons, whose memory the caller has checked, by h of their own edges.
 
-    φ is solved for on all vertices of the triangles, virtual ones included, and reported at those of the polygons. With
-    virtual vertices eliminated in step 3 (``PᵀCP``), a curve across polygons could not be a level set of φ: it crosses
-    more edges of triangles than its polygons have corners, and φ would be constant on whole polygons. h is half the
-    mean length of the polygons' own edges, so that virtual vertices do not change t.
+    φ is solved for on virtual vertices, too: with them eliminated (``PᵀCP``), a curve across polygons could not be a
+    level set of φ, which would be constant on whole polygons.
     """
     lowered = lowered_mesh(domain.triangulation)
     own = (domain.triangulation.edges.vertices < domain.n_vertices).all(axis=1)

@@ -158,9 +158,8 @@ def nearest_curve(
 ) -> Nearest:
     """Measure to the nearest of curves and points, and of the zero set of φ where oriented curves are missing.
 
-    In regions that curves bound, and at vertices next to a curve, the curve decides the side; elsewhere φ does. In
-    regions that no curve bounds, the zero set of φ completes the curves where it is farther from any curve than the
-    triangles there are large, or beyond the free end of one.
+    In regions that curves bound, and next to a curve, the curve decides the side; elsewhere φ does, and its zero set
+    counts far from any curve or beyond a free end.
     """
     present = CurvesThere.on(triangles, parts, tolerance, report)
     distance, counts = present.distance, [present.windows]
@@ -226,11 +225,10 @@ def missing_parts(
 
 
 def without_false_zeros(triangles: IntrinsicMesh, values: Floats, near: Bools, sided: Ints) -> Floats:
-    """(n,) values of φ, NaN at the corners of faces in which it is zero due to unoriented sources only.
+    """(n,) values of φ, NaN around parts of its zero set that are `near` unoriented sources (n,) and at no `sided`
+    vertex.
 
-    φ is zero at such a source only on average, so it may change sign around it. A connected part of the zero set that
-    lies entirely `near` the source, an (n,) mask, and at no vertex of an oriented curve, is due to the source alone.
-    `sided` are the numbers of the vertices at oriented curves, in any order.
+    φ is zero at such a source only on average, so it may change sign around it.
     """
     signs = np.sign(values)[triangles.corner_vertices]
     crossed = np.flatnonzero((signs.min(axis=1) < 0) & (signs.max(axis=1) > 0))
@@ -271,11 +269,7 @@ class CurveSides:
 
 
 def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
-    """Find the sides of curves, from their segments.
-
-    The regions are those of vertices joined by edges that no curve crosses. A region is on one side if all segments
-    seen from its vertices show them the same side; free ends connect both, and make every region around them unknown.
-    """
+    """Find the sides of curves: regions that no curve crosses are on one if all segments show them the same."""
     ends = free_ends(triangles, placed)
     nearby, reach = nearest_sides(triangles, placed, ends)
     oriented = placed.sides != 0
@@ -304,10 +298,7 @@ def free_ends(triangles: IntrinsicMesh, placed: PlacedSegments) -> Ints:
 
 
 def nearest_sides(triangles: IntrinsicMesh, placed: PlacedSegments, ends: Ints) -> tuple[Ints, Floats]:
-    """Side of the nearest oriented segment in the faces at each vertex, and the distance to it.
-
-    Of segments that meet at the nearest point, the one seen most from the front decides the side.
-    """
+    """Side of the nearest oriented segment in the faces at each vertex, by the most frontal of equals; distance."""
     n = triangles.n_vertices
     rows = np.flatnonzero(placed.sides != 0)
     start, step = placed.positions[rows, :1], np.diff(placed.positions[rows], axis=1)

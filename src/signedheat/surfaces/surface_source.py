@@ -44,10 +44,7 @@ class SurfaceSource(Frozen):
 
     @cached_property
     def ending(self) -> Bools:
-        """(m,) whether a face lies in a connected part of the surface in which an oriented curve ends.
-
-        Ends at the boundary and at nonmanifold edges, where three curves may meet, do not count.
-        """
+        """(m,) whether a face lies in a connected part in which an oriented curve ends, at two faces."""
         triangles = self.triangles
         oriented = [part for part in self.parts if part.oriented]
         if not oriented:
@@ -72,9 +69,8 @@ def surface_source(
 ) -> SurfaceSource:
     """Lower sources to an intrinsic mesh, whose faces they refer to; ``t = diffusion · spacing²``.
 
-    A sequence among the sources counts as one. Unoriented curves must run along edges: see `refine_to_conform`. An
-    isolated point has the weight of a curve of the length `spacing`. Curves with given normals need the `positions`,
-    (n_vertices, 3), in space.
+    A sequence among them counts as one; an isolated point weighs as a curve of length `spacing`. Unoriented curves must
+    run along edges (`refine_to_conform`); those with normals need `positions`, (n_vertices, 3).
     """
     groups = segments_of_each(sources, triangles, positions)
     parts = [part for group in groups for part in group]
@@ -113,9 +109,8 @@ def surface_source(
 
 
 def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> csr_array:
-    """(1, e) Eq. 11 with 1/3 for ψ_e(m): i(b − a) of a segment ab, to its edge or in thirds to the edges of its face.
+    """(1, e) Eq. 11 with the mean ⅓ for ψ_e(m): i(b − a) of ab to its edge, or in thirds to the edges of its face.
 
-    One third is the mean of ψ_e over a face; it gives segments along edges and segments inside faces the same weight.
     (The published code adds the whole vector to each of the three edges.)
     """
     sums = csr_array((1, triangles.n_edges), dtype=np.complex128)
@@ -127,10 +122,9 @@ def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -
 
 
 def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments], spacing: float) -> csr_array:
-    """(1, e) vectors away from curves along edges, on both sides and at free ends (App. A.2, Eq. 11 and Eq. 19).
+    """(1, e) vectors away from curves along edges ij, and from free ends (App. A.2, Eq. 11 and Eq. 19).
 
-    A face at edge ij, i before j in its own order, contributes i(p_j − p_i) to its other two edges. On ij itself the
-    contributions of the two sides cancel.
+    A face, with i before j in its order, adds i(p_j − p_i) to its other edges; on ij the two sides cancel.
     """
     curves = [p for p in parts if len(p.ends) and not p.oriented]
     if not curves:
@@ -154,10 +148,7 @@ def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments],
 
 
 def vertex_point_vectors(triangles: IntrinsicMesh, vertices: Ints) -> csr_array:
-    """(1, e) X₀ of points at vertices (Eq. 19): each corner, of angle α, adds i d (1 − e^{iα}) / Θ to its face's edges.
-
-    d is the direction of the first edge of the corner, counter-clockwise, and Θ the total angle at the vertex.
-    """
+    """(1, e) X₀ of points at vertices (Eq. 19): a corner of angle α, from d on, adds i d (1 − e^{iα}) / Θ."""
     faces, corners = np.nonzero(mask_of(triangles.n_vertices, vertices)[triangles.corner_vertices])
     leaving = triangles.edge_vectors[faces, corners]
     arriving = -triangles.edge_vectors[faces, (corners + 2) % 3]
@@ -169,12 +160,10 @@ def vertex_point_vectors(triangles: IntrinsicMesh, vertices: Ints) -> csr_array:
 
 
 def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_array:
-    """(1, e) X₀ of points on edges and inside faces: −∇δ_p against the functions ψ_e, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
+    """(1, e) X₀ of points on edges and in faces: −∇δ_p against ψ_e, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
 
-    Its diffusion is minus the gradient of the heat kernel, which points away from p with equal strength in all
-    directions, whatever the shape of the faces: on each, ``Σ_e ∇ψ_e = 0`` and ``Σ_e ∇ψ_e x_eᵀ`` is the identity. ∇ψ_e,
-    constant on faces, is averaged over the faces around each vertex and interpolated at p. At a vertex of equilateral
-    triangles it is Eq. 19 divided by √3 h, for which the caller corrects.
+    That gives the gradient of the heat kernel, whatever the faces; at a vertex of equilateral triangles it is Eq. 19
+    over √3 h, for which the caller corrects.
     """
     corner = np.argwhere(located.barycentric > 0)
     vertices = triangles.corner_vertices[located.faces[corner[:, 0]], corner[:, 1]]
@@ -226,12 +215,11 @@ def connected(parts: Sequence[CurveSegments]) -> Ints:
 
 
 def free_end_arcs(triangles: IntrinsicMesh, edges: Ints, vertices: Ints, least: float) -> tuple[Ints, Complexes]:
-    """Faces (j,), and vectors (j,) that point away from the free ends of curves, summed over the half disk behind each.
+    """Faces (j,), and vectors (j,) away from the free ends of curves, summed over the half disk behind each.
 
-    Directions are measured by their angle from the curve, the shortest way around the vertex. Behind the end are those
-    at a quarter of the total angle or more; at boundary and nonmanifold vertices, at a right angle or more. The weight
-    of an end is the length of its edge, but at least `least`: subdividing a curve into short edges must not make its
-    ends vanish. (The published code has no least weight.)
+    Behind is a quarter of the total angle or more from the curve; at boundary and nonmanifold vertices a right angle.
+    An end weighs as its edge, at least `least`, so that short edges do not make it vanish. (The published code has no
+    least.)
     """
     faces, vectors = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.complex128)]
     all_faces, all_corners = np.nonzero(mask_of(triangles.n_vertices, vertices)[triangles.corner_vertices])

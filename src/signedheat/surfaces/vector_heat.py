@@ -32,8 +32,7 @@ EXPONENTS = (-1.0, 0.5)
 class VectorHeat:
     """Solver of ``(M + tL) X = X₀`` (Eq. 12) on the edges of triangles, which are eliminated in a fill-reducing order.
 
-    X falls like exp(−r/√t) and leaves the range of floating-point numbers at about 300 mean edge lengths. What lies
-    beyond is solved for again with the same factor (`linear.restarts`).
+    Beyond some 300 mean edge lengths X underflows, and is solved for again with the same factor (`linear.restarts`).
     """
 
     triangles: IntrinsicMesh
@@ -54,10 +53,7 @@ class VectorHeat:
         return np.bincount(self.triangles.edges.face_edges.ravel(), thirds).astype(np.float64)
 
     def solve(self, sources: Sequence[csr_array], changes: int = 0) -> list[list[Complexes]]:
-        """X for each X₀, in stages, each up to a positive factor, NaN between the source and the stage's border.
-
-        A stage is (n_edges, 1 + `changes`): columns after the first are R X, R² X and so on, as `extrapolated` needs.
-        """
+        """X for each X₀, in stages (n_edges, 1 + `changes`) of any scale: X, R X, R² X, …; NaN where another has it."""
         starts = np.zeros((self.triangles.n_edges, len(sources), 1 + changes), dtype=np.complex128)
         for k, source in enumerate(sources):
             starts[source.indices, k, 0] = scaled(source.data, float(self.mass.min()))[0]
@@ -101,9 +97,8 @@ class VectorHeat:
 def extrapolated(columns: Complexes) -> Complexes:
     """(m,) directions Y without errors like the `EXPONENTS` of t, from (m, 3) columns X, R X and R² X.
 
-    With ``D = t d/dt``, Richardson's extrapolation in the limit of equal times is ``Π (1 − D/e) Y`` over the exponents
-    e: it keeps what does not depend on t, and takes ``t^e`` to zero. For ``R = (M + tL)⁻¹ M``, since ``tL = (M + tL) −
-    M``, ``D X = R X − X`` and ``D² X = X − 3 R X + 2 R² X``; those of Y follow from the angle θ of X = exp(ρ + iθ).
+    With ``D = t d/dt`` it is ``Π (1 − D/e) Y`` over exponents e, which takes ``t^e`` to zero. For ``R = (M + tL)⁻¹ M``,
+    ``D X = R X − X`` and ``D² X = X − 3 R X + 2 R² X``; those of Y follow from the angle θ of X = exp(ρ + iθ).
     """
     x, once, twice = columns.T
     with np.errstate(all="ignore"):
@@ -115,15 +110,11 @@ def extrapolated(columns: Complexes) -> Complexes:
 
 
 def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matrix:
-    """Upper triangle of ``M + t L``, the matrix of Eq. 12: one vector unknown per edge, in the frame of the edge.
+    """Upper triangle of ``M + t L`` (Eq. 12), in the frames of the edges: complex (e, e), or real (2e, 2e) with
+    reflections.
 
-    L is the connection Laplacian of Eq. 9, positive semidefinite here: ``2 (cot α + cot β)`` on the diagonal, α and β
-    the corners of a face at the two ends of the edge, and ``−2 cot θ conj(z_fe) z_fg`` between edges e and g that meet
-    in the corner θ; ``conj(z_fe) z_fg`` is the rotation of Eq. 8. M is diagonal: a third of the area of each face. No
-    face may be degenerate.
-
-    Complex Hermitian (e, e) where all frames agree with their faces; otherwise, since a reflection is not a complex
-    number, the real form (2e, 2e) with the real and imaginary part of each unknown in turn.
+    L (Eq. 9) has ``2 (cot α + cot β)`` on the diagonal, α and β the corners of a face at the ends of the edge, and ``−2
+    cot θ conj(z_fe) z_fg`` between edges e and g that meet in θ (Eq. 8). M is a third of the area of each face.
     """
     edge, z = triangles.edges.face_edges, triangles.edge_directions
     diagonal, factor = _local_entries(triangles, time, slice(None))
@@ -177,9 +168,7 @@ def nonmanifold_frames(
 ) -> tuple[IntrinsicMesh, Sequence[Sequence[CurveSegments]]]:
     """Make the face nearest to the sources the first face of every edge with more than two faces.
 
-    Heat that leaves one face through such an edge enters all the others. The frame of the edge distinguishes its first
-    face from the others, so that heat must come from the first: vectors that pass between two of the others would be
-    reflected. Edges whose ends are nearer than every opposite corner keep their first face.
+    Vectors that pass between two of the others would be reflected. Edges whose ends are nearer keep their first face.
     """
     table = triangles.edges
     if table.face_counts.max(initial=0) <= 2:

@@ -149,10 +149,7 @@ def _refuse_too_many(least: float, expected: float, resolution: float, power: in
 def _octree(
     samples: Any, origin: Floats, spacing: float, counts: Ints, depth: int, grading: float, resolution: float
 ) -> tuple[Ints, Ints]:
-    """Return lower corners and sizes of the leaves, in half cells of the finest level.
-
-    The distance to the samples has Lipschitz constant one, so the tree needs no balancing.
-    """
+    """Return lower corners and sizes of the leaves, in half cells of the finest level; distance needs no balancing."""
     size = 2 ** (depth + 1)
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3) * size
     octants = np.array(list(itertools.product((0, 1), repeat=3)))

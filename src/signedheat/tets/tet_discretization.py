@@ -96,9 +96,8 @@ class TetDiscretization(DiffusesEach):
     def diffuse(self, source: TetSource) -> Floats:
         """Solve ``(M + tL) X = X₀`` (Eq. 12) for one vector per face, and average it in the tets (App. B.2).
 
-        Diffusion in flat space carries vectors along without turning them. Where the straight line to the source leaves
-        the domain, the shortest way to it is bent, and its direction is that in which undirected heat falls (Crane et
-        al. 2013); its sign is that of the place from which this heat has come.
+        Vectors diffuse without turning. Where no straight line to the source stays in the domain, the direction is that
+        in which undirected heat falls (Crane et al. 2013), with the sign of the place it comes from.
         """
         heat = self._heats(source.time, lambda: self._heat_system(source.time))
         if self._is_convex:
@@ -119,10 +118,7 @@ class TetDiscretization(DiffusesEach):
         return HeatSystem(matrix, self.direct)
 
     def _in_tets(self, stages: list[Stage]) -> tuple[Floats, Floats, Floats]:
-        """Return means of X in the tets, multiples of the gradient of its last column, and logarithms of its scale.
-
-        Each tet takes them from the last stage in which all its four faces are known.
-        """
+        """Return means of X in tets, by the last stage with all faces, gradients of its last column, and log scales."""
         tet_faces = self.mesh.faces.tet_faces
         n = self.mesh.n_tets
         means, gradients, factors = np.zeros((n, stages[0].values.shape[1])), np.zeros((n, 3)), np.full(n, -np.inf)
@@ -233,11 +229,7 @@ def lowered_tets(mesh: TetMesh) -> TetDiscretization:
 
 @dataclass(frozen=True, eq=False)
 class TetIntegration(SpringIntegration):
-    """`SpringIntegration` whose levels at the samples are corrected for the curvature of φ.
-
-    The linear interpolant of a curved function differs from it. The difference is known to second order from the
-    gradients at the corners, once there is a first φ.
-    """
+    """`SpringIntegration` whose levels at the samples are corrected for the curvature of φ, from its gradients."""
 
     gradients: Callable[[Floats], Floats] = np.zeros_like  # from φ at the unknowns to (n, 3) gradients there
 

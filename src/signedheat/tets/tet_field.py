@@ -51,11 +51,9 @@ _LIDS = {
 
 
 def closed_level_set(mesh: TetShapes, values: Floats, gradients: Floats, level: float) -> tuple[Floats, Ints]:
-    """Return vertices and triangles of the surface that separates mesh vertices below a level from the others.
+    """Return vertices and triangles of the surface that separates mesh vertices below a level, closed at the boundary.
 
-    Normals point to the greater values. Vertices of the surface lie where φ takes the level, to second order, by its
-    values and gradients at the ends of edges. Where the surface meets the boundary of the mesh it is closed along the
-    boundary, on the side below the level. Tets with a NaN corner count as outside the mesh.
+    Vertices lie where φ takes the level by values and gradients at ends of edges. Tets with a NaN corner are outside.
     """
     tets = mesh.tets[~np.isnan(values[mesh.tets]).any(axis=1)]
     if not len(tets):
@@ -87,10 +85,9 @@ def level_triangles(vertices: Floats, tets: Ints, values: Floats, level: float) 
 def _crossings(
     vertices: Floats, values: Floats, gradients: Floats, level: float, keys: Ints, clearance: float
 ) -> tuple[Floats, Ints]:
-    """Return the positions at which edges take the level, and the index of the position of each key.
+    """Return where edges, by keys ``smaller · n + larger``, take the level, and the index of the place of each key.
 
-    A key is ``smaller · n + larger`` vertex id of an edge. At the fraction s of an edge e from a to b, φ is
-    ``(1 − s) φ_a + s φ_b + ½ s (1 − s) (∇φ_a − ∇φ_b)·e``.
+    At the fraction s of e from a to b, φ is ``(1 − s) φ_a + s φ_b + ½ s (1 − s) (∇φ_a − ∇φ_b)·e``.
     """
     crossings, triangles = np.unique(keys, return_inverse=True)
     low, high = crossings // len(vertices), crossings % len(vertices)
@@ -330,10 +327,7 @@ class TetField(Displayed, Combinable, Frozen):
         return TriangleTree.of(self.mesh.vertices[self.mesh.boundary.faces])
 
     def _place(self, points: Floats) -> tuple[Ints, Floats, Floats]:
-        """Return (k, 4) vertices and weights that interpolate at the closest point of the mesh, and the way from there.
-
-        The way (k, 3) is zero for points inside the mesh.
-        """
+        """Return (k, 4) vertices and weights at the closest point of the mesh, and (k, 3) the way from there."""
         tets = containing_tets(self.mesh.geometry, self._planes, points)
         inside, outside = np.flatnonzero(tets >= 0), np.flatnonzero(tets < 0)
         corners = np.zeros((len(points), 4), dtype=np.int64)

@@ -129,9 +129,7 @@ def _distance_around(
 ) -> tuple[Floats, Ints, int]:
     """Return any-angle distances of all points with a value, the nearest triangles, and how many points see none.
 
-    Triangles that lie in one tet are those of φ's zero set. A curved φ does not vanish where its linear interpolant
-    does. The difference is known to second order from the gradients at the corners of the tet:
-    ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k)``.
+    A curved φ vanishes ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k)`` over |∇φ| from the zero set of its interpolant.
     """
     mesh, planes, unknowns = lowered.mesh, lowered.planes, lowered.unknowns
     tree = TriangleTree.of(positions[corners])
@@ -165,8 +163,7 @@ def _any_angle(
 ) -> tuple[Floats, Floats, int]:
     """Return distances of vertices, where their paths start on the surface, and how many do not see that place.
 
-    `nearest`, (n,), holds the triangle nearest to each vertex regardless of visibility, or −1, and is overwritten.
-    Distance is inf where no surface is connected. Lines may lie outside the mesh by `slack`; the `queue` is empty.
+    `nearest`, (n,), the nearest triangles through anything or −1, is overwritten; lines may be `slack` outside.
     """
     points, tets, _, first_tet, tets_at = vertices
     n = len(points)

@@ -21,9 +21,8 @@ from .tet_mesh import TetMesh
 
 @dataclass(frozen=True, eq=False)
 class TetSource(Frozen):
-    """Sources on a tet mesh; a patch is all clipped polygons that are nearest to one vertex.
-
-    Where a source conforms to faces of the mesh, its patches are the vertices of these faces.
+    """Sources on a tet mesh; a patch is all clipped polygons nearest to one vertex, or parts of faces of the mesh at
+    one.
     """
 
     vectors: Floats  # (f, 3) X₀ at the faces
@@ -44,10 +43,7 @@ class TetSource(Frozen):
 def tet_source(
     mesh: TetMesh, planes: Planes, unknowns: Ints, sources: Sequence[Any], diffusion: float, spacing: float
 ) -> TetSource:
-    """Clip sources against a tet mesh; parts outside the mesh are dropped, and noted.
-
-    `unknowns`, (m, 4), holds the unknown of φ at each corner of each tet; ``t = diffusion · max(spacing, h_source)²``.
-    """
+    """Clip sources against a tet mesh, with `unknowns` (m, 4) of φ; ``t = diffusion · max(spacing, h_source)²``."""
     cuts, components, outside, n_components, n_unknowns = [], [], np.zeros(len(sources)), 0, int(unknowns.max()) + 1
     for number, source in enumerate(sources):
         elements = area_elements(source)
@@ -111,11 +107,9 @@ def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygo
 def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> Floats:
     """Return (f, 4) X₀ at the faces (Sec. 8.1), and in the last column the scalar source.
 
-    A polygon is distributed to the four faces of its tet in proportion to ψ = 1 − 3λ of the Crouzeix–Raviart basis,
-    where that is positive: negative shares would emit waves of the wrong sign. For a polygon in a face of the mesh ψ is
-    one there and zero on the other faces, as in the paper. Otherwise the shares are reweighted: a plane wave along the
-    normal decays by e^(−r/√t), so a face δ √t in front of the polygon emits e^δ times the correct amplitude forward and
-    e^−δ times backward. Weights that are a mean of e^−δ and e^δ correct both amplitudes, wherever such a mean exists.
+    A polygon goes to the faces of its tet as ψ = 1 − 3λ, where positive: negative shares emit waves of the wrong sign.
+    A plane wave decays by e^(−r/√t), so a face δ √t ahead emits e^δ times too much forward, e^−δ backward; weights that
+    are a mean of e^−δ and e^δ correct both.
     """
     shares = np.maximum(1 - 3 * polygons.barycentric, 0)
     corners = mesh.vertices[mesh.tets[polygons.tets]]
@@ -136,9 +130,8 @@ def _patches(
 ) -> tuple[sparse.csr_matrix, sparse.csr_matrix, Floats, Ints]:
     """Return interpolation rows, quadratic corrections, areas and components of the patches.
 
-    One row per clipped polygon would be more constraints than a function that is linear on tets can meet without being
-    constant around the source. A quadratic φ, at the point x with barycentric coordinates λ between corners v, is
-    ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
+    A row for each polygon would be more than a function linear on tets can meet. A quadratic φ at x is ``Σ λᵢ (φ(vᵢ) +
+    ½ ∇φ(vᵢ)·(x − vᵢ))``.
     """
     corners = unknowns[polygons.tets]
     conforming = _on_whole_faces(mesh, polygons, components)

@@ -59,10 +59,7 @@ def picture(path: PathLike, width: float, height: float, dpi: int = 130) -> Iter
 
 
 def distance_colors(low: float, high: float) -> ScalarMappable:
-    """Make a colour scale for distances between two values, light at zero and equally saturated inside and outside.
-
-    The scale is in the square root of distance, so that a thin inside is visible next to a wide outside.
-    """
+    """Make a colour scale, light at zero, by the root of distance, which shows a thin inside beside a wide outside."""
     reach = max(abs(low), abs(high), 1e-300)
     return _scale_of(mpl_colors.FuncNorm((signed_root, lambda x: x * np.abs(x)), -reach, reach))
 

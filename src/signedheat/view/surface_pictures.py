@@ -102,10 +102,7 @@ def oblique(elevation: float, azimuth: float, up: int = 2) -> Floats:
 
 
 def rasterize(corners: Floats, values: Floats, width: int, height: int) -> tuple[Floats, Ints, Floats]:
-    """Draw triangles (m, 3, 3), given in pixels and depth, with values (m, 3) at their corners.
-
-    Return depth, face and value of the nearest triangle at each pixel; face −1 and value NaN where there is none.
-    """
+    """Draw triangles (m, 3, 3), in pixels and depth: depth, nearest face or −1, and value (m, 3) or NaN."""
     depth, face = np.full(height * width, -np.inf), np.full(height * width, -1)
     shown = np.full(height * width, np.nan)
     _draw(np.ascontiguousarray(corners), width, height, depth, face)
@@ -120,11 +117,7 @@ def rasterize(corners: Floats, values: Floats, width: int, height: int) -> tuple
 
 @compiled
 def _draw(corners: Floats, width: int, height: int, depth: Floats, face: Ints) -> None:
-    """Depth and face of the nearest triangle at each pixel of a picture, row after row; the later one of equals.
-
-    In each row a triangle has the pixels from one of its sides on to before the next, so that two triangles with a
-    common side leave none out, and share none.
-    """
+    """Depth and face of the nearest triangle at each pixel; of a row it has those from one side to before the next."""
     for t in range(len(corners)):
         ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
         bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
