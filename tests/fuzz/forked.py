@@ -16,10 +16,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
 
-from signedheat.io import parsers
+from signedheat.io import parsers, sandbox
 
 PACKAGES = {
     "las": ("laspy", "lazrs"),
@@ -82,5 +83,6 @@ def held() -> int:
 @contextmanager
 def forked() -> Iterator[None]:
     """Parsers are forked from this process, on Linux."""
-    with patch.object(subprocess, "Popen", Forked) if sys.platform == "linux" else nullcontext():
+    changed = SimpleNamespace(**{**vars(subprocess), "Popen": Forked})
+    with patch.object(sandbox, "subprocess", changed) if sys.platform == "linux" else nullcontext():
         yield
