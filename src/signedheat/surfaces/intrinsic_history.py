@@ -152,6 +152,7 @@ def misplaced_lines(triangles: IntrinsicMesh, lines: Lines, lengths: Floats) -> 
 BEFORE = np.full((4, 3, 3), -1)
 """By kind of step, face and corner: which of the four points is that corner before the step; `AFTER`, after it."""
 AFTER = np.full((4, 3, 3), -1)
+BEFORE[TURN, 0], AFTER[TURN, 0] = [0, 1, 2], [0, 2, 1]
 BEFORE[FLIP, :2], AFTER[FLIP, :2] = [[0, 1, 2], [1, 0, 3]], [[3, 2, 0], [2, 3, 1]]
 BEFORE[SPLIT_EDGE, 0], AFTER[SPLIT_EDGE, :2] = [0, 1, 2], [[0, 3, 2], [3, 1, 2]]
 BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
@@ -193,36 +194,19 @@ def transfer_forward(
     barycentric: Floats,
     vectors: Floats,
 ) -> None:
-    """Carry points of the first triangulation, and vectors at them, through all steps to the last, in place.
+    """Carry points of the first triangulation, and vectors (p, k, 3) at them, through all steps, in place.
 
-    Faces (p,), barycentric coordinates (p, 3) and vectors (p, k, 3), differences of such, are overwritten. `first` has
-    the first step that changes each face, and `later`, (n, 3), the next one that changes each face of a step, −1 if
-    there is none: see `find_successors`.
+    Each point visits only the steps that change its face, by `find_successors`.
     """
     around, start = np.empty(3, np.int64), np.zeros(3, np.int64)
     for p in range(len(faces)):
         n = first[faces[p]]
         while n >= 0:
             faces_around(steps, n, around, start)
-            kind, place = steps[n, 0], 0
-            if kind == TURN:
-                swap_last(barycentric[p])
-                for k in range(vectors.shape[1]):
-                    swap_last(vectors[p, k])
-            else:
-                side = 1 if faces[p] == around[1] else 0
-                place = exchange(
-                    kind,
-                    weights[n],
-                    True,
-                    BEFORE[kind, side],
-                    start[side],
-                    AFTER[kind],
-                    start,
-                    barycentric[p],
-                    vectors[p],
-                )
-                faces[p] = around[place]
+            kind, side = steps[n, 0], 1 if faces[p] == around[1] else 0
+            old = BEFORE[kind, side]
+            place = exchange(kind, weights[n], True, old, start[side], AFTER[kind], start, barycentric[p], vectors[p])
+            faces[p] = around[place]
             n = later[n, place]
 
 
@@ -230,62 +214,45 @@ def transfer_forward(
 def transfer_backward(
     steps: Ints, weights: Floats, n_faces: int, faces: Ints, barycentric: Floats, vectors: Floats
 ) -> None:
-    """Transfer points and vectors at them from the last triangulation of a history to the first, in place.
+    """Carry points of the last triangulation, and vectors (p, k, 3) at them, back through all steps, in place.
 
-    Points have faces (p,) of the last triangulation, barycentric coordinates (p, 3) and vectors (p, k, 3), which are
-    differences of such. Those at the end without a face (−1) are the new vertices, in the order of insertion; they get
-    the position at which they were inserted.
+    Points at the end without a face (−1) are the inserted vertices, in order: they join where they were inserted.
     """
-    first = np.full(n_faces, -1)
-    later = np.full(len(faces), -1)
-    born = len(faces) - 1
+    # the points in each face, as a list: its first point, and the point after each
+    in_face, next_point = np.full(n_faces, -1), np.full(len(faces), -1)
+    unborn = len(faces) - 1
     for p in range(len(faces)):
         if faces[p] >= 0:
-            later[p] = first[faces[p]]
-            first[faces[p]] = p
-    around, start, heads = np.empty(3, np.int64), np.zeros(3, np.int64), np.empty(3, np.int64)
-    for m in range(len(steps)):
-        n = len(steps) - 1 - m
+            next_point[p] = in_face[faces[p]]
+            in_face[faces[p]] = p
+    around, start, moving = np.empty(3, np.int64), np.zeros(3, np.int64), np.empty(3, np.int64)
+    for n in range(len(steps) - 1, -1, -1):
         kind = steps[n, 0]
         faces_around(steps, n, around, start)
-        if kind == TURN:
-            p = first[around[0]]
-            while p >= 0:
-                swap_last(barycentric[p])
-                for k in range(vectors.shape[1]):
-                    swap_last(vectors[p, k])
-                p = later[p]
-            continue
-        for k in range(3):
-            heads[k] = -1
+        for k in range(3):  # empty the faces that the step made, before any point goes back into one of them
+            moving[k] = -1
             if AFTER[kind, k, 0] >= 0:
-                heads[k] = first[around[k]]
-                first[around[k]] = -1
+                moving[k] = in_face[around[k]]
+                in_face[around[k]] = -1
         for k in range(3):
-            p = heads[k]
-            while p >= 0:
-                q = later[p]
+            while moving[k] >= 0:
+                p = moving[k]
+                moving[k] = next_point[p]
+                new = AFTER[kind, k]
                 place = exchange(
-                    kind, weights[n], False, AFTER[kind, k], start[k], BEFORE[kind], start, barycentric[p], vectors[p]
+                    kind, weights[n], False, new, start[k], BEFORE[kind], start, barycentric[p], vectors[p]
                 )
                 faces[p] = around[place]
-                later[p] = first[faces[p]]
-                first[faces[p]] = p
-                p = q
-        is_last = steps[n, 3] >= 0 and (n == 0 or steps[n - 1, 3] != steps[n, 3])
-        if is_last and born >= 0 and faces[born] < 0:
-            faces[born] = around[0]
+                next_point[p] = in_face[faces[p]]
+                in_face[faces[p]] = p
+        inserts = steps[n, 3] >= 0 and (n == 0 or steps[n - 1, 3] != steps[n, 3])  # several steps split one edge
+        if inserts and unborn >= 0 and faces[unborn] < 0:
+            faces[unborn] = around[0]
             for k in range(3):
-                barycentric[born, (start[0] + k) % 3] = weights[n, k]
-            later[born] = first[around[0]]
-            first[around[0]] = born
-            born -= 1
-
-
-@kernel
-def swap_last(w: Floats) -> None:
-    """Exchange the last two entries, as a face that is turned over does with its corners."""
-    w[1], w[2] = w[2], w[1]
+                barycentric[unborn, (start[0] + k) % 3] = weights[n, k]
+            next_point[unborn] = in_face[around[0]]
+            in_face[around[0]] = unborn
+            unborn -= 1
 
 
 @kernel
@@ -310,25 +277,21 @@ def exchange(
         if (l < lead) == forward and c[l] > 0.0 and x[l] / c[l] < amount:
             gone, amount = l, x[l] / c[l]
     place = 0
-    while has(new_corners[place], gone):
+    while gone >= 0 and (new_corners[place] == gone).any():
         place += 1
-    shift(x, c, lead, gone, amount if forward else -amount)
+    if gone >= 0:  # no point goes where a face is only turned over
+        shift(x, c, lead, gone, amount if forward else -amount)
     for k in range(3):
         w[(new_start[place] + k) % 3] = x[new_corners[place, k]]
     for v in range(len(vectors)):
         x[:] = 0.0
         for k in range(3):
             x[corners[k]] = vectors[v, (start + k) % 3]
-        shift(x, c, lead, gone, x[gone] / c[gone] if forward else -x[gone] / c[gone])
+        if gone >= 0:
+            shift(x, c, lead, gone, x[gone] / c[gone] if forward else -x[gone] / c[gone])
         for k in range(3):
             vectors[v, (new_start[place] + k) % 3] = x[new_corners[place, k]]
     return place
-
-
-@kernel
-def has(corners: Ints, l: int) -> bool:
-    """Whether point l of a step is a corner of a face."""
-    return corners[0] == l or corners[1] == l or corners[2] == l
 
 
 @kernel
