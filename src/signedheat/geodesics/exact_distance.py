@@ -196,12 +196,12 @@ MANY = 4
 
 
 @compiled
-def _reach(distance: Floats, pseudosources: Bools, queue: Queue, first: int, v: int, length: float) -> None:
+def _reach(search: Search, v: int, length: float) -> None:
     """Record a path of this length to a vertex; if paths can bend around it (a pseudosource), queue it."""
-    if length < distance[v] * (1.0 - 1e-14):
-        distance[v] = length
-        if pseudosources[v]:
-            push(queue, first + v, length)
+    if length < search.distance[v] * (1.0 - 1e-14):
+        search.distance[v] = length
+        if search.pseudosources[v]:
+            push(search.queue, len(search.queued) + v, length)
 
 
 @compiled
@@ -309,68 +309,81 @@ def _most_windows(faces: Faces, queued: Ints, following: Ints, item: int) -> int
 @compiled
 def continue_search(faces: Faces, search: Search, slack: float, tolerance: float, limit: int) -> None:
     """Propagate in order of distance until nothing is queued, room is wanted, or `limit` windows have been made."""
-    distance, pseudosources, queue, queued, _, windows, following, counts = search
-    n_halfedges = len(queued)
+    queue, counts = search.queue, search.counts
     while queue.size[0] > 0 and counts[MADE] < limit:
-        if not has_room(counts, len(windows), _most_windows(faces, queued, following, queue.items[0])):
+        most = _most_windows(faces, search.queued, search.following, queue.items[0])
+        if not has_room(counts, len(search.windows), most):
             return
-        halfedge = pop(queue)
-        if halfedge >= n_halfedges:  # a pseudosource
-            v = halfedge - n_halfedges
-            key = distance[v]
-            for k in range(faces.first_corner[v], faces.first_corner[v + 1]):
-                face, corner = faces.corners[k] // 3, faces.corners[k] % 3
-                source = faces.positions[face, corner]
-                for step in range(1, 3):
-                    other = (corner + step) % 3
-                    length = key + abs(faces.positions[face, other] - source)
-                    _reach(distance, pseudosources, queue, n_halfedges, faces.vertices[face, other], length)
-                side = (corner + 1) % 3
-                propagate_across(faces, search, face, side, POINT, 0.0, 1.0, source, 0j, key, slack)
-            continue
+        item = pop(queue)
+        if item < len(search.queued):
+            _cross_face(faces, search, item, slack, tolerance)
+        else:
+            _bend_around(faces, search, item - len(search.queued), slack)
 
-        face, side = halfedge // 3, halfedge % 3
-        edge = faces.edges[face, side]
-        length = faces.lengths[edge]
-        tail, head = faces.edge_vertices[edge]
-        front, n_front = _collect(search, halfedge, distance[tail], distance[head], length, slack * length, tolerance)
-        _settle(search, halfedge, front, n_front)
-        a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
-        ahead = faces.forward[face, side]
-        origin, unit = (a, (b - a) / length) if ahead else (b, (a - b) / length)
-        up = 1j if ahead else -1j  # faces lie to the left of their sides
-        apex = (faces.positions[face, (side + 2) % 3] - origin) * unit.conjugate()
-        cx, cy = apex.real, abs(apex.imag)
-        tail_side, head_side = ((side + 2) % 3, (side + 1) % 3) if ahead else ((side + 1) % 3, (side + 2) % 3)
-        for k in range(n_front):
-            w = front[k]
-            if w[KIND] == FOCUS and w[Q] <= cy:
-                straighten(w)
-            s0, s1 = w[S0], w[S1]
-            d0x, d0y = ray(w, s0)
-            d1x, d1y = ray(w, s1)
-            left = d0x * cy - d0y * (cx - s0)  # negative: the ray leaves the apex to its right
-            right = d1x * cy - d1y * (cx - s1)
-            # an apex outside the visible sector, perhaps in a gap between windows, is reached by way of a window's end
-            if left > 0.0:
-                to_apex = arrival(w, s0, 0.0) + np.hypot(cx - s0, cy)
-            elif right < 0.0:
-                to_apex = arrival(w, s1, 0.0) + np.hypot(cx - s1, cy)
-            else:
-                to_apex = arrival(w, cx, cy)
-            _reach(distance, pseudosources, queue, n_halfedges, faces.vertices[face, (side + 2) % 3], to_apex)
-            turned = unit * (w[P] + up * w[Q])
-            source, normal = (origin, turned) if w[KIND] == BEAM else (origin + turned, 0j)
-            if left < 0.0:  # visible on the side from tail to apex
-                t0 = hit(s0, d0x, d0y, 0.0, 0.0, cx, cy)
-                t1 = hit(s1, d1x, d1y, 0.0, 0.0, cx, cy) if right < 0.0 else 1.0
-                t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)
-                propagate_across(faces, search, face, tail_side, w[KIND], t0, t1, source, normal, w[SIGMA], slack)
-            if right > 0.0:  # visible on the side from apex to head
-                t0 = hit(s0, d0x, d0y, cx, cy, length, 0.0) if left > 0.0 else 0.0
-                t1 = hit(s1, d1x, d1y, cx, cy, length, 0.0)
-                t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)
-                propagate_across(faces, search, face, head_side, w[KIND], t0, t1, source, normal, w[SIGMA], slack)
+
+@compiled
+def _bend_around(faces: Faces, search: Search, v: int, slack: float) -> None:
+    """Send circular waves from a vertex that paths bend around, along its edges and across its faces."""
+    for k in range(faces.first_corner[v], faces.first_corner[v + 1]):
+        face, corner = faces.corners[k] // 3, faces.corners[k] % 3
+        source = faces.positions[face, corner]
+        for step in range(1, 3):
+            end = (corner + step) % 3
+            length = search.distance[v] + abs(faces.positions[face, end] - source)
+            _reach(search, faces.vertices[face, end], length)
+        side = (corner + 1) % 3
+        propagate_across(faces, search, face, side, POINT, 0.0, 1.0, source, 0j, search.distance[v], slack)
+
+
+@compiled
+def _cross_face(faces: Faces, search: Search, halfedge: int, slack: float, tolerance: float) -> None:
+    """Send the windows queued at a halfedge through its face: to the corner across, and to the two other sides."""
+    face, side = halfedge // 3, halfedge % 3
+    edge = faces.edges[face, side]
+    length = faces.lengths[edge]
+    tail, head = faces.edge_vertices[edge]
+    at_tail, at_head = search.distance[tail], search.distance[head]
+    front, n_front = _collect(search, halfedge, at_tail, at_head, length, slack * length, tolerance)
+    _settle(search, halfedge, front, n_front)
+
+    # the frame of the edge, in the layout of the face, and the corner across, the apex, in that frame
+    a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
+    ahead = faces.forward[face, side]
+    origin, unit = (a, (b - a) / length) if ahead else (b, (a - b) / length)
+    up = 1j if ahead else -1j  # faces lie to the left of their sides
+    apex = (faces.positions[face, (side + 2) % 3] - origin) * unit.conjugate()
+    x, y = apex.real, abs(apex.imag)
+    beyond, before = (side + 1) % 3, (side + 2) % 3
+    tail_side, head_side = (before, beyond) if ahead else (beyond, before)
+    for k in range(n_front):
+        w = front[k]
+        if w[KIND] == FOCUS and w[Q] <= y:
+            straighten(w)
+        s0, s1, kind = w[S0], w[S1], w[KIND]
+        d0x, d0y = ray(w, s0)
+        d1x, d1y = ray(w, s1)
+        left = d0x * y - d0y * (x - s0)  # negative: the first ray leaves the apex to its right
+        right = d1x * y - d1y * (x - s1)
+        # an apex that no ray meets, perhaps in a gap between windows, is reached by way of a window's end
+        if left > 0.0:
+            to_apex = arrival(w, s0, 0.0) + np.hypot(x - s0, y)
+        elif right < 0.0:
+            to_apex = arrival(w, s1, 0.0) + np.hypot(x - s1, y)
+        else:
+            to_apex = arrival(w, x, y)
+        _reach(search, faces.vertices[face, before], to_apex)
+        way = unit * (w[P] + up * w[Q])
+        source, normal = (origin, way) if kind == BEAM else (origin + way, 0j)
+        if left < 0.0:  # from the tail towards the apex
+            t0 = hit(s0, d0x, d0y, 0.0, 0.0, x, y)
+            t1 = hit(s1, d1x, d1y, 0.0, 0.0, x, y) if right < 0.0 else 1.0
+            t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)
+            propagate_across(faces, search, face, tail_side, kind, t0, t1, source, normal, w[SIGMA], slack)
+        if right > 0.0:  # from the apex towards the head
+            t0 = hit(s0, d0x, d0y, x, y, length, 0.0) if left > 0.0 else 0.0
+            t1 = hit(s1, d1x, d1y, x, y, length, 0.0)
+            t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)
+            propagate_across(faces, search, face, head_side, kind, t0, t1, source, normal, w[SIGMA], slack)
 
 
 POINT, BEAM, FOCUS = 1.0, 0.0, -1.0
