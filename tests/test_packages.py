@@ -14,7 +14,6 @@ from refusals import refused
 from signedheat.cli import main
 from signedheat.io import parsers
 from signedheat.packages import REMEDIES, lazy_module, require
-from signedheat.tets.lattice import tetrahedralize_with_tetgen, tetrahedralize_with_tetwild
 from signedheat.view import save_scene
 
 SOURCES = sorted(set(Path(sh.__file__).parent.rglob("*.py")) - {Path(parsers.__file__)})
@@ -26,8 +25,6 @@ USES = {
     "trimesh": lambda folder: CUBE.to_trimesh(),
     "meshio": lambda folder: CUBE.to_meshio(),
     "pyvista": lambda folder: CUBE.to_pyvista(),
-    "tetgen": lambda folder: tetrahedralize_with_tetgen(CUBE, resolution=4),
-    "pytetwild": lambda folder: tetrahedralize_with_tetwild(CUBE, resolution=4),
     "matplotlib": lambda folder: save_scene(CUBE, folder / "scene.png"),
     "skimage": lambda folder: sh.GridField(sh.Grid([0, 0], 1, [3, 3]), np.eye(3) - 0.5).contour(0.0),
 }

@@ -169,20 +169,3 @@ def test_open_level_sets_end_at_the_boundary():
     lid = phi.contour()
     assert_closed_manifold(lid)
     assert enclosed_volume(lid) == pytest.approx(4 * 0.8, rel=1e-6)
-
-
-@pytest.mark.parametrize("package", ["tetgen", "pytetwild"])
-def test_tets_of_other_programs(package):
-    pytest.importorskip(package)
-    from signedheat.tets import lattice
-
-    mesher = {
-        "tetgen": lattice.tetrahedralize_with_tetgen,
-        "pytetwild": lattice.tetrahedralize_with_tetwild,
-    }[package]
-    whole = sphere(3)
-    broken = sh.TriangleMesh(whole.vertices, whole.faces[np.random.default_rng(0).random(whole.n_faces) > 0.1])
-    mesh = mesher(broken, resolution=8)
-    assert mesh.tet_volumes.sum() == pytest.approx(2.8**3, rel=2e-3)
-    phi = sh.SignedHeatSolver(mesh).distance(broken)
-    assert rms(phi.values - (np.linalg.norm(mesh.vertices, axis=1) - 1)) < 0.05
