@@ -23,7 +23,6 @@ import numpy as np
 import trimesh
 
 import signedheat as sh
-from signedheat.tets.lattice import box_walls
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 from shapes.tet_cases import plain_recipe
@@ -47,7 +46,10 @@ def lattice(n_tets: float) -> sh.TetMesh:
 
 def walls_for(n_tets: float) -> tuple[np.ndarray, np.ndarray]:
     """The sides of the box in triangles about as large as the faces of so many tets."""
-    return box_walls(np.full(3, -HALF), np.full(3, 2 * HALF), np.full(3, round((n_tets / 9) ** (1 / 3))))
+    n = round((n_tets / 9) ** (1 / 3))
+    cube = sh.DigitalSurface(np.ones((n, n, n)), 2 * HALF / n, np.full(3, HALF / n - HALF)).squares
+    squares = cube.corners.reshape(-1, 4)
+    return cube.vertices, np.concatenate([squares[:, :3], squares[:, [0, 2, 3]]])
 
 
 def with_tetgen(vertices: np.ndarray, faces: np.ndarray, n_tets: float) -> sh.TetMesh:
