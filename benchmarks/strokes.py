@@ -53,12 +53,13 @@ def main() -> None:
     parser.add_argument("--worst", type=int, default=20, help="how many of the worst are named")
     parser.add_argument("--picture", help="where to draw them")
     arguments = parser.parse_args()
-    cases = [(d, s, arguments.fine) for d in arguments.damages for s in range(*arguments.seeds)]
-    if arguments.processes > 1:
-        with ProcessPoolExecutor(arguments.processes) as pool:
-            outcomes = list(pool.map(outcome, *zip(*cases, strict=True), chunksize=4))
-    else:
-        outcomes = [outcome(*case) for case in cases]
+    cases = [(d, s, arguments.fine) for s in range(*arguments.seeds) for d in arguments.damages]
+    outcomes: list[Outcome] = []
+    with ProcessPoolExecutor(arguments.processes) as pool:
+        for each in pool.map(outcome, *zip(*cases, strict=True)):
+            outcomes.append(each)
+            if len(outcomes) % 100 == 0:
+                table(outcomes)
     table(outcomes)
     bad = [o for o in outcomes if o.wrong != bool(o.warned)]
     bad.sort(key=lambda o: -o.share if o.wrong else 0.0)
@@ -85,7 +86,7 @@ def outcome(damage: str, seed: int, fine: int) -> Outcome:
 
 
 def table(outcomes: list[Outcome]) -> None:
-    """The confusion matrix, by damage and of all."""
+    """The confusion matrix, by damage and of all; printed after every hundred cases."""
     print(f"{'':>14} {'cases':>6} {'right':>7} {'wrong, warned':>14} {'right, warned':>14} {'wrong in silence':>17}  s")
     for name in [*dict.fromkeys(o.damage for o in outcomes), "all"]:
         of = [o for o in outcomes if name in (o.damage, "all")]
@@ -102,9 +103,7 @@ def draw(outcomes: list[Outcome], fine: int, file: str) -> None:
     rows = -(-len(outcomes) // 5)
     plotter = pv.Plotter(shape=(rows, 10), window_size=(2600, 300 * rows), off_screen=True)
     for k, o in enumerate(outcomes):
-        drawing = strokes.drawing(
-            np.random.default_rng([o.seed, list(strokes.DAMAGES).index(o.damage)]), o.damage, fine
-        )
+        drawing = drawn(o.damage, o.seed, fine)
         mesh = drawing.mesh
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

@@ -301,6 +301,14 @@ class SmallLoops(Note):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class VerticesJoined(Note):
+    """Number of vertices of seams that are one with others at their place."""
+
+    vertices_joined: int
+    text: ClassVar[str] = "vertices joined at seams: {0.vertices_joined}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class VerticesAdded(Note):
     """Number of vertices added so that sources run along edges."""
 

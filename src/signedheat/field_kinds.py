@@ -52,8 +52,7 @@ def _(
     # NaN where diffusion did not reach, such as behind a single shared vertex
     values = np.where(discretization.reached_by(source.vectors), values, np.nan)
     triangulation, everywhere = discretization.triangulation, values
-    if discretization.restriction is not None:
-        values = values[discretization.restriction]
+    values = values[discretization.restriction]
     if isinstance(discretization.domain, PointCloud) and np.isnan(values).any():  # its triangles may have gaps
         cloud = discretization.domain
         used = mask_of(cloud.n_points, cloud.triangulation.faces)
@@ -71,7 +70,8 @@ def _(
     noted = replace(diagnostics, unreached=unreached).noting(*notes)
     finer = None
     if triangulation is not None:
-        finer = VertexField(triangulation, everywhere[: triangulation.n_vertices], noted, source)
+        added = everywhere[len(values) : triangulation.n_vertices]
+        finer = VertexField(triangulation, np.concatenate([values, added]), noted, source)
     return VertexField(discretization.domain, values, noted, source, finer)
 
 

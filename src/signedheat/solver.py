@@ -60,7 +60,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     Parameters
     ----------
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Grid
-        Where distance is measured.
+        Where distance is measured. Vertices of the rims of a mesh at one place, as along seams, are one.
     diffusion : float or Extrapolated, optional
         τ in ``t = τ h²``, h the mean distance between unknowns; the paper's is 1. Larger values close gaps in broken
         sources along rounder lines. By default 1 in space and, on surfaces, `Extrapolated`.

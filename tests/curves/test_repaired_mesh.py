@@ -10,6 +10,7 @@ import signedheat as sh
 from shapes.surface_cases import band
 from shapes.triangulated import klein_bottle
 from signedheat.curves.curve_distance import MeshRepaired
+from signedheat.diagnostics import VerticesJoined
 from signedheat.errors import InexactWarning, UnreachedWarning
 from signedheat.samples import sphere, union
 
@@ -82,7 +83,7 @@ def test_strokes_are_repaired_on_broken_meshes(name, whole):
     away, same = cKDTree(BALL.vertices).query(mesh.vertices)
     on_ball = away < 1e-9
     np.testing.assert_allclose(field.values[on_ball], whole[same[on_ball]], atol=1e-3 if "tents" not in name else 0.02)
-    assert (field.diagnostics.note(MeshRepaired) is None) == name.startswith("fin")
+    assert (field.diagnostics.note(MeshRepaired) is None) == name.startswith(("fin", "seam"))
 
 
 def with_rounded_seam(units, seed):
@@ -110,7 +111,34 @@ def test_seams_are_joined_whatever_rounded_them(units, scale, offset, whole):
     field = sh.signed_distance(curves, given)
     same = cKDTree(BALL.vertices).query(mesh.vertices)[1]
     np.testing.assert_allclose(field.values[order] / scale, whole[same], atol=1e-3)
-    assert field.diagnostics.note(MeshRepaired).vertices_joined == mesh.n_vertices - BALL.n_vertices
+    assert field.diagnostics.note(VerticesJoined).vertices_joined == mesh.n_vertices - BALL.n_vertices
+
+
+@pytest.mark.parametrize(
+    "measured",
+    [
+        lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),
+        lambda mesh, curves: sh.SignedHeatSolver(mesh, intrinsic=True).distance(curves),
+        lambda mesh, curves: sh.SignedHeatSolver(sh.intrinsic_delaunay(mesh, refine=True)).distance(curves).restrict(),
+        lambda mesh, curves: sh.sharpen(sh.SignedHeatSolver(mesh).distance(curves), method=sh.Convex()),
+    ],
+    ids=["solver", "intrinsic", "triangulation", "sharpen"],
+)
+@pytest.mark.parametrize("lift", [0.0, 2.0**-52])
+def test_seams_are_joined_for_the_method_alone(measured, lift):
+    mesh, same = with_seam(lift), cKDTree(BALL.vertices).query(with_seam(lift).vertices)[1]
+    field = measured(mesh, strokes(mesh, turned=()))
+    assert field.diagnostics.note(VerticesJoined).vertices_joined == mesh.n_vertices - BALL.n_vertices
+    np.testing.assert_allclose(field.values, measured(BALL, strokes(BALL, turned=())).values[same], atol=1e-6)
+
+
+def test_curves_are_closed_across_seams():
+    mesh = with_seam()
+    [whole] = sh.close_curves(mesh, strokes(mesh))
+    assert whole.closed
+    np.testing.assert_allclose(mesh.positions(whole)[:, 2], 0.2, atol=0.05)
+    phi = sh.piecewise_distance(mesh, strokes(mesh, turned=()))
+    assert len(phi.cut) == 0
 
 
 @pytest.mark.parametrize("units", [36, 100, 300])

@@ -117,7 +117,7 @@ def test_nonorientable_surfaces_equal_their_double_cover(closed):
     in_faces = np.where(rng.random(base.n_faces) < 0.1, rng.normal(size=base.n_faces) + 1j, 0)
     fields = []
     for triangles, laps in ((base, 1), (cover, 2)):
-        surface = SurfaceDiscretization(None, triangles)
+        surface = SurfaceDiscretization(None, triangles, np.arange(triangles.n_vertices))
         vectors = np.zeros(triangles.n_edges, dtype=complex)
         np.add.at(vectors, triangles.edges.face_edges, triangles.in_edge_frames(np.tile(in_faces, laps)[:, None]))
         samples = np.eye(base.n_vertices)[:1] if laps == 1 else np.eye(cover.n_vertices)[gluing.below == 0]

@@ -1,6 +1,6 @@
 """Distance to curves on surfaces in one call: exact where they are there, completed by heat where they are missing.
 
-It is measured on a repaired mesh: seams closed, copies of faces left out, faces turned to agree.
+It is measured on a repaired mesh: copies of faces left out, faces turned to agree.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from ..solver import SignedHeatSolver, distance_unwarned
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.source_segments import as_curves, given_curves, numbers_given, segments_of
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList, SurfacePoints
+from ..surfaces.surface_discretization import vertices_joined
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField
 from ..validation import flag
@@ -35,57 +36,43 @@ from .stroke_directions import CurvePieces, Decision, decide, with_turned
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MeshRepaired(Note):
-    """What was done to a mesh for distance on it: vertices joined at seams, faces turned, copies left out."""
+    """What was done to a mesh for distance on it: faces turned, copies left out."""
 
-    vertices_joined: int
     faces_turned: int
     copies: int
-    text: ClassVar[str] = (
-        "vertices joined at seams: {0.vertices_joined}; faces turned: {0.faces_turned}; copies of faces: {0.copies}"
-    )
+    text: ClassVar[str] = "faces turned: {0.faces_turned}; copies of faces: {0.copies}"
 
 
 @dataclass(frozen=True, eq=False)
 class RepairedMesh:
-    """A mesh on which vertices of rims at one place are one, and faces agree with their neighbours where they can."""
+    """A mesh with its seams joined and without copies of faces, which agree with their neighbours where they can."""
 
-    given: Any  # the mesh before: a `TriangleMesh` or a `PolygonMesh`
-    mesh: Any  # and after; of polygons only vertices are joined
-    vertices: Ints  # (n,) vertex of the repaired mesh at each one of the given mesh
+    given: TriangleMesh  # the mesh before
+    mesh: Any  # and after, a `TriangleMesh` on some of the same vertices
+    places: Ints  # (n,) vertex of the repaired mesh at each one of the given mesh
     faces: Ints  # (m,) triangle of the repaired mesh for each one of the given mesh, on the same vertices
     corners: Ints  # (m, 3) corner of that triangle at each corner of the given one
-    note: MeshRepaired  # what was done
+    notes: tuple[Note, ...]  # on what was done
 
     @classmethod
     def of(cls, given: object) -> RepairedMesh | None:
         """Repair a mesh; None if there is nothing to do, or it is none."""
-        if not isinstance(given, TriangleMesh | PolygonMesh):
+        if not isinstance(given, TriangleMesh):
             return None
-        once = given
-        if isinstance(given, TriangleMesh):  # beside a copy of its face, a rim looks like an edge of two faces
-            once = TriangleMesh(given.vertices, given.faces[np.unique(copied_faces(given.faces, given.n_vertices))])
-        places = joined_rims(given.vertices, *_halfedges(once))
-        used, vertices = np.unique(places, return_inverse=True)
-        joined = given.n_vertices - len(used)
-        if isinstance(given, PolygonMesh):
-            if not joined:
-                return None
-            mesh = PolygonMesh(given.vertices[used], np.split(vertices[given.corners], given.offsets[1:-1]))
-            n = given.triangulation.n_faces
-            whole = np.arange(n), np.tile(np.arange(3), (n, 1))
-            return cls(given, mesh, vertices, *whole, MeshRepaired(joined, 0, 0))
-        corners = vertices[given.faces]
-        first = copied_faces(corners, len(used))
-        kept, targets = np.unique(first, return_inverse=True)
+        n, kept = given.n_vertices, np.unique(copied_faces(given.faces, given.n_vertices))
+        # beside a copy of its face, a rim looks like an edge of two faces
+        once = given if len(kept) == given.n_faces else TriangleMesh(given.vertices, given.faces[kept])
+        corners = once.places[given.faces]
+        kept, targets = np.unique(copied_faces(corners, n), return_inverse=True)
         faces, areas = corners[kept], given.face_areas[kept]
-        turned = orient_faces(_pairs(faces, len(used)), faces.ravel(), np.repeat(np.arange(len(kept)), 3), areas).turned
+        turned = orient_faces(_pairs(faces, n), faces.ravel(), np.repeat(np.arange(len(kept)), 3), areas).turned
         copies = given.n_faces - len(kept)
-        if not (joined or copies or turned.any()):
+        if not (copies or turned.any()):
             return None
         faces = np.where(turned[:, None], faces[:, ::-1], faces)
         to = (corners[:, :, None] == faces[targets][:, None]).argmax(axis=2)
-        repaired = TriangleMesh(given.vertices[used], faces)
-        return cls(given, repaired, vertices, targets, to, MeshRepaired(joined, int(turned.sum()), copies))
+        notes = *vertices_joined(once), MeshRepaired(int(turned.sum()), copies)
+        return cls(given, TriangleMesh(given.vertices, faces), once.places, targets, to, notes)
 
     def on_it(self, source: Any) -> Any:
         """Move a curve, points, or a sequence of them to the repaired mesh; what does not fit the given one stays."""
@@ -104,8 +91,8 @@ class RepairedMesh:
 
     def on_given(self, field: VertexField[Any]) -> VertexField[Any]:
         """Return a field on the repaired mesh, at the vertices of the given one."""
-        values = field.values[self.vertices]
-        diagnostics = replace(field.diagnostics, unreached=np.flatnonzero(np.isnan(values))).noting(self.note)
+        values = field.values[self.places]
+        diagnostics = replace(field.diagnostics, unreached=np.flatnonzero(np.isnan(values))).noting(*self.notes)
         return VertexField(self.given, values, diagnostics)
 
 
@@ -241,6 +228,7 @@ def distance_to_pieces(
 
 def has_sides(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool:
     """Whether the faces that each curve runs on are connected, and can agree which side of the curve is left."""
+    mesh = mesh.joined
     if (mesh.edges.face_counts == 2 - (mesh.edges.balance != 0)).all():
         return True
     crossed = [segments_of(curve, mesh.intrinsic, mesh.vertices).faces for curve in curves]

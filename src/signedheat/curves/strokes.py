@@ -284,8 +284,7 @@ class Strokes:
     @property
     def own(self) -> Ints:
         """(j,) which of the n vertices are those of the domain."""
-        chosen = self.surface.restriction
-        return np.arange(self.surface.triangles.n_vertices) if chosen is None else chosen
+        return self.surface.restriction
 
     @cached_property
     def graph(self) -> CutGraph:

@@ -15,7 +15,7 @@ from ..jobs import Progress
 from ..mesh.intrinsic_mesh import IntrinsicMesh, mollify
 from .intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from .source_segments import CurveGroups
-from .surface_discretization import SurfaceDiscretization, refuse_too_many
+from .surface_discretization import SurfaceDiscretization, refuse_too_many, vertices_joined
 from .triangle_mesh import TriangleMesh
 
 SPOILED = 0.0015
@@ -112,11 +112,10 @@ def refined(
     refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", more=BYTES_REFINED * mesh.n_faces)  # which only grow
     domain = intrinsic_delaunay(mesh, keep, refine=True, angle=angle, coarsest=coarsest, progress=progress)
     refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
-    lowered_mesh = lowered(domain, domain=mesh, restriction=np.arange(mesh.n_vertices))
-    return replace(lowered_mesh, triangulation=domain)
+    return lowered(domain, domain=mesh, restriction=mesh.places, triangulation=domain)
 
 
-def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDiscretization:
+def lowered(triangulation: IntrinsicTriangulation, /, **options: Any) -> SurfaceDiscretization:
     """Discretise an intrinsic triangulation, with longer edges if triangles are flat; options override fields."""
     triangles = triangulation.triangles
     lengths, added = mollify(triangles.edge_lengths, THICKNESS)
@@ -124,11 +123,13 @@ def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDis
         thicker = IntrinsicMesh.from_lengths(triangles.corner_vertices, lengths, triangles.n_vertices, triangles.edges)
         # which halfedge leads each edge must not change
         triangles = replace(triangles, corner_positions=thicker.corner_positions)
+    mesh = triangulation.mesh
     options = {
         "domain": triangulation,
+        "restriction": np.concatenate([mesh.places, np.arange(mesh.n_vertices, triangles.n_vertices)]),
         "transfer": triangulation.transfer,
         "spacing": spacing(triangles),
-        "notes": (IntrinsicTriangles(triangulation.summary),),
+        "notes": (IntrinsicTriangles(triangulation.summary), *vertices_joined(mesh)),
         **options,
     }
     return SurfaceDiscretization(triangles=triangles, **options)

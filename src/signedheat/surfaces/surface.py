@@ -397,18 +397,11 @@ def check_mask(face_mask: Bools, n_faces: int) -> None:
         )
 
 
-class Joined(Protocol):
-    """Triangles along which points are joined; see `TriangleMesh` for what the properties mean."""
-
-    @property
-    def intrinsic(self) -> IntrinsicMesh: ...
-
-
 class PlaceableTriangles(Triangles, Protocol):
     """Triangles on which points in space are placed and joined; see `TriangleMesh` for what the properties mean."""
 
     @property
-    def joined(self) -> Joined: ...
+    def intrinsic(self) -> IntrinsicMesh: ...
     @property
     def edge_lengths(self) -> Floats: ...
     @property
@@ -435,7 +428,7 @@ def projected_curve(
             remedy="check units and placement, or raise max_distance",
             element=f"point {far}",
         )
-    triangles = mesh.joined.intrinsic
+    triangles = mesh.intrinsic
     start = np.arange(len(points) if closed else len(points) - 1)
     located, starts, ends, _ = join(
         triangles, locate_points(triangles, faces, weights), start, (start + 1) % len(points), "polyline"

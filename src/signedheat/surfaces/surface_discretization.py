@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from ..arrays import Bools, Complexes, Floats, Ints, LastUsed, fingerprint, mask_of
-from ..diagnostics import EdgesLengthened, LargeAngles, Note, PointsLeftOut, VerticesAdded
+from ..diagnostics import EdgesLengthened, LargeAngles, Note, PointsLeftOut, VerticesAdded, VerticesJoined
 from ..direct_integration import DirectIntegration, SpringIntegration, refuse_contradictions
 from ..discretization import Levels, SourceTerm, discretize
 from ..errors import GeometryError
@@ -41,7 +41,7 @@ class SurfaceDiscretization:
 
     domain: Any  # of the fields returned: a mesh, a cloud, a digital surface or an intrinsic triangulation
     triangles: IntrinsicMesh  # on which the method runs
-    restriction: Ints | None = None  # (n,) vertex of the triangles for each vertex of the domain, if they differ
+    restriction: Ints  # (n,) vertex of the triangles for each vertex of the domain
     transfer: Callable[[Any], Any] | None = None  # from a source on the domain to one on the triangles, if faces differ
     # (n_vertices, 3) in space, or (m, 3, 3) at the corners, up to translation, if every face lies in a plane of its
     # own; for curves with given normals. By default those of the domain's triangulation.
@@ -83,9 +83,8 @@ class SurfaceDiscretization:
         triangles, segments = refine_to_conform(self.triangles, self.segments(sources))
         surface = self
         if triangles is not self.triangles:  # their first vertices are the present ones
-            own = np.arange(self.triangles.n_vertices) if self.restriction is None else self.restriction
             notes = *self.notes, VerticesAdded(triangles.n_vertices - self.triangles.n_vertices)
-            surface = replace(self, triangles=triangles, restriction=own, transfer=None, notes=notes)
+            surface = replace(self, triangles=triangles, transfer=None, notes=notes)
         triangles, groups = nonmanifold_frames(triangles, segments)
         return surface._turned_to(triangles), groups
 
@@ -155,10 +154,16 @@ def _(domain: TriangleMesh) -> SurfaceDiscretization:
 
 def lowered_mesh(domain: TriangleMesh) -> SurfaceDiscretization:
     """Discretise a mesh, whose memory the caller has checked."""
-    triangles, added = laid_out(domain, 1e-6)
-    share = large_angles(triangles)
-    notes = (*([EdgesLengthened(added)] if added else []), *([LargeAngles(share)] if share else []))
-    return SurfaceDiscretization(domain, triangles, notes=notes)
+    triangles, added = laid_out(domain.joined, 1e-6)
+    share, joined = large_angles(triangles), vertices_joined(domain)
+    notes = (*([EdgesLengthened(added)] if added else []), *([LargeAngles(share)] if share else []), *joined)
+    return SurfaceDiscretization(domain, triangles, domain.places, notes=notes)
+
+
+def vertices_joined(mesh: TriangleMesh) -> list[Note]:
+    """Note how many vertices were joined at seams, if any."""
+    count = int((mesh.places != np.arange(mesh.n_vertices)).sum())
+    return [VerticesJoined(count)] if count else []
 
 
 def large_angles(triangles: IntrinsicMesh) -> float:
@@ -252,7 +257,7 @@ def lowered_polygons(domain: PolygonMesh) -> SurfaceDiscretization:
     lowered = lowered_mesh(domain.triangulation)
     own = (domain.triangulation.edges.vertices < domain.n_vertices).all(axis=1)
     spacing = 0.5 * float(domain.triangulation.edge_lengths[own].mean())
-    return replace(lowered, domain=domain, restriction=np.arange(domain.n_vertices), spacing=spacing)
+    return replace(lowered, domain=domain, restriction=lowered.restriction[: domain.n_vertices], spacing=spacing)
 
 
 NEIGHBORS, BYTES_PER_POINT = 40_000_000, 1300
@@ -267,8 +272,9 @@ def _(domain: PointCloud) -> SurfaceDiscretization:
     used = mask_of(domain.n_points, mesh.faces)
     duplicates = int((domain.representatives != np.arange(domain.n_points)).sum())
     notes = (PointsLeftOut(duplicates, np.flatnonzero(~used[domain.representatives]).tolist()),)
-    spacing = float(mesh.edge_lengths.mean())
-    return replace(lowered_mesh(mesh), domain=domain, restriction=domain.representatives, spacing=spacing, notes=notes)
+    lowered, spacing = lowered_mesh(mesh), float(mesh.edge_lengths.mean())
+    places = lowered.restriction[domain.representatives]
+    return replace(lowered, domain=domain, restriction=places, spacing=spacing, notes=notes)
 
 
 BYTES_PER_VOXEL = 20
@@ -298,4 +304,4 @@ def _(domain: DigitalSurface) -> SurfaceDiscretization:
     extent = float((domain.bounds[1] - domain.bounds[0]).max())
     spacing = max(min(0.5 * domain.radius, extent), float(domain.spacing.mean()))
     own = np.arange(domain.n_vertices)
-    return SurfaceDiscretization(domain, triangles, restriction=own, positions=positions, spacing=spacing)
+    return SurfaceDiscretization(domain, triangles, own, positions=positions, spacing=spacing)

@@ -66,15 +66,13 @@ def _(
         )
     elements = LinearElements.on_triangles(surface.triangles)
     new, diagnostics = sharpened(field, surface, elements, at_triangles(surface, field), source, method, progress)
-    values = new if surface.restriction is None else new[surface.restriction]
-    return replace(field, values=values, diagnostics=diagnostics)
+    return replace(field, values=new[surface.restriction], diagnostics=diagnostics)
 
 
 def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> Floats:
     """Values at the vertices of the surface's triangles; averages of neighbours at those that the domain lacks."""
-    if surface.restriction is None:
-        return field.values
-    assert not isinstance(field.domain, IntrinsicTriangulation)  # it has the vertices of its triangles
+    if isinstance(field.domain, IntrinsicTriangulation):
+        return field.values  # it has the vertices of its triangles
     values = field.domain.on_triangulation(field.values)
     if len(values) != surface.triangles.n_vertices:
         values = np.full(surface.triangles.n_vertices, np.nan)

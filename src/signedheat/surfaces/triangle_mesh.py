@@ -99,15 +99,19 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @cached_property
     def intrinsic(self) -> IntrinsicMesh:
-        """The triangles laid out in the plane, with edges lengthened by rounding error so that each has an area."""
-        return laid_out(self, MARGIN)[0]
+        """The triangles in the plane, joined at seams, with edges lengthened by rounding so that each has an area."""
+        return laid_out(self.joined, MARGIN)[0]
+
+    @cached_property
+    def places(self) -> Ints:
+        """(n,) the first vertex at the place of each boundary vertex, as along seams; all others are their own."""
+        return joined_rims(self.vertices, self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel())
 
     @cached_property
     def joined(self) -> TriangleMesh:
-        """The same faces, with one vertex for boundary vertices at the same place, as along seams."""
-        places = joined_rims(self.vertices, self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel())
-        whole = (places == np.arange(len(places))).all()
-        return self if whole else TriangleMesh(self.vertices, places[self.faces])
+        """The same faces, with one vertex for boundary vertices at the same place."""
+        whole = (self.places == np.arange(self.n_vertices)).all()
+        return self if whole else TriangleMesh(self.vertices, self.places[self.faces])
 
     @cached_property
     def search_tree(self) -> TriangleTree:
