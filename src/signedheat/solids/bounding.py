@@ -20,7 +20,7 @@ from ..search.winding_tree import WindingTree
 from .chain import Chain, inner_walls
 from .gauss import Dipoles, Matrix, Pieces, means, sampled, system_of, without_slender
 from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, levels_of_pieces, levels_within
-from .rims import meeting_edges, open_edges
+from .rims import meeting_either_way, open_edges
 
 COHERENT = 0.7
 """Least coherence of the levels of loose pieces that are the remains of a body. Bodies have .81 to 1, however little is
@@ -265,8 +265,7 @@ def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owner
     first[labels[::-1]] = faces[::-1]
     hubs = np.unique(chain.complexes[first], return_inverse=True)[1]
     several = np.bincount(labels)[owners] > 1
-    ends, owners = chain.positions[edges[several]], np.tile(owners[several], 2)
-    left, right = meeting_edges(np.concatenate([ends, ends[:, ::-1]]))  # which way pieces face is not known yet
+    owners, (left, right) = owners[several], meeting_either_way(chain.positions[edges[several]])
     return connected_components(
         n + int(hubs.max()) + 1,
         *(np.concatenate(ends) for ends in ((np.arange(n), owners[left]), (n + hubs, owners[right]))),

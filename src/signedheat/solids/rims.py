@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import scipy
 
@@ -179,6 +181,28 @@ def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
     >>> [edges.tolist() for edges in meeting_edges(np.array([one, other]))]
     [[0], [1]]
     """
+    first, second, cosines = _edges_beside(ends)
+    meeting = (cosines < OPPOSITE) & (ends[first] != ends[second, ::-1]).any(axis=(1, 2))
+    return first[meeting], second[meeting]
+
+
+def meeting_either_way(ends: Floats) -> tuple[Ints, Ints]:
+    """Pairs of edges that meet if one of them is turned or none: which way they run is not known yet.
+
+    Examples
+    --------
+    >>> one, other = [[0, 0, 0], [1, 0, 0]], [[0.3, 0.02, 0], [0.8, 0.01, 0]]
+    >>> [edges.tolist() for edges in meeting_either_way(np.array([one, other]))]
+    [[0], [1]]
+    """
+    first, second, cosines = _edges_beside(ends)
+    other = np.where((cosines < 0)[:, None, None], ends[second, ::-1], ends[second])
+    meeting = (np.abs(cosines) > -OPPOSITE) & (ends[first] != other).any(axis=(1, 2))
+    return first[meeting], second[meeting]
+
+
+def _edges_beside(ends: Floats) -> tuple[Ints, Ints, Floats]:
+    """Pairs of edges that lie along each other, and the cosine between the two."""
     along = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(along, axis=1)
     ways = along / np.maximum(lengths, 1e-300)[:, None]
@@ -190,12 +214,10 @@ def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
     crowded = np.flatnonzero(counts > 1)  # each place finds itself
     near = tree.query_ball_point(places[crowded], reach[crowded]) if len(crowded) else []
     first = np.repeat(crowded, counts[crowded])
-    second = np.concatenate([np.asarray(numbers, dtype=np.int64) for numbers in near]) if len(first) else first
+    second = np.fromiter(itertools.chain.from_iterable(near), dtype=np.int64, count=len(first))
     # each place with the edges that it lies along, whichever of the two is the longer
     beside = np.unique(np.concatenate([first, second]) * len(ends) + owners[np.concatenate([second, first])])
     pairs, shared = np.unique(owners[beside // len(ends)] * len(ends) + beside % len(ends), return_counts=True)
     pairs = np.stack([pairs // len(ends), pairs % len(ends)], axis=1)[shared >= SHARED]
-    pairs = np.unique(np.sort(pairs, axis=1), axis=0)
-    first, second = pairs[(ways[pairs[:, 0]] * ways[pairs[:, 1]]).sum(axis=1) < OPPOSITE].T
-    same = (ends[first] == ends[second, ::-1]).all(axis=(1, 2))
-    return first[~same], second[~same]
+    first, second = np.unique(np.sort(pairs, axis=1), axis=0).T
+    return first, second, (ways[first] * ways[second]).sum(axis=1)
