@@ -31,7 +31,7 @@ def rotation(quarter: int) -> np.ndarray:
     return np.linalg.matrix_power(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]]), quarter)
 
 
-mesh = disk(60)
+mesh = disk(40)
 sides = [np.array([[0.6, -0.3, 0], [0.6, 0.3, 0]]) @ rotation(quarter).T for quarter in range(4)]
 broken = [mesh.polyline(side) for side in sides]
 fields = [sh.SignedHeatSolver(mesh, diffusion).distance(broken) for diffusion in (1, 10, 100, 1000)]

@@ -11,9 +11,9 @@ import numpy as np
 import signedheat as sh
 from signedheat import samples, view
 
-x, y, z = samples.sphere(5).vertices.T
+x, y, z = samples.sphere(4).vertices.T
 bumps = 1 + 0.15 * np.sin(4 * x + 1) * np.sin(4 * y) * np.sin(4 * z + 2)
-ball = sh.TriangleMesh(np.stack([x, y, z], axis=1) * bumps[:, None], samples.sphere(5).faces)
+ball = sh.TriangleMesh(np.stack([x, y, z], axis=1) * bumps[:, None], samples.sphere(4).faces)
 whole = max(ball.level_set(ball.vertices[:, 2] - 0.3 * ball.vertices[:, 0], 0.2), key=lambda line: line.n_points)
 corners = np.einsum("nk,nkd->nd", whole.barycentric, ball.vertices[ball.faces[whole.faces]])
 step = len(corners) // 6

@@ -10,7 +10,7 @@ import numpy as np
 import signedheat as sh
 from signedheat import samples, view
 
-part = samples.torus(0.8, 0.3)
+part = samples.torus(0.8, 0.3, n_around=72, n_across=36)
 nominal = samples.with_flipped_faces(samples.without_faces(part, 0.1), 0.2)
 
 away = np.linalg.norm(part.vertices - [0.8, 0.0, 0.3], axis=1)

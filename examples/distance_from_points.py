@@ -9,7 +9,7 @@ import numpy as np
 import signedheat as sh
 from signedheat import samples, view
 
-ball = samples.sphere(5)
+ball = samples.sphere(4)
 poles = ball.points_at([int(ball.vertices[:, 2].argmax()), int(ball.vertices[:, 2].argmin())])
 phi = sh.sharpen(sh.SignedHeatSolver(ball).distance(poles))
 

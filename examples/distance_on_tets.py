@@ -9,8 +9,8 @@ import numpy as np
 import signedheat as sh
 from signedheat import samples, view
 
-shape = samples.without_patches(samples.sphere(4), 3, 0.35, seed=1)
-mesh = sh.tetrahedralize(shape, resolution=14, padding=0.8)
+shape = samples.without_patches(samples.sphere(3), 3, 0.35, seed=1)
+mesh = sh.tetrahedralize(shape, resolution=12, padding=0.8)
 phi = sh.sharpen(sh.SignedHeatSolver(mesh).distance(shape))
 offset = phi.offset(0.5)
 

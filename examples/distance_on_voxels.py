@@ -9,14 +9,14 @@ import numpy as np
 import signedheat as sh
 from signedheat import view
 
-index = np.stack(np.indices((60, 60, 60)), axis=-1)
-volume = np.linalg.norm(index - [29.4, 29.6, 29.3], axis=-1) < 27
+index = np.stack(np.indices((46, 46, 46)), axis=-1)
+volume = np.linalg.norm(index - [22.4, 22.6, 22.3], axis=-1) < 20
 axis = np.array([0.3, 0.2, 0.9]) / np.linalg.norm([0.3, 0.2, 0.9])
 
 errors = []
 for radius in (None, 0.0):  # corrected normals, and each face's own
-    surface = sh.DigitalSurface(volume, spacing=1 / 27, radius=radius)
-    center = np.array([29.4, 29.6, 29.3]) / 27
+    surface = sh.DigitalSurface(volume, spacing=1 / 20, radius=radius)
+    center = np.array([22.4, 22.6, 22.3]) / 20
     along = (surface.vertices - center) @ axis / np.linalg.norm(surface.vertices - center, axis=1)
     circle = surface.level_set(along, 0.3)
 

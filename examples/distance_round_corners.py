@@ -28,10 +28,10 @@ def tank(n: int) -> sh.TetMesh:
     return sh.TetMesh(points, tets.reshape(-1, 4))
 
 
-ball = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
+ball = trimesh.creation.icosphere(subdivisions=3, radius=RADIUS)
 keep = np.random.default_rng(0).random(len(ball.faces)) > 1 / 3
 phi = sh.signed_distance(sh.TriangleMesh(ball.vertices + CENTER, ball.faces[keep]), tank(10))
-plane = sh.Grid((0.0, 0.0), 0.01, (301, 201))
+plane = sh.Grid((0.0, 0.0), 0.02, (151, 101))
 x, y = np.moveaxis(plane.points, -1, 0)
 middle = np.stack([x, y, 0.5 + 0 * x], axis=-1).reshape(-1, 3)
 values = np.where((np.abs(x - 1.5) < 0.1) & (y < 1.5), np.nan, phi(middle).reshape(x.shape))

@@ -15,13 +15,13 @@ from signedheat.diagnostics import Jumps
 from signedheat.samples import sphere, torus
 from signedheat.view import draw_surface
 
-ring = torus(n_around=96, n_across=40)
-ball = sphere(4)
+ring = torus(n_around=60, n_across=24)
+ball = sphere(3)
 half = np.linspace(0, np.pi, 60)
 equator = [ball.polyline(np.stack([np.cos(half), side * np.sin(half), 0 * half], axis=1)) for side in (1, -1)]
 cases = {
-    "round the tube": (ring, [ring.path(np.arange(40), closed=True)]),
-    "round the hole": (ring, [ring.path(np.arange(96) * 40 + 6, closed=True)]),
+    "round the tube": (ring, [ring.path(np.arange(24), closed=True)]),
+    "round the hole": (ring, [ring.path(np.arange(60) * 24 + 4, closed=True)]),
     "halves against each other": (ball, equator),
 }
 figure, axes = plt.subplots(1, 3, figsize=(13, 4.5), layout="constrained")

@@ -12,7 +12,7 @@ import numpy as np
 import signedheat as sh
 from signedheat import samples, view
 
-samples.with_flipped_faces(samples.sphere(4), 0.3).save("ball.ply")
+samples.with_flipped_faces(samples.sphere(3), 0.3).save("ball.ply")
 ball = sh.transform(sh.read("ball.ply"), 25.4 * np.eye(4)[:3])  # inches to millimetres
 sdf = sh.signed_distance(ball, resolution=36)
 sh.save(sdf.offset(2.54), "grown.stl")

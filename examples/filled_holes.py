@@ -12,7 +12,7 @@ import trimesh
 import signedheat as sh
 from signedheat import samples, view
 
-whole = samples.torus(1.0, 0.4)
+whole = samples.torus(1.0, 0.4, n_around=72, n_across=36)
 scan = samples.without_patches(whole, 5, 0.25, seed=1)
 x, y, z = scan.vertices.T
 uv = np.stack([np.arctan2(y, x), np.arctan2(z, np.hypot(x, y) - 1.0)], axis=1) / (2 * np.pi) + 0.5

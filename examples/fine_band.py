@@ -11,12 +11,12 @@ import numpy as np
 import signedheat as sh
 from signedheat import samples, view
 
-broken = samples.without_patches(samples.torus(n_around=120, n_across=60), 3, 0.2, seed=1)
-band = sh.signed_distance(broken, spacing=0.03, padding=0.3, band=0.12)
+broken = samples.without_patches(samples.torus(n_around=80, n_across=40), 3, 0.2, seed=1)
+band = sh.signed_distance(broken, spacing=0.04, padding=0.3, band=0.12)
 band.save("torus.vdb")
 surface = band.contour()
 
-slice_grid = sh.Grid((-1.7, -1.7), 0.01, (341, 341))
+slice_grid = sh.Grid((-1.7, -1.7), 0.02, (171, 171))
 x, y = np.moveaxis(slice_grid.points, -1, 0)
 values = band(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)).reshape(x.shape)
 view.save_row(

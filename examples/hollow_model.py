@@ -7,11 +7,11 @@ A whole application: a duck with holes in its scan becomes a duck of even wall, 
 import signedheat as sh
 from signedheat import samples, view
 
-scan = samples.without_patches(samples.duck(40), 5, 0.2, seed=3)
-wall = sh.morphology.shell(scan, -0.1, 0.0, resolution=72)
+scan = samples.without_patches(samples.duck(28), 5, 0.2, seed=3)
+wall = sh.morphology.shell(scan, -0.1, 0.0, resolution=52)
 wall.save("hollow.stl")
 
-grid = sh.Grid.around(wall.bounds, resolution=80, padding=0.15)
+grid = sh.Grid.around(wall.bounds, resolution=56, padding=0.15)
 view.save_row(
     "hollow_model.png",
     ("in: holes", scan),

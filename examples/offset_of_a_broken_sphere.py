@@ -12,7 +12,7 @@ from signedheat import samples, view
 broken = samples.with_noise(samples.without_faces(samples.sphere(4), 0.35), 0.01)
 broken = samples.with_flipped_faces(broken, 0.1)
 
-sdf = sh.signed_distance(broken, resolution=64, padding=0.5)
+sdf = sh.signed_distance(broken, resolution=48, padding=0.5)
 surface = sdf.offset(0.2)
 
 surface.save("offset.stl")

@@ -7,13 +7,13 @@ A scan that is points alone: sides are found first, then the closed surface.
 import signedheat as sh
 from signedheat import samples, view
 
-cloud = sh.PointCloud(samples.oriented_points(samples.torus(1.0, 0.4), 5000).points)
-phi = sh.signed_distance(cloud, resolution=72)
+cloud = sh.PointCloud(samples.oriented_points(samples.torus(1.0, 0.4), 3000).points)
+phi = sh.signed_distance(cloud, resolution=52)
 surface = phi.contour()
 
 view.save_row(
     "points_without_normals.png",
-    ("in: 5000 points", cloud, {"view": (40, -58)}),
+    ("in: 3000 points", cloud, {"view": (40, -58)}),
     ("signed distance", phi, {"shape": cloud, "across": (2,)}),
     ("out: closed", surface, {"view": (40, -58)}),
 )

@@ -12,9 +12,9 @@ from signedheat import samples, view
 
 ball = samples.sphere(4)
 bowl = sh.TriangleMesh(ball.vertices, ball.faces[ball.vertices[ball.faces][..., 2].max(axis=1) <= 0])
-wall = sh.morphology.thicken(bowl, 0.06, resolution=72)
+wall = sh.morphology.thicken(bowl, 0.06, resolution=52)
 
-grid = sh.Grid.around(wall.bounds, resolution=72, padding=0.15)
+grid = sh.Grid.around(wall.bounds, resolution=52, padding=0.15)
 solid = sh.signed_distance(wall, grid)
 x, y, _ = np.moveaxis(grid.points, -1, 0)
 drill = sh.GridField(grid, np.hypot(x, y) - 0.2)

@@ -20,9 +20,9 @@ def part(points):
 
 
 bounds = [[-1.2, -0.9, -0.4], [1.2, 0.9, 0.4]]
-sharp = sh.contour(part, bounds, 0.06)
-rounded = sh.contour(part, bounds, 0.06, sharp=False)
-x, y, z = (np.linspace(low, high, n) for low, high, n in zip(*bounds, (41, 31, 15), strict=True))
+sharp = sh.contour(part, bounds, 0.08)
+rounded = sh.contour(part, bounds, 0.08, sharp=False)
+x, y, z = (np.linspace(low, high, n) for low, high, n in zip(*bounds, (31, 24, 12), strict=True))
 places = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)
 array = sh.contour(part(places.reshape(-1, 3)).reshape(places.shape[:3]), bounds)
 

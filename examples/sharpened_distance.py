@@ -23,7 +23,7 @@ def square(n: int) -> sh.TriangleMesh:
 
 
 def star_distance(points: np.ndarray) -> np.ndarray:
-    t = np.linspace(0, 2 * np.pi, 1200, endpoint=False)
+    t = np.linspace(0, 2 * np.pi, 600, endpoint=False)
     corners = 0.6 * (1 + 0.3 * np.cos(5 * t))[:, None] * np.stack([np.cos(t), np.sin(t)], axis=1)
     distance = np.full(len(points), np.inf)
     for a, side in zip(corners, np.roll(corners, -1, axis=0) - corners, strict=True):
@@ -32,7 +32,7 @@ def star_distance(points: np.ndarray) -> np.ndarray:
     return np.where(Outline(corners).contains_points(points), distance, -distance)
 
 
-mesh = square(100)
+mesh = square(80)
 exact = star_distance(mesh.vertices[:, :2])
 plain = sh.SignedHeatSolver(mesh, diffusion=100).distance(mesh.level_set(exact, 0.0))
 cases = {"heat, t = 100 h²": plain, "convex": sh.sharpen(plain, method=sh.Convex()), "geodesic": sh.sharpen(plain)}

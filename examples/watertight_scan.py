@@ -7,11 +7,11 @@ A whole application: a scan with holes, noise and turned faces becomes a closed 
 import signedheat as sh
 from signedheat import samples, view
 
-part = samples.torus(1.0, 0.4)
+part = samples.torus(1.0, 0.4, n_around=72, n_across=36)
 scan = samples.without_patches(part, 6, 0.3, seed=1)
 scan = samples.with_flipped_faces(samples.with_noise(scan, 0.008, seed=2), 0.1, seed=3)
 
-phi = sh.signed_distance(scan, resolution=72)
+phi = sh.signed_distance(scan, resolution=52)
 closed = phi.contour()
 closed.save("part.stl")
 confidence = sh.GridField(phi.grid, phi.values.clip(max=0.3))
