@@ -131,10 +131,7 @@ def bounds_around(shapes: Sequence[Any]) -> Floats:
 
 
 def point_areas(points: Floats) -> Floats:
-    """(n,) area of the disk around each point up to its k-th neighbour, divided by k; coinciding points share one.
-
-    In d dimensions the disk is a ball of dimension d − 1.
-    """
+    """(n,) area, or volume in d − 1, of the disk up to the k-th neighbour over k; coinciding points share one."""
     places, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     dimension = points.shape[1] - 1
     k = min(NEIGHBOURS, len(places) - 1)

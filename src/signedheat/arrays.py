@@ -88,11 +88,7 @@ V = TypeVar("V")
 
 
 class LastUsed(Generic[K, V]):
-    """A few values by key, the least recently used of which makes room before the next is made.
-
-    It holds what a frozen object derives from itself and an argument; what depends on the object alone is a
-    `functools.cached_property`. Copies and pickles of it are empty.
-    """
+    """A few values by key, for what a frozen object derives from an argument; copies and pickles are empty."""
 
     def __init__(self, size: int = 1) -> None:
         self.size = size

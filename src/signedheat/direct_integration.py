@@ -66,11 +66,7 @@ class DirectIntegration(Frozen):
         return [self._centered(values, source) for values, source in zip(solved.T, sources, strict=True)]
 
     def fit_exactly(self, divergence: Floats, source: SourceTerm, levels: Levels) -> Floats:
-        """Impose levels at every sample, or levels up to one unknown constant for each group of samples (Eq. 14).
-
-        The constants are those at which the multipliers of each group add up to zero. On each connected component of
-        the domain one constant is arbitrary; it is fixed by the mean over the samples.
-        """
+        """Impose levels, up to one constant for each group, at every sample (Eq. 14)."""
         rows, values = source.interpolation, levels.values
         if levels.groups is None:
             fitted, _ = self._interpolate(rows, divergence[:, None], values[:, None])
@@ -96,10 +92,7 @@ class DirectIntegration(Frozen):
         return self._centered(fitted[:, 0], source)
 
     def penalize(self, divergence: Floats, source: SourceTerm, strength: float) -> Floats:
-        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the line or area elements of the samples.
-
-        λ → 0 is the solution of Eq. 13, and what exceeds λ = ∞ by less than rounding is solved as well as that.
-        """
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the line or area elements, up to λ = ∞."""
         rows, stiffest = source.interpolation, float(self.stiffness.diagonal().max())
         if strength * float(source.weights.sum()) < SOFTEST * stiffest:
             return self.solve(divergence, source)
@@ -117,11 +110,8 @@ class DirectIntegration(Frozen):
     def _interpolate(self, rows: sparse.csr_matrix, forces: Floats, levels: Floats) -> tuple[Floats, Floats]:
         """Minimise ``½ φᵀ C φ − fᵀ φ`` where ``A φ = l``; also the multipliers μ of ``C φ + Aᵀ μ = f`` (Eq. 14).
 
-        An augmented Lagrangian: its matrix ``C + ρ Aᵀ A`` is definite even if rows of A are dependent, and with stiff
-        springs ρ two or three rounds suffice. Every round starts from the true residuals, which also corrects rounding
-        errors due to ρ. Along nearly dependent rows convergence is slow; there, conjugate gradients find the
-        displacements of the springs that close the remaining gaps. Where rows that depend on each other to rounding
-        contradict each other, no φ of this size closes the gap: it is left as it is.
+        ``C + ρ Aᵀ A`` is definite even if rows of A are dependent, and two or three rounds from the true residuals
+        suffice. Along nearly dependent rows conjugate gradients close the gaps, unless these contradict each other.
         """
         stiffness = whole(self.stiffness)
         spring = self.spring * self.stiffness.diagonal().max()
@@ -214,9 +204,8 @@ def refuse_contradictions(rows: sparse.csr_matrix, levels: Floats, values: Float
 class SpringIntegration(DirectIntegration):
     """`DirectIntegration` with a `fit` that imposes levels by springs.
 
-    Where a source crosses cells, a function that is linear on them is constant along it only if it is constant around
-    it. Springs of a strength adapted to the cells leave a smaller error than exact constraints, on the source and
-    everywhere. At vertices on the source the springs are stiff.
+    Exactly imposed across cells, a function linear on them would be constant around the source; springs leave less
+    error.
     """
 
     strength: float = 0.0  # of the springs, in 1/length
@@ -227,11 +216,7 @@ class SpringIntegration(DirectIntegration):
         return self.strength
 
     def fit(self, divergence: Floats, source: SourceTerm, levels: Levels) -> Floats:
-        """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, also over the constants of groups; see Eq. 14.
-
-        S is the diagonal matrix of the `springs`, in place of the multipliers of Eq. 14. A group of one sample, whose
-        constant may be anything, has no spring.
-        """
+        """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, S the `springs`, also over constants of groups."""
         places, springs = self.held(source)
         rows, levels = sparse.csr_matrix(places @ source.interpolation), levels.at(places)
         if levels.groups is not None:

@@ -298,11 +298,7 @@ def smooth_difference(a: Solid, b: Solid, width: float) -> Solid:
 
 
 def combined(a: Solid, b: Solid, takes_first: Callable[[Floats, Floats], Bools], bulge: float) -> Solid:
-    """Take the values of `a` where `takes_first(a, b)`, else those of `b`, and blend them where they are nearly equal.
-
-    `bulge` is the width of the transition: negative adds to the inside, positive takes from it. The result is NaN where
-    one of both is.
-    """
+    """Take `a` where `takes_first(a, b)`, else `b`, and blend over `bulge`, negative inwards; NaN where one is."""
     b = _checked(a, b)
 
     def rule(one: Floats, other: Floats) -> Floats:

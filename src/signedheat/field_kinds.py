@@ -114,10 +114,7 @@ def warned(field: AnyField) -> AnyField:
 
 
 def small_loops(source: SurfaceSource) -> int:
-    """Count the closed oriented curves shorter than `SMALL_LOOP` sides of the triangles that they cross.
-
-    Distance to them is several times less accurate than triangles of this size allow.
-    """
+    """Count closed oriented curves shorter than `SMALL_LOOP` sides of triangles, to which distance is inaccurate."""
     parts = [part for part in source.parts if part.oriented and len(part.ends)]
     if not parts:
         return 0
@@ -136,12 +133,7 @@ def small_loops(source: SurfaceSource) -> int:
 
 
 def spread(points: Floats, values: Floats, used: Bools) -> Floats:
-    """(n,) signed distances, continued from point to neighbouring point where they are NaN.
-
-    `used`, (n,), are the points that have a triangle. The length of the shortest way to a point with a value, from
-    neighbour to neighbour, adds to its absolute value; the sign stays. Points that are not used, and those that no way
-    leads to, stay NaN.
-    """
+    """(n,) signed distances, continued by the way between neighbours among the `used` (n,) where they are NaN."""
     lacking = np.isnan(values) & used
     ids = np.flatnonzero(used)
     if not lacking.any() or len(ids) <= NEAREST:

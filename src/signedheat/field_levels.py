@@ -27,10 +27,7 @@ class NodeValues(Protocol):
 
 
 def refuse_beyond_walls(walls: Floats, distance: float, domain: str, remedy: str) -> None:
-    """Raise `OutsideError` if the level at a distance leaves a domain although the shape does not.
-
-    `walls` are the values at the boundary; `domain` and `remedy` appear in the message.
-    """
+    """Raise `OutsideError` if a level leaves a domain, by values at its walls, although the shape does not."""
     low, high = float(np.fmin.reduce(walls)), float(np.fmax.reduce(walls))
     if (low > 0 or high < 0) and low < distance < high:
         raise OutsideError(
@@ -43,10 +40,7 @@ def refuse_beyond_walls(walls: Floats, distance: float, domain: str, remedy: str
 def on_level(
     distance: Callable[[Floats], Floats], points: Floats, values: NodeValues, grid: Grid, level: float
 ) -> Floats:
-    """Move (n, 3) points along the edges of a grid from the interpolated level to the exact level of `distance`.
-
-    This is regula falsi with halved weights (Dowell & Jarratt 1971). Points inside cells are not moved.
-    """
+    """Move (n, 3) points along edges of a grid to the exact level, by regula falsi (Dowell & Jarratt 1971)."""
     cells = (points - grid.origin) / grid.spacing
     near = np.rint(cells)
     cells = np.where(np.abs(cells - near) < 0.5 * CLEARANCE, near, cells)

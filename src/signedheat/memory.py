@@ -100,11 +100,7 @@ def fitting_count(count: int, estimate: Callable[[int], float], available: float
 
 
 def available_memory() -> int | None:
-    """Bytes that this process can still allocate; None if unknown.
-
-    This is the least of free memory, the limits of all enclosing control groups, and the limits of the process on
-    address space (``ulimit -v``) and data (``ulimit -d``).
-    """
+    """Bytes that this process can still allocate, by free memory, control groups and ``ulimit``; None if unknown."""
     limits = [bound for bound in (_free(), *_containers(), *_own_limits()) if bound is not None]
     return max(min(limits), 0) if limits else None
 

@@ -294,10 +294,7 @@ def offset(
 
 
 def offset_of(field: Any, distance: float) -> Any:
-    """Return the boundary at a distance from what a field measures, with edges if the field holds a solid.
-
-    It is contoured, without edges, from other fields, from those in bands, and where the grid does not hold all of it.
-    """
+    """Return the boundary at a distance from what a field measures, with edges if it holds all of its solid."""
     if isinstance(field, GridField) and isinstance(field.solid, Solid) and field.blocks is None:
         distance = finite_number(distance, "the distance")
         if np.nanmin(field.values) < distance < np.nanmin(values_at_walls(field)):
@@ -535,11 +532,7 @@ def _without_crumbs(wall: TriangleMesh, thickness: float) -> TriangleMesh:
 
 
 def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
-    """Make a round hole straight down from the bottom of the largest cavity, where that is widest.
-
-    A prism that faces inwards is added, from below the wall to `lift` above the bottom: winding numbers subtract it.
-    Where faces of wall and prism do not join, they are contoured with cells of size `cell`.
-    """
+    """Make a round hole straight down from the bottom of the largest cavity, by adding a prism that faces inwards."""
     parts, volumes = part_volumes(wall.vertices, wall.faces)
     if not volumes.min() < 0:
         raise SignedHeatError("the wall has no cavity to drain", remedy="leave out drain, or make the wall thinner")

@@ -118,9 +118,8 @@ def nearest(
 ) -> Nearest:
     """Measure to the nearest of a source and the zero set of φ; every kind of domain registers a function of its own.
 
-    `values` are φ at the unknowns, and `source` is what φ was computed from: unoriented curves and points count though
-    φ does not vanish there. Distance is exact to what is `given`; the zero set replaces it where it is missing. For
-    `tolerance` see `Geodesic`. `report` is called now and then, and may raise to end the search.
+    `source` is what φ was computed from; distance is exact to what is `given`, which the zero set completes. `report`
+    is called now and then, and may raise.
     """
     raise UnsupportedTypeError(f"there are no straight lines on a {type(domain).__name__}", element="method")
 
@@ -128,10 +127,7 @@ def nearest(
 def distance_to_nearest(
     domain: Any, values: Floats, source: SourceTerm | None, given: Any, tolerance: float, progress: Progress | None
 ) -> tuple[Floats, tuple[Note, ...]]:
-    """Measure signed distance to the nearest of a source and the zero set, on any domain; also return notes.
-
-    The source decides the sign where it can, φ elsewhere. Components with neither keep the values of φ.
-    """
+    """Measure signed distance to the nearest of a source, which decides signs, and the zero set; also return notes."""
     report = None if progress is None else lambda: progress(0.0, "sharpen")
     places = nearest(domain, values, source, given, tolerance, report)
     reached = np.isfinite(places.distances)

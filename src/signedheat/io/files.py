@@ -177,10 +177,7 @@ def _no_file(path: PathLike, mode: int) -> FileFormatError:
 
 
 def text(path: PathLike) -> str:
-    """Read a file as UTF-8, or UTF-16 with a byte order mark, with lines that end in ``\\n``.
-
-    Invalid bytes become replacement characters. Form feeds and the like do not end lines.
-    """
+    r"""Read a file as UTF-8, or UTF-16 with a byte order mark, with lines that end in ``\n``."""
     data = contents(path)
     encoding = "utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
     return data.decode(encoding, errors="replace").replace("\r\n", "\n").replace("\r", "\n")
@@ -222,10 +219,7 @@ def move_into_place(source: Path, path: PathLike) -> None:
 
 
 def replaceable(path: PathLike) -> os.stat_result | None:
-    """Return the status of the file that writing to `path` would replace, or None; raise if it must not be replaced.
-
-    Renaming would replace a file that is not writable, too; here that is refused.
-    """
+    """Return the status of the file that writing would replace, or None; raise if it is not writable."""
     real = Path(os.path.realpath(path))
     status = os.stat(real) if real.exists() else None
     if status is not None and not stat.S_ISREG(status.st_mode):

@@ -30,10 +30,7 @@ BYTES = 200
 
 
 def read_bodies(path: PathLike) -> list[Body]:
-    """Read vertices and triangles of all primitives of the default scene, placed by their nodes.
-
-    Buffers that the file names must lie in the same folder or below it. Materials, skins and morph targets are ignored.
-    """
+    """Read vertices and triangles of the default scene, placed by its nodes; files that it names must lie below it."""
     scene = _read_scene(path)
     missing = [name for name in scene.tree.get("extensionsRequired", []) if not name.startswith(SUPPORTED)]
     if any(INSTANCES in node.get("extensions", {}) for node in scene.tree.get("nodes", [])):

@@ -51,29 +51,10 @@ def parsed(
     least_seconds: int | None = None,
     **options: object,
 ) -> dict[str, Any]:
-    """Parse a file with a function of `parsers`.
+    """Parse a file by a function of `parsers` in a process of its own, and return arrays and other values by name.
 
-    Parameters
-    ----------
-    function : str
-        Name of the function.
-    path : str or path
-        The file.
-    package : str
-        Import name of the package that it needs.
-    purpose : str
-        Plural name of what needs the package, for messages.
-    bytes_per_byte : int
-        Memory limit per byte of the file, in addition to `LEAST_MEMORY`.
-    least_seconds : int, optional
-        Constant part of the limit of processor time; by default `LEAST_SECONDS`.
-    options : any
-        Further arguments that JSON can hold.
-
-    Returns
-    -------
-    dict
-        Arrays and other values by name.
+    `package` is what it needs, for a `purpose`; memory is limited to `bytes_per_byte` of the file beyond
+    `LEAST_MEMORY`, processor time by `least_seconds`. Options are what JSON can hold.
     """
     size = size_of(path)
     ensure_installed(package, purpose)

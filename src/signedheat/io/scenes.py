@@ -113,10 +113,7 @@ def unit_of(path: PathLike) -> str | None:
 
 
 def scale_to(path: PathLike, units: str) -> float:
-    """Return the factor from the lengths of a file to TO, given units ``TO`` or ``FROM:TO``.
-
-    Files that do not state their unit are in FROM, or in TO already.
-    """
+    """Return the factor from the lengths of a file to TO, given units ``TO`` or ``FROM:TO``, if it states none."""
     assumed, _, wanted = units.rpartition(":")
     return METRES[unit_of(path) or assumed or wanted] / METRES[wanted]
 

@@ -127,10 +127,7 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
 
 
 def whole_complexes(chain: Chain) -> tuple[Ints, Bools]:
-    """(m,) how often triangles count, and whether they belong to complexes that close as given.
-
-    All pieces of such a complex have a positive level in it, or all a negative one.
-    """
+    """(m,) how often triangles count, and whether they are in complexes that close as given, at one sign."""
     counts, complexes = chain.multiplicities, chain.complexes
     once = np.sign(counts)
     off = chain.unbalanced(counts, complexes)
@@ -197,12 +194,11 @@ def open_bounding(
     nested: Nesting = "given",
     as_oriented: bool = False,
 ) -> tuple[Floats, Bools, Ints, Floats]:
-    """Decide for open pieces, (p,) each: signs, whether they bound something, clusters of loose ones, and levels.
+    """Decide for open pieces, (p,) each: signs, whether they bound something, clusters of loose ones (else −1), and
+    levels.
 
-    A piece is loose if neither it nor its group is a body by itself. Clusters of other pieces are −1, their levels ½.
-    Until every piece has the level that it needs, those that fail and leave at least half as much unexplained as the
-    worst are left out, and the system is solved again. A body by itself needs `SHEET`; what is loose needs a cluster
-    that passes `CHANCE` and `COHERENT`, and among few pieces a level in proportion to its cluster's.
+    A piece is loose if neither it nor its group is a body by itself. Those that fail their level, and leave at least
+    half as much unexplained as the worst, are left out, round by round.
     """
     n, areas = len(pieces.areas), pieces.areas
     shared = np.bincount(groups, minlength=n)[groups] > 1

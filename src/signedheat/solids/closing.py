@@ -106,9 +106,8 @@ def samples_near(
 def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> tuple[Floats, Floats, Floats]:
     """(n, 3) normals and (n,) curvatures with which a surface continues beyond its rim, and (n,) their weights.
 
-    Across an opening of width W a surface that meets the flat lid at angle β must turn by 2 sin β, the chord of a
-    circle; if its curvature towards the rim is k, it would turn by k W. On a ball both are the same, on a box k is 0.
-    The samples are of the surface behind the flat lid; at each place of the rim the smooth patch `patches` ends.
+    Across an opening of width W it must turn by 2 sin β to meet the flat lid at angle β, and would by its curvature k
+    turn by k W: on a ball these are the same, on a box k is 0.
     """
     n, loop = lid.n_rim, lid.vertices[: lid.n_rim]
     reach = REACH * width
@@ -164,10 +163,9 @@ is 90°."""
 
 
 def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints, most: float) -> list[Ints]:
-    """(n − 2, 3) triangles that fill each loop of n vertices; none if they do not continue the surface.
+    """(n − 2, 3) triangles that fill each loop of n vertices with bends at the rim below `most`, or none.
 
-    Loops run counterclockwise as seen from outside; `normals` are those of the faces behind their edges, loop after
-    loop; `taken` are sorted `edge_keys` that may not be made; `most` is the root mean square of the angles at the rim.
+    Loops are counterclockwise from outside; `normals` are those behind their edges; `taken` sorted `edge_keys`.
     """
     starts = np.concatenate([[0], np.cumsum([len(loop) for loop in loops], dtype=np.int64)])
     if not len(loops):
@@ -185,10 +183,10 @@ def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints
 def _least_bent(
     corners: Floats, ids: Ints, normals: Floats, starts: Ints, taken: Ints, most: float
 ) -> tuple[Ints, Bools]:
-    """Triangles, as places in their loops, and whether each loop's bend at the rim is within an angle.
+    """Triangles, as places in their loops, and whether each loop bends at the rim within an angle.
 
-    `cost[i, j]` is the bend of the best lid between corners i and j, without the edge between them; `rims[i, j]` sums
-    lengths times squared angles at the rim; `across[i, j]` is the normal of its triangle there.
+    `cost[i, j]` is the bend of the best lid between corners i and j; `rims` sums lengths times squared angles at the
+    rim.
     """
     n_loops = len(starts) - 1
     faces, closed = np.empty((len(corners) - 2 * n_loops, 3), dtype=np.int64), np.zeros(n_loops, dtype=np.bool_)
@@ -283,18 +281,9 @@ NONE = np.empty((0, 2), dtype=np.int64)
 def closed_by(vertices: Floats, faces: Ints, *, bent: bool = True, outlines: Ints = NONE) -> tuple[Floats, Ints]:
     """Close the boundary of (m, 3) triangles: (n + k, 3) vertices, and (p, 3) triangles that balance each edge.
 
-    Small holes are closed by the triangles between their corners that bend least, where these continue the surface;
-    rims that run along each other by strips; and each other loop by a lid: with `bent`, a thin plate that continues how
-    the surface bends, or else flat faces that meet in creases, or a film. Whole loops of `outlines`, (k, 2), stay open.
-    Where lids have more points along an edge than faces have, triangles without area lie between.
-
-    Examples
-    --------
-    >>> from signedheat import samples
-    >>> ball = samples.sphere(2)
-    >>> _, added = closed_by(ball.vertices, ball.faces[1:])
-    >>> sorted(added[0]) == sorted(ball.faces[0])
-    True
+    Small holes get triangles between corners, rims that run along each other strips, other loops lids: `bent` ones, or
+    flat faces in creases, or films. Whole loops of `outlines`, (k, 2), stay open. Where lids are finer, triangles
+    without area lie between.
     """
     faces = np.asarray(faces, dtype=np.int64)
     if len(boundary(faces)) == len(outlines):

@@ -44,17 +44,7 @@ SIDES = 16
 
 
 def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Floats, Ints]:
-    """(k, 3) points on rims, at most a step apart, and (m, 3) triangles from them to the borders of patches.
-
-    Examples
-    --------
-    >>> from signedheat import samples
-    >>> ball = samples.sphere(2)
-    >>> points, added = seam_triangles(ball.vertices, ball.faces[5:], ball.faces[:3], 0.05)
-    >>> left = boundary(np.concatenate([ball.faces[5:], ball.faces[:3], added]))
-    >>> bool(np.isin(left, np.append(boundary(ball.faces[5:]), len(ball.vertices) + np.arange(len(points)))).all())
-    True
-    """
+    """(k, 3) points on rims, at most a step apart, and (m, 3) triangles from them to the borders of patches."""
     rim, (tails, heads) = boundary(faces), boundary(patches).T
     starts, ways = vertices[rim[:, 0]], vertices[rim[:, 1]] - vertices[rim[:, 0]]
     counts = np.maximum(np.ceil(np.linalg.norm(ways, axis=1) / step), 1).astype(np.int64) - 1
@@ -253,11 +243,7 @@ def oriented_points(cloud: PointCloud) -> tuple[PointCloud, tuple[Note, ...]]:
 
 
 def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
-    """Make the solid of a mesh, given its distinct triangles (`chain`) and what each of them bounds (`decided`).
-
-    Bodies of which little is left are completed by heat, all other triangles that bound something by lids; those that
-    bound nothing are kept as sheets. Origins of the solid are ids of triangles of the mesh.
-    """
+    """Make the solid of a mesh from its distinct triangles and what they bound: torn bodies by heat, others by lids."""
     vertices = mesh.vertices
     counts = np.abs(decided.counts)
     faces = np.where((decided.counts < 0)[:, None], chain.faces[:, ::-1], chain.faces)

@@ -68,17 +68,8 @@ class Quadrics:
 def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats, Ints, Floats]:
     """(n, 3) points of least error of quadrics in boxes, (n,) ranks of the planes, (n, 3) least fixed directions.
 
-    A minimum outside of its box moves along the direction in which the error grows the least, that of a crease, until
-    it is in the box; or else it is looked for again on the wall that it is beyond the farthest, up to three times.
-    The corners of boxes, and the points, are relative to the centres.
-
-    Examples
-    --------
-    >>> normals = np.eye(3)
-    >>> corner = Quadrics.of(np.zeros(3, dtype=int), np.full((3, 3), 0.2), normals, 1)
-    >>> points, ranks, _ = minimizers(corner, np.full((1, 3), -1.0), np.array([[1.0, 1.0, 0.1]]))
-    >>> points.round(3).tolist(), ranks.tolist()
-    ([[0.2, 0.2, 0.1]], [3])
+    A minimum outside of its box moves along the direction in which the error grows the least, that of a crease, into
+    it, or is looked for on the wall that it is beyond the farthest.
     """
     values, vectors = np.linalg.eigh(quadrics.products)
     least = FLAT**2 * np.maximum(values[:, 2], 1e-300)
@@ -244,10 +235,7 @@ def _probes(along: Floats, across: Floats, spacing: Floats) -> Floats:
 def divided_along_creases(
     offset: ImplicitSurface, spacing: Floats, vertices: Floats, faces: Ints
 ) -> tuple[Floats, Ints]:
-    """Divide bent edges that are off the level, with new vertices on the level, unless triangles would intersect.
-
-    This restores creases through cells whose edges the level does not cross, and which thus have no vertex.
-    """
+    """Divide bent edges off the level at creases without a vertex, unless triangles would intersect."""
     new = np.ones(len(faces), dtype=bool)
     for _ in range(DIVISIONS if len(faces) <= MOST else 0):
         edges, points = _creases_off(offset, spacing, vertices, faces, new)
@@ -271,10 +259,7 @@ def divided_along_creases(
 def _creases_off(
     offset: ImplicitSurface, spacing: Floats, vertices: Floats, faces: Ints, new: Bools
 ) -> tuple[Ints, Floats]:
-    """Return (k, 2) halfedges of bent edges off the level, and (k, 3) points on the crease or level for them.
-
-    Only edges of faces that are `new`, (m,), are looked at, and at most one in each face is returned.
-    """
+    """Return (k, 2) halfedges of bent edges off the level, one in a `new` face (m,), and (k, 3) points on it."""
     step = float(spacing.max())
     normals, edges = unit(area_vectors(vertices[faces])), edge_table(faces).pairs
     edges = edges[new[edges // 3].any(axis=1)]
@@ -434,10 +419,7 @@ def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCe
 
 
 def blocks_at(offset: Offset, grid: Grid) -> Ints:
-    """(n, 3) places of the blocks of a grid with nodes near a surface, found from coarse to fine.
-
-    Heights change by no more than one goes, so that the one at the middle of a block says how near the surface is.
-    """
+    """(n, 3) places of the blocks of a grid near a surface: heights change by no more than one goes."""
     diagonal = (1.0 if offset.level is not None else STEEPEST) * float(np.linalg.norm(grid.spacing))
 
     def near(centres: Floats, half: float) -> Bools:

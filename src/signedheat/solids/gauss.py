@@ -342,10 +342,7 @@ class Dipoles:
 
 
 def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> sparse.csr_array:
-    """(k, k) signed Laplacian, times μ, of pieces whose neighbours lie roughly in one plane.
-
-    Places count less off each other's plane, and where two pieces have many: these know for themselves.
-    """
+    """(k, k) signed Laplacian, times μ, of pieces whose neighbours lie roughly in one plane, but not of many places."""
     n, k = len(places), min(NEIGHBORS, len(places) - 1)
     near = scipy.spatial.cKDTree(places).query(places, k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), near.ravel()

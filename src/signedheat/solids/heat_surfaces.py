@@ -192,10 +192,7 @@ class Heat:
 
 
 def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0.0) -> tuple[Floats, Ints] | None:
-    """Extract the closed zero set of φ around a shape, as vertices and faces; None if the shape bounds nothing.
-
-    Cells are as large as noise is wide, or a share of the gaps between points; 0 means the smallest.
-    """
+    """Extract the closed zero set of φ around a shape, in cells as wide as noise; None if it bounds nothing."""
     bounds = shape.bounds
     side = float(np.ptp(bounds, axis=0).max())
     nodes = int(np.clip((1 + 2 * ROOM) * side / cell, *NODES)) if cell > 0 else NODES[1]

@@ -76,11 +76,7 @@ class Implicit:
 
 @dataclass(frozen=True, eq=False)
 class NodePlanes:
-    """Values between the nodes of a grid, by the planes through values and slopes at nodes.
-
-    Planes are mixed linearly; where they differ as at an edge, their maximum or minimum counts if it gives back the
-    values at the nodes, as it does of what is convex or concave.
-    """
+    """Planes through values and slopes at nodes, mixed linearly, but at convex or concave edges their extremes."""
 
     origin: Floats
     spacing: Floats
@@ -272,11 +268,9 @@ def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
 
 
 def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, level: float) -> tuple[Implicit, Grid]:
-    """Make the level set of values f, (nx, ny, nz), at the nodes of a grid that fills the box, from corner to corner.
+    """Make the level set of values f, (nx, ny, nz), in a box, and the grid to contour on, with walls outside.
 
-    `gradient`: slopes at the nodes, (nx, ny, nz, 3), or a function that gives them at (n, 3) places; by default
-    differences, which count as unknown at nodes where they change much.
-    Also return the grid to contour on, with one more node on each side: walls just outside the box close the surface.
+    `gradient` is slopes at nodes, (nx, ny, nz, 3), or a function; by default differences, unknown where they change.
     """
     values = array_of(f, "f").astype(np.float64)
     if values.ndim != 3 or min(values.shape) < 2 or not np.isfinite(values).all():
@@ -309,10 +303,7 @@ def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, 
 
 
 def _slopes(values: Floats, axis: int) -> tuple[Floats, Floats]:
-    """Second-order differences from node to node along an axis, and how much they change.
-
-    Of three parabolas the one that bends least counts (Harten et al. 1987): slopes do not reach across edges.
-    """
+    """Second-order differences along an axis, of the least bent of three parabolas (Harten 1987), and their change."""
     v = np.moveaxis(values, axis, 0)
     if len(v) < 3:
         return np.broadcast_to(np.moveaxis(v[1:] - v[:1], 0, axis), values.shape), np.zeros(values.shape)

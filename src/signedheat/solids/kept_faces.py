@@ -73,15 +73,10 @@ class Joined:
 
 
 def given_surface(solid: Evaluated, contour: Callable[[], TriangleMesh], cell: float) -> tuple[TriangleMesh, Floats]:
-    """Triangles of a solid that have the inside behind them only, joined into a closed mesh.
+    """Triangles of a solid with the inside behind them only, joined into a closed mesh, by `contour` where they are
+    not.
 
-    Those that join already stay as they are, in their order. Where triangles do not join, the surface of `contour`,
-    with cells of this size, takes their place; the middles of such places, (k, 3), are returned, too.
-
-    Raises
-    ------
-    GeometryError
-        If there are no such triangles, or they do not join with the contour either.
+    The middles of such places, (k, 3), are returned, too. Triangles that join stay as they are.
     """
     windings = solid.windings
     bounding = solid.triangles[solid.bounding]
@@ -247,21 +242,7 @@ def _among(places: Ints, others: Ints) -> Bools:
 
 
 def split_at_pinches(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
-    """Give parts of a closed mesh that touch along edges or at vertices their own: what is inside stays apart.
-
-    Around an edge of more than two faces each is paired with the one that bounds the same wedge of the inside. Edges of
-    more whose ends hang together all around get middles. A mesh that is manifold stays as it is.
-
-    Examples
-    --------
-    Two tetrahedra with an edge in common:
-
-    >>> points = np.array([[0.0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
-    >>> tet = np.array([[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]])
-    >>> other = np.array([0, 1, 4, 5])[tet]
-    >>> len(split_at_pinches(points, np.concatenate([tet, other]))[0])
-    8
-    """
+    """Give parts of a closed mesh that touch along edges or at vertices their own: what is inside stays apart."""
     points, faces = _split(points, faces)
     while True:
         table = edge_table(faces)

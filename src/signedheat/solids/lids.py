@@ -130,10 +130,7 @@ def _around_disc(shares: Floats) -> Floats:
 
 
 def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tuple[Floats, Ints] | None:
-    """Make a lid that spans a loop and follows another lid: the points added to the loop's, and triangles.
-
-    It is triangulated in the same plane, or the same disc; None if the loop's shadow in the plane crosses itself.
-    """
+    """Make a lid that spans a loop over another lid: added points, and triangles; None if its shadow crosses itself."""
     n, ways = over.n_rim, np.roll(loop, -1, axis=0) - loop
     edges, shares = cut_to_pieces(loop)
     if frame is None:
@@ -163,10 +160,7 @@ def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tup
 
 
 def film(pattern: Film) -> Film:
-    """Make the lid of nearly least area: each shape's lengths give the next one (Pinkall & Polthier 1993).
-
-    No weight is negative, so that the lid stays within the hull of its rim.
-    """
+    """Make the lid of nearly least area (Pinkall & Polthier 1993), within the hull of its rim."""
     n, vertices, faces, plane = pattern.n_rim, pattern.vertices, pattern.faces, pattern.plane
     if n == len(vertices):
         return pattern
@@ -323,13 +317,7 @@ class _Run:
 
 
 def is_flat(points: Floats) -> bool:
-    """Whether points lie in a plane.
-
-    Examples
-    --------
-    >>> is_flat(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.001]]))
-    True
-    """
+    """Whether points lie in a plane."""
     around = points - points.mean(axis=0)
     normal = np.linalg.eigh(around.T @ around)[1][:, 0]
     return bool(np.abs(around @ normal).max() <= FLAT * np.linalg.norm(np.ptp(points, axis=0)))
@@ -343,9 +331,8 @@ def flat_lid(loop: Floats) -> tuple[Floats, Ints] | None:
 def creased(loop: Floats, normals: Floats) -> tuple[Floats, Ints] | None:
     """Make the lid of flat faces that closes a rim, as added points and triangles; None if there is none.
 
-    Consecutive sides in a plane are closed in that plane by a straight crease, if the sides before and after them lie
-    in a plane with their ends; three such runs, by creases to the point where their planes meet. This restores edges
-    and corners of boxes. No face is folded back over the surface, whose (n, 3) `normals` are 0 where unknown.
+    Sides in a plane are closed in it by a crease, three such runs to where their planes meet; no face folds back over
+    the surface, whose (n, 3) `normals` are 0 where unknown.
     """
     points, sides = loop, _straight_sides(loop, normals)
     polygons: list[Ints] = []

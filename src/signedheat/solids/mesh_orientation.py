@@ -271,11 +271,7 @@ def orient(
 
 
 def agreeing_faces(mesh: TriangleMesh) -> Ints:
-    """(m, 3) faces of a mesh, some turned so that neighbours run along their common edge in opposite directions.
-
-    In each component, connected across edges of two faces, those of most of the area stay; if they cannot agree, all.
-    Faces name the first of the vertices at each place, so that they agree across seams, too, and copies are equal.
-    """
+    """(m, 3) faces, by the first vertex at each place, turned to agree where all of a component can."""
     chain, faces = Chain.of(mesh), mesh.faces.copy()
     turned = chain.pieces(np.ones(len(chain.faces), dtype=bool)).turned
     proper = chain.numbers >= 0

@@ -35,10 +35,7 @@ ALONG_A_CURVE = np.stack(
 def distances_in(
     tree: FaceTree, windings: Windings, grid: Grid, first: Ints, places: Ints
 ) -> tuple[Floats, NDArray[np.float32]]:
-    """Compute (a, b, c) signed distances at the nodes of blocks, NaN between these; and confidence.
-
-    `first` is the first node of the box around them; `places` are the first nodes of the blocks, divided by `SIDE`.
-    """
+    """Compute (a, b, c) signed distances at nodes of blocks, from node `first` on, or NaN; and confidence."""
     shape = np.minimum((places.max(axis=0) + 1) * SIDE, grid.shape) - first
     squares, faces = np.full(tuple(shape), np.nan), np.full(tuple(shape), -1, dtype=np.int32)
     boxes = tree.features.rows, tree.tree.bounds, tree.discs, tree.tree.items
@@ -121,10 +118,7 @@ def _fill(
     out_squares: Floats,
     out_faces: NDArray[np.int32],
 ) -> Bools:
-    """Write the nearest faces of all nodes of blocks, and squared distances; return which blocks are too crowded.
-
-    `eighths` is `EIGHTHS`, an argument because its length must be unknown to the compiler.
-    """
+    """Write nearest faces of nodes, and squared distances; return blocks too crowded. `eighths` is `EIGHTHS`."""
     leaves, parts = len(bounds) // 2, eighths.shape[1]
     most = LEAF * min(CROWDED, leaves) + 1
     faces, counts = np.empty((3, parts, most), dtype=np.int32), np.empty((3, parts), dtype=np.int64)
@@ -202,10 +196,7 @@ def _divide(
     out: NDArray[np.int32],
     counts: Ints,
 ) -> None:
-    """Find the faces that can be nearest to a node of each of eight boxes.
-
-    Squared distance is convex, so it lies above its tangent plane at the centre: twice the way from the foot.
-    """
+    """Find faces that can be nearest in each of eight boxes: squared distance lies above its tangent plane."""
     ways, can = np.empty((4, len(best))), np.empty(len(best), dtype=np.int64)
     for e in range(len(best)):
         counts[e] = 0
@@ -251,8 +242,8 @@ def _leaves_of_tree(bounds: Floats, discs: Floats, box: Floats, stack: Ints, out
 def _can_be_nearest(bounds: Floats, discs: Floats, node: int, box: Floats) -> bool:
     """Whether a place y in the box or disc of a node is as near to some x of a box as the foot q of its centre.
 
-    Around the centre ``|x − y|² − |x − q|²`` at the worst x is the sum over the axes of ``y² − q² − 2 e |y − q|``, e
-    half the box, each of which is least where y is e or −e, or at an end. For a disc as in `_divide`.
+    ``|x − y|² − |x − q|²`` at the worst x is the sum over axes of ``y² − q² − 2 e |y − q|``, e half the box, least at
+    ±e or an end.
     """
     total, scale = 0.0, 0.0
     for d in range(3):

@@ -186,10 +186,7 @@ ASIDE = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class SheetWall:
-    """A solid around a surface: its faces, moved to an origin, and the rim where it ends.
-
-    Beyond a rim, only what stands upright on it counts; over the inside of the surface, distance along it to the rim.
-    """
+    """A solid around a surface: faces, moved to an origin, and the rim, where only what is upright counts."""
 
     tree: FaceTree
     origin: Floats

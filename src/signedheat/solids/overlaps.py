@@ -35,15 +35,7 @@ one."""
 
 
 def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) -> Floats:
-    """(n,) levels at the centres of some triangles, each due to its own group, with counts as multiplicities.
-
-    Examples
-    --------
-    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    >>> tet = corners[np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])]
-    >>> levels_within(tet, np.zeros(4, dtype=int), np.ones(4, dtype=int), np.arange(2)).round(6).tolist()
-    [0.5, 0.5]
-    """
+    """(n,) levels at the centres of some triangles, each due to its own group, with counts as multiplicities."""
     names, labels = np.unique(groups, return_inverse=True)
     starts, order = grouped(labels, len(names))
     rank = np.argsort(order)
@@ -139,9 +131,7 @@ def bodies_around(
 ) -> Floats:
     """(n,) winding numbers, at the places of a system, of the bodies that each place ignores.
 
-    It sees its own body, the body in which this is a cavity, and the cavities in it; bodies beside it, and those that
-    overlap or contain it as bodies, it ignores. A piece of no body belongs to the nearest one. `nested` decides which
-    bodies within others are cavities; as given, all but those whose faces clearly faced outwards (`HINT`).
+    It sees its own body, the one in which this is a cavity, and cavities in it; `nested` decides which bodies are.
     """
     directed = np.where((signs < 0)[pieces.labels, None, None], pieces.triangles[:, ::-1], pieces.triangles)
     bodies = Bodies.of(pieces, directed, groups, alone, signs * given)

@@ -30,19 +30,7 @@ class PointOrientation(ShortRepr):
 
 
 def orient_points(cloud: PointCloud) -> PointOrientation:
-    """Turn the normals of a point cloud outwards, all together; fit them first where there are none.
-
-    Normals given are weak evidence for which side is out: if most are inverted, that is found out. Growth is n log n.
-
-    Examples
-    --------
-    >>> from signedheat import samples
-    >>> found = orient_points(PointCloud(samples.oriented_points(samples.torus(), 2000).points))
-    >>> ring = found.cloud.points * (1, 1, 0)
-    >>> outward = found.cloud.points - ring / np.linalg.norm(ring, axis=1, keepdims=True)
-    >>> bool(((outward * found.cloud.normals).sum(axis=1) > 0).all())
-    True
-    """
+    """Turn the normals of a point cloud outwards, fitted where there are none; given ones may be mostly inverted."""
     if cloud.points.shape[1] != 3:
         raise GeometryError(
             f"point clouds are oriented in space: points need 3 coordinates, not {cloud.points.shape[1]}",
@@ -82,26 +70,10 @@ REACH = 1.5
 
 
 def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats) -> Floats:
-    """Move the zero set of φ onto a smooth surface through oriented points, where there are any.
+    """Move the zero set of φ, (nx, ny, nz), at nodes `steps` apart, onto a smooth surface through oriented points.
 
-    φ, (nx, ny, nz), is given at nodes `steps`, (3,), apart, and positive where the unit normals, (n, 3), point to; the
-    points, (n, 3), are relative to the first node. Return the new φ.
-
-    At a node x near the zero set φ becomes the weighted mean of ``½ (n_i + n) · (x − p_i)`` over nearby points p_i; n_i
-    are their normals, n the weighted mean of these. The plane of a point lies on one side of a curved surface, and
-    the plane through it with the normal at x on the other: half the sum of both has no error of second order. Points
-    that face against ∇φ do not count, so that the two sides of a thin wall stay apart.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> normals = rng.normal(size=(800, 3))
-    >>> normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    >>> nodes = np.stack(np.meshgrid(*[np.linspace(-1.5, 1.5, 25)] * 3, indexing="ij"), axis=-1)
-    >>> truth = np.linalg.norm(nodes, axis=-1) - 1.0
-    >>> fitted = fitted_to_points(truth + 0.05, np.full(3, 0.125), normals + 1.5, normals)
-    >>> bool(np.abs(fitted - truth)[np.abs(truth) < 0.1].max() < 0.015)
-    True
+    Near it φ becomes the weighted mean of ``½ (n_i + n) · (x − p_i)`` over points p_i, from the first node, n the mean
+    of their normals: the planes with either lie on two sides of a curved surface. Points against ∇φ do not count.
     """
     tree = scipy.spatial.cKDTree(points)
     n_neighbours = min(NEIGHBOURS, len(points))

@@ -28,16 +28,7 @@ STRAIGHT = 1e-5
 
 
 def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:
-    """(k, 2) directed edges that the faces of each part lack, and (k,) these parts, ascending.
-
-    If k more faces run along an edge in one direction than in the other, it is listed k times, as missing faces would
-    run along it. As many of these edges begin at each vertex as end there.
-
-    Examples
-    --------
-    >>> open_edges(np.array([[0, 1, 2], [2, 1, 3]]), np.zeros(2, dtype=int))[0].tolist()
-    [[1, 0], [0, 2], [3, 1], [2, 3]]
-    """
+    """(k, 2) directed edges that the faces of each part lack, as often as they do, and (k,) these parts, ascending."""
     table = edge_table(faces)
     n, edges_of_sides, owners = len(table.vertices), table.face_edges.ravel(), np.repeat(parts, 3)
     lacking, last = table.balance != 0, np.empty(n, dtype=np.int64)
@@ -52,13 +43,7 @@ def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:
 
 
 def boundary(faces: Ints) -> Ints:
-    """(k, 2) directed edges that faces lack, with multiplicity: together with them, all edges are balanced.
-
-    Examples
-    --------
-    >>> boundary(np.array([[0, 1, 2], [2, 1, 3]])).tolist()
-    [[1, 0], [0, 2], [3, 1], [2, 3]]
-    """
+    """(k, 2) directed edges that faces lack, with multiplicity: together with them, all edges are balanced."""
     table = edge_table(faces)
     open_edges = np.flatnonzero(table.balance)
     excess = table.balance[open_edges]
@@ -69,15 +54,7 @@ def boundary(faces: Ints) -> Ints:
 def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
     """Find closed loops around the gaps of faces, along all boundary edges; no loop passes a vertex twice.
 
-    Where several loops meet at a vertex, each edge that arrives there goes on along the edge at the other side of the
-    gap beside it. Where gaps are connected at vertices, loops come apart there, beginning far from the middle of all.
-
-    Examples
-    --------
-    >>> vertices = np.array([[0.0, 0, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 0]])
-    >>> faces = np.array([[0, 1, 2], [0, 3, 4]])
-    >>> [loop.tolist() for loop in loops(vertices, faces, boundary(faces))]
-    [[0, 4, 3], [2, 1, 0]]
+    An edge goes on at the other side of the gap beside it; gaps connected at vertices come apart far from the middle.
     """
     if not len(edges):
         return []
@@ -113,10 +90,7 @@ def _normals(vertices: Floats, faces: Ints) -> Floats:
 
 @compiled
 def _across_gaps(starts: Ints, names: Ints) -> Ints:
-    """Find the edge that follows each one, given the edges at each vertex in order; −1 − e if e arrives.
-
-    Gaps are nested as parentheses are.
-    """
+    """Find the edge after each, of those at each vertex in order, −1 − e if e arrives; gaps nest like parentheses."""
     following, waiting = np.full(len(names) // 2, -1), np.empty(len(names) // 2, dtype=np.int64)
     for v in range(len(starts) - 1):
         depth = 0
@@ -161,40 +135,20 @@ def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) ->
 
 
 def corners_of(points: Floats) -> Ints:
-    """(k,) corners of a closed loop: points where it does not go straight on.
-
-    Examples
-    --------
-    >>> corners_of(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 2, 0]])).tolist()
-    [0, 2, 3]
-    """
+    """(k,) corners of a closed loop: points where it does not go straight on."""
     ahead = unit(np.roll(points, -1, axis=0) - points)
     return np.flatnonzero(np.linalg.norm(ahead - np.roll(ahead, 1, axis=0), axis=1) > STRAIGHT)
 
 
 def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
-    """Pairs of edges, without common ends, that run along each other in opposite directions, as patches do.
-
-    Examples
-    --------
-    >>> one, other = [[0, 0, 0], [1, 0, 0]], [[0.8, 0.01, 0], [0.3, 0.02, 0]]
-    >>> [edges.tolist() for edges in meeting_edges(np.array([one, other]))]
-    [[0], [1]]
-    """
+    """Pairs of edges, without common ends, that run along each other in opposite directions, as patches do."""
     first, second, cosines = _edges_beside(ends)
     meeting = (cosines < OPPOSITE) & (ends[first] != ends[second, ::-1]).any(axis=(1, 2))
     return first[meeting], second[meeting]
 
 
 def meeting_either_way(ends: Floats) -> tuple[Ints, Ints]:
-    """Pairs of edges that meet if one of them is turned or none: which way they run is not known yet.
-
-    Examples
-    --------
-    >>> one, other = [[0, 0, 0], [1, 0, 0]], [[0.3, 0.02, 0], [0.8, 0.01, 0]]
-    >>> [edges.tolist() for edges in meeting_either_way(np.array([one, other]))]
-    [[0], [1]]
-    """
+    """Pairs of edges that meet if one of them is turned or none: which way they run is not known yet."""
     first, second, cosines = _edges_beside(ends)
     other = np.where((cosines < 0)[:, None, None], ends[second, ::-1], ends[second])
     meeting = (np.abs(cosines) > -OPPOSITE) & (ends[first] != other).any(axis=(1, 2))

@@ -128,9 +128,8 @@ def training_points(
 ) -> tuple[dict[str, NDArray[np.float32]], dict[str, NDArray[np.float32]]]:
     """Sample n points of each kind in single precision: on a closed surface, and around it with signed distances.
 
-    On it: (n, 6) positions and normals, uniform in area, and along sharp edges, if there are any. Around it: (n, 3)
-    points in the cube around the bounding sphere, and those on the surface moved by normal noise; their (n,) distances
-    are ``…_label``. With `normalize`, the shape is first moved and scaled into the unit sphere.
+    On it: (n, 6) positions and normals, by area and along sharp edges. Around it: (n, 3) in the cube around its sphere,
+    and near it; their (n,) distances are ``…_label``. With `normalize`, in the unit sphere.
     """
     random = np.random.default_rng(0)
     lower, upper = surface.bounds

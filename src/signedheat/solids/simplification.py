@@ -30,11 +30,7 @@ LARGE = 3.0
 
 
 def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
-    """Simplify a surface, so that no point of either surface is farther than a tolerance from the other.
-
-    manifold3d collapses edges, fewer until both distances are proven and nothing intersects itself; if that never
-    succeeds, the surface is returned unchanged, with an `InexactWarning`.
-    """
+    """Simplify a surface by manifold3d to a proven tolerance; unchanged, with an `InexactWarning`, if that fails."""
     given = manifold3d.Manifold(
         manifold3d.Mesh64(np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.uint64))
     )
@@ -64,15 +60,7 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
 def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
     """Whether all of a surface lies within a distance of another one; False if it is too close to call.
 
-    Distance to one triangle is convex, so that no point of a piece is farther from it than a corner. Pieces not all of
-    which is near the triangle nearest to their middle are cut by planes upright on its sides.
-
-    Examples
-    --------
-    >>> flat = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]], [[0, 1, 2]])
-    >>> raised = TriangleMesh([[0, 0, 0.1], [1, 0, 0], [0, 1, 0.0]], [[0, 1, 2]])
-    >>> is_within(raised, flat, 0.11), is_within(raised, flat, 0.09)
-    (True, False)
+    Distance to a triangle is convex, so corners of pieces tell; pieces near several are cut upright on its sides.
     """
     tree = FaceTree.of(FaceFeatures.of(other.vertices, other.faces))
     rows = tree.features.rows
@@ -91,12 +79,7 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
 
 
 def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
-    """(k, 3, 3) parts of (n, 3, 3) pieces, cut upright on the side of a triangle that leaves most on both sides.
-
-    `rows`, (n, 16), are the triangles nearest to the pieces, as `triangle_rows` gives them. A cut leaves pieces wider
-    than `least` on both sides. Pieces much larger than their triangle, and those that no side cuts, are halved along
-    their longest side.
-    """
+    """(k, 3, 3) parts of (n, 3, 3) pieces, cut upright on a side of their nearest triangles, (n, 16), or halved."""
     sides = np.linalg.norm(np.roll(pieces, -1, axis=1) - pieces, axis=2)
     relative = pieces - rows[:, None, :3]
     p = (relative * rows[:, None, 3:6]).sum(axis=2)

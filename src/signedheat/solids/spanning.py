@@ -101,15 +101,7 @@ def area_vector(loop: Floats) -> Floats:
 
 
 def spanned(loop: Floats, inner: Floats) -> Spanned | None:
-    """Delaunay triangles of a polygon in the plane, with those points that are inside; None if it crosses itself.
-
-    Examples
-    --------
-    >>> square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
-    >>> found = spanned(square, np.array([[0.5, 0.5], [2.0, 0.5]]))
-    >>> len(found.faces), found.inner.tolist()
-    (4, [0])
-    """
+    """Delaunay triangles of a polygon in the plane, with those points that are inside; None if it crosses itself."""
     count = len(loop)
     edges, shares = np.arange(count), np.zeros(count)
     for _ in range(SPLITS):

@@ -258,17 +258,7 @@ def thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
 
 
 def widths(shape: Mesh) -> Widths:
-    """Measure walls and gaps between faces opposite each other, at places spread evenly over a shape.
-
-    Its faces point outwards. Faces that share a vertex are a fold, and have no width between them.
-
-    Examples
-    --------
-    >>> from signedheat import samples
-    >>> found = widths(samples.torus(major=1.0, minor=0.4))
-    >>> 0.77 < found.wall < 0.8, 1.19 < found.gap < 1.22
-    (True, True)
-    """
+    """Measure walls and gaps between opposite faces, not of folds, at places spread evenly over a shape."""
     mesh, exponent = shape.triangulation, int(np.frexp(np.abs(shape.bounds).max())[1])
     triangles = np.ldexp(mesh.vertices, -exponent)[mesh.faces]  # so that no product leaves the range of numbers
     size = float(np.ldexp(1.0, exponent))
@@ -297,11 +287,7 @@ def widths(shape: Mesh) -> Widths:
 
 
 def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) -> tuple[Floats, Ints]:
-    """(n,) diameters of the largest balls behind places on a surface, and the face of the tree that each touches.
-
-    `facing` are unit normals of the faces of the tree, zero of those that are no walls. They and `normals` all point
-    out of a solid, or all into it. NaN and face 0 where nothing is opposite.
-    """
+    """(n,) diameters of largest balls behind places, or NaN, and the face each touches; `facing` 0 is no wall."""
     lower, upper = tree.tree.bounds[1, :3], tree.tree.bounds[1, 3:]
     extent = float(np.linalg.norm(upper - lower))
     least = COINCIDENT * float(np.abs(tree.tree.bounds[1]).max())
@@ -332,10 +318,7 @@ def _ways(normals: Floats, items: Ints) -> Floats:
 
 
 def _normals_at(triangles: Floats, faces: Ints, places: Floats) -> Floats:
-    """(n, 3) unit normals at places on faces, mixed of those at corners, which are means across smooth edges.
-
-    Without, balls behind places off the middle of a face would be tilted, and too small by as much.
-    """
+    """(n, 3) unit normals at places, mixed of means at corners: others would tilt balls, and make them small."""
     ids = indexed(triangles)[1]
     flat, pairs = unit(area_vectors(triangles)), edge_table(ids).pairs
     pairs = pairs[np.einsum("ij,ij->i", *flat[pairs // 3].swapaxes(0, 1)) > SMOOTH]
@@ -387,8 +370,7 @@ def _descend(
 ) -> None:
     """Diameters, no more than in `out`, at (n, 6) places and their normals: what reaches into a ball makes it smaller.
 
-    What reaches into it by less than `SLACK` is left out first, since a ball that fits a round wall touches all of it.
-    Then what is around the place that it touches counts `FINER`, and so on: where a wall is flat, to the last digit.
+    Less than `SLACK` is left out first, since a ball that fits a round wall touches all of it; then `FINER`, and so on.
     """
     leaves, stack = len(bounds) // 2, np.empty(66, dtype=np.int64)
     for p in range(len(places)):

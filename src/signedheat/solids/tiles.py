@@ -116,11 +116,7 @@ def band_field(
     scheduler: Scheduler,
     progress: Progress | None,
 ) -> GridField[Literal[3]]:
-    """Compute the signed distance to a solid in blocks near its surface, and on a coarse grid everywhere.
-
-    `width` is the distance from the surface up to which the band reaches, on both sides. Values are kept in memory, or
-    in the folder `store`, whose tiles `scheduler` computes: see `Solid.field`.
-    """
+    """Compute the signed distance up to `width` from a solid, in memory or a store, and on a coarse grid everywhere."""
     refuse_plane_grid(grid)
     width = positive_number(width, "band")
     tree, windings = prepared(solid)
@@ -177,11 +173,7 @@ def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> tuple[I
 
 
 def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: float) -> tuple[Ints, int]:
-    """(n, 3) places of blocks, found from coarse to fine, and 1; or none, and how many times larger cells have room.
-
-    `near` says of cubes of nodes, by their centres and half the nodes along their edges, which may be wanted. If the
-    grid has more blocks than the limit, the number of those wanted is first estimated by following some cubes only.
-    """
+    """(n, 3) places of blocks that `near` wants, and 1; or none, and how many times larger cells would have to be."""
     if math.prod(-(-n // SIDE) for n in grid.shape) > limit:
         numbers = {side: number for side, _, number in _cubes(grid, near, SOME)}
         if max(numbers.values()) > UNSURE * limit:
@@ -193,10 +185,7 @@ def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: floa
 
 
 def _cubes(grid: Grid, near: Callable[[Floats, float], Bools], few: int | None) -> Iterator[tuple[int, Ints, float]]:
-    """Yield cubes that may be wanted, from coarse to fine: the blocks along their edges, their places, their number.
-
-    The number is estimated if only the parts of `few` cubes are followed.
-    """
+    """Yield cubes from coarse to fine: blocks along edges, places, and how many, estimated from `few`."""
     n_blocks = -(-np.array(grid.shape) // SIDE)
     side, each, random = 1 << max(0, int(np.ceil(np.log2(n_blocks.max())))), 1.0, np.random.default_rng(0)
     places, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))

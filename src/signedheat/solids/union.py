@@ -42,10 +42,7 @@ class TriangleGroup:
 def united(
     surfaces: list[TriangleGroup], keep_overlaps: bool, notes: Sequence[Note] = (), points: Floats | None = None
 ) -> Solid:
-    """Make the solid that surfaces close: without what lies inside, where bodies overlap, and idle completion.
-
-    Confidence in completion falls with the distance from `points`, (n, 3), by default the corners of given faces.
-    """
+    """Make the solid that surfaces close, with confidence that falls from `points`, (n, 3), or given corners."""
     whole = joined_surfaces(surfaces)
     closing = np.concatenate([np.full(len(surface.triangles), surface.closing) for surface in surfaces])
     windings = Windings(whole.triangles if closing.all() else whole.triangles[closing])

@@ -48,19 +48,7 @@ class Rim:
 
 
 def seams(rims: list[Rim]) -> list[Ints]:
-    """(k, 3) vertices of the triangles of strips between stretches of rims that run along each other.
-
-    A stretch consists of whole straight sides. What lies between two of them must be a gap: where faces of one part
-    lie between, as in a bar between two holes, they are no seam.
-
-    Examples
-    --------
-    >>> square, behind = np.array([[0.0, 0, 0], [9, 0, 0], [9, -9, 0], [0, -9, 0]]), np.full((4, 3), 5.0)
-    >>> rim = Rim.of(np.arange(4), square, behind, np.zeros(4, dtype=int))
-    >>> beside = Rim.of(np.arange(4, 8), square[::-1] * [1, -1, 1] + [0, 0.1, 0], behind, np.ones(4, dtype=int))
-    >>> [len(strip) for strip in seams([rim, beside])]
-    [2]
-    """
+    """(k, 3) vertices of triangles of strips between whole sides of rims that run along each other, across gaps."""
     if not rims:
         return []
     corners = [corners_of(rim.corners) for rim in rims]
@@ -200,10 +188,7 @@ def strip(one: Rim, other: Rim) -> Ints:
 
 
 def _zipped(one: Ints, points: Floats, other: Ints, across: Floats) -> Ints:
-    """Triangles between two chains, along the first and against the other: the shorter diagonal that comes next.
-
-    Chains may have vertices in common.
-    """
+    """Triangles between two chains, along the first and against the other: the shorter diagonal that comes next."""
     a, b, rows = 0, 0, []
     while a < len(one) - 1 or b < len(other) - 1:
         if b == len(other) - 1 or (
