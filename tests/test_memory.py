@@ -54,7 +54,7 @@ def test_the_spacing_that_a_command_tells_fits_under_a_limit(tmp_path):
     samples.without_patches(samples.sphere(4), 4, 0.1).save(tmp_path / "holes.stl")
     code = """
 import resource, sys
-resource.setrlimit(resource.RLIMIT_DATA, (480_000_000, 480_000_000))
+resource.setrlimit(resource.RLIMIT_DATA, (420_000_000, 420_000_000))
 from signedheat.cli import main
 sys.exit(main(sys.argv[1:]))
 """
@@ -155,13 +155,13 @@ def of_what_is_compiled(command):
 @pytest.mark.parametrize(
     ("kind", "size"),
     [
-        ("triangles", 140),
-        ("polygons", 100),
-        ("points", 30_000),
-        ("voxels", 80),
-        ("tets", 20),
+        ("triangles", 90),
+        ("polygons", 70),
+        ("points", 15_000),
+        ("voxels", 56),
+        ("tets", 14),
         ("piecewise", 30),
-        ("noisy soups", 64),
+        ("noisy soups", 40),
         ("φ alone, a ball", 128),
         ("φ alone, 64 balls", 128),
     ],
@@ -267,7 +267,7 @@ SMALL_BALL = samples.sphere(1)
         lambda: sh.complete(SMALL_BALL).distance(TOO_MANY),
         lambda: sh.GridField(sh.Grid((0, 0, 0), 1.0, (3, 3, 3)), np.zeros((3, 3, 3)))(TOO_MANY),
         lambda: sh.deviation(TOO_MANY, SMALL_BALL),
-        lambda: sh.signed_distance(sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True), resolution=10**8),
+        lambda: sh.signed_distance(sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True), resolution=10**7),
     ],
 )
 def test_allocations_that_fail_are_memory_limits(call):

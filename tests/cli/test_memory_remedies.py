@@ -39,13 +39,13 @@ def told_by(error):
         ("volume holes.ply -o out.npz", "--resolution 700", 60),
         ("volume holes.ply -o out.npz --plain", "--spacing 1e-6", 60),
         ("volume holes.ply -o out.vtu --tets", "--resolution 500", 120),
-        ("volume holes.ply -o out.npz --band 0.02", "--spacing 1e-7", 120),
+        ("volume holes.ply -o out.npz --band 0.02", "--spacing 1e-7", 60),
         ("volume ball.ply -o out.npz --band 0.02", "--spacing 2e-3", 145),
         ("thickness ball.ply -o out.npz", "--resolution 700", 60),
         ("offset holes.ply 0.1 -o out.stl", "--resolution 700", 60),
         ("morph dilate ball.ply 0.1 -o out.stl", "--resolution 700", 60),
         ("morph shell ball.ply 0 0.2 -o out.stl", "--resolution 700", 60),
-        ("morph thicken holes.ply 0.3 -o out.stl", "--resolution 700", 60),
+        ("morph thicken holes.ply 0.3 -o out.stl", "--resolution 700", 25),
     ],
 )
 def test_what_is_told_to_fit_does(folder, command, size, megabytes, monkeypatch, capsys):
