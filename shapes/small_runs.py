@@ -21,10 +21,11 @@ def runs() -> dict[str, np.ndarray]:
     ball = samples.sphere(1)
     broken = samples.without_faces(ball, 0.2, 0)
     found = {}
-    grid = sh.SignedHeatSolver(sh.Grid.around(broken, 9)).distance(broken)
+    grid = sh.SignedHeatSolver(sh.Grid.around(broken, 7)).distance(broken)
     found["grid"] = grid.values
     found["sharpened grid"] = sh.sharpen(grid).values
-    found["solid on a grid"] = sh.complete(broken).field(grid=grid.grid).values
+    few = samples.without_faces(samples.sphere(0), 0.2, 0)
+    found["solid on a grid"] = sh.complete(few).field(grid=grid.grid).values
     curve = ball.polyline([[1.0, 0.1, 0.2], [0.0, 1.0, -0.1], [-1.0, 0.0, 0.3]])
     surface = sh.SignedHeatSolver(ball).distance(curve)
     found["surface"] = surface.values

@@ -75,7 +75,7 @@ def test_opening_takes_thin_arms_off():
 @pytest.mark.parametrize("sides", [(0.1,), (0.1, 0.0), (0.0, 0.1), (0.15, 0.1)])
 def test_a_sheet_gains_twice_its_area_times_the_distance(sides):
     sheet = waved_sheet()
-    solid = sh.morphology.thicken(sheet, *sides, resolution=72)
+    solid = sh.morphology.thicken(sheet, *sides, resolution=48)
     assert_closed_manifold(solid)
     above, below = sides if len(sides) == 2 else 2 * sides
     # rims are upright, and the mean curvature of the waves, which changes its sign, cancels
@@ -141,7 +141,7 @@ def test_the_inner_shell_of_a_sliced_file_is_a_cavity_with_a_wall():
     both = samples.union(BALL, samples.sphere(4, radius=0.5))
     for nested, volume in (("cavities", 1 - 0.9**3 + 0.6**3 - 0.5**3), ("given", 1 - 0.9**3)):
         solid = sh.complete(both, nested=nested)
-        wall = sh.morphology.shell(solid, -0.1, 0.0, resolution=48, keep_outside=True)
+        wall = sh.morphology.shell(solid, -0.1, 0.0, resolution=36, keep_outside=True)
         assert enclosed_volume(wall) == pytest.approx(4 / 3 * np.pi * volume, rel=0.02)
 
 
@@ -242,20 +242,20 @@ def test_mitred_boxes_stay_boxes():
     shape = turned_box()
     for corners in ("mitre", "sharp"):
         for distance in (0.1, -0.1):
-            made = sh.offset(shape, distance, corners=corners, resolution=48)
+            made = sh.offset(shape, distance, corners=corners, resolution=32)
             assert_closed_manifold(made)
             assert not len(self_intersections(made.vertices, made.faces))
             assert enclosed_volume(made) == pytest.approx(np.prod(np.array([2.0, 1.3, 0.5]) + 2 * distance), rel=1e-3)
     a, b, c, d = 2.0, 1.3, 0.5, 0.1
     steiner = a * b * c + 2 * d * (a * b + b * c + c * a) + np.pi * d**2 * (a + b + c) + 4 / 3 * np.pi * d**3
-    assert enclosed_volume(sh.offset(shape, 0.1, resolution=48)) == pytest.approx(steiner, rel=3e-3)
+    assert enclosed_volume(sh.offset(shape, 0.1, resolution=32)) == pytest.approx(steiner, rel=3e-3)
 
 
 @pytest.mark.parametrize(
     ("corners", "degrees", "tip"), [("mitre", 90, 2**0.5), ("mitre", 30, 2.0), ("sharp", 30, 3.8637)]
 )
 def test_tips_reach_where_planes_meet_or_as_far_as_they_may(corners, degrees, tip):
-    made = sh.offset(wedge(degrees), 0.1, corners=corners, spacing=0.02)
+    made = sh.offset(wedge(degrees), 0.1, corners=corners, spacing=0.03)
     middle = made.vertices[np.abs(made.vertices[:, 2] - 0.5) < 0.3]
     assert middle[:, 0].max() == pytest.approx(0.1 * tip, abs=2e-3)
 
@@ -276,14 +276,14 @@ def test_reflex_edges_are_mitred_inside():
 
 
 def test_distances_may_vary():
-    slope = sh.offset(BALL, lambda places: 0.2 + 0.1 * places[:, 2], resolution=48)
-    same = sh.offset(BALL, 0.2 + 0.1 * BALL.vertices[:, 2], resolution=48)
+    slope = sh.offset(BALL, lambda places: 0.2 + 0.1 * places[:, 2], resolution=32)
+    same = sh.offset(BALL, 0.2 + 0.1 * BALL.vertices[:, 2], resolution=32)
     for made in (slope, same):
         assert_closed_manifold(made)
         assert not len(self_intersections(made.vertices, made.faces))
         lengths = radii(made)
         np.testing.assert_allclose(lengths, 1.2 + 0.1 * made.vertices[:, 2] / lengths, atol=3e-3)
-    inwards = sh.offset(BALL, 0.2 * BALL.vertices[:, 2], resolution=48)  # outside above, inside below
+    inwards = sh.offset(BALL, 0.2 * BALL.vertices[:, 2], resolution=32)  # outside above, inside below
     lengths = radii(inwards)
     np.testing.assert_allclose(lengths, 1 + 0.2 * inwards.vertices[:, 2] / lengths, atol=3e-3)
 
@@ -307,7 +307,7 @@ def test_a_wall_may_keep_the_faces_outside_and_have_a_drain():
     assert enclosed_volume(wall) == pytest.approx(whole, rel=1e-3)
     level = box((-1.0, -0.7, -0.5), (1.0, 0.6, 0.3))
     for keep in (True, False):
-        drained = sh.morphology.shell(level, -0.1, 0.0, resolution=64, keep_outside=keep, drain=0.2)
+        drained = sh.morphology.shell(level, -0.1, 0.0, resolution=48, keep_outside=keep, drain=0.2)
         assert_closed_manifold(drained)
         assert drained.to_trimesh().euler_number == 2  # outside and inside are one surface now
         assert enclosed_volume(drained) == pytest.approx(whole - np.pi * 0.1**2 * 0.1, rel=1e-4 if keep else 6e-3)
@@ -319,6 +319,6 @@ def test_walls_have_no_sealed_crumbs(keep):
     head = samples.union(
         samples.sphere(4), box((0.9, -0.1, -0.1), (1.5, 0.1, 0.1)), samples.sphere(3, 0.27, (1.6, 0, 0))
     )
-    assert sh.offset(head, -0.2, resolution=96).to_trimesh().body_count == 2
-    wall = sh.morphology.shell(head, -0.2, 0.0, resolution=96, keep_outside=keep)
+    assert sh.offset(head, -0.2, resolution=72).to_trimesh().body_count == 2
+    wall = sh.morphology.shell(head, -0.2, 0.0, resolution=72, keep_outside=keep)
     assert wall.to_trimesh().body_count == 2

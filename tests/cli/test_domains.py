@@ -33,9 +33,9 @@ def ball(tmp_path):
 @pytest.fixture
 def arcs(tmp_path):
     """A circle of radius 1, clockwise, of which three parts are missing."""
-    angle = -2 * np.pi * np.arange(300) / 300
+    angle = -2 * np.pi * np.arange(120) / 120
     points = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    lines = [sh.Polyline(points[k : k + 80]) for k in (0, 100, 200)]
+    lines = [sh.Polyline(points[k : k + 32]) for k in (0, 40, 80)]
     sh.io.write_polylines(tmp_path / "arcs.csv", lines)
     sh.io.write_polylines(tmp_path / "arcs.svg", lines)
     return tmp_path
@@ -95,7 +95,7 @@ def test_contour_view_and_info_in_the_plane(arcs, capsys):
     succeed(capsys, "view", arcs / "phi.vti", "-o", arcs / "view.png")
     assert json.loads(succeed(capsys, "info", arcs / "phi.vti", "--json"))["shape"] == [48, 48]
     told = json.loads(succeed(capsys, "info", arcs / "arcs.svg", "--json"))
-    assert told["n_polylines"] == 3 and told["n_closed"] == 0 and told["n_points"] == 240
+    assert told["n_polylines"] == 3 and told["n_closed"] == 0 and told["n_points"] == 96
 
 
 def test_drawings(tmp_path):
@@ -149,9 +149,9 @@ def test_curves_in_space_on_a_mesh(ball, capsys, curves):
 
 
 def test_surface_of_voxels(ball, capsys):
-    index = np.stack(np.indices((40, 40, 40)), axis=-1)
-    np.save(ball / "voxels.npy", np.linalg.norm((index - 19.5) / 16, axis=-1) < 1)
-    about = {"origin": [-19.5 / 16] * 3, "spacing": [1 / 16] * 3}
+    index = np.stack(np.indices((36, 36, 36)), axis=-1)
+    np.save(ball / "voxels.npy", np.linalg.norm((index - 17.5) / 15, axis=-1) < 1)
+    about = {"origin": [-17.5 / 15] * 3, "spacing": [1 / 15] * 3}
     (ball / "voxels.json").write_text(json.dumps(about))
     out = ball / "phi.npz"
     summary = json.loads(succeed(capsys, "surface", ball / "voxels.npy", ball / "half.csv", "-o", out, "--json"))
@@ -217,7 +217,7 @@ def test_version(capsys):
 def test_tets_from_the_command_line(tmp_path, capsys):
     """Around the shape, sharpened unless told otherwise; contoured, looked at and described again."""
     sphere(3).save(tmp_path / "ball.stl")
-    flags = ("--tets", "--resolution", "8", "--padding", "0.3")
+    flags = ("--tets", "--resolution", "6", "--padding", "0.3")
     fields = []
     for name, more in (("sharp.vtu", ()), ("plain.vtu", ("--plain",))):
         succeed(capsys, "volume", tmp_path / "ball.stl", *flags, *more, "-o", tmp_path / name)

@@ -138,12 +138,12 @@ def test_offsets_have_the_edges_of_the_function_whoever_makes_them(tmp_path):
     """Of a turned box made smaller, of which contours cut the edges off: they lose 6e-4 of its volume."""
     turn = trimesh.transformations.random_rotation_matrix(np.array([0.3, 0.5, 0.7]))
     trimesh.creation.box([1, 1, 1], turn).export(tmp_path / "box.stl")
-    shape = sh.read(tmp_path / "box.stl")
-    assert main(["offset", str(tmp_path / "box.stl"), "-0.1", "-o", str(tmp_path / "command.stl")]) == 0
-    assert main(["morph", "erode", str(tmp_path / "box.stl"), "0.1", "-o", str(tmp_path / "morph.stl")]) == 0
-    Job(offsets=(-0.1,))(tmp_path / "box.stl", tmp_path / "batch")
+    shape, nodes = sh.read(tmp_path / "box.stl"), ("--resolution", "48")
+    assert main(["offset", str(tmp_path / "box.stl"), "-0.1", "-o", str(tmp_path / "command.stl"), *nodes]) == 0
+    assert main(["morph", "erode", str(tmp_path / "box.stl"), "0.1", "-o", str(tmp_path / "morph.stl"), *nodes]) == 0
+    Job(offsets=(-0.1,), resolution=48)(tmp_path / "box.stl", tmp_path / "batch")
     made = [sh.read(tmp_path / name) for name in ("command.stl", "morph.stl", "batch_-0.1.stl")]
-    for surface in (*made, sh.offset(shape, -0.1), sh.morphology.erode(shape, 0.1)):
+    for surface in (*made, sh.offset(shape, -0.1, resolution=48), sh.morphology.erode(shape, 0.1, resolution=48)):
         assert trimesh.Trimesh(surface.vertices, surface.faces).volume == pytest.approx(0.8**3, rel=1e-5)
 
 
@@ -194,7 +194,7 @@ def test_info_of_shapes_and_fields(tmp_path, ball, capsys):
 
 
 def test_info_tells_which_way_parts_face(tmp_path, capsys):
-    outer, inner = samples.sphere(3), samples.sphere(2, radius=0.8)
+    outer, inner = samples.sphere(2), samples.sphere(2, radius=0.8)
     flat = sh.TriangleMesh([[2, 0, 0], [3, 0, 0], [2, 1, 0]], [[0, 1, 2]])
     wall = sh.TriangleMesh([[0, 0, 3], [1, 0, 3], [0, 1, 3]], [[0, 1, 2], [0, 2, 1]])
     shapes = {
@@ -233,7 +233,7 @@ def test_pictures(tmp_path, ball, capsys):
 
 
 def test_demo_needs_no_file(tmp_path, capsys):
-    assert main(["demo", "-o", str(tmp_path / "demo"), "--resolution", "40", "--json"]) == 0
+    assert main(["demo", "-o", str(tmp_path / "demo"), "--resolution", "24", "--json"]) == 0
     out, err = capsys.readouterr()
     summary = json.loads(out)
     assert "faces turned" in err and "of the surface is completed" in err
