@@ -208,11 +208,12 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         listed, left_out = given_curves(self.domain, as_list(sources))
         kept = numbers_kept(len(listed), left_out)
         _warn_of_one_sided_curves(self.domain, listed, kept)
-        if left_out is not None and isinstance(constraint, LevelValues):
-            if len(constraint.values) == len(kept) + len(left_out.without_length):
-                constraint = replace(constraint, values=[constraint.values[k] for k in kept])
         discretization, adapted = self.discretization.adapt(listed)
         terms = lowered_for_times(discretization, adapted, self._times(discretization))
+        if isinstance(constraint, LevelValues):
+            if len(constraint.values) == len(kept) + (0 if left_out is None else len(left_out.without_length)):
+                last = int(terms[0].source_ids.max())  # the others lie outside the domain
+                constraint = replace(constraint, values=[constraint.values[k] for k in kept[: last + 1]])
         return _Prepared(discretization, terms, () if left_out is None else (left_out,), constraint)
 
     @overload

@@ -189,6 +189,15 @@ def test_levels_of_several_sources_and_components():
         solver.distance([left, right], sh.LevelValues([0, 1, 2]))
 
 
+def test_levels_of_sources_outside_of_the_grid_do_not_move_those_of_the_others():
+    apart, one, outside = ([samples.sphere(1, 0.3, (x, 0, 0)) for x in xs] for xs in ((-1.0, 0.0), (1.0,), (50.0,)))
+    solver = sh.SignedHeatSolver(sh.Grid((-1.5, -0.5, -0.5), 0.1, (31, 11, 11)))
+    pair = samples.union(*apart)  # with as many components in all as there are sources
+    alone = solver.distance([pair, *one], sh.LevelValues([0.0, 0.1]))
+    beside = solver.distance([pair, *one, *outside], sh.LevelValues([0.0, 0.1, 5.0]))
+    assert np.array_equal(alone.values, beside.values)
+
+
 def test_sides_that_coincide_are_told_and_refused_when_nothing_is_left():
     thin = sh.TriangleMesh(
         [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1e-4]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
