@@ -222,6 +222,24 @@ def test_tets_of_meshio_that_are_no_rows_of_four_vertices_are_refused():
         sh.TetMesh.from_meshio(mesh)
 
 
+def test_volumes_of_other_cells_beside_tets_are_refused_however_they_come(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    corners = np.array([[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)])
+    voxel = pyvista.UnstructuredGrid({10: np.array([[0, 1, 2, 4]]), 11: np.arange(8)[None]}, corners)
+    voxel.save(tmp_path / "voxel.vtu")
+    mixed = meshio.Mesh(corners, [("tetra", [[0, 1, 2, 4]]), ("hexahedron", [[0, 1, 3, 2, 4, 5, 7, 6]])])
+    for make, thing in (
+        (sh.TetMesh.from_pyvista, voxel),
+        (sh.TetMesh.from_meshio, mixed),
+        (sh.as_shape, voxel),
+        (sh.as_shape, mixed),
+        (sh.read, tmp_path / "voxel.vtu"),
+    ):
+        with refused(sh.errors.GeometryError) as caught:
+            make(thing)
+        assert "not tets alone" in caught.value.cause
+
+
 class OnlyDlpack:
     """An array of a library that NumPy cannot read otherwise."""
 

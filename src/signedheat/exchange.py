@@ -47,6 +47,8 @@ _SIDES = {"triangle": 3, "quad": 4}
 _VTK_FACES = (5, 7, 9)
 """Types of cells of VTK that are faces: triangles, polygons and quadrilaterals; `_VTK_TETRA` is that of tets."""
 _VTK_TETRA = 10
+FLAT = ("vertex", "line", "triangle", "quad", "polygon")
+"""Beginnings of the names that meshio gives to cells without a volume; beside tets these are left out."""
 
 
 def with_values(thing: Any, values: NDArray[np.floating]) -> Any:
@@ -470,10 +472,11 @@ def _from_cells(thing: Any) -> Elements:
 
 
 def tets_of_pyvista(grid: Any) -> Ints:
-    """(t, 4) the tets of a `pyvista.UnstructuredGrid`."""
+    """(t, 4) the tets of a `pyvista.UnstructuredGrid`; no other part of a volume may be left out."""
     cells = {int(kind): ids for kind, ids in grid.cells_dict.items()}
-    if _VTK_TETRA not in cells:
-        raise GeometryError(f"the grid holds no tets among its {grid.n_cells} cells", remedy="triangulate it first")
+    if _VTK_TETRA not in cells or max(cells) > _VTK_TETRA:
+        held = ", ".join(map(str, sorted(cells))) or "none"
+        raise GeometryError(f"its types of cells are {held}, not tets alone (10)", remedy="triangulate it first")
     return np.asarray(cells[_VTK_TETRA], dtype=np.int64)
 
 
@@ -498,11 +501,12 @@ def from_meshio(thing: Any, as_points: bool = False) -> Elements:
 
 
 def tets_of_meshio(mesh: Any) -> Ints:
-    """(t, 4) the tets of a `meshio.Mesh`."""
+    """(t, 4) the tets of a `meshio.Mesh`; no other part of a volume may be left out."""
+    kinds = sorted({block.type for block in mesh.cells})
+    if "tetra" not in kinds or not all(kind == "tetra" or kind.startswith(FLAT) for kind in kinds):
+        held = ", ".join(kinds) or "no cells"
+        raise GeometryError(f"it holds {held}, not tets alone", remedy="convert it to linear tetrahedra first")
     blocks = [block.data for block in mesh.cells if block.type == "tetra"]
-    if not blocks:
-        kinds = sorted({block.type for block in mesh.cells}) or ["no cells"]
-        raise GeometryError(f"the mesh holds no tets, but {', '.join(kinds)}", remedy="convert it to tetrahedra first")
     for block in blocks:
         if block.ndim != 2 or block.shape[1] != 4:
             raise GeometryError(f"tets are rows of four vertices, not an array of {block.shape}", element="tets")

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError, GeometryError
-from ..exchange import NAME
+from ..errors import FileFormatError
+from ..exchange import FLAT, NAME
 from ..packages import require
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -41,8 +41,6 @@ TETGEN = (".node", ".ele")
 TET_FORMATS = frozenset(MODULES)
 
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
-OTHER_VOLUMES = {"tetra10", "hexahedron", "wedge", "pyramid"}
-"""Cells in space, by their names in meshio, that are refused, since no part of a volume may be left out."""
 COUNTED = {"PhysicalNames": 1, "Entities": 4, "Nodes": 2, "Elements": 2, "Periodic": 1, "NodeData": 1, "ElementData": 1}
 """Sections of Gmsh files, and the number of counts at the beginning of each (one in version 2)."""
 IN_TEXT = ("PhysicalNames", "NodeData", "ElementData")
@@ -53,10 +51,7 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
     """Read a `TetMesh`; or, from a file without tets, its surface."""
     mesh = load_cells(path)
     kinds = {block.type for block in mesh.cells}
-    if kinds & OTHER_VOLUMES or not kinds & {"tetra", "triangle", "quad"}:
-        present = ", ".join(sorted(kinds)) or "no cells"
-        raise GeometryError(f"it holds {present}, not tets alone", remedy="convert it to linear tetrahedra first")
-    if "tetra" in kinds:
+    if not kinds & {"triangle", "quad"} or not all(kind.startswith(FLAT) for kind in kinds):
         return TetMesh.from_meshio(mesh)
     return (TriangleMesh if "quad" not in kinds else PolygonMesh).from_meshio(mesh)
 

@@ -167,7 +167,7 @@ class TetMesh(Displayed, Frozen):
         Raises
         ------
         GeometryError
-            If it has no tets, or tets of other than four corners.
+            If it has no tets, other cells with a volume, or tets of other than four corners.
 
         Examples
         --------
@@ -204,7 +204,7 @@ class TetMesh(Displayed, Frozen):
 
     @classmethod
     def from_pyvista(cls, grid: pyvista.UnstructuredGrid) -> TetMesh:
-        """Convert the tets of a grid of PyVista; cells of other kinds are ignored.
+        """Convert the tets of a grid of PyVista; its faces, lines and vertices are left out.
 
         Parameters
         ----------
@@ -219,7 +219,7 @@ class TetMesh(Displayed, Frozen):
         Raises
         ------
         GeometryError
-            If it has no tets.
+            If it has no tets, or other cells with a volume.
 
         Examples
         --------
