@@ -127,3 +127,12 @@ def test_bands_as_images_have_all_nodes(tmp_path):
     exact = np.clip(solid.distance(band.grid.points.reshape(-1, 3)).reshape(band.grid.shape), -0.2, 0.2)
     np.testing.assert_allclose(image.values, exact, atol=1e-6)
     np.testing.assert_array_equal(image.grid.spacing, band.grid.spacing)
+
+
+def test_values_too_large_for_16_bits_and_other_fields_are_refused(tmp_path):
+    large = sh.GridField(sh.Grid((0, 0, 0), 1.0, (2, 2, 2)), np.full((2, 2, 2), 7e4))
+    write_vdb(large, tmp_path / "a.vdb")
+    tet = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+    for field in (large, sh.TetField(tet, np.zeros(4))):
+        with refused(sh.errors.FileFormatError, file="b.vdb"):
+            write_vdb(field, tmp_path / "b.vdb", half=True)

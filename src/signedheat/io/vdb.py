@@ -28,6 +28,7 @@ MAGIC, FILE_VERSION, LIBRARY = 0x56444220, 224, (10, 0)
 """Magic number, version of the format, and version of a library that writes it."""
 ZIP, ALL_VALUES = 1, 6
 """Flag of values packed by zlib; byte before values that says that all of them are there."""
+MOST_HALF = float(np.finfo(np.float16).max)
 SIDES, SIZES = (32, 16), (128, SIDE)
 """Nodes above the blocks, from the top: children along each edge, and voxels along each edge of a child."""
 CONVENTION = (
@@ -66,7 +67,8 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
     Raises
     ------
     FileFormatError
-        If the name is no ``.vdb``, the field is not in space, or the file cannot be written.
+        If the name is no ``.vdb``, the field is none on a grid in space, its values are too large for 16 bits, or the
+        file cannot be written.
 
     Examples
     --------
@@ -77,9 +79,16 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
     ...     write_vdb(ball, f"{folder}/ball.vdb")
     """
     format_for(path, {".vdb": None}, "an OpenVDB grid")
-    if field.grid.dimension != 3:
-        raise FileFormatError("an OpenVDB grid has three axes", remedy="save the field as .npz", path=path)
+    if not isinstance(field, GridField) or field.grid.dimension != 3:
+        raise FileFormatError("an OpenVDB grid has three axes", remedy="save the field by its own `save`", path=path)
     tree = _band(field) if field.blocks is not None else _whole(field)
+    largest = float(np.abs(tree.values).max())
+    if half and largest > MOST_HALF:
+        raise FileFormatError(
+            f"numbers of 16 bits reach to {MOST_HALF:g}, and the values to {largest:g}",
+            remedy="leave out half",
+            path=path,
+        )
     metadata: dict[str, str | bool] = {
         "name": NAME,
         "class": "level set" if field.blocks is not None else "unknown",
