@@ -286,6 +286,10 @@ def test_what_a_format_cannot_hold_is_refused(tmp_path):
     ):
         with refused(sh.errors.FileFormatError, file=name):
             shape.save(tmp_path / name)
+    flat = sh.PointCloud([[0.0, 1.0]], [[1.0, 0.0]])
+    for ending in ("ply", "obj", "off", "vtp", "xyz", "pc"):
+        with refused(sh.errors.GeometryError, "points"):
+            flat.save(tmp_path / f"a.{ending}")
     with refused(sh.errors.FileFormatError):
         TRIANGLES.save(tmp_path / "no" / "such" / "folder.stl")
     assert not list(tmp_path.iterdir())

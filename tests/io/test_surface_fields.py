@@ -27,6 +27,14 @@ def test_values_and_vertices_come_back(tmp_path, name, ending):
     assert type(back.domain) is type(domain) and np.array_equal(back.values, field.values)
 
 
+def test_clouds_come_back_with_what_their_triangles_are_made_of(tmp_path):
+    cloud = sh.PointCloud(SQUARE, normals=5 * [[0, 0, 1]], areas=np.arange(1.0, 6), n_neighbors=4)
+    sh.VertexField(cloud, np.zeros(5)).save(tmp_path / "phi.npz")
+    back = sh.load_field(tmp_path / "phi.npz").domain
+    assert back.n_neighbors == 4 and np.array_equal(back.normals, cloud.normals)
+    assert np.array_equal(back.areas, cloud.areas)
+
+
 @pytest.mark.parametrize("ending", ["ply", "vtp"])
 def test_shapes_without_values_are_no_fields_but_are_looked_at(tmp_path, ending):
     path = tmp_path / f"ball.{ending}"

@@ -49,6 +49,8 @@ OF_BANDS = (
 CLIPPED = "signed distance, negative inside, in the units of the shape; beyond the band plus or minus its half width"
 BYTES_PER_NODE = 20.0
 """Memory per node to write a band as a whole grid."""
+OF_CLOUDS = ("normals", "areas", "n_neighbors")
+"""Arrays of the archive of a field on a point cloud, besides its points."""
 _DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}
 """Numbers of axes that a format supports; the others support any number."""
 
@@ -171,14 +173,14 @@ def load_vertex_field(path: PathLike) -> VertexField:
             if NAME not in shape.values:
                 raise FileFormatError(f"its vertices have no {NAME}: it holds a shape, not a field")
             return VertexField(cast("SurfaceShape", shape_of(shape)), np.asarray(shape.values[NAME], np.float64))
-        arrays = read_npz(path, ("faces", "offsets", "normals"), needed=("vertices", "values"))
+        arrays = read_npz(path, ("faces", "offsets", *OF_CLOUDS), needed=("vertices", "values"))
         vertices, values = arrays["vertices"], arrays["values"]
         if "offsets" in arrays:
             domain: SurfaceShape = PolygonMesh(vertices, np.split(arrays["faces"], arrays["offsets"][1:-1]))
         elif "faces" in arrays:
             domain = TriangleMesh(vertices, arrays["faces"])
         else:
-            domain = PointCloud(vertices, arrays.get("normals"))
+            domain = PointCloud(vertices, **{name: arrays[name] for name in OF_CLOUDS if name in arrays})
         if values.shape != (len(vertices),):
             raise damaged(f"{values.shape} values for {len(vertices)} vertices: the file is damaged")
         return VertexField(domain, values)
@@ -290,7 +292,7 @@ def _write_vertex_npz(field: VertexField[SurfaceShape], path: PathLike) -> None:
     elif isinstance(domain, PolygonMesh):
         arrays |= {"faces": domain.corners, "offsets": domain.offsets}
     else:
-        arrays["normals"] = domain.normals
+        arrays |= {"normals": domain.normals, "areas": domain.areas, "n_neighbors": domain.n_neighbors}
     write_npz(path, **arrays)
 
 

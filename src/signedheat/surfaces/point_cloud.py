@@ -121,6 +121,12 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @property
     def _elements(self) -> Elements:
+        if self.points.shape[1] != 3:
+            raise GeometryError(
+                f"files and other packages hold points in space, and these have {self.points.shape[1]} coordinates",
+                remedy="add z = 0",
+                element="points",
+            )
         return Elements(self.points, normals=self.normals, areas=self.areas)
 
     @property
