@@ -367,3 +367,40 @@ def test_vtk_structured_points_are_no_more_than_the_file_can_hold(tmp_path):
     with pytest.raises(sh.errors.SignedHeatError) as caught:
         sh.read(tmp_path / "a.vtk")
     assert caught.value.path.endswith("a.vtk")
+
+
+def test_colors_of_points_are_no_normals(tmp_path):
+    (tmp_path / "a.xyz").write_text("0 0 0 255 0 10\n1 0 0 20 30 40\n0 1 0 1 2 3\n")
+    assert sh.read(tmp_path / "a.xyz").normals is None
+    (tmp_path / "a.xyz").write_text("0 0 0 0 0 1\n1 0 0 0 1 0\n")
+    assert sh.read(tmp_path / "a.xyz").normals.tolist() == [[0, 0, 1], [0, 1, 0]]
+
+
+def test_off_with_four_coordinates_is_not_taken_for_points_in_space(tmp_path):
+    (tmp_path / "a.off").write_text("4OFF\n3 1 0\n0 0 0 1\n2 0 0 2\n0 2 0 2\n3 0 1 2\n")
+    with refused(FileFormatError):
+        sh.read(tmp_path / "a.off")
+
+
+def test_lines_of_vtk_are_no_points(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    pyvista.Line().save(tmp_path / "a.vtp")
+    with refused(FileFormatError):
+        sh.read(tmp_path / "a.vtp")
+
+
+def test_images_of_vtk_have_the_values_that_they_show(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    image = pyvista.ImageData(dimensions=(3, 4, 5))
+    image.point_data["mask"], image.point_data["distance"] = np.ones(60), np.arange(60.0)
+    image.set_active_scalars("distance")
+    image.save(tmp_path / "a.vti")
+    assert sh.load_field(tmp_path / "a.vti").values.ravel(order="F").tolist() == list(range(60))
+
+
+@pytest.mark.parametrize("name", [None, 3, b"a.stl", ["a.stl"]])
+def test_what_is_no_name_of_a_file_is_refused(name):
+    ball = samples.sphere(0)
+    for use in (sh.read, sh.load_field, sh.io.load, ball.save, sh.io.read_polylines):
+        with refused(sh.SignedHeatError):
+            use(name)

@@ -21,7 +21,7 @@ from typing import Any, BinaryIO, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FileFormatError, MemoryLimitError, SignedHeatError
+from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, UnsupportedTypeError
 from ..memory import available_memory
 
 PathLike = str | os.PathLike[str]
@@ -36,7 +36,11 @@ READING_MODULES = f"{__package__}.", f"{PACKAGE}packages"
 
 def extension(path: PathLike) -> str:
     """Return the extension of a file name in lower case, such as ``".stl"`` or ``".nii.gz"``."""
-    suffixes = [suffix.lower() for suffix in Path(path).suffixes[-2:]]
+    try:
+        suffixes = [suffix.lower() for suffix in Path(path).suffixes[-2:]]
+    except TypeError:
+        kind = type(path).__name__
+        raise UnsupportedTypeError(f"a {kind} is not the name of a file", remedy="pass a str or a path") from None
     return "".join(suffixes if suffixes[-1:] == [".gz"] else suffixes[-1:])
 
 
@@ -124,6 +128,7 @@ def size_of(path: PathLike) -> int:
 @contextmanager
 def _opened(path: PathLike) -> Iterator[tuple[BinaryIO, int]]:
     """Open a regular file, and yield it with its size in bytes; errors, also of the `with` block, name the file."""
+    extension(path)  # refuses numbers, which would open what the process has opened already
     try:
         # O_NONBLOCK, so that opening a pipe does not wait for its writer
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))) as file:

@@ -219,6 +219,10 @@ def read_off(path: PathLike) -> Elements:
     kind = rows[0][0].upper() if rows else ""
     if not kind.endswith("OFF") or "BINARY" in [word.upper() for word in rows[0]]:
         raise FileFormatError("it does not begin with OFF, so it is not an OFF file in text form")
+    if "4" in kind:
+        raise FileFormatError(
+            "its vertices have four coordinates each", remedy="divide by the fourth, and save it as OFF"
+        )
     rows[0] = rows[0][1:]
     rows = rows if rows[0] else rows[1:]
     if not rows or len(rows[0]) < 2:

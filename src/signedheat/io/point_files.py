@@ -92,9 +92,11 @@ def write_point_lists(lists: Sequence[tuple[Floats, bool]]) -> str:
 
 
 def read_xyz(path: PathLike) -> Elements:
-    """Read lines of 3 numbers (positions) or 6 (positions and normals)."""
+    """Read lines of 3 numbers (positions) or 6 (positions and normals, or colours, which are ignored)."""
     table = np.concatenate(read_rows(path, (3, 6)))
-    return Elements(table[:, :3], normals=table[:, 3:] if table.shape[1] == 6 else None)
+    others = table[:, 3:]
+    are_colors = (others >= 0).all() and (others == np.rint(others)).all() and others.max(initial=0.0) > 1
+    return Elements(table[:, :3], normals=others if others.size and not are_colors else None)
 
 
 def write_xyz(shape: Elements, path: PathLike) -> bytes:

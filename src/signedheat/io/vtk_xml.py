@@ -62,7 +62,7 @@ def write_vti(origin: Floats, spacing: Floats, values: Mapping[str, NDArray[Any]
 
 
 def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Floats, NDArray[Any] | None]:
-    """Read the first scalar array, origin and spacing of image data, and the array named `other`, if present."""
+    """Read the array that the file says to show, or else the first; origin, spacing, and the array named `other`."""
     root, arrays = parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
     extent = parsed_numbers(image.get("WholeExtent", "").split() if image is not None else [], "extent", int)
@@ -87,10 +87,11 @@ def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Flo
         origin = origin + spacing * extent[::2]
     nodes = piece.find("PointData")
     listed = [] if nodes is None else nodes.findall("DataArray")
-    if not listed:
+    if nodes is None or not listed:
         raise FileFormatError("there are no values at the nodes", remedy="save them as point data")
     images = []
-    for element in [listed[0], *(element_ for element_ in listed[1:] if element_.get("Name") == other)][:2]:
+    shown = next((each for each in listed if each.get("Name") == nodes.get("Scalars")), listed[0])
+    for element in [shown, *(each for each in listed if each is not shown and each.get("Name") == other)][:2]:
         if element.get("NumberOfComponents", "1") not in ("1", ""):
             raise FileFormatError(
                 f"'{element.get('Name')}' has {element.get('NumberOfComponents')} numbers at each node",
@@ -157,6 +158,8 @@ def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
     faces = np.concatenate(corners), np.concatenate(counts)
     if len(faces[1]):
         return Elements(np.concatenate(points), *faces, values=values)
+    if any(arrays.count(piece, "NumberOfLines") for piece in root.iterfind("PolyData/Piece")):
+        raise FileFormatError("there are lines and no faces", remedy="save the points alone, or a surface")
     normals = columns["Normals"].reshape(-1, 3) if "Normals" in columns else None
     return Elements(np.concatenate(points), normals=normals, areas=columns.get("area"), values=values)
 
