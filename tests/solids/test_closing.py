@@ -97,7 +97,9 @@ def test_what_is_closed_does_not_depend_on_how_it_is_given(shape, bent):
 
 def test_lids_fade_as_a_spheroid_flattens():
     heights = np.arange(0.5, 1.21, 0.05)
-    shares = np.array([volume(*dome(k)) / volume(*dome(k), bent=False) for k in heights])
+    shares = np.array(
+        [volume(*dome(k, around=32, down=8)) / volume(*dome(k, around=32, down=8), bent=False) for k in heights]
+    )
     assert np.abs(np.diff(shares) / shares[:-1]).max() < 0.15  # 3 % for each hundredth
     assert shares[np.argmin(np.abs(heights - 1))] == pytest.approx(2, rel=0.03)
     assert volume(*dome(4.0)) == pytest.approx(volume(*dome(4.0), bent=False), rel=1e-9)
@@ -158,12 +160,12 @@ def test_a_rim_of_many_edges_takes_no_quadratic_time():
 
 
 def test_a_rim_with_mirror_images_has_one_lid_in_every_order_of_faces():
-    ball = samples.sphere(4)
+    ball = samples.sphere(3)
     middles = ball.vertices[ball.faces].mean(axis=1)
     faces = ball.faces[(middles[:, 0] > 0) & (middles[:, 1] > 0)]  # four corners are equally far from the middle
     volumes = [
         sh.complete(sh.TriangleMesh(ball.vertices, faces[np.random.default_rng(seed).permutation(len(faces))])).volume
-        for seed in range(4)
+        for seed in range(3)
     ]
     np.testing.assert_allclose(volumes, volumes[0], rtol=1e-9)
 

@@ -114,7 +114,7 @@ def test_files_in_different_units_are_brought_into_one(tmp_path, capsys):
     assert "mm³" in out and float(out.split("volume ")[1].split()[0]) == pytest.approx(20_000**2 * 10_000, rel=1e-6)
 
 
-def terrain(height, n=24):
+def terrain(height, n=16):
     """A graph over a square with sides of 10, its normals up."""
     x, y = np.meshgrid(np.linspace(0, 10, n), np.linspace(0, 10, n), indexing="ij")
     ids = np.arange(n * n).reshape(n, n)

@@ -21,7 +21,7 @@ def turned(mesh):
     return sh.TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
 
 
-def contoured(values, extent, n=56):
+def contoured(values, extent, n=36):
     grid = sh.Grid(-np.array(extent), 2 * max(extent) / n, np.ceil(np.array(extent) / max(extent) * n).astype(int) + 1)
     return sh.GridField(grid, values(grid.points)).contour(0.0)
 
@@ -40,12 +40,12 @@ def holed_plate():
 
 def shells():
     """A ball in the cavity of a shell."""
-    return samples.union(samples.sphere(4), turned(samples.sphere(4, 0.8)), samples.sphere(3, 0.4))
+    return samples.union(samples.sphere(3), turned(samples.sphere(3, 0.8)), samples.sphere(2, 0.4))
 
 
 SHAPES = {
     "sphere": samples.sphere,
-    "torus": samples.torus,
+    "torus": lambda: samples.torus(n_around=64, n_across=32),
     "genus two": holed_plate,
     "box": lambda: box((2, 1, 0.7)),
     "two bodies": lambda: samples.union(samples.sphere(), box((1, 1, 1), (1.8, 0, 0))),
@@ -77,7 +77,7 @@ def test_points_of_a_plate_face_outwards_whatever_their_draw():
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_noisy_points_face_outwards(name):
-    truth = samples.oriented_points(SHAPES[name](), 5000)
+    truth = samples.oriented_points(SHAPES[name](), 3000)
     diagonal = float(np.linalg.norm(np.ptp(truth.points, axis=0)))
     noise = np.random.default_rng(1).normal(scale=0.005 * diagonal, size=truth.points.shape)
     found = orient_points(sh.PointCloud(truth.points + noise))

@@ -72,7 +72,7 @@ def test_on_coarse_grids_around_many_faces():
 
 def test_gaps_beside_what_was_given_do_not_leak():
     """Between faces and the zero set of φ they are wider than these steps."""
-    solid = complete(samples.without_faces(samples.sphere(3), 0.75, seed=1), completion="heat")
+    solid = complete(samples.without_faces(samples.sphere(2), 0.75, seed=1), completion="heat")
     rim = solid.faces.vertices[0]
     field = solid.field(grid=sh.Grid(1.02 * rim - 0.12, 0.01, (24, 24, 24)))
     assert_exact(field, solid)
@@ -92,7 +92,7 @@ def test_places_between_nodes_are_exact_too(solid):
 @pytest.mark.parametrize("level", [0.0, 0.11, -0.11])
 def test_contours_lie_on_the_level(level):
     solid = complete(SHAPES["holes"]())
-    field = solid.field(resolution=40)
+    field = solid.field(resolution=30)
     surface = field.offset(level)
     assert_closed_manifold(surface)
     off = np.abs(solid.distance(surface.vertices) - level) / field.grid.spacing[0]
@@ -163,7 +163,7 @@ def test_bands_are_the_whole_grid_near_the_surface(solid):
 
 def test_contours_of_bands_are_those_of_whole_grids():
     solid = complete(SHAPES["holes"]())
-    whole = solid.field(resolution=60)
+    whole = solid.field(resolution=44)
     band = solid.field(grid=whole.grid, band=4 * float(whole.grid.spacing[0]))
     for level in (0.0, 0.9 * band.width, -band.width):
         ours, theirs = band.offset(level), whole.offset(level)
@@ -186,7 +186,7 @@ def test_grids_are_as_asked_for_or_have_128_nodes_along_the_longest_side():
 
 def test_stores_hold_the_same_bits_whoever_computes_them(tmp_path):
     solid = complete(SHAPES["two bodies"]())
-    options = {"resolution": 90, "band": 0.05}
+    options = {"resolution": 80, "band": 0.05}
     band = solid.field(**options)
     assert band.n_nodes < 0.4 * band.grid.n_nodes
     by_threads = solid.field(**options, store=tmp_path / "new" / "threads")
