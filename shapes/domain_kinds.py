@@ -135,7 +135,7 @@ def lattice_of_voxels(spacing):
 
 
 def tets_around_balls(n):
-    mesh = tet_cases.boxes((16, 16, 16), 0.2, jitter=0.15)
+    mesh = tet_cases.boxes((12, 12, 12), 3.2 / 12, jitter=0.15)
     return sh.TetMesh(*copies(mesh.vertices - 1.6, mesh.tets, n))
 
 

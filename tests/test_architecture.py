@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import importlib
 import subprocess
 import sys
@@ -54,15 +55,21 @@ FLOORS = [
 ]
 """From the ground up: a module may import what is on its own floor or below. docs/architecture.md shows the same."""
 
+
+@functools.cache
+def graph():
+    return import_graph(PACKAGE)
+
+
 SLOW_TO_IMPORT = ("numba", "matplotlib", "trimesh", "meshio", "skimage", "nibabel")
 
 
 def test_no_circle_of_imports():
-    assert circles(import_graph(PACKAGE)) == []
+    assert circles(graph()) == []
 
 
 def test_imports_point_down():
-    assert upward_imports(import_graph(PACKAGE), FLOORS) == []
+    assert upward_imports(graph(), FLOORS) == []
 
 
 SLICES = "surfaces", "grids", "tets"
@@ -73,11 +80,10 @@ LEFT: set[tuple[str, str]] = {("tets.lattice", "grids.grid")}
 
 
 def test_slices_do_not_import_each_other():
-    graph = import_graph(PACKAGE)
     between = {
         (module.removeprefix("signedheat."), imported.removeprefix("signedheat."))
-        for module in graph
-        for imported in graph[module]
+        for module in graph()
+        for imported in graph()[module]
         if module.split(".")[1:2] != imported.split(".")[1:2]
         if all(any(name.startswith(f"signedheat.{each}.") for each in SLICES) for name in (module, imported))
     }
@@ -113,18 +119,12 @@ def test_no_public_name_is_that_of_a_module():
         assert not modules & set(package.__all__), name
 
 
-SUBMODULES = sorted(set(import_graph(PACKAGE)) - {"signedheat", "signedheat.__main__"})
-
-
-@pytest.mark.parametrize(
-    "first",
-    [f"for name in {SUBMODULES!r}: import_module(name)", f"for name in {SUBMODULES[::-1]!r}: import_module(name)"],
-    ids=["forwards", "backwards"],
-)
-def test_public_names_are_the_same_whatever_is_imported_first(first):
+@pytest.mark.parametrize("step", [1, -1], ids=["forwards", "backwards"])
+def test_public_names_are_the_same_whatever_is_imported_first(step):
+    submodules = sorted(set(graph()) - {"signedheat", "signedheat.__main__"})[::step]
     code = f"""from importlib import import_module
 import signedheat as sh
-{first}
+for name in {submodules!r}: import_module(name)
 public = import_module("signedheat.public")
 assert all(getattr(sh, name) is getattr(public, name) for name in (*public.__all__, *public.MODULES))
 print(*dir(sh))"""

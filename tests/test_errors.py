@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import copy
+import functools
 import pickle
 import re
 from pathlib import Path
@@ -77,15 +78,17 @@ def test_wrong_types_are_type_errors_too():
     assert caught.value.path == "input.ply"
 
 
+@functools.cache
 def calls_of_errors():
     """(where, text of the cause, names of the keywords) of every error of our own that the package makes."""
-    names = {kind.__name__ for kind in KINDS}
+    names, found = {kind.__name__ for kind in KINDS}, []
     for path in Path(sh.__file__).parent.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names and node.args:
                 cause = ast.get_source_segment(text, node.args[0]) or ""
-                yield f"{path.name}:{node.lineno}", cause, {keyword.arg for keyword in node.keywords}
+                found.append((f"{path.name}:{node.lineno}", cause, {keyword.arg for keyword in node.keywords}))
+    return found
 
 
 def test_every_error_says_what_it_is_about_or_what_to_do():

@@ -68,8 +68,8 @@ def grown(first: int, last: int) -> int:
 
 @READS_PROC
 def test_many_solvers_grids_and_fields_leave_nothing():
-    """80 solvers with two fields each, 40 grids and other domains, after 100 that fill what is kept on purpose."""
-    assert grown(100, 180) < 4_000_000  # 50 kB a solver; one that is kept takes 400
+    """50 solvers with two fields each, 40 grids and other domains, after 60 that fill what is kept on purpose."""
+    assert grown(60, 110) < 4_000_000  # 50 kB a solver; one that is kept takes 400
 
 
 @pytest.mark.slow

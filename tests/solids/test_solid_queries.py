@@ -211,7 +211,7 @@ def test_what_is_no_solid_is_not_believed(tmp_path, name, new_key, kind):
         except sh.FileFormatError:
             return
         queried = again if kind == "solid" else again.solid
-        assert np.isfinite(queried.distance(points_around(solid))).all()
+        assert np.isfinite(queried.distance(points_around(queried))).all()
         return
     with refused(sh.FileFormatError, file="one.npz"):
         (sh.io.load if kind == "solid" else sh.load_field)(path)

@@ -90,7 +90,7 @@ def test_points_on_a_lattice_are_covered_once_however_ambiguous():
 
 
 def test_a_noisy_cloud_hardly_has_holes_and_no_edge_has_three_faces():
-    points = cases.sphere_points(4000) + 0.006 * np.random.default_rng(1).normal(size=(4000, 3))
+    points = cases.sphere_points(4000) + 0.006 * np.random.default_rng(1).normal(size=(6000, 3))
     counts = sh.PointCloud(points).triangulation.edges.face_counts
     assert counts.max() == 2
     assert (counts == 1).mean() < 0.005
@@ -109,7 +109,7 @@ def test_small_holes_are_filled_and_outer_boundaries_stay():
 @pytest.mark.parametrize("name", CASES)
 def test_error_falls_and_is_below_the_peers(name):
     peers = pytest.importorskip("potpourri3d")
-    errors, sizes = [], [500, 1500, 4500]
+    errors, sizes = [], [400, 1000, 2500]
     for n in sizes:
         points, ids, exact = CASES[name](n)
         normals = outward(name, points)
@@ -268,10 +268,9 @@ def points_on_a_plate(n=12000, seed=0):
     return points[kept] * PLATE, normals[kept], loop
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_left_on_a_thin_plate_is_that_of_its_normals_wherever_curves_start_and_in_any_order(seed):
-    points, normals, loop = points_on_a_plate(seed=seed)
-    random = np.random.default_rng(seed)
+def test_left_on_a_thin_plate_is_that_of_its_normals_wherever_curves_start_and_in_any_order():
+    points, normals, loop = points_on_a_plate()
+    random = np.random.default_rng(0)
     order = random.permutation(len(points))
     far = np.abs(points[:, 0]) > 0.1
     ways = {
@@ -315,12 +314,12 @@ def test_the_sides_of_a_thin_plate_are_joined_at_its_rim_and_nowhere_else(thickn
     assert (np.sign(values) == np.sign(points[:, 0]))[far].all()
 
 
-def both_sides(thickness, spacing=0.05):
+def both_sides(thickness, spacing=0.058):
     """Points on a hollow ball, spread evenly over either side for itself, and normals."""
     random = np.random.default_rng(1)
     points, normals = [], []
     for side in (1, -1):
-        directions = random.normal(size=(8000, 3))
+        directions = random.normal(size=(6000, 3))
         directions /= np.linalg.norm(directions, axis=1)[:, None]
         kept = directions[spread_out(directions, np.full(len(directions), 0.8 * spacing))]
         points.append(kept * (1 + side * thickness / 2))
@@ -333,7 +332,7 @@ def both_sides(thickness, spacing=0.05):
     [(0.1, True, False), (0.5, True, False), (0.1, False, True), (0.5, False, True), (1, False, False)],
 )
 def test_sides_nearer_than_points_are_apart_are_kept_apart_or_announced(thickness, given, announced):
-    points, normals = both_sides(thickness * 0.05)
+    points, normals = both_sides(thickness * 0.058)
     cloud = sh.PointCloud(points, normals if given else None)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
