@@ -23,7 +23,7 @@ from signedheat import TriangleMesh, complete, orientation, samples
 from signedheat.mesh import welding
 from signedheat.mesh.components import element_components
 from signedheat.mesh.triangles import area_vectors
-from signedheat.solids import bounding, completion, gauss, overlaps, regions
+from signedheat.solids import bounding, chain, completion, gauss, overlaps, regions
 
 MODULES = (bounding, gauss, overlaps)
 NUMBERS = ("SHEET", "COHERENT", "CHANCE", "ALONG", "REACH", "HINT", "APART", "HELD", "AGREEMENT", "MANY", "SLENDER")
@@ -274,15 +274,18 @@ def joined(units: float) -> dict[str, float]:
     return result
 
 
-def parted(tolerances: tuple[float, ...], seeds: int) -> dict[str, float]:
-    """Share of assemblies of touching boxes whose volume is wrong, by how far rounding moves their corners."""
+def parted(seeds: int, apart: bool = False) -> dict[str, float]:
+    """Share of assemblies of touching boxes whose volume is wrong, by how far rounding moves their corners.
+
+    Boxes are closed, or their sides are `apart`.
+    """
     box = sides((1.0, 1.0, 1.0))
     corners, numbers = np.unique(box.vertices.round(9), axis=0, return_inverse=True)
     faces = numbers.reshape(-1)[box.faces]
-    before = regions.TOLERANCES
-    regions.TOLERANCES = tolerances
+    if apart:
+        corners, faces = box.vertices, box.faces
     result = {}
-    for rounding in (1e-11, 1e-9, 1e-8, 3e-8, 1e-7, 3e-7, 1e-6, 1e-5):
+    for rounding in (1e-13, 1e-11, 1e-9, 1e-8, 3e-8, 1e-7, 3e-7, 1e-6, 1e-5):
         wrong = 0
         for seed in range(10 * seeds):
             rng = np.random.default_rng([seed, 11])
@@ -294,7 +297,6 @@ def parted(tolerances: tuple[float, ...], seeds: int) -> dict[str, float]:
             many = (faces + len(corners) * np.arange(len(cells))[:, None, None]).reshape(-1, 3)
             wrong += abs(complete((points, many)).volume / volume - 1) > 1e-9 + 20 * rounding
         result[f"{rounding:g}"] = wrong / (10 * seeds)
-    regions.TOLERANCES = before
     return result
 
 
@@ -328,10 +330,19 @@ def main(seeds: int = 2) -> None:
     for name in shares[welding.SEAM]:
         print(f"{name:54s} " + " ".join(f"{row[name]:4.0%}" for row in shares.values()))
 
-    for most in range(1, len(regions.TOLERANCES) + 1):
-        wrong = parted(regions.TOLERANCES[:most], seeds)
-        listed = ", ".join(f"{rounding} {share:.0%}" for rounding, share in wrong.items())
-        print(f"assemblies wrong with {most} of regions.TOLERANCES, by rounding: {listed}", flush=True)
+    tolerances = regions.TOLERANCES
+    for most in range(1, len(tolerances) + 1):
+        regions.TOLERANCES = tolerances[:most]
+        print(f"assemblies wrong with {most} of regions.TOLERANCES, by rounding: {listed(parted(seeds))}", flush=True)
+    for units in (welding.ROUNDING / 4, welding.ROUNDING, 4 * welding.ROUNDING):
+        chain.ROUNDING = units
+        print(f"with sides apart and welding.ROUNDING {units:g}: {listed(parted(seeds, apart=True))}", flush=True)
+    chain.ROUNDING = welding.ROUNDING
+
+
+def listed(shares: dict[str, float]) -> str:
+    """Shares in one line."""
+    return ", ".join(f"{name} {share:.0%}" for name, share in shares.items())
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from signedheat.mesh.welding import welded_vertices
+from signedheat.mesh.welding import ROUNDING, joined_rims, same_positions
 
 PLACES = ((0, 0, 0), (1e3, -1e3, 10), (431250, 5412300, 100), (1e6, 1e6, 1e6), (1e7, 0, 0), (1e7, 1e7, 1e7))
 SIDES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
@@ -28,14 +28,17 @@ def house(unit, sides=range(6)):
 
 
 def classes(vertices, faces):
-    return welded_vertices(vertices, faces.ravel(), np.roll(faces, -1, axis=1).ravel())
+    same = same_positions(vertices)
+    corners = same[faces]
+    return joined_rims(vertices, corners.ravel(), np.roll(corners, -1, axis=1).ravel(), ROUNDING)[same]
 
 
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("sides", [range(6), range(1, 6), [0, 2, 4]])
 @pytest.mark.parametrize("unit", [1.0, 0.5])
 def test_coordinates_on_lattices_are_kept_wherever_they_are(place, sides, unit):
-    vertices, faces = house(unit, sides)
+    last_place = np.spacing(np.float32(np.abs(place).max()))
+    vertices, faces = house(max(unit, 2 * last_place), sides)
     corners = (vertices + place)[faces].reshape(-1, 3)
     soup = classes(corners, np.arange(len(corners)).reshape(-1, 3))
     assert len(np.unique(soup)) == len(np.unique(faces))

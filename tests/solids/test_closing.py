@@ -10,7 +10,7 @@ import signedheat as sh
 from shapes.bodies import finer
 from signedheat import samples
 from signedheat.mesh.edges import edge_table
-from signedheat.solids import lids
+from signedheat.solids import closing, lids
 from signedheat.solids.closing import closed_by
 from signedheat.solids.rims import boundary, loops
 
@@ -188,3 +188,29 @@ def test_a_disc_has_room_for_sides_as_short_as_rounding():
     rim = lids.SmoothRim.of(loop)
     points, faces = lids.draped(loop, rim.starts, None, lids.film(lids.pattern(rim, None)))
     assert set(range(len(loop))) <= set(faces.ravel().tolist()) and faces.max() == len(loop) + len(points) - 1
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-7])
+def test_a_slit_that_is_left_between_two_corners_is_closed(monkeypatch, height):
+    """As strips leave slits: their lids are triangles of no width."""
+    box = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
+    vertices = np.concatenate([box, [[1 / 3, 0, 1 + height], [2 / 3, 0, 1 + height]]])
+    sides = [
+        [0, 2, 3],
+        [0, 3, 1],
+        [0, 1, 5],
+        [0, 5, 4],
+        [2, 6, 7],
+        [2, 7, 3],
+        [0, 4, 6],
+        [0, 6, 2],
+        [1, 3, 7],
+        [1, 7, 5],
+    ]
+    faces = np.array([*sides, [6, 4, 8], [6, 8, 9], [6, 9, 5], [6, 5, 7]])
+    for way in ("small_lids", "strips"):
+        monkeypatch.setattr(closing, way, lambda *_: np.empty((0, 3), dtype=np.int64))
+    points, added = closing.closed_by(vertices, faces)
+    assert sorted(np.unique(added).tolist()) == [4, 5, 8, 9]
+    assert len(points) == 10
+    assert not edge_table(np.concatenate([faces, added])).balance.any()

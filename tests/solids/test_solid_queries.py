@@ -131,6 +131,18 @@ def test_boxes_whose_common_sides_rounding_parts_are_one_solid(kind, rounding):
         assert trimesh.Trimesh(kept.vertices, kept.faces).volume == pytest.approx(volume, rel=20 * rounding + 1e-9)
 
 
+@pytest.mark.parametrize("rounding", [0.0, 1e-13, 1e-11, 1e-9, 1e-8, 3e-8])
+def test_cells_whose_sides_are_apart_by_rounding_are_one_solid(rounding):
+    """As files that hold each face as a mesh of its own: walls between cells are there twice."""
+    rng = np.random.default_rng(5)
+    cell = trimesh.creation.box(bounds=[[0, 0, 0], [1, 1, 1]]).subdivide().triangles
+    corners = np.concatenate([cell + cell_at for cell_at in np.ndindex(2, 2, 1)][:3])
+    sides = sh.TriangleMesh(corners.reshape(-1, 3), np.arange(9 * len(corners) // 3).reshape(-1, 3))
+    turned = sides.vertices @ Rotation.from_rotvec([0.3, 0.5, 0.7]).as_matrix().T
+    solid = sh.complete((turned + rounding * rng.uniform(-1, 1, turned.shape), sides.faces))
+    assert solid.volume == pytest.approx(3, rel=20 * rounding + 1e-9)
+
+
 def test_vertices_at_which_cones_touch_are_not_regular():
     cones = two_cones()
     features = FaceFeatures.of(cones.vertices, cones.faces)

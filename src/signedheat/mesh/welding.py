@@ -9,11 +9,9 @@ from ..arrays import Bools, Floats, Ints, read_only
 from ..compiled import compiled
 from .edges import find_edges
 
-SINGLE, DOUBLE = 2.0**-22, 2.0**-46
-"""Largest difference of coordinates of one place, relative to the largest coordinate, in single and in double
-precision."""
-SHORT_EDGES = 0.1
-"""Share of the open edges that may be so short that welding collapses them."""
+ROUNDING = 4.0
+"""Largest difference of coordinates of one place, in units of single precision of the size of a shape, or of the last
+places of its coordinates."""
 SEAM, GAP = 64.0, 1024.0
 """Largest difference of coordinates of one vertex of a seam, and of two that are announced as nearly one, in units of
 single precision of the size of the surface. Halved, a vertex in a hundred is missed on two of twelve seams; doubled,
@@ -23,40 +21,15 @@ COLLAPSE = 0.25
 _HALF = 0xFFFFFFFF
 
 
-def welded_vertices(points: Floats, tails: Ints, heads: Ints) -> Ints:
-    """Return (n,) the first vertex at the place of each, where places may differ by rounding on rims.
-
-    Vertices at different places become one if both are on open edges of the halfedges (h,), with an odd number of
-    faces, and rounding explains the difference: a few units in the last place, along axes whose coordinates make use of
-    it.
-    """
-    same = same_positions(points)
-    single = _is_single(points)
-    farthest = float(np.abs(points).max(initial=0.0)) * (SINGLE if single else DOUBLE)
-    if (welded(points, farthest) == same).all():
-        return same
-    tails, heads = same[tails], same[heads]
-    edges, _, counts, _, _ = find_edges(read_only(tails), read_only(heads), tails != heads, len(points))
-    is_open = (edges >= 0) & (np.append(counts, 0)[edges] % 2 == 1)
-    rims = np.unique(np.concatenate([tails[is_open], heads[is_open]]))
-    lengths = np.abs(points[tails[is_open]] - points[heads[is_open]]).max(axis=1)
-    if len(rims):
-        tolerance = min(farthest, float(np.quantile(lengths, SHORT_EDGES)) / 4)
-        own = np.arange(len(points))
-        own[rims] = rims[welded(points[rims], np.where(_is_rounded(points, single), tolerance, 0.0))]
-        same = own[same]
-    return same
-
-
-def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float = SEAM) -> Ints:
+def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:
     """Return (n,) the first vertex at the place of each that is on a rim, as of a seam; all others stay.
 
-    Places are one if they differ by `units` of single precision of the size of what is given, or of the last places of
-    its coordinates if these are larger, but never so that an edge collapses. So seams of single precision are joined
-    wherever a transformation in double precision took them.
+    Rims are edges of the halfedges (h,) that an odd number of faces have. Places are one if they differ by `units` of
+    single precision of the size of what is given, or by `ROUNDING` last places of coordinates that make use of these,
+    but never so that an edge collapses. So what single precision parted is joined wherever double precision moved it.
     """
     edges, _, counts, _, _ = find_edges(read_only(tails), read_only(heads), tails != heads, len(points))
-    is_open = (edges >= 0) & (np.append(counts, 0)[edges] == 1)
+    is_open = (edges >= 0) & (np.append(counts, 0)[edges] % 2 == 1)
     rims = np.unique([tails[is_open], heads[is_open]])
     places = np.arange(len(points))
     if not len(rims):
@@ -66,9 +39,10 @@ def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float = SEAM) -
     lengths, shortest = np.abs(points[heads] - points[tails]).max(axis=1), np.full(len(points), np.inf)
     for ends in (tails, heads):
         np.minimum.at(shortest, places[ends], np.where(lengths > 0, lengths, np.inf))
-    last_place = float(np.abs(used).max()) * (2.0**-24 if _is_single(used) else 2.0**-53)
-    unit = max(2.0**-24 * float(np.ptp(used, axis=0).max()), last_place)
-    near = first[np.searchsorted(rims, rims[welded(points[rims], units * unit)])]
+    digits = 24 if _is_single(used) else 53
+    last_places = np.where(_is_rounded(used, digits), ROUNDING * np.abs(used).max() * 2.0**-digits, 0.0)
+    tolerances = np.maximum(units * 2.0**-24 * np.ptp(used, axis=0).max(), last_places)
+    near = first[np.searchsorted(rims, rims[welded(points[rims], tolerances)])]
     apart = np.abs(points[first] - points[near]).max(axis=1)
     places[rims] = np.where(apart <= COLLAPSE * np.minimum(shortest[first], shortest[near]), near, first)
     return places
@@ -80,9 +54,9 @@ def _is_single(points: Floats) -> bool:
         return bool((points.astype(np.float32) == points).all())
 
 
-def _is_rounded(points: Floats, single: bool) -> Bools:
+def _is_rounded(points: Floats, digits: int) -> Bools:
     """Return (3,) whether coordinates along an axis make use of the last place of the largest of them."""
-    last_places = np.ldexp(1.0, np.frexp(np.abs(points).max(axis=0))[1] - (24 if single else 53))
+    last_places = np.ldexp(1.0, np.frexp(np.abs(points).max(axis=0))[1] - digits)
     return (np.fmod(points, 2.0 * last_places) != 0).any(axis=0)
 
 

@@ -72,12 +72,12 @@ def winding_sums(triangles: Floats, points: Floats) -> Floats:
     """Return (n,) winding numbers around few points, triangle by triangle (van Oosterom & Strackee 1983)."""
     numbers = np.zeros(len(points))
     for begin in range(0, len(triangles), BLOCK):
-        block = triangles[begin : begin + BLOCK]
+        block = np.ascontiguousarray(triangles[begin : begin + BLOCK].transpose(1, 2, 0))  # fast along long rows
         for k, point in enumerate(points):
-            a, b, c = (block - point).transpose(1, 0, 2)
-            ab, bc, ca = ((u * v).sum(axis=1) for u, v in ((a, b), (b, c), (c, a)))
-            x, y, z = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
-            volumes = (a * np.cross(b, c)).sum(axis=1)
+            a, b, c = block - point[:, None]
+            x, y, z = (np.sqrt(np.einsum("dn,dn->n", corner, corner)) for corner in (a, b, c))
+            ab, bc, ca = (np.einsum("dn,dn->n", *sides) for sides in ((a, b), (b, c), (c, a)))
+            volumes = np.einsum("dn,dn->n", a, np.cross(b, c, axis=0))
             numbers[k] += np.arctan2(volumes, x * y * z + ab * z + bc * x + ca * y).sum() / (2 * np.pi)
     return numbers
 

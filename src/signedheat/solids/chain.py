@@ -21,7 +21,7 @@ from ..mesh.components import connected_components, element_components
 from ..mesh.edges import EdgeTable, FaceOrientation, edge_table, orient_faces, pair_halfedges
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import axes_across, unit
-from ..mesh.welding import coincident_faces, welded_vertices
+from ..mesh.welding import ROUNDING, coincident_faces, joined_rims, same_positions
 from ..search.winding_tree import WindingTree
 from ..surfaces.triangle_mesh import TriangleMesh
 from .overlaps import APART
@@ -131,7 +131,8 @@ class Chain(Frozen):
     def of(cls, mesh: TriangleMesh) -> Chain:
         """Make the chain of a mesh."""
         tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-        ids = welded_vertices(mesh.vertices, tails, heads)[mesh.faces]
+        same = same_positions(mesh.vertices)
+        ids = joined_rims(mesh.vertices, same[tails], same[heads], ROUNDING)[same[mesh.faces]]
         first, backwards = coincident_faces(ids.ravel(), np.arange(0, 3 * len(ids) + 1, 3))
         distinct = np.flatnonzero(first == np.arange(len(ids)))
         numbers = np.full(len(ids) + 1, -1)

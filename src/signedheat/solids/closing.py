@@ -479,6 +479,8 @@ def _spanned(surface: _Surface, loop: Ints, frame: Frame | None, bent: bool) -> 
         if lid is not None:
             return lid
         places = corners_of(corners)
+        if len(places) < 3:
+            return np.empty((0, 3)), fan(np.arange(len(loop)))
         if len(places) <= MOST_SIDES:
             triangles = least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[0]
             return np.empty((0, 3)), _with_sides(np.arange(len(loop)), places, triangles)

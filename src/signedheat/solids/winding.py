@@ -54,7 +54,7 @@ class Windings(Frozen):
 
     def numbers(self, points: Floats) -> Floats:
         """(n,) winding numbers."""
-        return self.tree.numbers(points) if len(self.triangles) else np.zeros(len(points))
+        return self.tree.numbers(points) if len(self.triangles) and len(points) else np.zeros(len(points))
 
     def numbers_once(self, points: Floats) -> Floats:
         """(n,) winding numbers, summed without a tree if the points are few: for callers that ask only once."""

@@ -14,7 +14,7 @@ from ..exchange import Elements, Exchangeable
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.intrinsic_mesh import MARGIN, IntrinsicMesh, laid_out
 from ..mesh.triangles import area_vectors
-from ..mesh.welding import joined_rims
+from ..mesh.welding import SEAM, joined_rims
 from ..search.nearest_triangles import TriangleTree
 from ..validation import coordinates, element_ids, used_bounds
 from .surface import Surface
@@ -105,7 +105,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     @cached_property
     def places(self) -> Ints:
         """(n,) the first vertex at the place of each boundary vertex, as along seams; all others are their own."""
-        return joined_rims(self.vertices, self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel())
+        return joined_rims(self.vertices, self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel(), SEAM)
 
     @cached_property
     def joined(self) -> TriangleMesh:
