@@ -12,6 +12,7 @@ import signedheat as sh
 from refusals import refused
 from shapes.bodies import box, distance_to_box
 from shapes.grid_cases import assert_closed_manifold, enclosed_volume
+from shapes.tet_cases import lattice
 from signedheat import memory, samples
 from signedheat.cli import main
 from signedheat.mesh.self_intersections import self_intersections
@@ -55,6 +56,20 @@ def test_a_broken_ball_grows_as_if_it_were_whole():
     assert_closed_manifold(grown)
     # Holes of angular radius 0.35 leave 1 − cos 0.35 = 0.06 open to interpretation.
     assert np.quantile(np.abs(radii(grown) - 1.3), 0.99) < 0.06
+    np.testing.assert_allclose(radii(grown), 1.3, atol=0.1)
+
+
+@pytest.mark.parametrize("step", [1, -1])
+def test_outlines_that_overlap_are_one_whichever_way_they_run(step):
+    square = np.array([[0.0, 0.0], [1, 0], [1, 1], [0, 1]])
+    both = [sh.Polyline(square[::step] + shift, closed=True) for shift in (0.0, [0.5, 0.2])]
+    for operation, reach in ((sh.morphology.dilate, 0.1), (sh.morphology.erode, -0.1), (sh.morphology.opening, 0.0)):
+        [outline] = operation(both, 0.1)
+        np.testing.assert_allclose(outline.bounds, [[-reach, -reach], [1.5 + reach, 1.2 + reach]], atol=1e-3)
+
+
+def test_on_tets_faces_are_turned():
+    grown = sh.morphology.dilate(samples.with_flipped_faces(samples.sphere(2), 0.3), 0.3, lattice(16))
     np.testing.assert_allclose(radii(grown), 1.3, atol=0.1)
 
 

@@ -37,13 +37,11 @@ from .memory import within_memory
 from .mesh.triangles import part_volumes
 from .search.face_tree import FaceFeatures, FaceTree
 from .search.nearest_triangles import weights_in
-from .sharpening import sharpen
 from .solids.completion import complete
 from .solids.contouring import sharp_surface
 from .solids.implicit_surfaces import contour
 from .solids.offsets import Offset, Reach, SheetWall, checked_reach
 from .solids.solid import Solid
-from .solver import SignedHeatSolver
 from .surfaces.digital_surface import DigitalSurface
 from .surfaces.point_cloud import PointCloud
 from .surfaces.polygon_mesh import PolygonMesh
@@ -126,7 +124,7 @@ def dilate(
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh, PointCloud; in the plane Polyline; on a surface Curve; or a sequence of them
-        The shape, which may be broken. The inside, where φ < 0, is behind the normals, or to the right of curves.
+        The shape, which may be broken. What is inside is what `signedheat.signed_distance` says.
     distance : float
         The offset, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
@@ -371,7 +369,7 @@ def shell(
     if keep_outside and measure is None:
         solid: object = complete(shape)
     else:
-        field = (measure or _field)(shape, grid)
+        field = (measure or signed_distance)(shape, grid)
         solid = field.solid if isinstance(field, GridField) else None
     if keep_outside:
         if not isinstance(solid, Solid):
@@ -559,19 +557,6 @@ def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
         return solid.surface(spacing=cell)
 
 
-def _field(shape: Sources, domain: Domain) -> Field:
-    """Compute the distance whose level sets are the offsets: on grids in space, to the completed solid."""
-    if isinstance(domain, Grid) and domain.dimension == 3:
-        return signed_distance(shape, domain)
-    return _sided(domain, shape)
-
-
-def _sided(domain: Domain, shape: Sources) -> Field:
-    """Compute the signed distance to a shape that may have sides but no inside; sharpen it on grids."""
-    field = SignedHeatSolver(domain).distance(shape)
-    return sharpen(field) if isinstance(field, GridField) else field
-
-
 def _offsets(
     shape: Sources,
     distance: float,
@@ -584,7 +569,7 @@ def _offsets(
     distance = finite_number(distance, "the distance", least=0)
     domain = _given_or_room(domain, shape, distance if 1 in signs else 0.0, resolution)
     for sign in signs:
-        field = (measure or _field)(shape, domain)
+        field = (measure or signed_distance)(shape, domain)
         shape = boundary = offset_of(field, sign * distance)
     return boundary
 
