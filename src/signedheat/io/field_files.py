@@ -180,7 +180,8 @@ def load_vertex_field(path: PathLike) -> VertexField:
         elif "faces" in arrays:
             domain = TriangleMesh(vertices, arrays["faces"])
         else:
-            domain = PointCloud(vertices, **{name: arrays[name] for name in OF_CLOUDS if name in arrays})
+            given: dict[str, Any] = {name: arrays[name] for name in OF_CLOUDS if name in arrays}
+            domain = PointCloud(vertices, **given)
         if values.shape != (len(vertices),):
             raise damaged(f"{values.shape} values for {len(vertices)} vertices: the file is damaged")
         return VertexField(domain, values)
