@@ -230,7 +230,7 @@ def main(wanted: list[str]) -> int:
     for ending, variants in formats().items():
         if wanted and ending not in wanted:
             continue
-        cells = []
+        print(f"| `.{ending}` |", end="", flush=True)
         for name, attack in ATTACKS.items():
             kinds: Counter[str] = Counter()
             for read, files in variants:
@@ -247,8 +247,8 @@ def main(wanted: list[str]) -> int:
                             failures.append(f".{ending} {name}: {kind[:200]}")
             tried, wrong = kinds.total(), kinds.total() - kinds["read"] - kinds["refused"]
             cell = f"{tried:,} ({kinds['read']:,})" + (f" **{wrong} wrong**" if wrong else "")
-            cells.append(cell if tried else "–")
-        print(f"| `.{ending}` | " + " | ".join(cells) + " |", flush=True)
+            print(f" {cell if tried else '–'} |", end="", flush=True)
+        print()
     print("\n".join(["", f"{len(failures)} failures", *failures]))
     return int(bool(failures))
 
