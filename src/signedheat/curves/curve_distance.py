@@ -31,7 +31,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField
 from ..validation import flag
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
-from .stroke_directions import CurvePieces, Decision, decide, with_turned
+from .stroke_directions import CurvePieces, Decision, decide, pieces_for_all, with_turned
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -178,19 +178,20 @@ def distance_to_pieces(
     constraint: Constraint | None,
     every_piece: bool,
     numbers: Ints | None = None,
+    pieces: CurvePieces | None = None,
 ) -> tuple[VertexField[Surface], list[CurveOrPoints]]:
     """Distance to curves that may be pieces of broken ones, and the curves that it was measured to.
 
     Pieces are turned until they bound something together (`curve_orientation`), and those that do not are left out,
     unless most do not. Where faces cannot agree which side is left, pieces are taken as they are. There is an
     `InexactWarning` where the answer is a guess. Warnings and notes name curves by `numbers`, (n,), by default their
-    places in the list.
+    places in the list. `pieces` are decided on triangles of their own, by default those of the solver.
     """
     listed = flattened(curves)
     numbers = np.arange(len(listed)) if numbers is None else numbers
     surface_of(solver).segments(listed)  # refuses curves that do not fit
     once = triangulated_once(solver, listed)
-    pieces = CurvePieces.of(surface_of(once), listed)
+    pieces = pieces or CurvePieces.of(surface_of(once), listed)
     if pieces is None:
         return distance_unwarned(solver, listed, constraint), listed
     if isinstance(solver.domain, TriangleMesh) and not has_sides(solver.domain, listed):
@@ -346,12 +347,15 @@ def distance_to_curves(
         solver, given = SignedHeatSolver(repaired.mesh, diffusion, share, intrinsic), repaired.on_it(given)
     listed, left_out = given_curves(solver.domain, given)
 
+    is_default = intrinsic == "auto"
+    pieces = None if is_default or as_oriented else pieces_for_all(solver.domain, flattened(listed))
+
     def measured(by: SignedHeatSolver[Any]) -> tuple[VertexField[AnySurface], CurvesAndPoints]:
         if as_oriented:
             return distance_unwarned(by, given, constraint), listed
-        return distance_to_pieces(by, listed, constraint, every_piece, numbers_given(listed, left_out))
+        return distance_to_pieces(by, listed, constraint, every_piece, numbers_given(listed, left_out), pieces)
 
-    field, taken = on_resolving_triangles(measured, solver, listed) if intrinsic == "auto" else measured(solver)
+    field, taken = on_resolving_triangles(measured, solver, listed) if is_default else measured(solver)
     rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))
     sharpened = sharpen(field, taken, progress=rest)
     if repaired is not None:

@@ -9,7 +9,6 @@ from typing import cast
 
 import numpy as np
 import scipy
-from scipy import sparse
 
 from ..arrays import Bools, Floats, Frozen, Ints, ShortRepr
 from ..errors import UnsupportedTypeError
@@ -47,20 +46,19 @@ SINGLY = 16
 speed. Halved and doubled, none of 46 drawings changes."""
 TURNED = 0.34
 """Turning whole loops is a guess if they make up more than this share of the length; a loop is turned as a whole if no
-more than this share of it is not. Of 530 drawings (`benchmarks/strokes.py`, seeds 9000 to 9052) 4 are wrong in silence
-and 13 right with a warning; at .3 4 and 16, at .36 5 and 12, at .4 7 and 12."""
-HALF = 0.45
-"""Turning a part of a loop is a guess if it is more than this share, by length and by number of strokes. Without this,
-4 and 12 of the same drawings; at .34, of 283 drawings with turned strokes nine more are right with a warning."""
-WORTH, CLOSED = 0.5, 0.25
-"""The inside is a guess if it depends on a stroke worth less than this, relative to its length; the second if the
-stroke is likely to be a whole closed curve. At .4 5 and 13 of the same drawings, at .6 2 and 16, but then circles in
-three pieces, a third of them gone, are guesses, too. Of 30 closed curves none is worth less than .41 if three tenths
-are gone, and none of those is wrong; of those of which six tenths are gone, three of the seven nearly closed ones are
-wrong, and worth at most .17."""
+more than this share of it is not. Of 648 drawings (`benchmarks/strokes.py`, seeds from 20000 on) 4 are wrong in silence
+and 8 right with a warning; at .25 3 and 10, at .4 5 and 8."""
+NEARLY = 0.0025
+"""Two insides are equally likely if their costs differ by less than this share of the length of all strokes, as for two
+copies of a stroke that face either way. Zero or halved, nothing changes on these drawings; at .01 4 and 10."""
+WORTH = 0.4
+"""The inside is a guess if it depends on a stroke worth less than this, relative to its length: halved 6 and 8 of these
+drawings, doubled 3 and 42. Of 30 closed curves none is worth less than .41 if three tenths are gone, and none of those
+is wrong; of those of which six tenths are gone, three of the seven nearly closed ones are wrong, and worth at most
+.17."""
 OTHERWISE = 0.05
-"""The inside depends on a stroke if this share of the area changes sides without it. By shortest lines alone 4 and 13
-of the same drawings, but of 320 others two more are wrong in silence, and one fewer is right with a warning."""
+"""The inside depends on a stroke if this share of the area changes sides without it: halved 4 and 15 of these drawings,
+doubled 8 and 8."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +110,7 @@ class Decision:
     best: Inside  # the best directions that were found, and what is inside then
     # whether most of the length bounds nothing in the least energy, so that sides were taken to be smooth
     bounds_nothing: bool = False
-    tied: bool = False  # whether something else is inside in another answer that costs the same
+    tied: bool = False  # whether something else is inside in another answer that costs nearly the same
 
     def turned(self, n: int) -> Bools:
         """(n,) which of all curves given are turned."""
@@ -142,31 +140,12 @@ class Decision:
         return not self.bounds_nothing and bool((self.best.explained[~self.loose] >= EXPLAINED).all())
 
     def turned_loops(self) -> Ints:
-        """Numbers of the pieces turned of loops that are mostly turned, unless they are few."""
+        """Numbers of the curves turned of loops that are mostly turned, unless they are few."""
         strokes, best = self.pieces.strokes, self.best
-        triangles = strokes.surface.triangles
-        signs = best.sides[triangles.corner_vertices]
-        crossed = triangles.corner_vertices[signs.min(axis=1) != signs.max(axis=1)]
-        loop = connected_components(triangles.n_vertices, *crossed[:, [0, 1, 1, 2]].reshape(-1, 2).T)
-        at_loop = np.zeros(triangles.n_vertices, dtype=bool)
-        at_loop[crossed] = True
-        nearby = strokes.means.tocoo()
-        chosen = at_loop[nearby.col]
-        pairs = nearby.row[chosen], loop[nearby.col[chosen]]
-        count = sparse.csr_matrix((np.ones(len(pairs[0])), pairs), shape=(len(best.signs), triangles.n_vertices))
-        own = np.asarray(count.argmax(axis=1)).ravel()
-        bounds = best.explained >= EXPLAINED
-        lengths = np.where(bounds, strokes.lengths, 0.0)
-
-        def share_turned(weights: Floats) -> Floats:
-            turned, total = (np.bincount(own, weights * way, triangles.n_vertices) for way in (best.signs < 0, 1))
-            return np.asarray(turned[own] / np.where(total[own] > 0, total[own], 1.0))
-
-        by_length, by_number = share_turned(lengths), share_turned(bounds.astype(np.float64))
-        mostly = (by_length > 1 - TURNED) | (np.minimum(by_length, by_number) > HALF)
-        against = mostly & (best.signs < 0) & bounds
-        # others turned prove nothing
-        few = lengths[against].sum() < TURNED * lengths[against | (best.signs > 0)].sum()
+        lengths = np.where(best.explained >= EXPLAINED, strokes.lengths, 0.0)
+        turned, total = (np.bincount(strokes.group, lengths * way) for way in (best.signs < 0, 1))
+        against = (turned > (1 - TURNED) * total)[strokes.group] & (best.signs < 0) & (lengths > 0)
+        few = lengths[against].sum() < TURNED * lengths[against | (best.signs > 0)].sum()  # others turned prove nothing
         return self.pieces.curves(against & (not few))
 
     def worth_little(self, values: Floats) -> Ints:
@@ -177,10 +156,8 @@ class Decision:
         arc by a larger bulge than lines do.
         """
         strokes, best, own = self.pieces.strokes, self.best, self.pieces.strokes.own
-        closed = (strokes.is_loop & (np.bincount(strokes.group) == 1))[strokes.group]
-        least = np.where(closed, CLOSED, WORTH) * strokes.lengths
         missing = cost(strokes, best) + strokes.lengths.sum()  # a stroke is worth its length less this, or more
-        chosen = longest_of(strokes, np.flatnonzero(strokes.lengths - least < missing))
+        chosen = longest_of(strokes, np.flatnonzero((1 - WORTH) * strokes.lengths < missing))
         without = settled_from(strokes, [altered(best.signs, [k], 0.0) for k in chosen.tolist()], self.pieces.movable)
         worth = np.array([cost(strokes, rival) - cost(strokes, best) for rival in without])
         areas, away = strokes.areas[own], np.diff(strokes.means.tocsc().indptr)[own] == 0
@@ -192,7 +169,7 @@ class Decision:
 
         share = np.array([depending(rival) for rival in without]) / areas.sum()
         found = np.zeros(len(best.signs), dtype=bool)
-        found[chosen[(worth < least[chosen]) & (share > OTHERWISE)]] = True
+        found[chosen[(worth < WORTH * strokes.lengths[chosen]) & (share > OTHERWISE)]] = True
         return self.pieces.curves(found)
 
 
@@ -248,11 +225,16 @@ def decide(pieces: CurvePieces) -> Decision:
         best = better
     if mostly_loose(strokes, best):
         return Decision(pieces, strokes.inside(smooth), bounds_nothing=True)
-    most = misfit(strokes, best) + TIE * strokes.lengths.sum()
-    rivals = [inside for inside in strokes.seen if misfit(strokes, inside) <= most]
-    best = min(rivals, key=lambda inside: (int((inside.signs < 0).sum()), (inside.signs < 0).tolist()))
-    otherwise = [strokes.either_way(best), *(strokes.areas[inside.sides != best.sides].sum() for inside in rivals)]
+    near, equal = (rivals(strokes, best, share) for share in (NEARLY, TIE))
+    best = min(equal, key=lambda inside: (int((inside.signs < 0).sum()), (inside.signs < 0).tolist()))
+    otherwise = [strokes.either_way(best), *(strokes.areas[inside.sides != best.sides].sum() for inside in near)]
     return Decision(pieces, best, tied=bool(max(otherwise) > OTHERWISE * strokes.areas.sum()))
+
+
+def rivals(strokes: Strokes, best: Inside, share: float) -> list[Inside]:
+    """Insides seen that cost more by at most this share of the length of all strokes."""
+    most = misfit(strokes, best) + share * strokes.lengths.sum()
+    return [inside for inside in strokes.seen if misfit(strokes, inside) <= most]
 
 
 def least_of(strokes: Strokes, insides: list[Inside]) -> Inside:
@@ -427,17 +409,22 @@ def curve_orientation(
         )
     listed = flattened(as_curves(surface, as_list(curves)))
     turned, agreement = np.zeros(len(listed), dtype=bool), np.ones(len(listed))
-
-    def seen(solver: SignedHeatSolver[SurfaceDomain]) -> CurvePieces | None:
-        return CurvePieces.of(surface_of(triangulated_once(solver, listed)), listed)
-
-    pieces = on_resolving_triangles(seen, SignedHeatSolver(surface), listed)
+    pieces = pieces_for_all(surface, listed)
     if pieces is not None:
         decision = decide(pieces)
         turned = decision.turned(len(listed))
         explained = np.where(pieces.movable, np.clip(decision.best.explained, 0.0, 1.0), 1.0)
         agreement[pieces.numbers] = explained[pieces.stroke]
     return CurveOrientation(with_turned(listed, turned), turned, agreement)
+
+
+def pieces_for_all(domain: SurfaceDomain, curves: Sequence[CurveOrPoints]) -> CurvePieces | None:
+    """Return the pieces of curves as they are by default, so that options of distance decide nothing about them."""
+
+    def seen(solver: SignedHeatSolver[SurfaceDomain]) -> CurvePieces | None:
+        return CurvePieces.of(surface_of(triangulated_once(solver, curves)), curves)
+
+    return on_resolving_triangles(seen, SignedHeatSolver(domain), curves)
 
 
 def with_turned(curves: Sequence[CurveOrPoints], turned: Bools) -> list[CurveOrPoints]:
