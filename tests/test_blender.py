@@ -52,7 +52,7 @@ def test_surfaces_are_closed_and_where_they_should_be(monkeypatch, distance):
 @pytest.mark.skipif(sys.platform == "win32", reason="the program here is a shell's")
 def test_fields_are_volumes(command, tmp_path):
     _, vertices, polygons = holed()
-    protocol.field_of(command, vertices, polygons, 32, str(tmp_path / "ball.vdb"))
+    protocol.field_of(command, vertices, polygons, 16, str(tmp_path / "ball.vdb"))
     assert (tmp_path / "ball.vdb").read_bytes().startswith(b" BDV")
 
 

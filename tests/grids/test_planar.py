@@ -107,9 +107,9 @@ def test_points_on_a_line():
 
 def test_a_sphere_in_four_dimensions():
     rng = np.random.default_rng(1)
-    points = rng.normal(size=(4000, 4))
+    points = rng.normal(size=(3000, 4))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
-    phi = sh.SignedHeatSolver(sh.Grid.around(sh.PointCloud(points, normals=points), 14, padding=0.4)).distance(
+    phi = sh.SignedHeatSolver(sh.Grid.around(sh.PointCloud(points, normals=points), 12, padding=0.4)).distance(
         sh.PointCloud(points, normals=points)
     )
     assert phi.grid.dimension == 4

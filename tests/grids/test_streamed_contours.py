@@ -17,7 +17,7 @@ def test_parts_make_the_same_surface(tmp_path, cut):
     whole = sphere(1500)
     middles = whole.vertices[whole.faces].mean(axis=1)
     part = sh.TriangleMesh(whole.vertices, whole.faces[middles[:, 2] < cut])  # leaves the box, or not
-    band = sh.signed_distance(part, resolution=150, band=0.1)
+    band = sh.signed_distance(part, resolution=100, band=0.12)
     for level in (0.0, 0.05):
         path = tmp_path / "contour.ply"
         counts = band.save_contour(path, level)

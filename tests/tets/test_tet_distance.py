@@ -74,7 +74,7 @@ def test_sphere_converges_though_no_tet_follows_it():
     sizes, errors = [], []
     for n in (9, 13, 18):
         mesh = boxes((n, n, n), 3.2 / n, jitter=0.15)
-        middle = sh.TriangleMesh(sphere(5).vertices + 1.6, sphere(5).faces)
+        middle = sh.TriangleMesh(sphere(4).vertices + 1.6, sphere(4).faces)
         phi = distance(mesh, middle, diffusion=n / 3)
         sizes.append(3.2 / n)
         errors.append(rms(phi.values - (np.linalg.norm(mesh.vertices - 1.6, axis=1) - 1)))

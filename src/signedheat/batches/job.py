@@ -278,8 +278,8 @@ class Watertight:
     >>> import tempfile
     >>> from signedheat import samples
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     samples.broken_duck().save(f"{folder}/duck.stl")
-    ...     figures = Watertight()(Path(f"{folder}/duck.stl"), Path(f"{folder}/closed"))
+    ...     samples.without_patches(samples.sphere(2), 2, 0.5).save(f"{folder}/ball.stl")
+    ...     figures = Watertight()(Path(f"{folder}/ball.stl"), Path(f"{folder}/closed"))
     >>> figures["bodies"], figures["way"], figures["self_intersections"]
     (1, 'faces kept', 0)
     """

@@ -101,10 +101,10 @@ def load(path: PathLike) -> Solid:
     --------
     >>> import tempfile, signedheat as sh
     >>> from signedheat import samples
-    >>> solid = sh.complete(samples.broken_duck())
+    >>> solid = sh.complete(samples.without_faces(samples.sphere(2), 0.2))
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     solid.save(f"{folder}/duck.npz")
-    ...     again = sh.io.load(f"{folder}/duck.npz")
+    ...     solid.save(f"{folder}/ball.npz")
+    ...     again = sh.io.load(f"{folder}/ball.npz")
     >>> bool(again.distance([[0.1, 0.2, 0.3]]) == solid.distance([[0.1, 0.2, 0.3]]))
     True
     """
