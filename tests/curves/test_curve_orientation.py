@@ -37,7 +37,7 @@ def wave(mesh: sh.TriangleMesh) -> np.ndarray:
 
 
 @pytest.mark.parametrize("lost", [0.0, 0.25, 0.5])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_all_pieces_of_one_curve_agree(lost, seed):
     mesh = sphere(4)
     rng = np.random.default_rng(seed)

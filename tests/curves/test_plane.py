@@ -117,8 +117,8 @@ def test_a_drawing_with_gaps_is_exact_where_it_is_there():
 def test_a_turned_and_scaled_drawing_has_the_same_distances():
     turn = np.array([[0.8, 0.6], [-0.6, 0.8]])
     points = np.random.default_rng(0).uniform(-1.3, 1.3, (400, 2))
-    one = sh.signed_distance(sides(0.1), resolution=160)
-    other = sh.signed_distance([sh.Polyline(1e3 * line.points @ turn) for line in sides(0.1)], resolution=160)
+    one = sh.signed_distance(sides(0.1), resolution=80)
+    other = sh.signed_distance([sh.Polyline(1e3 * line.points @ turn) for line in sides(0.1)], resolution=80)
     assert np.abs(other(1e3 * points @ turn) / 1e3 - one(points)).max() < 0.03
 
 
@@ -177,11 +177,17 @@ def test_a_guess_is_announced():
         sh.signed_distance([side.reversed() if k % 2 else side for k, side in enumerate(sides(0.05))], resolution=32)
 
 
-@pytest.mark.parametrize("side", [0.4, 1.2, 18.0])
-def test_a_drawing_is_completed_alike_wherever_distance_is_asked(side):
+@pytest.fixture(scope="module")
+def drawing():
+    """Sides of which one is turned, and distance around them."""
     lines = sides(0.1)
     lines[2] = lines[2].reversed()
-    everywhere = sh.signed_distance(lines, resolution=65)
+    return lines, sh.signed_distance(lines, resolution=65)
+
+
+@pytest.mark.parametrize("side", [0.4, 1.2, 18.0])
+def test_a_drawing_is_completed_alike_wherever_distance_is_asked(side, drawing):
+    lines, everywhere = drawing
     grid = sh.Grid.around([[0.7, 0.7], [0.7 + side, 0.7 + side]], 19, padding=0.0)  # at, and around, a missing corner
     inside = (grid.points >= everywhere.grid.origin).all(axis=-1) & (grid.points <= everywhere.grid.upper).all(axis=-1)
     field = sh.signed_distance(lines, grid)
