@@ -194,6 +194,17 @@ def collapse(
     return result
 
 
+TINY = np.float32(1e-34)
+"""Size below which values count as unknown, and are taken from a coarser level."""
+
+
+@compiled
+def _size(vector: NDArray[np.float32]) -> np.float32:
+    """Return the largest of four components, by which vectors are divided before they are squared; or 0 if unknown."""
+    largest = max(max(abs(vector[0]), abs(vector[1])), max(abs(vector[2]), abs(vector[3])))
+    return largest if largest >= TINY else np.float32(0)
+
+
 @compiled
 def _carry(
     vectors: NDArray[np.float32],
@@ -214,10 +225,10 @@ def _carry(
                         continue
                     for m in range(STRETCH * s, min(STRETCH * (s + 1), n3)):
                         line, d = vectors[i, j, k, m], m // factors[3]
-                        largest = max(max(abs(line[0]), abs(line[1])), max(abs(line[2]), abs(line[3])))
-                        if (m % 2 and factors[3] == 2) or largest < TINY:
+                        size = _size(line)
+                        if (m % 2 and factors[3] == 2) or size == 0:
                             continue
-                        scale = largest ** (power - np.float32(1))
+                        scale = size ** (power - np.float32(1))
                         for q in range(4):
                             coarse[a, b, c, d, q] = scale * line[q]
                         counts[a, b, c, d // STRETCH] += 1
@@ -275,11 +286,10 @@ def unit_vectors(
                     if not inside[i, j, k, s]:
                         continue
                     for m in range(STRETCH * s, min(STRETCH * (s + 1), n)):
-                        square = np.float32(0)
-                        largest = max(max(abs(line[m, 0]), abs(line[m, 1])), max(abs(line[m, 2]), abs(line[m, 3])))
-                        if largest < TINY:
+                        square, size = np.float32(0), _size(line[m])
+                        if size == 0:
                             continue
-                        factor = np.float32(1) / largest
+                        factor = np.float32(1) / size
                         for d in range(dimension):
                             square += (factor * line[m, d]) ** 2
                         factor /= np.sqrt(square)
@@ -303,10 +313,6 @@ def quotients(
                     for m in range(STRETCH * s, min(STRETCH * (s + 1), n)):
                         if line[m, 0] > TINY:
                             out[0, i, j, k, m] = line[m, 1] / line[m, 0]
-
-
-TINY = np.float32(1e-34)
-"""Size below which values count as unknown, and are taken from a coarser level."""
 
 
 def diffuse_by_sweeps(

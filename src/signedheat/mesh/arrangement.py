@@ -446,11 +446,11 @@ def _meet(points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Int
                         touch[s, i, k], on[s, i], hit[1 - s, k] = True, True, True
                 for d in range(3):
                     heights[s, i] += normals[1 - s, d] * (points[v, d] - points[faces[g, 0], d])
-                if not on[s, i] and abs(heights[s, i]) <= slack:
-                    if _is_over(points, points[v], faces[g], normals[1 - s]):
-                        meetings.append((IN_FACE, g, v))
-                        places.append((0.0, 0.0, 0.0))
-                        on[s, i] = True
+                flat = not on[s, i] and abs(heights[s, i]) <= slack
+                if flat and _is_over(points, points[v], faces[g], normals[1 - s]):
+                    meetings.append((IN_FACE, g, v))
+                    places.append((0.0, 0.0, 0.0))
+                    on[s, i] = True
         f, g = pairs[r, 0], pairs[r, 1]
         for i in range(3):
             e = face_edges[f, i]
@@ -462,10 +462,7 @@ def _meet(points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Int
                     continue
                 if touch[0, i, k] or touch[0, (i + 1) % 3, k] or touch[1, k, i] or touch[1, (k + 1) % 3, i]:
                     continue
-                if e < h:
-                    off = _closest(points, a, b, c, d, place)
-                else:
-                    off = _closest(points, c, d, a, b, place)
+                off = _closest(points, a, b, c, d, place) if e < h else _closest(points, c, d, a, b, place)
                 if off <= slack:
                     meetings.append((EDGES, min(e, h), max(e, h)))
                     places.append((place[0], place[1], place[2]))
@@ -510,14 +507,9 @@ def _is_along(chains: Chains, line: int, p: int) -> bool:
     """Return whether a point is an end of a line or lies on it."""
     if p == chains.ends[line, 0] or p == chains.ends[line, 1]:
         return True
-    begin, end = chains.starts[line], chains.starts[line + 1]
-    while begin < end:
-        middle = (begin + end) // 2
-        if chains.points[middle] < p:
-            begin = middle + 1
-        else:
-            end = middle
-    return begin < chains.starts[line + 1] and chains.points[begin] == p
+    on_line = chains.points[chains.starts[line] : chains.starts[line + 1]]
+    place = np.searchsorted(on_line, p)
+    return place < len(on_line) and on_line[place] == p
 
 
 @compiled

@@ -17,15 +17,13 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..mesh.box_tree import LEAF, BoxTree
-from ..parallel import in_chunks
+from ..parallel import CHUNK, in_chunks
 
 DEPTH = 1e-5
 """Offset behind a face, relative to its size."""
 IN_PLANE = 1e-9
 """Volume of the cone to a triangle, relative to the product of its edges at the apex, up to which the apex is in its
 plane."""
-BLOCK = 2**13
-"""Number of triangles, or of leaves, that are summed at a time."""
 OPENING = 1.25
 """Distance, relative to a node's radius, above which its moments replace its faces."""
 
@@ -71,8 +69,8 @@ class WindingTree:
 def winding_sums(triangles: Floats, points: Floats) -> Floats:
     """Return (n,) winding numbers around few points, triangle by triangle (van Oosterom & Strackee 1983)."""
     numbers = np.zeros(len(points))
-    for begin in range(0, len(triangles), BLOCK):
-        block = np.ascontiguousarray(triangles[begin : begin + BLOCK].transpose(1, 2, 0))  # fast along long rows
+    for begin in range(0, len(triangles), CHUNK):
+        block = np.ascontiguousarray(triangles[begin : begin + CHUNK].transpose(1, 2, 0))  # fast along long rows
         for k, point in enumerate(points):
             a, b, c = block - point[:, None]
             x, y, z = (np.sqrt(np.einsum("dn,dn->n", corner, corner)) for corner in (a, b, c))
@@ -164,7 +162,7 @@ def moments_of(triangles: Floats, tree: BoxTree, opening: float) -> Floats:
     """Return (2 · leaves, 23) area vector, centre, (`opening` · radius)², and coefficients of M and S."""
     leaves = len(tree.bounds) // 2
     grouped = tree.items.reshape(leaves, LEAF)
-    blocks = [_of_leaves(triangles, grouped[start : start + BLOCK]) for start in range(0, leaves, BLOCK)]
+    blocks = [_of_leaves(triangles, grouped[start : start + CHUNK]) for start in range(0, leaves, CHUNK)]
     vectors, weights, firsts, centres, first, second, radii = (
         np.concatenate(part, axis=-1) for part in zip(*blocks, strict=True)
     )

@@ -50,8 +50,6 @@ along a line, as on the narrow side of a plate. At 0.01 edges at holes are 44 % 
 balls of 200 random points have a hole."""
 NEAREST = 7
 """Number of neighbours from which spacing is estimated."""
-GIVEN = 1.0
-"""Weight of an estimated normal, relative to that of each of the six neighbours in the same plane."""
 _CHUNK = 65536
 """Number of points that propose triangles at once."""
 
@@ -293,7 +291,7 @@ def aligned(axes: Floats, faces: Ints, normals: Floats, given: Floats) -> Ints:
     parts = connected_components(n, tail, head)
     across = (axes[tail] * axes[head]).sum(axis=1)
     links = Links(tail, head, across * np.abs(across))  # creases weigh little
-    own = GIVEN * (axes * normals).sum(axis=1)
+    own = (axes * normals).sum(axis=1)  # estimates weigh as much as a neighbour in the same plane
     found = signs_of(Links.joined(links, Links(np.arange(n), np.full(n, n), own)), n + 1)
     signs = (found[:n] * found[n]).astype(np.int64)
     preference = np.bincount(parts, signs * (axes * given).sum(axis=1))

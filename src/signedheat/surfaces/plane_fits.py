@@ -38,10 +38,8 @@ ON_QUADRIC = 24
 """Number of neighbours to which a quadric is fitted."""
 STARTS = 5
 """Number of planes from which the fit to points on a surface starts, since it ends at the nearest of several sheets."""
-_TRIAL_HEIGHTS = (0.5, 0.5, 0.5)
-"""Heights of the planes on which it is tried whether points are noisy."""
 _TRIED = 2000
-"""Number of points on which it is tried."""
+"""Number of points on which it is tried whether they are noisy, or have two sides."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +74,7 @@ def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
     if normals is not None:
         reach = float(np.median(tree.query(points[tried], k=CLEAN_NEIGHBORS + 1)[0][:, -1]))
         tree = scipy.spatial.cKDTree(np.column_stack([points, reach * normals]))
-    deviations = planes_near(points, tree, tried, CLEAN_NEIGHBORS, _TRIAL_HEIGHTS, on_surface=True)[3]
+    deviations = planes_near(points, tree, tried, CLEAN_NEIGHBORS, NOISY_HEIGHTS, on_surface=True)[3]
     if np.median(deviations) < CLEAN_DEVIATION:
         return []
     sizes = [k for k in NOISY_NEIGHBORS if k <= largest]

@@ -31,9 +31,6 @@ from .surface_source import SurfaceSource, ends_among, surface_source
 from .triangle_mesh import TriangleMesh
 from .vector_heat import VectorHeat, extrapolated, nonmanifold_frames
 
-TIMES = 2
-"""Number of diffusion times whose factors are kept: there is another one where curves end."""
-
 
 @dataclass(frozen=True, eq=False)
 class SurfaceDiscretization:
@@ -49,7 +46,8 @@ class SurfaceDiscretization:
     triangulation: IntrinsicTriangulation | None = None  # of the domain, whose field is kept as well
     spacing: float = math.nan  # h: by default half the mean edge length, the distance between midpoints of edges
     notes: tuple[Note, ...] = ()  # on repairs made in building the triangles, for the diagnostics of every field
-    _heats: LastUsed[float, VectorHeat] = field(default_factory=lambda: LastUsed(TIMES), init=False, repr=False)
+    # by diffusion time: there is another one where curves end
+    _heats: LastUsed[float, VectorHeat] = field(default_factory=lambda: LastUsed(2), init=False, repr=False)
     _turned: LastUsed[bytes, SurfaceDiscretization] = field(default_factory=LastUsed, init=False, repr=False)
 
     def __post_init__(self) -> None:

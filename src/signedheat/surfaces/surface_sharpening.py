@@ -32,8 +32,6 @@ from .surface_discretization import SurfaceDiscretization
 from .surface_source import SurfaceSource, lie_along
 from .vertex_field import VertexField
 
-FAR = 1.0
-"""Distance from any curve, in sizes of triangles, beyond which the zero set completes the curves."""
 ROUGHLY = 1e-4
 """Tolerance of distances that are only compared, with differences below a thousandth ignored."""
 INVENTED = 0.05
@@ -200,7 +198,7 @@ def missing_parts(
     """Find the parts of the zero set of φ that complete the curves, and the number of windows of each search."""
     size = np.sqrt(2 * triangles.face_areas)
     corners = triangles.corner_vertices
-    apart = there.distance[corners].mean(axis=1) > FAR * size
+    apart = there.distance[corners].mean(axis=1) > size
     counts = []
     if len(there.sides.free_ends):
         ends = CurveSegments.of_points(there.placed.nodes[there.sides.free_ends])

@@ -38,8 +38,6 @@ NEAR = 2.0
 """Distance from a face, in mean edges, within which the face's side decides the sign."""
 FAR = 1.5
 """Distance from all faces, in mean edges, beyond which the zero set completes the shape."""
-LARGEST_BEND = 1.0
-"""Limit of the quadratic correction of the zero set, relative to h; at creases of φ the correction has no meaning."""
 
 
 @sharpen_field.register
@@ -145,7 +143,7 @@ def _distance_around(
     gradients = mesh.geometry.mean_gradients(np.nan_to_num(values), unknowns, len(values))[unknowns[tets]]
     slope = np.linalg.norm(np.einsum("pk,pki->pi", weights, gradients), axis=1)
     rise = 0.5 * np.einsum("pk,pki,pki->p", weights, gradients, places[:, None] - points[unknowns[tets]])
-    most = LARGEST_BEND * lowered.spacing
+    most = lowered.spacing  # at creases of φ the correction has no meaning
     bend = np.clip(rise / np.where(slope > 0, slope, np.inf), -most, most)
     distances[curved] = np.maximum(distances[curved] + np.copysign(1.0, values[curved]) * bend, 0.0)
     return distances, triangles, hidden

@@ -27,19 +27,15 @@ from ..surfaces.vertex_field import VertexField, on_simple_surface
 from ..tets.tet_field import TetField
 from ..tets.tet_mesh import TetMesh
 from .figures import new_figure, picture
-from .slice_pictures import clearest_layer, draw_line, draw_plane, draw_slices
+from .slice_pictures import TET_NODES, clearest_layer, draw_line, draw_plane, draw_slices
 from .surface_pictures import draw_shape, draw_surface
 
 pillow: Any = lazy_module("PIL.Image", "pictures")
 
 SIDE = 3.4
 """Size of the picture in inches."""
-DPI = 90
-N_COLORS = 96
 PANEL = 4.3
 """Side of a panel of a row, in inches."""
-SECTION_NODES = 80
-"""Nodes along the longest side of a section through tets."""
 
 
 def save_row(path: PathLike, *panels: tuple[Any, ...]) -> None:
@@ -77,9 +73,9 @@ def html_of(thing: object) -> str:
     if not drawn:
         return text
     whole, small = io.BytesIO(), io.BytesIO()
-    figure.savefig(whole, dpi=DPI, format="png")
+    figure.savefig(whole, dpi=90, format="png")
     # with few colours, since notebooks store it with every output
-    pillow.open(whole).convert("RGB").quantize(N_COLORS).save(small, format="png", optimize=True)
+    pillow.open(whole).convert("RGB").quantize(96).save(small, format="png", optimize=True)
     data = base64.b64encode(small.getvalue()).decode()
     return f'{text}<br><img alt="{html.escape(type(thing).__name__)}" src="data:image/png;base64,{data}">'
 
@@ -125,7 +121,7 @@ def _(field: GridField, axes: Any, **options: Any) -> bool:
 
 @draw.register
 def _(field: TetField, axes: Any, **options: Any) -> bool:
-    grid = Grid.around(np.delete(field.mesh.bounds, 1, axis=1), SECTION_NODES, padding=0.0)
+    grid = Grid.around(np.delete(field.mesh.bounds, 1, axis=1), TET_NODES, padding=0.0)
     points = np.insert(grid.points.reshape(-1, 2), 1, field.mesh.bounds[:, 1].mean(), axis=1)
     draw_plane(GridField(grid, field(points).reshape(grid.shape)), axes, **options)
     axes.set(ylabel="z")

@@ -29,8 +29,6 @@ mpl_figure: Any = lazy_module("matplotlib.figure", "pictures")
 PICTURE_FORMATS = frozenset({".png", ".pdf", ".svg", ".jpg"})
 INSIDE_TO_OUTSIDE = ["#0b3c5d", "#3f7fae", "#a9cce3", "#fbfaf5", "#f6c9a0", "#d9793a", "#8c2d04"]
 """Colours from far inside to far outside: blue, light at the surface, orange."""
-TICKS = 7
-"""Approximate number of labels of a colour bar."""
 CLOSEST = 0.07
 """Least distance between labels, relative to the length of the bar."""
 
@@ -121,7 +119,7 @@ def add_color_bar(
     bar = figure.colorbar(colors, ax=list(axes), shrink=0.85, pad=0.015)
     bar.set_label(f"signed distance, a line every {step:g}")
     if len(isolines):
-        apart = round_step((isolines[-1] - isolines[0]) / TICKS)
+        apart = round_step((isolines[-1] - isolines[0]) / 7)  # about seven labels
         ticks = apart * np.arange(np.ceil(isolines[0] / apart), np.floor(isolines[-1] / apart) + 1)
         reach = float(np.max(colors.norm.vmax or 0.0))
         first, last = isolines[0], isolines[-1]

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 mpl_collections: Any = lazy_module("matplotlib.collections", "pictures")
 
 AXES = "xyz"
-TET_NODES = 64
+TET_NODES = 80
 """Nodes along the longest side of the grid at which a field on tets is drawn."""
 
 

@@ -371,8 +371,6 @@ THICK = 95.0
 """Percentile of thickness at which colours end."""
 BINS = 40
 """Number of bins of the histogram of thickness."""
-UNKNOWN = 190
-"""Grey of faces without a thickness."""
 COLORS = np.array([[int(color[at : at + 2], 16) for at in (1, 3, 5)] for color in INSIDE_TO_OUTSIDE])
 
 
@@ -417,7 +415,7 @@ def _mixed(values: Floats, low: float, high: float, stops: Ints) -> NDArray[np.u
 def _thickness_colors(found: Thickness) -> NDArray[np.uint8]:
     """(m, 3) colours of faces: thin walls orange, thick ones blue, grey where nothing is opposite."""
     known = ~np.isnan(found.values)
-    colors = np.full((len(known), 3), UNKNOWN, dtype=np.uint8)
+    colors = np.full((len(known), 3), 190, dtype=np.uint8)
     if known.any():
         colors[known] = _mixed(found.values[known], *_limits(found), COLORS[::-1])
     return colors
