@@ -287,7 +287,7 @@ class IntrinsicPiecewiseField(PiecewiseField):
 
     def gradient(self, points: SurfacePoints) -> Floats:
         """(n, 3) ∇φ in space at points of the mesh, in the triangles on which φ is linear."""
-        return self.domain.gradient_of_corners(self.values, points.faces, points.barycentric)
+        return self.domain.gradient(self.values, points.faces, points.barycentric)
 
     def __call__(self, points: SurfacePoints) -> Floats:
         """(n,) φ at points of the mesh."""

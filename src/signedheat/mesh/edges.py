@@ -129,10 +129,8 @@ class EdgeTable(Frozen):
 
     def elimination_order(self, vertex_order: NDArray[np.integer]) -> Ints:
         """Order unknowns at edges by their ends' order, ``order[k]`` k-th: separators of vertices separate edges."""
-        rank = np.empty(len(vertex_order), dtype=np.int64)
-        rank[vertex_order] = np.arange(len(vertex_order))
-        a, b = rank[self.vertices].T
-        return np.argsort((np.minimum(a, b) + 1) * len(rank) - np.maximum(a, b), kind="stable")
+        a, b = np.argsort(vertex_order)[self.vertices].T  # the rank of each end
+        return np.argsort((np.minimum(a, b) + 1) * len(vertex_order) - np.maximum(a, b), kind="stable")
 
 
 def edge_table(faces: Ints) -> EdgeTable:

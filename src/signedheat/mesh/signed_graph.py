@@ -31,10 +31,6 @@ class Links:
         columns = zip(*((part.tails, part.heads, part.weights) for part in parts), strict=True)
         return cls(*(np.concatenate(column) for column in columns))
 
-    def renamed(self, nodes: Ints) -> Links:
-        """Return the same links between the groups that nodes belong to."""
-        return Links(nodes[self.tails], nodes[self.heads], self.weights)
-
     def strength(self, n_nodes: int) -> Floats:
         """Return (n,) the sum of absolute weights at each node."""
         sizes = np.abs(self.weights)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints, mask_of
 from ..errors import SourceError
-from .components import grouped, members_of
+from .components import by_first_use, grouped, members_of
 from .edges import EdgeTable
 from .intrinsic_mesh import IntrinsicMesh
 
@@ -200,11 +200,8 @@ def unique_points(located: LocatedPoints) -> tuple[Ints, Ints]:
         new[1:] |= np.abs(np.diff(column[order])) > SNAP
     group = np.empty(len(located), dtype=np.int64)
     group[order] = np.cumsum(new) - 1
-    first = np.full(int(new.sum()), len(located), dtype=np.int64)
-    np.minimum.at(first, group, np.arange(len(located)))
-    rank = np.empty_like(first)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return np.sort(first), rank[group]
+    numbers, _ = by_first_use(group, int(new.sum()))
+    return np.unique(numbers, return_index=True)[1], numbers
 
 
 def concatenated(parts: Sequence[LocatedPoints]) -> LocatedPoints:

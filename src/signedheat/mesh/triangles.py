@@ -209,9 +209,7 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
     gain[present] = 0.0
     if held is not None:
         gain[held[a] | held[b] | held[c] | held[d]] = 0.0
-    order = np.argsort(gain, kind="stable")
-    rank = np.empty(len(gain), dtype=np.int64)
-    rank[order] = np.arange(1, len(gain) + 1)
+    rank = 1 + np.argsort(np.argsort(gain, kind="stable"))
     rank[gain <= 1e-9 * reach] = 0  # less is rounding
     best = np.zeros(len(faces), dtype=np.int64)
     for face in faces_around:

@@ -11,7 +11,7 @@ from ..arrays import Bools, Complexes, Floats, Frozen, Ints
 from ..errors import SourceError
 from ..geodesics.exact_distance import cleared
 from ..geodesics.geodesic_sources import zero_line
-from ..mesh.components import grouped, members_of
+from ..mesh.components import by_first_use, grouped, members_of
 from ..mesh.conforming_refinement import cut_along
 from ..mesh.curve_segments import CurveSegments
 from ..mesh.edges import EdgeTable
@@ -78,13 +78,11 @@ def in_order(triangles: IntrinsicMesh, heights: Floats) -> tuple[IntrinsicMesh, 
     old = triangles.edges
     rows = faces[:, None]
     sides, forward = old.face_edges[rows, turns], old.forward[rows, turns]
-    first = np.unique(sides, return_index=True)[1]
-    first.sort()
-    edges, ahead = sides.ravel()[first], forward.ravel()[first]
-    number = np.empty(triangles.n_edges, dtype=np.int64)
-    number[edges] = np.arange(len(edges))
+    numbers, edges = by_first_use(sides.ravel(), triangles.n_edges)
+    ahead = forward.ravel()[np.unique(numbers, return_index=True)[1]]
     vertices = np.where(ahead[:, None], old.vertices[edges], old.vertices[edges][:, ::-1])
-    table = EdgeTable(vertices, number[sides], forward == ahead[number[sides]])
+    numbers = numbers.reshape(-1, 3)
+    table = EdgeTable(vertices, numbers, forward == ahead[numbers])
     corners, positions = triangles.corner_vertices[rows, turns], triangles.corner_positions[rows, turns]
     return IntrinsicMesh(corners, positions, table, triangles.n_vertices), edges, faces, turns
 

@@ -221,12 +221,12 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return self._forward(ids, weights, np.zeros((len(ids), 0, 3)))[:2]
 
     def gradient(self, values: Floats, faces: Ints, barycentric: Floats) -> Floats:
-        """Compute gradients in space of a function that is linear on these triangles.
+        """Compute gradients in space of a function that is linear on these triangles, and may jump between them.
 
         Parameters
         ----------
-        values : (n_vertices,) float
-            The function at the vertices of the triangulation.
+        values : (n_vertices,) or (n_faces, 3) float
+            The function at the vertices of the triangulation, or at the corners of each triangle.
         faces : (p,) int
             Faces of the mesh.
         barycentric : (p, 3) float
@@ -244,33 +244,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         >>> better.gradient(better.vertices[:, 0], np.array([0]), np.array([[0.2, 0.3, 0.5]])).round(9)[:, :2].tolist()
         [[1.0, 0.0]]
         """
-        return self.gradient_of_corners(values[self.faces], faces, barycentric)
-
-    def gradient_of_corners(self, corners: Floats, faces: Ints, barycentric: Floats) -> Floats:
-        """Compute gradients in space of a function that may jump between these triangles.
-
-        Parameters
-        ----------
-        corners : (n_faces, 3) float
-            The function at the corners of each triangle.
-        faces : (p,) int
-            Faces of the mesh.
-        barycentric : (p, 3) float
-            Barycentric coordinates of the points in these faces.
-
-        Returns
-        -------
-        (p, 3) float
-            Gradients at the points.
-
-        Examples
-        --------
-        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-        >>> better = intrinsic_delaunay(strip, refine=True)
-        >>> corners = better.vertices[better.faces, 0]
-        >>> better.gradient_of_corners(corners, np.array([0]), np.array([[0.2, 0.3, 0.5]])).round(9)[:, :2].tolist()
-        [[1.0, 0.0]]
-        """
+        corners = values[self.faces] if values.ndim == 1 else values
         ids = self._existing(faces)
         sides = np.broadcast_to([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]], (len(ids), 2, 3))
         places, _, moves = self._forward(ids, barycentric, sides)

@@ -316,8 +316,8 @@ def fitted_outward(points: Floats) -> tuple[PlaneFits, OutwardSigns]:
     return next((fits, outward) for fits, outward in tried if outward.coherence >= best - WORSE)
 
 
-def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False, groups: Ints | None = None) -> OutwardSigns:
-    """Find signs that turn axes (n, 3) outwards, the same for all points of a group (n,)."""
+def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> OutwardSigns:
+    """Find signs that turn axes (n, 3) outwards."""
     # links between chosen points; node m of the graph is the outside, node m + 1 the signs as given
     n = len(axes)
     chosen = spread_out(fits.places, SPREAD * fits.reaches) if fits.noisy else np.arange(n)
@@ -331,20 +331,14 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False, groups: In
         typical = 0.5 * float(np.median(links.strength(m + 1)[:m]))
         own = np.ones(m) if given else axes[chosen] @ UPWARD
         links = Links.joined(links, Links(np.arange(m), np.full(m, m + 1), GIVEN_WEIGHT * typical * own))
-    nodes = np.arange(m + 2)
-    if groups is not None:
-        outside = int(groups.max()) + 1
-        nodes = np.unique(np.append(groups[chosen], [outside, outside + 1]), return_inverse=True)[1].ravel()
     # signs of the chosen points, relative to the outside or to the given signs; others follow their neighbours
-    decision = signs_of(links.renamed(nodes), int(nodes.max()) + 1)[nodes]
+    decision = signs_of(links, m + 2)
     signs = np.zeros(n)
     signs[chosen] = decision[:m] * decision[m if sided else m + 1]
     rest = np.flatnonzero(signs == 0)
     if len(rest):
         signs[rest] = _followed(places, axes[chosen] * signs[chosen, None], fits.places[rest], axes[rest])
     coherence = links.coherence(decision)
-    if groups is not None:  # the sign of the majority of each group
-        signs = np.where(np.bincount(groups, signs) >= 0, 1.0, -1.0)[groups]
     if given and min((signs < 0).mean(), (signs > 0).mean()) <= MOST_WRONG * (1 - coherence):
         signs = np.full(n, 1.0 if signs.sum() >= 0 else -1.0)
     return OutwardSigns(signs, sided, coherence)
