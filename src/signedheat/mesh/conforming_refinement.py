@@ -370,36 +370,16 @@ class FaceCutter:
 
     def cut_face(self, face: int, inside: list[int]) -> None:
         """Cut one face along the segments inside it."""
-        triangles, merged = self.triangles, self.merged
         around = ((self.begin[face] + np.arange(3)) % 3).tolist()
-        points, vertices = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], triangles.corner_vertices[face, around].tolist()
-        sides: list[list[int]] = []
-        edge_of: dict[tuple[int, int], tuple[int, bool]] = {}
-        frames: dict[int, tuple[int, int, bool]] = {}
-        for k, side in enumerate(around):
-            edge, forward = int(triangles.edges.face_edges[face, side]), bool(triangles.edges.forward[face, side])
-            members = self.on_edge.get(edge, [])[:: 1 if forward else -1]
-            subs = self.sub_edges.get(edge, [edge])[:: 1 if forward else -1]
-            (x, y), (u, v) = points[k], points[(k + 1) % 3]
-            chain = [k]
-            for i in members:
-                t = merged.nodes.along[i] if forward else 1 - merged.nodes.along[i]
-                chain.append(len(points))
-                points.append((float(x + t * (u - x)), float(y + t * (v - y))))
-                vertices.append(self.vertex_of[i])
-            sides.append(chain[1:])
-            chain.append((k + 1) % 3)
-            for j, sub in enumerate(subs):
-                edge_of[chain[j], chain[j + 1]] = sub, forward
-                along = (chain[j], chain[j + 1]) if forward else (chain[j + 1], chain[j])
-                frames[sub] = (*along, bool(triangles.reflected[face, side]))
-        cut = Triangulation.of(points, sides)
+        outline = self.outline(face, around)
+        cut, vertices = Triangulation.of(outline.points, outline.sides), outline.vertices
         for i in self.in_face[face]:
-            cut.insert((float(merged.nodes.barycentric[i, around[1]]), float(merged.nodes.barycentric[i, around[2]])))
+            u, v = self.merged.nodes.barycentric[i, around[1:]].tolist()
+            cut.insert((u, v))
             vertices.append(self.vertex_of[i])
 
-        local = {v: k for k, v in reversed(list(enumerate(vertices)))}
-        ends = [[local[self.vertex_of[i]] for i in merged.ends[p].tolist()] for p in inside]
+        point_at = {v: k for k, v in reversed(list(enumerate(vertices)))}
+        ends = [[point_at[self.vertex_of[i]] for i in self.merged.ends[p].tolist()] for p in inside]
         ways = [cut.connect(*pair) for pair in ends]
         if any(way[-1] != end for way, (_, end) in zip(ways, ends, strict=True)):
             raise SourceError(
@@ -407,32 +387,57 @@ class FaceCutter:
                 remedy="merge the vertices that nearly coincide",
                 element=f"face {face}",
             )
-        vertices += [self.new_vertex() for _ in range(len(cut.points) - len(vertices))]
-        flat = np.array(cut.points)
-        q = triangles.corner_positions[face, around]
-        positions = q[0] + flat[:, 0] * (q[1] - q[0]) + flat[:, 1] * (q[2] - q[0])
+        vertices += [self.new_vertex() for _ in range(len(cut.points) - len(vertices))]  # where segments cross
+        (x, y), (a, b, c) = np.array(cut.points).T, self.triangles.corner_positions[face, around]
+        positions = a + x * (b - a) + y * (c - a)
+        self.add_faces(face, cut, outline, positions)
+        for p, way in zip(inside, ways, strict=True):
+            self.add_pieces(p, cut.along(way), outline, positions)
 
-        for corner in cut.triangles:
-            edges, ahead = [], []
-            for u, v in edges_of(corner):
-                if (u, v) not in edge_of:
+    def outline(self, face: int, around: list[int]) -> Outline:
+        """Return a face with the nodes on its sides; `around` lists its corners from the first on."""
+        triangles, along = self.triangles, self.merged.nodes.along
+        result = Outline([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], triangles.corner_vertices[face, around].tolist())
+        for k, side in enumerate(around):
+            edge, forward = int(triangles.edges.face_edges[face, side]), bool(triangles.edges.forward[face, side])
+            order = 1 if forward else -1
+            (x, y), (u, v), chain = result.points[k], result.points[(k + 1) % 3], [k]
+            for i in self.on_edge.get(edge, [])[::order]:
+                t = float(along[i] if forward else 1 - along[i])
+                chain.append(len(result.points))
+                result.points.append((x + t * (u - x), y + t * (v - y)))
+                result.vertices.append(self.vertex_of[i])
+            result.sides.append(chain[1:])
+            for part, sub in zip(
+                pairwise([*chain, (k + 1) % 3]), self.sub_edges.get(edge, [edge])[::order], strict=True
+            ):
+                result.edge_of[part] = sub, forward
+                result.frames[sub] = (*part[::order], bool(triangles.reflected[face, side]))
+        return result
+
+    def add_faces(self, face: int, cut: Triangulation, outline: Outline, positions: Complexes) -> None:
+        """Add the triangles of a face, and the edges within it, which are numbered as they appear."""
+        for corners in cut.triangles:
+            for u, v in edges_of(corners):
+                if (u, v) not in outline.edge_of:
                     edge = self.new_edge()
-                    edge_of[u, v], edge_of[v, u], frames[edge] = (edge, True), (edge, False), (u, v, False)
-                edges.append(edge_of[u, v][0])
-                ahead.append(edge_of[u, v][1])
-            self.faces.append(NewFace(face, [vertices[i] for i in corner], edges, ahead, positions[list(corner)]))
+                    outline.edge_of[u, v], outline.edge_of[v, u] = (edge, True), (edge, False)
+                    outline.frames[edge] = u, v, False
+            edges, ahead = zip(*(outline.edge_of[side] for side in edges_of(corners)), strict=True)
+            vertices = [outline.vertices[i] for i in corners]
+            self.faces.append(NewFace(face, vertices, edges, ahead, positions[list(corners)]))
 
-        for p, chain in zip(inside, map(cut.along, ways), strict=True):
-            whole = abs(positions[chain[-1]] - positions[chain[0]])
-            for u, v in pairwise(chain):
-                edge = (edge_of.get((u, v)) or edge_of[v, u])[0]
-                tail, head, over = frames[edge]
-                step = np.conj(positions[head] - positions[tail])
-                vector = merged.vectors[p] * step / whole if whole > 0 else 0j  # its ends are nearer than rounding
-                ends_here = self.node(vertices[u]), self.node(vertices[v])
-                self.pieces.append(
-                    NewSegment(*ends_here, -1, edge, np.conj(vector) if over else vector, merged.owners[p])
-                )
+    def add_pieces(self, p: int, chain: list[int], outline: Outline, positions: Complexes) -> None:
+        """Add the parts of segment p, between the points of a chain, with its normal in the frames of their edges."""
+        whole = abs(positions[chain[-1]] - positions[chain[0]])
+        for u, v in pairwise(chain):
+            edge, _ = outline.edge_of.get((u, v)) or outline.edge_of[v, u]
+            tail, head, reflected = outline.frames[edge]
+            step = np.conj(positions[head] - positions[tail])
+            vector = self.merged.vectors[p] * step / whole if whole > 0 else 0j  # its ends are nearer than rounding
+            vector = np.conj(vector) if reflected else vector
+            ends = self.node(outline.vertices[u]), self.node(outline.vertices[v])
+            self.pieces.append(NewSegment(*ends, -1, edge, vector, self.merged.owners[p]))
 
     def assemble(self) -> tuple[IntrinsicMesh, MergedSources, Bools, Ints]:
         """Return what `cut_along` returns."""
@@ -481,13 +486,26 @@ class FaceCutter:
         return finer, moved, is_new, parents[order]
 
 
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A face with the nodes on its sides, in the plane in which its corners are (0, 0), (1, 0) and (0, 1)."""
+
+    points: list[Point]
+    vertices: list[int]  # the vertex at each point
+    sides: list[list[int]] = field(default_factory=list)  # the points along each side, without corners
+    # the edge between two points, and whether it runs from the first to the second
+    edge_of: dict[Edge, tuple[int, bool]] = field(default_factory=dict)
+    # the points at tail and head of each edge, and whether its frame is a reflection
+    frames: dict[int, tuple[int, int, bool]] = field(default_factory=dict)
+
+
 class NewFace(NamedTuple):
     """A part of a face that was cut."""
 
     parent: int
-    corners: list[int]
-    edges: list[int]
-    ahead: list[bool]
+    corners: Sequence[int]
+    edges: Sequence[int]
+    ahead: Sequence[bool]
     positions: Complexes
 
 
