@@ -94,15 +94,9 @@ def test_corners_and_edges_of_boxes_are_exact(seed):
 
 
 def test_edges_that_cut_creases_off_are_divided(monkeypatch):
-    """Nuts, some of whose creases pass through cells without crossing their edges: sums of the largest distances."""
-    angles = np.linspace(0, 2 * np.pi, 7)[:-1]
-    rim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    points = np.concatenate([np.c_[rim, np.zeros(6)], np.c_[rim, np.full(6, 0.8)]])
-    hull = scipy.spatial.ConvexHull(points)
-    outside = np.cross(*(points[hull.simplices[:, k]] - points[hull.simplices[:, 0]] for k in (1, 2)))
-    backwards = (outside * hull.equations[:, :3]).sum(axis=1) < 0
-    faces = np.where(backwards[:, None], hull.simplices[:, ::-1], hull.simplices)
-    solids = [complete(turned(sh.TriangleMesh(points, faces), seed)) for seed in range(9)]
+    """Notches, some of whose creases pass through cells without crossing their edges: sums of the largest distances."""
+    body, notch = box((-1.0, -0.7, -0.3), (1.0, 0.6, 0.3)), box((-0.4, -0.2, -0.1), (0.5, 0.9, 0.9))
+    solids = [complete(turned(body, seed)) - complete(turned(notch, seed)) for seed in range(6)]
     largest = []
     for divisions in (contouring.DIVISIONS, 0):
         monkeypatch.setattr(contouring, "DIVISIONS", divisions)

@@ -65,8 +65,8 @@ class Quadrics:
         return Quadrics(self.products[rows], self.sides[rows])
 
 
-def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats, Ints, Floats]:
-    """(n, 3) points of least error of quadrics in boxes, (n,) ranks of the planes, (n, 3) least fixed directions.
+def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats, Ints]:
+    """(n, 3) points of least error of quadrics in boxes, and (n,) ranks of the planes.
 
     A minimum outside of its box moves along the direction in which the error grows the least, that of a crease, into
     it, or is looked for on the wall that it is beyond the farthest.
@@ -90,7 +90,7 @@ def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats
         inner = quadrics.products[rows] * (free[:, :, None] & free[:, None, :])
         sides = (quadrics.sides[rows] - np.einsum("nij,nj->ni", quadrics.products[rows], held[rows])) * free
         points[rows] = _solved(*np.linalg.eigh(inner), sides, least[rows]) + held[rows]
-    return np.clip(points, lower, upper), ranks, vectors[:, :, 0]
+    return np.clip(points, lower, upper), ranks
 
 
 def _way_into(points: Floats, along: Floats, lower: Floats, upper: Floats) -> Floats:
@@ -110,8 +110,6 @@ def _solved(values: Floats, vectors: Floats, sides: Floats, least: Floats) -> Fl
 
 MANY = 1 << 17
 """Batch size for pieces of the level."""
-ASIDE = 0.05
-"""Distance from a crease, in cells, of probes for its ends."""
 ON = 1e-3
 """Distance from the level, in cells, above which a vertex is moved onto it."""
 BEYOND = 0.6
@@ -126,10 +124,10 @@ DIVISIONS = 6
 """Rounds of division; the largest error on a bracket is .08 cells with three rounds, and .05 with six."""
 NEAR = 4.0
 """Distance, in cells, within which triangles of a new vertex may intersect others."""
+HALVES = np.array(list(np.ndindex(2, 2, 2))) - 0.5
+"""Offsets, in cells, from a vertex on a crease of probes for further planes."""
 BETWEEN = 0.1, 0.3, 0.6
 """Positions of probes, as shares of the way from the middle of an edge to the opposite corner."""
-AHEAD = 0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5
-"""Distances along a crease, in cells, of probes for its ends."""
 
 
 class ImplicitSurface(Protocol):
@@ -199,20 +197,19 @@ def _vertices(
     lower, upper = lower - middles, upper - middles
     on, normals = offset.planes(points)
     quadrics = Quadrics.of(owners, on - middles[owners], normals, count)
-    minima, ranks, along = minimizers(quadrics, lower, upper)
+    minima, ranks = minimizers(quadrics, lower, upper)
     off = offset.distance(middles + minima)
     wider = np.full((count, 3), np.nan)
     creased = np.flatnonzero((ranks > 1) & alone)
     if len(creased):
         # find planes in a cell with a crease that do not cross its edges
         low, high = lower[creased] - BEYOND * grid.spacing, upper[creased] + BEYOND * grid.spacing
-        probes = minima[creased][:, None] + _probes(along[creased], quadrics.sides[creased], grid.spacing)
-        on, normals = offset.planes((middles[creased][:, None] + probes).reshape(-1, 3))
-        probed = np.repeat(np.arange(len(creased)), probes.shape[1])
+        on, normals = offset.planes(((middles + minima)[creased, None] + HALVES * grid.spacing).reshape(-1, 3))
+        probed = np.repeat(np.arange(len(creased)), len(HALVES))
         on -= middles[creased][probed]
         within = ((on > low[probed]) & (on < high[probed])).all(axis=1)
         more = Quadrics.of(probed[within], on[within], normals[within], len(creased))
-        farther, higher, _ = minimizers(quadrics[creased] + more, low, high)
+        farther, higher = minimizers(quadrics[creased] + more, low, high)
         error = np.abs(offset.distance(middles[creased] + farther))
         wanted = (error < ON * step) & ((higher > ranks[creased]) | (higher == 3) | (np.abs(off[creased]) > ON * step))
         wider[creased[wanted]] = middles[creased[wanted]] + farther[wanted]
@@ -221,15 +218,6 @@ def _vertices(
         onto = np.clip(minima - off[:, None] * gradients, lower, upper)
         minima = np.where((np.abs(off) > ON * step)[:, None], onto, minima)
     return middles + minima, middles, wider
-
-
-def _probes(along: Floats, across: Floats, spacing: Floats) -> Floats:
-    """(n, p, 3) offsets of probes from vertices on creases: around them, and on both sides along the crease."""
-    around = np.broadcast_to(0.5 * spacing * (2 * np.array(list(np.ndindex(2, 2, 2))) - 1), (len(along), 8, 3))
-    length = np.linalg.norm(across, axis=1)[:, None]
-    aside = ASIDE * spacing * across / np.where(length > 0, length, 1.0)
-    ahead = [way * share * spacing * along + sign * aside for share in AHEAD for way in (-1, 1) for sign in (-1, 1)]
-    return np.concatenate([around, np.stack(ahead, axis=1)], axis=1)
 
 
 def divided_along_creases(
@@ -275,7 +263,7 @@ def _creases_off(
     on, directions = offset.planes(np.concatenate(probes))
     owners = np.tile(np.arange(len(edges)), len(probes))
     room = np.broadcast_to(BEYOND * spacing, middles.shape)
-    moves, _, _ = minimizers(Quadrics.of(owners, on - middles[owners], directions, len(edges)), -room, room)
+    moves, _ = minimizers(Quadrics.of(owners, on - middles[owners], directions, len(edges)), -room, room)
     off, gradients = offset.slopes(middles)
     points, nearest = middles + moves, middles - off[:, None] * gradients
     points = np.where((np.abs(offset.distance(points)) < ON * step)[:, None], points, nearest)
