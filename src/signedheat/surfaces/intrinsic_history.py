@@ -124,7 +124,7 @@ def straight_lines(gluing: Gluing, faces: Ints, barycentric: Floats, vectors: Fl
     while True:
         (owners, crossed), (starts, ends) = np.empty((2, room), np.int64), np.empty((2, room, 3))
         lines = Lines(owners, crossed, starts, ends, np.empty((room, vectors.shape[1], 3)))
-        count = trace_both_ways(gluing, faces, barycentric, halves, *lines[1:], lines.owners)
+        count = trace_both_ways(gluing, faces, barycentric, halves, lines)
         if count <= room:
             break
         room = count
@@ -323,28 +323,16 @@ def keep_on_edges(w: Floats, v: Floats) -> None:
 
 
 @kernel
-def trace_geodesic(
-    g: Gluing,
-    face: int,
-    barycentric: Floats,
-    vectors: Floats,
-    forward: bool,
-    out_faces: Ints,
-    out_starts: Floats,
-    out_ends: Floats,
-    out_vectors: Floats,
-    n: int,
-) -> int:
-    """Trace a geodesic from a point along its first vector, or against it, over its length; carry the other vectors.
+def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, sign: float, out: Lines, n: int) -> int:
+    """Trace a geodesic from a point along its first vector, times ±1, over its length; carry the other vectors.
 
-    Write one row per face crossed, from row n on, as far as there is room: the face, where the line enters and leaves
-    it, and the vectors there. Return the next row. A line ends where faces as thin as rounding have made it longer.
+    Write a row for each face crossed, from row n on, as far as there is room; return the next row. A line ends where
+    faces as thin as rounding have made it longer.
     """
     f, left, slides = face, 1.0, 0
     w, v = barycentric.copy(), vectors.copy()
     square, rounding = squared_length(g, f, v[0])
     longest = 4.0 * (abs(square) + ROUNDING * rounding)
-    sign = 1.0 if forward else -1.0
     for _ in range(1000000):
         keep_on_edges(w, v[0])
         step, leaving = left, -1
@@ -352,12 +340,12 @@ def trace_geodesic(
             slope = sign * v[0, k]
             if slope < 0.0 and w[k] < -slope * step:
                 step, leaving = w[k] / -slope, k
-        if n < len(out_faces):
-            out_faces[n] = f
+        if n < len(out.faces):
+            out.faces[n] = f
             for k in range(3):
-                out_starts[n, k] = w[k]
+                out.starts[n, k] = w[k]
                 for m in range(len(v)):
-                    out_vectors[n, m, k] = v[m, k]
+                    out.vectors[n, m, k] = v[m, k]
         for k in range(3):
             w[k] = max(w[k] + sign * step * v[0, k], 0.0)
         if leaving >= 0:
@@ -365,8 +353,8 @@ def trace_geodesic(
         total = w[0] + w[1] + w[2]
         for k in range(3):
             w[k] /= total
-            if n < len(out_faces):
-                out_ends[n, k] = w[k]
+            if n < len(out.faces):
+                out.ends[n, k] = w[k]
         n += 1
         left -= step
         square, rounding = squared_length(g, f, v[0])
@@ -401,25 +389,12 @@ def trace_geodesic(
 
 
 @kernel
-def trace_both_ways(
-    g: Gluing,
-    faces: Ints,
-    barycentric: Floats,
-    vectors: Floats,
-    out_faces: Ints,
-    out_starts: Floats,
-    out_ends: Floats,
-    out_vectors: Floats,
-    owners: Ints,
-) -> int:
+def trace_both_ways(g: Gluing, faces: Ints, barycentric: Floats, vectors: Floats, out: Lines) -> int:
     """Trace half of the first vector both ways from every point p; rows of the backward half have owner −1 − p."""
     n = 0
     for p in range(len(faces)):
-        for way in range(2):
+        for owner, sign in ((p, 1.0), (-1 - p, -1.0)):
             begin = n
-            n = trace_geodesic(
-                g, faces[p], barycentric[p], vectors[p], way == 0, out_faces, out_starts, out_ends, out_vectors, n
-            )
-            for k in range(begin, min(n, len(owners))):
-                owners[k] = p if way == 0 else -1 - p
+            n = trace_geodesic(g, faces[p], barycentric[p], vectors[p], sign, out, n)
+            out.owners[begin : min(n, len(out.owners))] = owner
     return n
