@@ -22,28 +22,17 @@ class SourceTerm(Protocol):
     """Sources lowered to one discretisation."""
 
     @property
-    def vectors(self) -> Any:
-        """X₀, the right-hand side of Eq. 12 (on surfaces Eq. 11, Eq. 19), in the discretisation's own layout."""
-
+    def vectors(self) -> Any: ...  # X₀ of Eq. 12 (on surfaces Eq. 11, Eq. 19), in the discretisation's own layout
     @property
-    def time(self) -> float:
-        """t of Eq. 12: ``diffusion · max(h_domain, h_source)²``."""
-
+    def time(self) -> float: ...  # t of Eq. 12: ``diffusion · max(h_domain, h_source)²``
     @property
-    def interpolation(self) -> Any:
-        """A of Eq. 14: sparse (s, n), row i interpolates φ at source sample i."""
-
+    def interpolation(self) -> Any: ...  # A of Eq. 14: sparse (s, n), row i interpolates φ at source sample i
     @property
-    def weights(self) -> Floats:
-        """(s,) line or area element of each sample."""
-
+    def weights(self) -> Floats: ...  # (s,) line or area element of each sample
     @property
-    def components(self) -> Ints:
-        """(s,) connected component of the source that each sample lies on, from 0."""
-
+    def components(self) -> Ints: ...  # (s,) connected component of the source that each sample lies on, from 0
     @property
-    def source_ids(self) -> Ints:
-        """(s,) index of the source, among those passed to the solver, that each sample lies on."""
+    def source_ids(self) -> Ints: ...  # (s,) index of the source, of those passed to the solver, of each sample
 
 
 class Integration(Protocol):

@@ -58,17 +58,10 @@ class SolidQueries(Protocol):
     """What can answer queries at points exactly, as a `Solid` does."""
 
     @property
-    def triangles(self) -> Floats:
-        """(m, 3, 3) corners of all that distance is measured to."""
-
-    def distance(self, points: ArrayLike) -> Floats:
-        """Return (...) signed distances of (..., d) points, negative inside."""
-
-    def inside(self, points: ArrayLike) -> Bools:
-        """Return (...) whether points are inside."""
-
-    def closest(self, points: ArrayLike) -> Closest:
-        """Find the nearest place for each of (..., d) points."""
+    def triangles(self) -> Floats: ...  # (m, 3, 3) corners of all that distance is measured to
+    def distance(self, points: ArrayLike) -> Floats: ...  # (...) signed distances of (..., d) points
+    def inside(self, points: ArrayLike) -> Bools: ...  # (...) whether points are inside
+    def closest(self, points: ArrayLike) -> Closest: ...  # the nearest place for each of (..., d) points
 
 
 @dataclass(frozen=True, eq=False)

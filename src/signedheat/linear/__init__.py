@@ -32,11 +32,8 @@ class Factor(Protocol):
     """A factor that solves systems with a Hermitian positive definite matrix."""
 
     @property
-    def n(self) -> int:
-        """Number of unknowns."""
-
-    def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
-        """Solve for one right-hand side (n,) or several (n, k)."""
+    def n(self) -> int: ...  # number of unknowns
+    def solve(self, rhs: NDArray[Any]) -> NDArray[Any]: ...  # for one right-hand side (n,) or several (n, k)
 
 
 def available_backends() -> list[str]:

@@ -82,7 +82,7 @@ class _Analysis:
         self.call = _Call(upper, order)
         self.lock = threading.Lock()
         self._made: NDArray[Any] | None = None
-        self._finalizer = weakref.finalize(self, _Call.release, self.call)
+        self._finalizer = weakref.finalize(self, self.call, _RELEASE)
         self.call(_ANALYZE)
 
     def factorize(self, values: NDArray[Any]) -> None:
@@ -151,9 +151,6 @@ class _Call:
             raise FactorizationError(
                 f"PARDISO failed with error {status.value} on {self._n} unknowns: {cause}", element="matrix"
             )
-
-    def release(self) -> None:
-        self(_RELEASE)
 
 
 def _address(array: NDArray[Any]) -> ctypes.c_void_p:

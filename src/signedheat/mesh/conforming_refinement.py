@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order
 
-from ..arrays import Bools, Complexes, Floats, Ints
+from ..arrays import Bools, Complexes, Floats, Ints, mask_of
 from ..errors import SourceError
 from .curve_segments import CurveSegments, MergedSources
 from .edges import EdgeTable
@@ -278,8 +278,7 @@ def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Se
     last = m + triangles.n_edges
     face, end = np.repeat(merged.faces[inside], 2), merged.ends[inside].ravel()
     on_edge = nodes.kinds[end] == EDGE
-    with_points = np.zeros(triangles.n_edges, dtype=bool)
-    with_points[nodes.elements[nodes.kinds == EDGE]] = True
+    with_points = mask_of(triangles.n_edges, nodes.elements[nodes.kinds == EDGE])
     faces_at, side = np.nonzero(with_points[triangles.edges.face_edges])
     wanted = nodes[np.unique(np.concatenate([s for s, bad in zip(merged.samples, unfit, strict=True) if bad]))]
     begin = [

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..arrays import Bools, Complexes, Floats, Ints
+from ..arrays import Bools, Complexes, Floats, Ints, mask_of
 from ..errors import SourceError
 from .components import connected_components
 from .intrinsic_mesh import IntrinsicMesh, face_pairs
@@ -269,9 +269,7 @@ def _agreement_around(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> tup
     first_faces[triangles.edges.face_edges.ravel()[first]] = first // 3
     telling = np.where(edges < 0, faces, first_faces[edges])
     corners = triangles.corner_vertices
-    touched = np.zeros(triangles.n_vertices, dtype=bool)
-    touched[corners[faces]] = True
-    touched[corners[telling]] = True
+    touched = mask_of(triangles.n_vertices, corners[np.append(faces, telling)])
     around = np.asarray(touched[corners].any(axis=1))
     number = np.cumsum(around) - 1
     pairs = face_pairs(triangles)

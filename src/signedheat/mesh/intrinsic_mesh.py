@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from ..arrays import Bools, Complexes, Floats, Frozen, Ints
+from ..arrays import Bools, Complexes, Floats, Frozen, Ints, mask_of
 from ..errors import GeometryError
 from .components import connected_components, element_components
 from .edges import EdgeTable, edge_table
@@ -122,9 +122,7 @@ class IntrinsicMesh(Frozen):
         Its second axis points into the first face of the edge and out of all others; where a face runs along the edge
         the other way than that needs, vectors are conjugated.
         """
-        is_first = np.zeros(3 * self.n_faces, dtype=bool)
-        is_first[self.first_halfedges] = True
-        return self.edges.forward != is_first.reshape(-1, 3)
+        return self.edges.forward != mask_of(3 * self.n_faces, self.first_halfedges).reshape(-1, 3)
 
     @cached_property
     def first_halfedges(self) -> Ints:

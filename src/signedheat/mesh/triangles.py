@@ -23,28 +23,17 @@ class Triangles(Protocol):
     """Triangles in space."""
 
     @property
-    def vertices(self) -> Floats:
-        """(n, 3) positions."""
-
+    def vertices(self) -> Floats: ...  # (n, 3) positions
     @property
-    def faces(self) -> Ints:
-        """(m, 3) vertex ids."""
-
+    def faces(self) -> Ints: ...  # (m, 3) vertex ids
     @property
-    def edges(self) -> EdgeTable:
-        """The edges of the faces."""
-
+    def edges(self) -> EdgeTable: ...  # the edges of the faces
     @property
-    def n_vertices(self) -> int:
-        """Number of vertices."""
-
+    def n_vertices(self) -> int: ...  # number of vertices
     @property
-    def n_faces(self) -> int:
-        """Number of faces."""
-
+    def n_faces(self) -> int: ...  # number of faces
     @property
-    def bounds(self) -> Floats:
-        """(2, 3) lower and upper corner of the box around the faces."""
+    def bounds(self) -> Floats: ...  # (2, 3) lower and upper corner of the box around the faces
 
 
 def area_vectors(triangles: Floats) -> Floats:

@@ -50,8 +50,7 @@ class WindingTree:
     def levels(self, places: Floats, normals: Floats, areas: Floats) -> Floats:
         """Return (n,) means of the numbers on both sides of places on faces with these unit normals and areas."""
         steps = DEPTH * np.sqrt(areas)[:, None] * normals
-        sides: Floats = 0.5 * (self.numbers(places - steps) + self.numbers(places + steps))
-        return sides
+        return 0.5 * (self.numbers(places - steps) + self.numbers(places + steps))
 
     def behind(self, faces: NDArray[np.integer], places: Floats) -> Floats:
         """Return (n,) winding numbers just behind places (n, 3) in faces (n,), away from their rims."""

@@ -173,8 +173,7 @@ def _holes(around: Rims, lengths: Floats, faces: Ints, decided: Bounding, used: 
             if piece not in longest or lengths[k] > lengths[longest[piece]]:
                 longest[piece] = k
     outlines = np.isin(np.arange(len(around)), list(longest.values()))
-    result: Bools = chosen | ((single >= 0) & ~outlines)
-    return result
+    return chosen | ((single >= 0) & ~outlines)
 
 
 def _through(around: Rims, vertices: Floats, named: Ints) -> Bools:

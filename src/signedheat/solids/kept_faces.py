@@ -40,22 +40,12 @@ SQUARES = np.array([[[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0]], [[1, 0, 0], [1
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """Triangles that meet in whole edges, and where they do not close or pass through each other.
+    """Triangles that meet in whole edges, and where they do not close or pass through each other."""
 
-    Attributes
-    ----------
-    points, faces : (n, 3) float, (m, 3) int
-        The triangles.
-    bad : (k, 2) int
-        Ends of edges that faces do not run along as often one way as the other, and of those of faces that meet.
-    open : bool
-        Whether there are any of the former.
-    """
-
-    points: Floats
-    faces: Ints
-    bad: Ints
-    open: bool
+    points: Floats  # (n, 3)
+    faces: Ints  # (m, 3)
+    bad: Ints  # (k, 2) ends of edges that do not cancel, and of those of faces that meet
+    open: bool  # whether there are any of the former
 
     @classmethod
     def of(cls, points: Floats, faces: Ints) -> Joined:
@@ -73,11 +63,7 @@ class Joined:
 
 
 def given_surface(solid: Evaluated, contour: Callable[[], TriangleMesh], cell: float) -> tuple[TriangleMesh, Floats]:
-    """Triangles of a solid with the inside behind them only, joined into a closed mesh, by `contour` where they are
-    not.
-
-    The middles of such places, (k, 3), are returned, too. Triangles that join stay as they are.
-    """
+    """Triangles of a solid with the inside behind only, joined into a closed mesh, and (k, 3) where by a contour."""
     windings = solid.windings
     bounding = solid.triangles[solid.bounding]
     if not len(bounding):
@@ -139,8 +125,7 @@ def _along(edges: Floats, step: float) -> Floats:
     pieces = np.maximum(np.ceil(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1) / step), 1).astype(np.int64)
     row = np.repeat(np.arange(len(edges)), pieces + 1)
     share = (np.arange(len(row)) - np.repeat(np.cumsum(pieces + 1) - pieces - 1, pieces + 1)) / pieces[row]
-    points: Floats = edges[row, 0] + share[:, None] * (edges[row, 1] - edges[row, 0])
-    return points
+    return edges[row, 0] + share[:, None] * (edges[row, 1] - edges[row, 0])
 
 
 def _far(surface: TriangleMesh, triangles: Floats, distance: float) -> Floats:
@@ -180,21 +165,11 @@ def _without_crumbs(mesh: TriangleMesh, boxes: Boxes) -> TriangleMesh:
 
 @dataclass(frozen=True, eq=False)
 class Boxes:
-    """Cells of a grid.
+    """Cells of a grid."""
 
-    Attributes
-    ----------
-    places : (n, 3) int
-        Their numbers along each axis.
-    cell : float
-        Length of their edges.
-    shift : (3,) float
-        Position of the grid's origin, in cells.
-    """
-
-    places: Ints
-    cell: float
-    shift: Floats
+    places: Ints  # (n, 3) their numbers along each axis
+    cell: float  # length of their edges
+    shift: Floats  # (3,) position of the grid's origin, in cells
 
     @classmethod
     def around(cls, points: Floats, cell: float, shift: Floats) -> Boxes:

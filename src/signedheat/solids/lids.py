@@ -263,8 +263,7 @@ def _cotangents(vertices: Floats, faces: Ints) -> Floats:
     corners = vertices[faces]
     u, v = np.roll(corners, -1, axis=1) - corners, np.roll(corners, -2, axis=1) - corners
     cosine, sine = (u * v).sum(axis=2), np.linalg.norm(np.cross(u, v), axis=2)
-    halves: Floats = 0.5 * cosine / np.maximum(np.maximum(sine, np.abs(cosine) / 100.0), 1e-300)
-    return halves
+    return 0.5 * cosine / np.maximum(np.maximum(sine, np.abs(cosine) / 100.0), 1e-300)
 
 
 def stiffness(lid: Lid) -> sparse.csr_array:

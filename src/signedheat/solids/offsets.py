@@ -58,8 +58,7 @@ class Offset:
     def distance(self, points: Floats) -> Floats:
         """(n,) heights of (n, 3) points above the surface, negative inside; these are distances if constant."""
         if self.level is not None:
-            heights: Floats = self.solid.distance(points) - self.level
-            return heights
+            return self.solid.distance(points) - self.level
         return self._heights(points)[0]
 
     def slopes(self, points: Floats) -> tuple[Floats, Floats]:
@@ -102,8 +101,7 @@ class Offset:
         slack = TOGETHER * float(np.ptp(tree.bounds[1].reshape(2, 3), axis=0).max())
 
         def part(rows: Floats) -> tuple[Floats, Ints]:
-            result: tuple[Floats, Ints] = _steepest(features.rows, tree.bounds, tree.items, self._normals, rows, slack)
-            return result
+            return _steepest(features.rows, tree.bounds, tree.items, self._normals, rows, slack)
 
         above, faces = in_chunks(part, np.concatenate([places[near], sides[:, None] * away[near]], axis=1))
         beyond = (1 - self.limit) * np.abs(reach[near]) + far[near]  # of the ball that cuts off
@@ -125,8 +123,7 @@ class Offset:
         step = STEP * float(np.ptp(self.solid.tree.tree.bounds[1].reshape(2, 3), axis=0).max())
         around = (points[:, None] + step * ALONG_AXES).reshape(-1, 3)
         reaches = self.reach(self.solid.tree.search(around).places).reshape(-1, 2, 3)
-        result: Floats = (reaches[:, 0] - reaches[:, 1]) / (2 * step)
-        return result
+        return (reaches[:, 0] - reaches[:, 1]) / (2 * step)
 
 
 def checked_reach(reach: Reach) -> Reach:

@@ -467,10 +467,9 @@ class Solid(Displayed, Represented, Frozen):
         >>> complete(samples.sphere(4)).offset(0.5, resolution=32).bounds.round(1).tolist()
         [[-1.5, -1.5, -1.5], [1.5, 1.5, 1.5]]
         """
-        surface: TriangleMesh = morphology.offset(
+        return morphology.offset(
             self, distance, corners=corners, resolution=resolution, spacing=spacing, progress=progress
         )
-        return surface
 
     def sample(
         self, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = WIDTHS, seed: int = 0
@@ -499,8 +498,7 @@ class Solid(Displayed, Represented, Frozen):
         >>> complete(samples.sphere(2)).sample(100, near=0.5)
         Samples(100 points, 50 near the surface, distances from -0.6 to 0.489)
         """
-        taken: Samples = sampling.sample(self, n, near=near, widths=widths, seed=seed)
-        return taken
+        return sampling.sample(self, n, near=near, widths=widths, seed=seed)
 
     @overload
     def __or__(self, other: Solid) -> Solid: ...

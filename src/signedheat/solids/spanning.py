@@ -37,8 +37,7 @@ class Spanned:
     def rim(self, loop: Floats) -> Floats:
         """(r, d) positions of the points of the rim on a loop of that many vertices."""
         ways = np.roll(loop, -1, axis=0) - loop
-        points: Floats = loop[self.edges] + self.shares[:, None] * ways[self.edges]
-        return points
+        return loop[self.edges] + self.shares[:, None] * ways[self.edges]
 
     def balanced(self) -> Ints:
         """(p, 3) faces whose boundary is the loop, with triangles without area along edges that were halved."""
@@ -82,8 +81,7 @@ def farthest(loop: Floats, away: Floats) -> int:
 
 def side_lengths(loop: Floats) -> Floats:
     """(n,) lengths of the sides of a closed loop."""
-    lengths: Floats = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
-    return lengths
+    return np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
 
 
 def shares_of(loop: Floats) -> tuple[Floats, float]:
@@ -96,8 +94,7 @@ def shares_of(loop: Floats) -> tuple[Floats, float]:
 def area_vector(loop: Floats) -> Floats:
     """(3,) the area that a closed loop encloses, along its normal."""
     around = loop - loop.mean(axis=0)
-    vector: Floats = 0.5 * np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
-    return vector
+    return 0.5 * np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
 
 
 def spanned(loop: Floats, inner: Floats) -> Spanned | None:
@@ -140,8 +137,7 @@ def _to_the_left(faces: Ints, n: int) -> Ints | None:
     left, right = labels[leftward.any(axis=1)], labels[(at_rim & ~leftward).any(axis=1)]
     if int(leftward.sum()) != n or np.isin(left, right).any():
         return None
-    kept: Ints = faces[np.isin(labels, left)]
-    return kept
+    return faces[np.isin(labels, left)]
 
 
 def counterclockwise(points: Floats) -> Ints:
@@ -185,8 +181,7 @@ def _inside(points: Floats, polygon: Floats) -> Bools:
     (ax, ay), (bx, by) = polygon.T[..., None], np.roll(polygon, -1, axis=0).T[..., None]
     rise = np.where(by == ay, 1.0, by - ay)  # what is level is not crossed
     crosses = ((ay > y) != (by > y)) & (x < ax + (y - ay) * (bx - ax) / rise)
-    inside: Bools = np.logical_xor.reduce(crosses, axis=0)
-    return inside
+    return np.logical_xor.reduce(crosses, axis=0)
 
 
 def points_in_disc(n: int) -> Floats:

@@ -61,28 +61,17 @@ class Evaluated(SolidQueries, Protocol):
     """The part of `Solid` that is used here; importing the class would be circular."""
 
     @property
-    def origins(self) -> Ints:
-        """(m,) face of the source of each triangle; −1 in the completion."""
-
+    def origins(self) -> Ints: ...  # (m,) face of the source of each triangle; −1 in the completion
     @property
-    def bounding(self) -> Bools:
-        """(m,) whether a triangle has the inside behind it only."""
-
+    def bounding(self) -> Bools: ...  # (m,) whether a triangle has the inside behind it only
     @property
-    def source(self) -> TriangleMesh | None:
-        """Triangles of the input, if they are known."""
-
+    def source(self) -> TriangleMesh | None: ...  # triangles of the input, if they are known
     @property
-    def tree(self) -> FaceTree:
-        """Search tree over the triangles."""
-
+    def tree(self) -> FaceTree: ...  # search tree over the triangles
     @property
-    def windings(self) -> Windings:
-        """Winding numbers, which decide what is inside."""
-
+    def windings(self) -> Windings: ...  # winding numbers, which decide what is inside
     @property
-    def diagnostics(self) -> Diagnostics:
-        """Notes on faces that were turned, left out and added."""
+    def diagnostics(self) -> Diagnostics: ...  # notes on faces that were turned, left out and added
 
 
 def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> GridField[Literal[3]]:

@@ -24,15 +24,7 @@ DEPTH = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Windings(Frozen):
-    """Winding numbers of a cycle of triangles, whose edges are balanced: used equally often in both directions.
-
-    Therefore they are integers away from the triangles, and change only across them.
-
-    Raises
-    ------
-    GeometryError
-        If an edge is not balanced.
-    """
+    """Winding numbers of a cycle of triangles, with balanced edges: integers, which change only across them."""
 
     triangles: Floats  # (m, 3, 3) corners; equal places have equal numbers
 
@@ -62,8 +54,7 @@ class Windings(Frozen):
 
     def inside(self, points: Floats) -> Bools:
         """(n,) whether points are inside."""
-        result: Bools = self.numbers(points) > INSIDE
-        return result
+        return self.numbers(points) > INSIDE
 
     def sides(self, triangles: Floats) -> tuple[Bools, Bools]:
         """(n,) whether places just behind (n, 3, 3) triangles are inside; and the same just in front of them."""
@@ -80,5 +71,4 @@ def open_edges_of(triangles: Floats) -> Floats:
     faces = same_positions(corners).reshape(-1, 3)
     a, b, c = faces.T
     table = edge_table(faces[(a != b) & (b != c) & (c != a)])
-    ends: Floats = corners[table.vertices[table.balance != 0]]
-    return ends
+    return corners[table.vertices[table.balance != 0]]

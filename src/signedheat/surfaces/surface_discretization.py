@@ -140,8 +140,7 @@ class SurfaceDiscretization:
             return np.ones(self.triangles.n_vertices, dtype=bool)
         is_source = mask_of(self.triangles.n_edges, vectors.indices[vectors.data != 0])
         with_source = np.unique(parts[is_source[self.triangles.edges.face_edges].any(axis=1)])
-        reached = mask_of(self.triangles.n_vertices, self.triangles.corner_vertices[np.isin(parts, with_source)])
-        return reached
+        return mask_of(self.triangles.n_vertices, self.triangles.corner_vertices[np.isin(parts, with_source)])
 
 
 @discretize.register
