@@ -45,7 +45,7 @@ def told_by(error):
         ("offset holes.ply 0.1 -o out.stl", "--resolution 700", 60),
         ("morph dilate ball.ply 0.1 -o out.stl", "--resolution 700", 60),
         ("morph shell ball.ply 0 0.2 -o out.stl", "--resolution 700", 60),
-        ("morph thicken holes.ply 0.3 -o out.stl", "--resolution 700", 15),
+        ("morph thicken holes.ply 0.3 -o out.stl", "--resolution 700", 8),
     ],
 )
 def test_what_is_told_to_fit_does(folder, command, size, megabytes, monkeypatch, capsys):
