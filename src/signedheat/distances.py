@@ -18,7 +18,6 @@ from .field_kinds import Field
 from .foreign import ForeignShape, as_list, as_shapes, converted
 from .grids.grid import Dimension, Grid, room_around
 from .grids.grid_field import GridField
-from .grids.polyline import Polyline
 from .jobs import Progress, within
 from .kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
 from .memory import within_memory
@@ -31,7 +30,6 @@ from .solids.overlaps import Nesting
 from .solids.solid import Solid
 from .solver import SignedHeatSolver, checked
 from .surfaces.extrapolation import Diffusion
-from .surfaces.point_cloud import PointCloud
 from .surfaces.polygon_mesh import PolygonMesh
 from .surfaces.surface_curves import Curve, CurvesAndPoints, ElementList, SurfacePoints
 from .surfaces.triangle_mesh import TriangleMesh
@@ -276,11 +274,11 @@ def _measure(source: object, domain: Domain | None) -> Callable[..., Field]:
         _refuse_other_dimension(sources, domain)
     if isinstance(source, Solid) and (domain is None or isinstance(domain, Grid | TetMesh)):
         return distance_to_solid
-    in_plane = bool(sources) and all(isinstance(part, Polyline) for part in sources)
     if domain is None:
         if any(isinstance(part, Curve | SurfacePoints) for part in sources):
             raise SourceError("curves lie on a surface", remedy="pass it: signed_distance(curves, surface)")
-        return distance_to_lines if in_plane else distance_to_shapes
+        in_space = not sources or any(not hasattr(part, "bounds") or part.bounds.shape[1] == 3 for part in sources)
+        return distance_to_shapes if in_space else distance_to_lines
     if not isinstance(domain, (Grid, TetMesh, *get_args(SurfaceDomain))):
         raise UnsupportedTypeError(
             f"distance is not measured on a {type(domain).__name__}",
@@ -342,23 +340,12 @@ def completed_distance(
     band: float | None = None,
     progress: Progress | None = None,
 ) -> GridField | TetField:
-    """Complete a shape, then measure the distance to it on a grid or on tets."""
-    if not isinstance(domain, Grid | TetMesh):
-        kind = type(domain).__name__
-        raise UnsupportedTypeError(
-            f"distance to a shape in space is measured on a Grid or a TetMesh, not on a {kind}", element="domain"
-        )
-    in_space = isinstance(domain, Grid) and domain.dimension == 3
-    if band is not None and not in_space:
+    """Complete a shape, then measure the distance to it on a grid in space or on tets."""
+    if band is not None and not isinstance(domain, Grid):
         raise UnsupportedTypeError("a band is computed around solids, on a grid in space", remedy="leave out the band")
-    joined = shape if isinstance(shape, Solid) else joined_shape(shape)
-    solid = completed(joined, options, method, within(progress, 0.0, 0.5))
+    solid = completed(shape, options, method, within(progress, 0.0, 0.5))
     progress = within(progress, 0.5, 1.0)
-    if isinstance(domain, Grid) and in_space:
+    if isinstance(domain, Grid):
         return solid.field(grid=domain, band=band, progress=progress)
-    if isinstance(domain, TetMesh):
-        phi: GridField | TetField = sharpen(TetField(domain, solid.distance(domain.vertices)), solid.boundary)
-    else:
-        source = joined if isinstance(joined, PointCloud) else solid.boundary
-        phi = SignedHeatSolver(domain, method.diffusion, progress).distance(source, method.constraint)
+    phi = sharpen(TetField(domain, solid.distance(domain.vertices)), solid.boundary, progress=progress)
     return replace(phi, diagnostics=phi.diagnostics.noting(*solid.diagnostics.notes))

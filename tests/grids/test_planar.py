@@ -209,3 +209,10 @@ def test_long_diffusion_rounds_corners(diffusion, least, most):
     grid = sh.Grid((-1.5, -1.5), 3 / 120, (121, 121))
     [line] = sh.SignedHeatSolver(grid, diffusion=diffusion).distance(sides).contour(0.0)
     assert least < np.linalg.norm(line.points - [1, 1], axis=1).min() < most
+
+
+def test_points_in_the_plane_need_no_grid():
+    points = circle(60).points
+    cloud = sh.PointCloud(points, points)
+    alone = sh.signed_distance(cloud, resolution=40)
+    assert np.array_equal(alone.values, sh.signed_distance(cloud, alone.grid).values)

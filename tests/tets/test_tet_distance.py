@@ -324,3 +324,17 @@ def test_components_are_numbered_as_sources_name_them(cube):
     assert np.asarray(source.interpolation.sum(axis=1)).ravel() == pytest.approx(np.ones(len(source.weights)))
     areas = np.bincount(source.components, source.weights)
     assert areas[0] > areas[1]  # the section through the middle is the largest
+
+
+def test_progress_of_distance_to_a_solid_ends_at_one_and_cancels():
+    seen = []
+
+    def cancel(fraction, step):
+        seen.append(fraction)
+        if fraction > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sh.signed_distance(sphere(2), lattice(8), progress=cancel)
+    sh.signed_distance(sphere(2), lattice(8), progress=lambda fraction, step: seen.append(fraction))
+    assert seen[-1] == 1
