@@ -7,7 +7,7 @@ not matter. Shapely cuts the plane along all outlines, and the rule nonzero or e
 the outlines run around a point in them. A drawing is wrong if at any of 2,000 points, or at a node of the field, the
 sign differs, or the distance by more than a millionth of the size; points nearer to the outline do not count.
 
-    python benchmarks/outlines.py [--drawings 500] [--picture outlines.png]
+    python benchmarks/outlines.py [--seeds 0 500] [--picture outlines.png]
 """
 
 from __future__ import annotations
@@ -32,14 +32,16 @@ FONTS = ("DejaVu Sans", "DejaVu Serif", "STIXGeneral", "DejaVu Sans Mono", "cmr1
 def main() -> None:
     """Print how many of each kind are wrong."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--drawings", type=int, default=500)
+    parser.add_argument("--seeds", type=int, nargs=2, default=(0, 500))
     parser.add_argument("--picture", help="where to draw the first ten")
     arguments = parser.parse_args()
     kinds = list(KINDS)
     wrong: dict[str, list[int]] = {kind: [] for kind in kinds}
+    counts = dict.fromkeys(kinds, 0)
     refused, worst, shown = [], 0.0, []
-    for seed in range(arguments.drawings):
+    for seed in range(*arguments.seeds):
         kind, fill, groups = drawing(seed)
+        counts[kind] += 1
         outlines = [points for group in groups for points in group]
         try:
             field = sh.signed_distance([sh.Polyline(p, closed=True) for p in outlines], resolution=48, fill=fill)
@@ -50,10 +52,10 @@ def main() -> None:
         worst = max(worst, off)
         if off > EXACT:
             wrong[kind].append(seed)
-        if seed < 10:
+        if len(shown) < 10:
             shown.append((f"{kind}, {fill}", field, outlines))
     for kind, seeds in wrong.items():
-        print(f"{kind:>8}: {len(seeds)} of {len(range(kinds.index(kind), arguments.drawings, len(kinds)))} {seeds[:9]}")
+        print(f"{kind:>8}: {len(seeds)} of {counts[kind]} {seeds[:9]}")
     print(f"largest error {worst:.1e} of the size; refused {len(refused)}", *refused[:5], sep="\n")
     if arguments.picture:
         draw(shown, arguments.picture)

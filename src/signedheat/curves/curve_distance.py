@@ -299,7 +299,8 @@ def reason_for_doubt(
     if not decision.all_bound or not all(isinstance(curve, Curve) and curve.oriented for curve in curves):
         return ""  # other curves and points have sides of their own
     # the shortest completion against that by heat
-    areas, sides = strokes.areas[strokes.own], decision.best.sides[strokes.own]
+    own = strokes.surface.restriction
+    areas, sides = strokes.areas[own], decision.best.sides[own]
     near = np.abs(field.values) <= strokes.surface.triangles.lengths_of_edges.mean()
     apart = areas[(np.sign(field.values) != sides) & ~near & ~np.isnan(field.values)].sum() / areas.sum()
     if apart > APART:

@@ -155,7 +155,7 @@ class Decision:
         The inside is another where the cut says so, or, away from strokes, the (n,) values of the field: heat closes an
         arc by a larger bulge than lines do.
         """
-        strokes, best, own = self.pieces.strokes, self.best, self.pieces.strokes.own
+        strokes, best, own = self.pieces.strokes, self.best, self.pieces.strokes.surface.restriction
         missing = cost(strokes, best) + strokes.lengths.sum()  # a stroke is worth its length less this, or more
         chosen = longest_of(strokes, np.flatnonzero((1 - WORTH) * strokes.lengths < missing))
         without = settled_from(strokes, [altered(best.signs, [k], 0.0) for k in chosen.tolist()], self.pieces.movable)

@@ -281,11 +281,6 @@ class Strokes:
         """(n,) area that belongs to each vertex."""
         return self.surface.triangles.vertex_areas
 
-    @property
-    def own(self) -> Ints:
-        """(j,) which of the n vertices are those of the domain."""
-        return self.surface.restriction
-
     @cached_property
     def graph(self) -> CutGraph:
         """The vertices and edges of the surface."""
