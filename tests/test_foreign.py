@@ -94,7 +94,7 @@ def test_they_are_taken_wherever_a_shape_is(take):
 
 
 def test_they_are_saved_and_drawn_and_hold_the_curves_of_files(tmp_path):
-    pictures = {}
+    pictures, field = {}, sh.signed_distance(BALL, resolution=12)
     for name, given in {"own": BALL, "trimesh": BALL.to_trimesh(), "arrays": (BALL.vertices, BALL.faces)}.items():
         sh.save(given, tmp_path / f"{name}.ply")
         assert np.array_equal(sh.read(tmp_path / f"{name}.ply").faces, BALL.faces)
@@ -102,7 +102,7 @@ def test_they_are_saved_and_drawn_and_hold_the_curves_of_files(tmp_path):
         again = sh.io.read_curves(tmp_path / f"{name}.json", given)
         assert np.abs(places_of(again[1]) - places_of(ARCS[1])).max() < 1e-12
         view.save_scene(given, tmp_path / f"{name}.png")
-        view.save_slices(sh.signed_distance(BALL, resolution=12), tmp_path / f"{name}-slices.png", given)
+        view.save_slices(field, tmp_path / f"{name}-slices.png", given)
         view.save_row(tmp_path / f"{name}-row.png", ("ball", given))
         pictures[name] = [(tmp_path / f"{name}{end}.png").read_bytes() for end in ("", "-slices", "-row")]
     assert pictures["own"] == pictures["trimesh"] == pictures["arrays"]

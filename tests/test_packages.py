@@ -86,7 +86,7 @@ def test_pictures_are_refused_before_anything_is_computed(monkeypatch, folder, c
 
 def test_the_demo_without_pictures_makes_the_rest(monkeypatch, tmp_path, capsys):
     block(monkeypatch, "matplotlib")
-    assert main(["demo", "-o", str(tmp_path), "--resolution", "24"]) == 0
+    assert main(["demo", "-o", str(tmp_path), "--resolution", "12"]) == 0
     assert {path.name for path in tmp_path.iterdir()} == {"duck.stl", "distance.vti", "offset.stl"}
     assert "pip install matplotlib" in capsys.readouterr().err
 

@@ -123,7 +123,7 @@ def test_a_process_that_dies_before_it_gets_a_shape_is_replaced(tmp_path, files,
 def test_results_do_not_depend_on_the_number_of_workers(tmp_path):
     """Nor on the process: this one, and two workers."""
     for k in range(2):
-        samples.without_faces(samples.sphere(2, radius=1 + k), 0.2, seed=k).save(tmp_path / f"in{k}.ply")
+        samples.without_faces(samples.sphere(1, radius=1 + k), 0.2, seed=k).save(tmp_path / f"in{k}.ply")
     sampling = sh.batches.Sampling(n=300, normalize=True)
     job = sh.batches.Job(volume=".npy", offsets=(0.1, -0.1), samples=sampling, info=True, resolution=16)
     one, two = tmp_path / "one", tmp_path / "two"

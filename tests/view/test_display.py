@@ -39,7 +39,7 @@ THINGS = {
     "tets": lambda: TETS,
     "line": lambda: SQUARE,
     "field on a grid": lambda: sh.GridField(GRID, np.linalg.norm(GRID.points, axis=-1) - 1),
-    "field in a band": lambda: sh.signed_distance(samples.sphere(3), spacing=0.1, band=0.2),
+    "field in a band": lambda: sh.signed_distance(samples.sphere(2), spacing=0.15, band=0.3),
     "field of one sign": lambda: sh.GridField(GRID, np.linalg.norm(GRID.points, axis=-1) + 1),
     "field in the plane": lambda: sh.GridField(PLANE, height(PLANE.points)),
     "field on tets": lambda: sh.TetField(TETS, height(TETS.vertices)),
