@@ -96,11 +96,11 @@ def test_what_is_closed_does_not_depend_on_how_it_is_given(shape, bent):
 
 
 def test_lids_fade_as_a_spheroid_flattens():
-    heights = np.arange(0.5, 1.21, 0.05)
+    heights = np.arange(0.5, 1.21, 0.1)
     shares = np.array(
         [volume(*dome(k, around=32, down=8)) / volume(*dome(k, around=32, down=8), bent=False) for k in heights]
     )
-    assert np.abs(np.diff(shares) / shares[:-1]).max() < 0.15  # 3 % for each hundredth
+    assert np.abs(np.diff(shares) / shares[:-1]).max() < 0.3  # 3 % for each hundredth
     assert shares[np.argmin(np.abs(heights - 1))] == pytest.approx(2, rel=0.03)
     assert volume(*dome(4.0)) == pytest.approx(volume(*dome(4.0), bent=False), rel=1e-9)
 

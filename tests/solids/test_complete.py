@@ -385,7 +385,7 @@ def test_rounding_chooses_nothing(parts):
 
 
 def test_points_with_normals_and_noisy_soups_are_completed_by_heat():
-    points = np.random.default_rng(0).uniform(-1.5, 1.5, (3000, 3))
+    points = np.random.default_rng(0).uniform(-1.5, 1.5, (1000, 3))
     truth = np.linalg.norm(points, axis=1) - 1
     cloud = samples.oriented_points(samples.sphere(4), 1000)
     soup = samples.soup(samples.sphere(3), 0.02)
