@@ -28,6 +28,7 @@ from ..surfaces.vertex_field import VertexField
 from ..validation import flag
 from .curve_distance import distance_to_pieces
 from .resolution import flattened, on_resolving_triangles
+from .stroke_directions import pieces_for_all
 
 ZERO = 1e-7
 """φ is zero at a vertex of the rim if its size is at most this, in mean edge lengths."""
@@ -117,10 +118,12 @@ def conforming_distance(
     surface = cast("SurfaceDomain", converted(domain))
     kept, left_out = given_curves(surface, as_list(curves))
 
+    pieces = None if as_oriented or own_levels else pieces_for_all(surface, flattened(kept))
+
     def measured(solver: SignedHeatSolver[SurfaceDomain]) -> VertexField:
         if as_oriented or own_levels:
             return distance_unwarned(solver, curves, constraint)
-        field = distance_to_pieces(solver, kept, constraint, every_piece, numbers_given(kept, left_out))[0]
+        field = distance_to_pieces(solver, kept, constraint, every_piece, numbers_given(kept, left_out), pieces)[0]
         return field if left_out is None else replace(field, diagnostics=field.diagnostics.noting(left_out))
 
     return on_resolving_triangles(measured, SignedHeatSolver(surface, diffusion, progress), kept, always=True)
