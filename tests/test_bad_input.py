@@ -89,6 +89,7 @@ def test_shell(arguments, keywords, error):
         case("by nothing", BALL, 0),
         case("raise the resolution", BALL, 0.01, resolution=24),
         case("no source was given", [], 0.3, error=sh.errors.SourceError),
+        case("rows differ in length", BALL, 0.3, faces=[[1], [2, 3]], error=sh.errors.SourceError),
         case("a PointCloud has none", POINTS, 0.3, resolution=24, error=sh.errors.SourceError),
         case("a Polyline has none", sh.Polyline([[0, 0], [1, 0]]), 0.3, resolution=24, error=sh.errors.SourceError),
         case("not on a TetMesh", BALL, 0.3, None, BOX, error=sh.errors.UnsupportedTypeError),
@@ -151,6 +152,28 @@ def test_close_curves(arguments, keywords, error):
 
 
 SOLID = sh.complete(BALL)
+
+
+@pytest.mark.parametrize(
+    "distance",
+    [["a"] * BALL.n_vertices, [0.1, [0.2]], np.full(BALL.n_vertices, 1j), [None] * BALL.n_vertices, np.array("1"),
+     np.array(True), np.ma.masked_less(np.full(BALL.n_vertices, 0.1), 1)],
+)  # fmt: skip
+def test_distances_of_an_offset(distance):
+    with refused(sh.errors.SignedHeatError):
+        sh.offset(SOLID, distance, resolution=12)
+
+
+@pytest.mark.parametrize("sources", [RING[0], BALL, None, 3])
+def test_several_sources_are_a_list(sources):
+    with refused(sh.errors.SourceError):
+        sh.SignedHeatSolver(BALL).distance_many(sources)
+
+
+def test_numbers_are_not_missing_or_text():
+    for value in (None, "1"):
+        with refused(sh.errors.GeometryError, element="values"):
+            sh.GridField(sh.Grid(0.0, 1.0, 2), np.array([0.0, value], dtype=object))
 
 
 @pytest.mark.parametrize("value", ["yes", 2**70, 1.0, None, np.zeros(3)], ids=lambda value: type(value).__name__)

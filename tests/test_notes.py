@@ -41,3 +41,8 @@ def test_numbers_of_numpy_are_plain():
     note = sh.complete(samples.without_patches(samples.sphere(2), 2, 0.4)).diagnostics.notes[0]
     changed = dataclasses.replace(note, **{dataclasses.fields(note)[0].name: np.int64(3)})
     assert json.dumps(dataclasses.asdict(changed))
+
+
+def test_diagnostics_can_be_compared():
+    assert sh.results.Diagnostics() not in (sh.results.Diagnostics(), None)
+    assert len({sh.results.Diagnostics(), sh.results.Diagnostics()}) == 2

@@ -45,7 +45,7 @@ class Note(Frozen, ShortRepr):
 AnyNote = TypeVar("AnyNote", bound=Note)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Diagnostics(ShortRepr):
     """Timings, diffusion time, and notes on the computation of a field.
 

@@ -50,7 +50,7 @@ from .surfaces.triangle_mesh import TriangleMesh
 from .surfaces.vertex_field import VertexField
 from .tets.tet_mesh import TetMesh
 from .transforms import concatenated
-from .validation import finite_number, flag, positive_number, refuse_beside
+from .validation import array_of, finite_number, flag, numbers, positive_number, refuse_beside
 
 __all__ = [
     "closing", "dilate", "erode", "offset", "opening", "shell", "smooth_difference", "smooth_intersection",
@@ -278,11 +278,10 @@ def offset(
     if callable(distance):
         reach = checked_reach(distance)
         largest = float(reach(solid.triangles.reshape(-1, 3)).max())
-    elif np.ndim(distance) == 0:
-        reach = largest = finite_number(cast("float", distance), "the distance")
-    else:
-        values = np.asarray(distance, dtype=np.float64)
+    elif (values := numbers(distance, "distance", SignedHeatError)).ndim:
         reach, largest = checked_reach(_linear(shape, values)), float(values.max(initial=0.0))
+    else:
+        reach = largest = finite_number(distance, "the distance")
     sides = np.array([[-1.0], [1.0]])
     grid = Grid.around(solid.bounds + sides * max(largest, 0.0), resolution, None, spacing)
     if LIMITS[corners] > 1:
@@ -467,7 +466,7 @@ def _chosen(sheet: object, faces: ArrayLike) -> TriangleMesh | PolygonMesh:
     if not isinstance(sheet, TriangleMesh | PolygonMesh):
         raise SourceError("faces can be chosen for a single mesh only", element="faces", remedy="pass it alone")
     n = sheet.n_faces if isinstance(sheet, TriangleMesh) else sheet.n_polygons
-    named = np.asarray(faces)
+    named = array_of(faces, "faces", SourceError)
     chosen = np.flatnonzero(named) if named.dtype == bool and named.shape == (n,) else named.ravel()
     if not len(chosen) or chosen.dtype.kind not in "iu" or chosen.min() < 0 or chosen.max() >= n:
         raise SourceError(

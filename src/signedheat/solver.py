@@ -12,7 +12,7 @@ from .arrays import Frozen, Ints
 from .constraints import Constraint, LevelValues, ZeroSet
 from .diagnostics import Diagnostics, Note
 from .discretization import Adaptable, Discretization, SourceTerm, discretize
-from .errors import InexactWarning, UnsupportedTypeError, warn_user
+from .errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
 from .field_kinds import Field, to_field, warned
 from .foreign import ForeignShape, as_list, converted
 from .grids.grid import Dimension, Grid
@@ -255,10 +255,17 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         [-0.5, 0.5]
         """
         constraint = checked(constraint)
+        try:
+            listed = list(sources)
+        except TypeError:
+            kind = type(sources).__name__
+            raise SourceError(
+                f"distance is measured to each source of a list, and a {kind} is none", remedy="call distance instead"
+            ) from None
         report = within(self.progress, 0.4, 1.0)  # before, the domain is discretised
         fields: list[Field] = []
-        for begin in range(0, len(sources), _BATCH):
-            batch = (self._prepared(each, constraint) for each in sources[begin : begin + _BATCH])
+        for begin in range(0, len(listed), _BATCH):
+            batch = (self._prepared(each, constraint) for each in listed[begin : begin + _BATCH])
             for (discretization, _, imposed), run in groupby(
                 batch, lambda each: (each.discretization, each.times, each.constraint)
             ):
@@ -278,7 +285,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
                     diagnostics = Diagnostics(timings=seconds, time=source.time, notes=each.notes)
                     fields.append(warned(to_field(discretization, values, source, diagnostics)))
             if report is not None:
-                report(len(fields) / len(sources), f"{len(fields)} of {len(sources)}")
+                report(len(fields) / len(listed), f"{len(fields)} of {len(listed)}")
         return fields
 
 

@@ -41,6 +41,8 @@ def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryEr
     try:
         if array.dtype.kind not in "biufO":
             raise TypeError
+        if array.dtype.kind == "O" and any(value is None or isinstance(value, str | bytes) for value in array.flat):
+            raise TypeError  # NumPy makes NaN of nothing, and reads texts
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # whatever is lost in converting
             return np.array(array, dtype=np.float64)
@@ -163,7 +165,9 @@ def finite_number(
     value: object, name: str, least: float = -np.inf, error: type[SignedHeatError] = SignedHeatError
 ) -> float:
     """`value` as a finite float, at least `least`."""
-    if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:  # type: ignore[arg-type]
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, bool) or not isinstance(value, Real):
         described = _described(value) if isinstance(value, np.ndarray) else " ".join(f"{value!r:.60}".split())
         raise error(f"{name} must be a number, not {described}", element=name)
     try:
