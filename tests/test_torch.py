@@ -88,3 +88,16 @@ def test_other_vertices_are_refused():
     cloud = sh.complete(samples.oriented_points(samples.sphere(2), 500))
     with refused(sh.errors.SourceError, "solid"):
         sh.torch.distance(cloud, points, torch.zeros((42, 3)))
+
+
+def test_whole_numbers_have_distances_that_are_not():
+    solid = sh.complete(samples.sphere(2))
+    assert sh.torch.distance(solid, torch.tensor([[0, 1, 1]])).item() == pytest.approx(0.41, abs=0.02)
+
+
+def test_meshes_and_missing_vertices_are_refused():
+    solid, points = sh.complete(samples.sphere(1)), torch.zeros((1, 3))
+    with refused(sh.errors.UnsupportedTypeError, "solid"):
+        sh.torch.distance(samples.sphere(1), points)
+    with refused(sh.errors.SourceError, "vertices"):
+        sh.torch.distance(solid, points, np.full((42, 3), np.nan))

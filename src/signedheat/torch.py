@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import SourceError
+from .errors import SourceError, UnsupportedTypeError
 from .packages import lazy_module
 from .solids.solid import Solid
 
@@ -42,12 +42,15 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
     Returns
     -------
     (...) tensor
-        In the shape of the points, of their type and device; computed on the processor in double precision.
+        In the shape of the points, of their device and, if that is one of reals, their type; computed on the processor
+        in double precision.
 
     Raises
     ------
     SourceError
         If the solid was not completed from a triangle mesh with these vertices.
+    UnsupportedTypeError
+        If it is no solid.
     MissingPackageError
         If PyTorch is not installed.
 
@@ -65,7 +68,12 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
     >>> round(d.item(), 6), points.grad.tolist(), round(-cube.grad[:, 2].sum().item(), 6)
     (0.5, [[0.0, 0.0, 1.0]], 1.0)
     """
+    if not isinstance(solid, Solid):
+        raise UnsupportedTypeError(
+            f"a {type(solid).__name__} is no Solid", remedy="pass sh.complete(mesh)", element="solid"
+        )
     points = torch.as_tensor(points)
+    points = points if points.is_floating_point() else points.to(torch.get_default_dtype())
     rows, shape = points.reshape(-1, points.shape[-1] if points.ndim else 1), points.shape[:-1]
     found = solid.closest(rows.detach().cpu().double().numpy())
     nearest = torch.from_numpy(found.points)
@@ -74,8 +82,9 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
             raise SourceError(
                 "the solid was not completed from one triangle mesh", remedy="complete a triangle mesh", element="solid"
             )
+        vertices = torch.as_tensor(vertices)
         now, then = vertices.detach().cpu().double().numpy(), solid.source.vertices
-        if now.shape != then.shape or np.abs(now - then).max() > SAME * np.abs(then).max():
+        if now.shape != then.shape or not np.abs(now - then).max() <= SAME * np.abs(then).max():
             raise SourceError(
                 "the vertices differ from those of the completed mesh",
                 remedy="complete the mesh again after each step",
