@@ -6,6 +6,7 @@ import os
 import pickle
 import signal
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,17 @@ def measure(path: Path, stem: Path) -> dict[str, object]:
         os.kill(os.getpid(), signal.SIGKILL)
     Path(f"{stem}.txt").write_text(path.read_text())
     return {"length": len(path.read_text()), "notes": ["this is known"]}
+
+
+@dataclass(frozen=True)
+class Text:
+    """A job whose method is given to workers."""
+
+    text: str
+
+    def write(self, path: Path, stem: Path) -> dict[str, object]:
+        Path(f"{stem}.txt").write_text(self.text)
+        return {}
 
 
 class Here:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from batch_jobs import Here, counted, measure
+from batch_jobs import Here, Text, counted, measure
 from refusals import refused
 from signedheat import samples
 from signedheat.batches import pool
@@ -98,6 +98,14 @@ def test_another_job_does_everything_again(tmp_path):
     finer = sh.batches.Job(volume=".npz", resolution=20)
     assert sh.batches.run(tmp_path / "ball.ply", out, finer, workers=1).skipped == 0
     assert max(sh.load_field(out / "ball.npz").grid.shape) == 20
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_methods_of_other_objects_are_other_jobs(tmp_path, files):
+    folder = files("a.ply")
+    for text, skipped in (("one", 0), ("one", 1), ("two", 0)):
+        batch = sh.batches.run(folder, tmp_path / "out", Text(text).write, workers=1)
+        assert batch.skipped == skipped and (tmp_path / "out" / "a.txt").read_text() == text
 
 
 def test_what_was_short_of_memory_is_tried_again_alone(tmp_path, files):
@@ -251,6 +259,13 @@ def test_what_is_no_batch_says_so(tmp_path, files, monkeypatch):
         sh.batches.Job()
     with pytest.raises(sh.errors.SignedHeatError):
         sh.batches.Job(samples=sh.batches.Sampling(), plain=True)
+    assert sh.batches.Job(offsets=0.5).offsets == (0.5,)
+    for odd in (
+        {"offsets": ("a",)}, {"offsets": (np.nan,)}, {"offsets": 1.0, "band": "x"}, {"volume": "npz"},
+        {"offsets": 1.0, "surfaces": "stl"}, {"samples": 100},
+    ):  # fmt: skip
+        with pytest.raises(sh.errors.SignedHeatError):
+            sh.batches.Job(**odd)
     for wrong in ({"volume": ".nrrd"}, {"offsets": (0.2,)}, {"info": True, "plain": True}):
         with pytest.raises(sh.errors.SignedHeatError):
             sh.batches.Job(band=0.1, **wrong)

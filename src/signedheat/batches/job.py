@@ -13,16 +13,23 @@ import numpy as np
 from ..arrays import Floats
 from ..constraints import Constraint, EachComponent, LevelValues, ZeroSet
 from ..distances import completed_distance, grid_around, plain_distance
-from ..errors import FileFormatError, GeometryError, InexactWarning, SignedHeatError, SourceError
+from ..errors import (
+    FileFormatError,
+    GeometryError,
+    InexactWarning,
+    SignedHeatError,
+    SourceError,
+    UnsupportedTypeError,
+)
 from ..foreign import as_shape
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_field import GridField
-from ..io.field_files import BAND_FORMATS
+from ..io.field_files import BAND_FORMATS, FIELD_FORMATS
 from ..io.files import distinct_names, extension
 from ..io.key_figures import describe, shape_figures
 from ..io.numpy_files import write_npz
 from ..io.scenes import METRES, scale_to, unit_of
-from ..io.shape_files import read, save
+from ..io.shape_files import SHAPE_FORMATS, read, save
 from ..io.voxel_files import LABEL_FORMATS, read_labels
 from ..kinds import ShapeLike
 from ..mesh.components import element_components
@@ -43,7 +50,7 @@ from ..solver import checked
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import transform
-from ..validation import positive_number, whole_number
+from ..validation import finite_number, positive_number, whole_number
 from .inputs import Input
 
 
@@ -108,7 +115,8 @@ class Job:
     Raises
     ------
     SignedHeatError
-        If nothing is asked for, samples or a band are asked for of a plain field, or offsets lie beyond the band.
+        If nothing is asked for, samples or a band are asked for of a plain field, offsets lie beyond the band or are
+        not numbers, or an extension is none of a field or a surface.
 
     Examples
     --------
@@ -139,6 +147,16 @@ class Job:
     plain: bool = False
 
     def __post_init__(self) -> None:
+        given = self.offsets if isinstance(self.offsets, Iterable) else [self.offsets]
+        object.__setattr__(self, "offsets", tuple(finite_number(offset, "an offset") for offset in given))
+        for ending, formats in ((self.volume, FIELD_FORMATS), (self.surfaces, SHAPE_FORMATS)):
+            if ending is not None and ending not in formats:
+                raise FileFormatError(f"{ending!r} is no extension", remedy=f"use one of {' '.join(sorted(formats))}")
+        if self.band is not None:
+            positive_number(self.band, "band")
+        if not isinstance(self.samples, Sampling | None):
+            kind = type(self.samples).__name__
+            raise UnsupportedTypeError(f"a {kind} is no Sampling", remedy="pass Sampling(n=…)", element="samples")
         reach = max(map(abs, self.offsets), default=0.0)
         cause = remedy = ""
         if not (self._measures or self.info):

@@ -22,10 +22,11 @@ import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack, closing, contextmanager, suppress
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from signal import SIG_IGN, SIGINT, Signals, signal
+from types import FunctionType
 from typing import Any
 
 from ..compiled import MOST_THREADS
@@ -401,7 +402,7 @@ def run(
 
 def _described(job: Function) -> str:
     """Describe a job and the version of the package; shapes with another description are done again."""
-    text = repr(job) if is_dataclass(job) else f"{getattr(job, '__module__', '')}.{getattr(job, '__qualname__', job)}"
+    text = f"{job.__module__}.{job.__qualname__}" if isinstance(job, FunctionType) else repr(job)
     package = __name__.partition(".")[0]
     return f"{text} by {package} {import_module(package).__version__}"
 
