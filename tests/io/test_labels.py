@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat.cli import main
 from signedheat.inspection import inspect
 from signedheat.solids.completion import complete
@@ -197,3 +198,23 @@ def test_the_boundary_of_voxels_goes_to_the_world(labels, kind):
     assert complete(surface, as_oriented=True).inside(middle[None])[0]  # also where axes are mirrored
     corners = surface.vertices[surface.faces] - middle
     assert np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() > 0
+
+
+@pytest.mark.parametrize(
+    ("labels", "axes", "origin"),
+    [
+        (np.ones((2, 2, 2), int), [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]], np.zeros(3)),
+        (np.ones((2, 2, 2), int), np.zeros((3, 3)), np.zeros(3)),
+        (np.ones((2, 2, 2), int), np.eye(3), [0, 0, np.nan]),
+        (np.ones((2, 2, 2), int), np.eye(4), np.zeros(3)),
+        (np.ones((2, 2), int), np.eye(3), np.zeros(3)),
+        (np.full((2, 2, 2), "a"), np.eye(3), np.zeros(3)),
+    ],
+)
+def test_images_without_right_angles_or_places_are_refused(labels, axes, origin):
+    with refused(sh.errors.GeometryError):
+        sh.io.LabelImage(labels, axes, origin)
+
+
+def test_images_of_lists_are_images():
+    assert sh.io.LabelImage([[[0, 1]]], np.eye(3).tolist(), [0, 0, 0]).boundary.n_faces > 0

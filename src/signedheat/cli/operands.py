@@ -38,7 +38,7 @@ from ..io.image_files import CONFIDENCE, NIFTI
 from ..io.key_figures import describe as describe
 from ..io.scenes import scale_to, unit_of
 from ..io.solid_arrays import holds_solid
-from ..io.voxel_files import LabelImage, image_at, read_labels
+from ..io.voxel_files import LabelImage, read_labels
 from ..jobs import Progress, within
 from ..memory import refuse_beyond_memory
 from ..solids.completion import Completion, complete, completed
@@ -325,7 +325,7 @@ def image_of(arguments: Namespace) -> LabelImage | None:
         return image
     turn = matrix[:3, :3]
     with prefix_errors(arguments.shape):
-        return image_at(image.labels, turn @ image.axes, turn @ image.origin + matrix[:3, 3], image.space)
+        return LabelImage(image.labels, turn @ image.axes, turn @ image.origin + matrix[:3, 3], image.space)
 
 
 def labels_of(image: LabelImage) -> list[int] | None:

@@ -152,12 +152,12 @@ def load_field(path: PathLike) -> Field:
     with reading(path):
         if image.values.dtype == bool:
             raise FileFormatError("the values are booleans, not real numbers: this is not a field")
-        grid = _made(Grid, image.origin, image.spacing, image.values.shape)
+        grid = made(Grid, image.origin, image.spacing, image.values.shape)
         solid = _held_solid(path) if extension(path) == ".npz" else None
-        return _made(GridField, grid, np.ascontiguousarray(image.values), confidence=image.confidence, solid=solid)
+        return made(GridField, grid, np.ascontiguousarray(image.values), confidence=image.confidence, solid=solid)
 
 
-def _made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
+def made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
     """Construct a grid or field from a file; errors become errors of the file."""
     try:
         return kind(*parts, **options)
@@ -193,16 +193,16 @@ def _load_tet_field(path: PathLike) -> TetField:
         if NAME not in cells.point_data:
             raise FileFormatError(f"it has no point data '{NAME}': it was not written as a field")
         values = np.asarray(cells.point_data[NAME], dtype=np.float64)
-        return _made(TetField, _made(TetMesh.from_meshio, cells), values)
+        return made(TetField, made(TetMesh.from_meshio, cells), values)
 
 
 def _load_band(path: PathLike) -> GridField:
     needed = ("places", "values", "origin", "spacing", "shape", "width", "coarse_values", "coarse_spacing")
     with reading(path):
         arrays = read_npz(path, (CONFIDENCE,), needed)
-        grid = _made(Grid, arrays["origin"], arrays["spacing"], arrays["shape"])
+        grid = made(Grid, arrays["origin"], arrays["spacing"], arrays["shape"])
         far = arrays["coarse_values"]
-        coarse = _made(GridField, _made(Grid, arrays["origin"], arrays["coarse_spacing"], far.shape), far)
+        coarse = made(GridField, made(Grid, arrays["origin"], arrays["coarse_spacing"], far.shape), far)
         places = arrays["places"]
         if places.ndim != 2 or places.dtype.kind not in "iu" or places.shape[1] != len(grid.shape):
             raise damaged("its blocks have no places", element="places")
@@ -212,7 +212,7 @@ def _load_band(path: PathLike) -> GridField:
         if not np.array_equal(blocks.places, places):
             raise damaged("its blocks are not in order", element="places")
         options = {"blocks": blocks, "coarse": coarse, "width": float(arrays["width"]), "solid": _held_solid(path)}
-        return _made(GridField, grid, arrays["values"], confidence=arrays.get(CONFIDENCE), **options)
+        return made(GridField, grid, arrays["values"], confidence=arrays.get(CONFIDENCE), **options)
 
 
 def _write_npz(field: GridField, path: Path) -> None:

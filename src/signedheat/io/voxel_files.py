@@ -9,7 +9,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Frozen, short
+from ..arrays import Floats, Frozen, read_only, short
 from ..errors import FileFormatError, GeometryError
 from ..exchange import NAME
 from ..foreign import Represented
@@ -20,7 +20,8 @@ from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import transform
-from .field_files import CONVENTION, ensure_field_writable, save_field
+from ..validation import array_of, numbers
+from .field_files import CONVENTION, ensure_field_writable, made, save_field
 from .files import PathLike, ensure_writable, extension, reading, replacing
 from .image_files import NIBABEL, NIFTI, nibabel, read_image, write_nrrd
 
@@ -57,6 +58,11 @@ class LabelImage(Represented, Frozen):
     space : str, optional
         What the axes of the world are, as in NRRD files: ``"left-posterior-superior"``.
 
+    Raises
+    ------
+    GeometryError
+        If the image does not have three axes, or they are not at right angles.
+
     Examples
     --------
     >>> image = LabelImage(np.full((3, 4, 5), 7), axes=2.0 * np.eye(3), origin=np.zeros(3))
@@ -70,6 +76,31 @@ class LabelImage(Represented, Frozen):
     axes: Floats
     origin: Floats
     space: str | None = None
+
+    def __post_init__(self) -> None:
+        labels, axes, origin = (
+            array_of(self.labels, "labels"),
+            numbers(self.axes, "axes"),
+            numbers(self.origin, "origin"),
+        )
+        if labels.ndim != 3 or labels.dtype.kind not in "biuf" or axes.shape != (3, 3) or origin.shape != (3,):
+            raise GeometryError(
+                f"labels, axes and origin of an image in space have the shapes (nx, ny, nz), (3, 3) and (3,), not "
+                f"{labels.shape}, {axes.shape} and {origin.shape}",
+                element="labels",
+            )
+        lengths = np.linalg.norm(axes, axis=0)
+        if not (np.isfinite(axes).all() and (lengths > 0).all() and np.isfinite(origin).all()):
+            raise GeometryError("its axes have no directions", remedy="write it again", element="axes")
+        cosine = float(np.abs((axes / lengths).T @ (axes / lengths) - np.eye(3)).max())
+        if cosine > SQUARE:
+            raise GeometryError(
+                f"its axes are not at right angles, but off by {np.degrees(np.arcsin(min(cosine, 1.0))):.3g}°",
+                remedy="resample the image along right angles",
+                element="axes",
+            )
+        for name, array in (("labels", labels), ("axes", axes), ("origin", origin)):
+            object.__setattr__(self, name, read_only(array))
 
     @property
     def spacing(self) -> Floats:
@@ -122,7 +153,7 @@ class LabelImage(Represented, Frozen):
             others = present[present != 0]
             if len(others) != 1:
                 raise GeometryError(
-                    f"the image has {_listed(present)}", remedy="choose one with --label", element="labels"
+                    f"the image has {_listed(present)}", remedy="choose one by `label`, or --label", element="labels"
                 )
             label = float(others[0])
         inside = self.labels == label
@@ -269,25 +300,7 @@ def read_labels(path: PathLike) -> LabelImage:
     """
     image = read_image(path, LABEL_FORMATS, "labels")
     with reading(path):
-        if image.values.ndim != 3:
-            raise FileFormatError(f"the image has {image.values.ndim} axes, not 3")
-        if image.axes.shape != (3, 3) or image.origin.shape != (3,):
-            raise FileFormatError("its axes or its origin are not those of space", remedy="write it again")
-        return image_at(image.values, image.axes, image.origin, image.space)
-
-
-def image_at(labels: NDArray[np.generic], axes: Floats, origin: Floats, space: str | None) -> LabelImage:
-    """Make an image of labels; raise `FileFormatError` if its axes (3, 3) are not at right angles."""
-    lengths = np.linalg.norm(axes, axis=0)
-    if not (np.isfinite(axes).all() and (lengths > 0).all() and np.isfinite(origin).all()):
-        raise FileFormatError("its axes have no directions", remedy="write it again")
-    cosines = (axes / lengths).T @ (axes / lengths) - np.eye(3)
-    if np.abs(cosines).max() > SQUARE:
-        raise FileFormatError(
-            f"its axes are not at right angles, but off by {np.degrees(np.arcsin(np.abs(cosines).max())):.3g}°",
-            remedy="resample the image along right angles",
-        )
-    return LabelImage(labels, axes, origin, space)
+        return made(LabelImage, image.values, image.axes, image.origin, image.space)
 
 
 def read_volume(path: PathLike, level: float | None = None, radius: float | None = None) -> DigitalSurface:
