@@ -202,11 +202,7 @@ def refuse_contradictions(rows: sparse.csr_matrix, levels: Floats, values: Float
 
 @dataclass(frozen=True, eq=False)
 class SpringIntegration(DirectIntegration):
-    """`DirectIntegration` with a `fit` that imposes levels by springs.
-
-    Exactly imposed across cells, a function linear on them would be constant around the source; springs leave less
-    error.
-    """
+    """`DirectIntegration` with a `fit` by springs: across cells, exact levels make φ constant around the source."""
 
     strength: float = 0.0  # of the springs, in 1/length
 

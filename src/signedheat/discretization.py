@@ -73,10 +73,7 @@ class Adaptable(Protocol):
 
 
 class Discretization(Adaptable, Protocol):
-    """A domain as the method needs it: what each of the three steps does on it.
-
-    The source terms that it is given are those that its own `lower` has made.
-    """
+    """A domain as the method needs it: what each of the three steps does on it, for sources that it has lowered."""
 
     @property
     def integration(self) -> Integration:

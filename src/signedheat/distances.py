@@ -319,11 +319,7 @@ def distance_to_shapes(
     keep_overlaps: bool = False,
     progress: Progress | None = None,
 ) -> GridField | TetField:
-    """Compute the signed distance to shapes in space: see `signed_distance`.
-
-    On tets, distance is along paths around walls, with the signs of the solid: where none is in between, it is the
-    solid's.
-    """
+    """Compute the signed distance to shapes in space: see `signed_distance`."""
     options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
     method = Heat(checked(constraint), positive_number(diffusion, "diffusion"))
     joined = joined_shape(shape)

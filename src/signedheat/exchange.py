@@ -481,10 +481,7 @@ def tets_of_pyvista(grid: Any) -> Ints:
 
 
 def from_meshio(thing: Any, as_points: bool = False) -> Elements:
-    """From a `meshio.Mesh`: its triangles, quadrilaterals and polygons, block after block; or else its tets.
-
-    With `as_points`, a mesh of other cells alone is a cloud.
-    """
+    """From a `meshio.Mesh`: its polygons, else its tets; `as_points`, a mesh of other cells alone is a cloud."""
     if not hasattr(thing, "cells") or not hasattr(thing, "points"):
         raise _no_shape(thing, "a Mesh", "read it with meshio.read")
     blocks = [block.data for block in thing.cells if block.type in _SIDES or block.type.startswith("polygon")]

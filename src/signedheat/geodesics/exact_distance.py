@@ -47,8 +47,7 @@ def distance_to_zero_line(
 ) -> tuple[Floats, int]:
     """Return the distance of every vertex to the zero set of a function linear in faces, and the number of windows.
 
-    Windows are merged where that changes distances by less than `tolerance` of the edge. If there are `window_limit`,
-    the search was cut short.
+    Merging windows changes distances by less than `tolerance` of the edge; `window_limit` cuts the search short.
     """
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
     return distance_to_segments(triangles, [zero_line(triangles, values)], tolerance, report)

@@ -144,10 +144,8 @@ class PlacedSegments:
         return np.concatenate([home, faces]), np.concatenate([points, across]), firsts, seconds
 
     def _directions(self, triangles: IntrinsicMesh) -> tuple[Complexes, Complexes]:
-        """(s,) directions from each node along the first and the last segment there, in its face or the frame of its
-        edge.
-
-        0 stands for none; at an edge of three faces or more, how segments in faces go on is ambiguous.
+        """(s,) directions, or 0, along the first and last segment at nodes, in their faces or the frames of their
+        edges.
         """
         nodes, kinds = self.nodes, self.nodes.kinds
         steps = self.positions[:, 1] - self.positions[:, 0]

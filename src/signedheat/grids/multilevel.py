@@ -318,8 +318,7 @@ def quotients(
 def diffuse_by_sweeps(
     sources: NodeSources, active: Bools, ratios: Floats, rounds: int, given: NDArray[np.float32] | None = None
 ) -> NDArray[np.float32]:
-    """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j``, Eq. 12, in `active` stretches; a = t / h²,
-    (4,).
+    """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j``, Eq. 12, in `active` stretches, a = t / h².
 
     Elsewhere X, (l₀, l₁, l₂, n, 4), is `given`, and overwritten; by default it is zero, in memory never touched.
     """
@@ -335,11 +334,7 @@ def diffuse_by_sweeps(
 
 
 def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int, *arguments: Any) -> None:
-    """Run ``kernel(*arguments, tiles)`` over lines of the last axis, in all directions; tiles are (begin, end, step) ·
-    3.
-
-    Tiles on one diagonal do not depend on each other, so results do not depend on the number of threads.
-    """
+    """Run ``kernel(*arguments, tiles)`` over all lines in all directions; tiles on a diagonal are independent."""
     steps = [(1, -1) if n > 1 else (1,) for n in shape[:3]]
     threads = 1 if np.prod(shape) < FEW_NODES else n_threads()
     size = [

@@ -289,10 +289,7 @@ def _around_crossings(contour: Contour, nearest: Ints, places: Floats) -> Floats
 
 
 def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Ints]:
-    """Return vertices, in cells, and triangles; crossed edges, and a vertex on each; the edge of each vertex, or −1.
-
-    Marching cubes joins crossings of compressed values, so that the edge of each can be read off.
-    """
+    """Return vertices, in cells, and triangles; crossed edges, and a vertex on each; the edge of each vertex, or −1."""
     unused = 3 - values.ndim
     if not ((values < 0).any() and (values >= 0).any()):
         none = np.empty(0, dtype=np.int64)

@@ -37,10 +37,7 @@ _HEADER = 84  # of STL, in bytes: 80 of comment, 4 that count the facets
 
 
 def read_stl(path: PathLike) -> TriangleMesh:
-    """Read all facets of all solids in an STL file; stored normals are ignored.
-
-    Corners with exactly the same coordinates become one vertex: STL has no other way to express that facets meet.
-    """
+    """Read all facets of all solids in an STL file, without normals; corners with equal coordinates are one vertex."""
     data = contents(path).removeprefix(codecs.BOM_UTF8)
     announced = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else 0
     is_text = data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:1000].lower()

@@ -96,10 +96,7 @@ def read_3mf(path: PathLike) -> TriangleMesh:
 
 
 def unit_of(path: PathLike) -> str | None:
-    """Return the unit of length of a file: that of a 3MF file, metres for glTF, None for formats without units.
-
-    Of STEP millimetres, since it is read so whatever it says.
-    """
+    """Return the unit of length of a file: that of 3MF, m for glTF, mm for STEP, None for formats without."""
     if extension(path) in (".glb", ".gltf", ".step", ".stp"):
         return "mm" if extension(path).startswith(".st") else "m"
     if extension(path) != ".3mf":

@@ -122,11 +122,7 @@ def write_vtp(shape: Elements, path: PathLike) -> bytes:
 
 
 def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
-    """Read the polygons of all pieces, or the points if there are no polygons.
-
-    `names` are further values at the points that are wanted. These, normals and areas are read where all pieces have
-    them.
-    """
+    """Read the polygons of all pieces, or else the points, with values by `names` where all pieces have them."""
     root, arrays = parse(path, "PolyData")
     points, corners, counts, n_points = [], [], [], 0
     found: dict[str, list[NDArray[Any]]] = {name: [] for name in ("Normals", "area", *names)}

@@ -13,11 +13,7 @@ from ..compiled import compiled
 
 
 def elimination_order(upper: Any) -> Ints:
-    """Order the unknowns of a sparse symmetric matrix by nested dissection: ``order[k]`` is eliminated k-th.
-
-    On even surfaces the fill is that of METIS, in a fifth of the time; for unknowns in a volume PARDISO's METIS is
-    better.
-    """
+    """Order unknowns of a sparse symmetric matrix by nested dissection, for surfaces: ``order[k]`` is the k-th."""
     graph = whole(upper)
     return _dissect(graph.indptr, graph.indices)
 

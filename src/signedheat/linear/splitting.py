@@ -28,8 +28,7 @@ def split_rounds(
 ) -> Iterator[Round]:
     """Yield the state after each round, without end; `image` and `split` are K x and z to begin with.
 
-    Given v = K x + u, `proximal` minimises f(z) + ρ/2 |z − v|²; given v = z − u, `solve` minimises g(x) + ρ/2 |K x −
-    v|².
+    `proximal` minimises f(z) + ρ/2 |z − v|², v = K x + u; `solve` minimises g(x) + ρ/2 |K x − v|², v = z − u.
     """
     relaxed, dual = image, np.zeros_like(image)
     while True:

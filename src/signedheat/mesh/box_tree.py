@@ -88,8 +88,7 @@ class BoxTree(NamedTuple):
     ) -> tuple[Ints, Ints]:
         """Find boxes near each of (n, 3, 3) triangles: (n + 1,) where those of each begin, and (k,) their numbers.
 
-        Nodes that are all of the triangle's own group, (n,), are passed over; a search begins at its leaf, (n,), and
-        goes right.
+        Nodes of the triangle's own group, (n,), are passed over; a search begins at its leaf, (n,), and goes right.
         """
         corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(3, slack)
         own = np.full(len(corners), -1) if groups is None else np.ascontiguousarray(groups, dtype=np.int64)

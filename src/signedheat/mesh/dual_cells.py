@@ -147,8 +147,7 @@ SLACK = 1e-6
 def dual_triangles(
     cells: DualCells, crossings: Crossings, vertices: Floats, fanned: Bools
 ) -> tuple[Floats, Ints, Ints]:
-    """Join the vertices of pieces, (v, 3) in cells, to outward triangles (m, 3), by the diagonal nearer to each
-    crossing.
+    """Join the vertices of pieces, (v, 3) in cells, to outward triangles (m, 3), by the better diagonals.
 
     Crossings of `fanned` edges, (e,), and without a possible diagonal, become vertices; these edges (k,) are returned.
     """

@@ -117,10 +117,9 @@ class IntrinsicMesh(Frozen):
 
     @cached_property
     def reflected(self) -> Bools:
-        """(m, 3) where the frame of edge k is a reflection, not a rotation, of the layout of the face.
+        """(m, 3) where the frame of edge k is a reflection of the layout of the face: vectors are conjugated between.
 
-        Its second axis points into the first face of the edge and out of all others; where a face runs along the edge
-        the other way than that needs, vectors are conjugated.
+        Its second axis points into the first face of the edge and out of all others, whichever way they run along it.
         """
         return self.edges.forward != mask_of(3 * self.n_faces, self.first_halfedges).reshape(-1, 3)
 
@@ -211,9 +210,7 @@ class FacePairs:
     shares: Floats  # (p,) weight of each pair: 1, or ½ where three or more faces meet
 
     def ends(self, corner_values: Floats) -> Floats:
-        """Return (p, 2) differences of (m, 3) corner values at the edge's tail and head, first face less second (Eq.
-        15).
-        """
+        """Return (p, 2) differences, first face less second, of corner values at the edge's tail and head (Eq. 15)."""
         flat = corner_values.ravel()
         at_tail, at_head = flat[self.tails], flat[self.heads]
         return np.stack([at_tail[:, 0] - at_tail[:, 1], at_head[:, 0] - at_head[:, 1]], axis=1)

@@ -250,13 +250,7 @@ Scheduler: TypeAlias = Executor | ClusterClient | str | None
 
 @dataclass(frozen=True)
 class TilesComputed(Note):
-    """A band was computed in tiles on disk.
-
-    Attributes
-    ----------
-    tiles, reused : int
-        Number of all tiles, and of those that existed already.
-    """
+    """A band was computed in tiles on disk, some of which existed already."""
 
     tiles: int
     reused: int

@@ -70,8 +70,7 @@ Diffusion = float | Extrapolated
 def default_diffusion(discretization: Discretization) -> Diffusion:
     """`Extrapolated` on surfaces, where directions limit the accuracy; 1 in space.
 
-    Of h²/t extrapolation leaves about 1/τ²; Y is smoothed over h √τ where it turns back. With τ like h^(−2/5) both fall
-    like h^(4/5).
+    Extrapolation leaves 1/τ², and Y is smoothed over h √τ where it turns back: with τ like h^(−2/5) both fall alike.
     """
     if not isinstance(discretization, SurfaceDiscretization):
         return 1.0

@@ -236,8 +236,7 @@ def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
 def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     """Insert a vertex at the circumcentre of bad face f, or on a segment in the way; return False without room for it.
 
-    A face whose shortest side joins vertices that nearly coincide stays, unless it is a cap without a segment in the
-    way.
+    A face whose shortest side joins vertices that nearly coincide stays, unless it is a cap with nothing in the way.
     """
     h = is_bad(g, f, goal)[1]
     close = coincide(g, agenda, h)

@@ -161,8 +161,7 @@ class TangentPlanes:
         return in_chunks(found, np.column_stack([here, there]))[0]
 
     def unfolded(self, here: Ints, there: Ints) -> Floats:
-        """(m, 2) places of points (m,) in the planes of others (m,), along the mean of both normals, turned into the
-        plane.
+        """(m, 2) places of points (m,) in the planes of others (m,), along the mean of both normals.
 
         On the other side of a plate, the directions in which both sides end take the place of the normals.
         """
@@ -319,8 +318,7 @@ TOUCHING = 1e-7
 def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
     """(n, MAX_SIDES) Delaunay neighbours of the origin among places (n, k, 2), counter-clockwise; (n,) sides.
 
-    The Voronoi cell, a square to ±1, is cut by the bisectors of neighbours, nearest first; sides left are −1, and
-    count.
+    The Voronoi cell, a square to ±1, is cut by bisectors of neighbours, nearest first; sides left are −1, and count.
     """
     n, k = places.shape[:2]
     neighbours = np.full((n, MAX_SIDES), -1, dtype=np.int64)

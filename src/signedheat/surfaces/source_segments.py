@@ -46,8 +46,7 @@ def segments_of(
 ) -> CurveSegments:
     """Cut source `number`, whose faces are those of the triangles, into segments; return `CurveSegments` as they are.
 
-    Points that share no face are joined by geodesics. Given normals need `positions` in space of vertices or of
-    corners.
+    Points that share no face are joined by geodesics. Given normals need `positions` of vertices or corners.
     """
     raise SourceError(
         f"source {number} is a {type(source).__name__}: on a surface, distance is measured to a "
@@ -200,13 +199,7 @@ def numbers_kept(n: int, left_out: WithoutLength | None) -> Ints:
 
 
 def numbers_given(sources: Sequence[Any], left_out: WithoutLength | None) -> Ints:
-    """(n,) the same for n curves, of which those of a group count one by one.
-
-    Examples
-    --------
-    >>> numbers_given([None, [None, None]], WithoutLength([0, 2])).tolist()
-    [1, 3, 4]
-    """
+    """(n,) the same for n curves, of which those of a group count one by one."""
     kept = numbers_kept(len(sources), left_out)
     counts = np.ones(kept.max(initial=-1) + 1, dtype=np.int64)
     counts[kept] = [len(source) if isinstance(source, Sequence) else 1 for source in sources]

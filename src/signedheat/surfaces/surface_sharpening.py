@@ -154,8 +154,7 @@ def nearest_curve(
 ) -> Nearest:
     """Measure to the nearest of curves and points, and of the zero set of φ where oriented curves are missing.
 
-    In regions that curves bound, and next to a curve, the curve decides the side; elsewhere φ does, and its zero set
-    counts far from any curve or beyond a free end.
+    Curves decide sides in regions that they bound, and next to them; far from them the zero set of φ counts.
     """
     present = CurvesThere.on(triangles, parts, tolerance, report)
     distance, counts = present.distance, [present.windows]
@@ -221,8 +220,7 @@ def missing_parts(
 
 
 def without_false_zeros(triangles: IntrinsicMesh, values: Floats, near: Bools, sided: Ints) -> Floats:
-    """(n,) values of φ, NaN around parts of its zero set that are `near` unoriented sources (n,) and at no `sided`
-    vertex.
+    """(n,) values of φ, NaN around parts of its zero set `near` unoriented sources (n,) and at no `sided` vertex.
 
     φ is zero at such a source only on average, so it may change sign around it.
     """

@@ -162,8 +162,7 @@ def vertex_point_vectors(triangles: IntrinsicMesh, vertices: Ints) -> csr_array:
 def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_array:
     """(1, e) X₀ of points on edges and in faces: −∇δ_p against ψ_e, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
 
-    That gives the gradient of the heat kernel, whatever the faces; at a vertex of equilateral triangles it is Eq. 19
-    over √3 h, for which the caller corrects.
+    That is the gradient of the heat kernel; at vertices of equilateral triangles Eq. 19 over √3 h, which callers mend.
     """
     corner = np.argwhere(located.barycentric > 0)
     vertices = triangles.corner_vertices[located.faces[corner[:, 0]], corner[:, 1]]

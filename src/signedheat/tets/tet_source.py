@@ -21,9 +21,7 @@ from .tet_mesh import TetMesh
 
 @dataclass(frozen=True, eq=False)
 class TetSource(Frozen):
-    """Sources on a tet mesh; a patch is all clipped polygons nearest to one vertex, or parts of faces of the mesh at
-    one.
-    """
+    """Sources on a tet mesh; a patch is all clipped polygons nearest to one vertex, or of faces of the mesh at one."""
 
     vectors: Floats  # (f, 3) X₀ at the faces
     strengths: Floats  # (f,) the scalar source: areas without their normals, as for an unsigned distance
@@ -130,8 +128,7 @@ def _patches(
 ) -> tuple[sparse.csr_matrix, sparse.csr_matrix, Floats, Ints]:
     """Return interpolation rows, quadratic corrections, areas and components of the patches.
 
-    A row for each polygon would be more than a function linear on tets can meet. A quadratic φ at x is ``Σ λᵢ (φ(vᵢ) +
-    ½ ∇φ(vᵢ)·(x − vᵢ))``.
+    Rows for all polygons are too many for linear functions. A quadratic φ at x is ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
     """
     corners = unknowns[polygons.tets]
     conforming = _on_whole_faces(mesh, polygons, components)
