@@ -509,7 +509,7 @@ def _is_along(chains: Chains, line: int, p: int) -> bool:
         return True
     on_line = chains.points[chains.starts[line] : chains.starts[line + 1]]
     place = np.searchsorted(on_line, p)
-    return place < len(on_line) and on_line[place] == p
+    return bool(place < len(on_line) and on_line[place] == p)
 
 
 @compiled

@@ -407,11 +407,10 @@ class FaceCutter:
                 result.points.append((x + t * (u - x), y + t * (v - y)))
                 result.vertices.append(self.vertex_of[i])
             result.sides.append(chain[1:])
-            for part, sub in zip(
-                pairwise([*chain, (k + 1) % 3]), self.sub_edges.get(edge, [edge])[::order], strict=True
-            ):
-                result.edge_of[part] = sub, forward
-                result.frames[sub] = (*part[::order], bool(triangles.reflected[face, side]))
+            reflected, parts = bool(triangles.reflected[face, side]), self.sub_edges.get(edge, [edge])[::order]
+            for (a, b), part in zip(pairwise([*chain, (k + 1) % 3]), parts, strict=True):
+                result.edge_of[a, b] = part, forward
+                result.frames[part] = (a, b, reflected) if forward else (b, a, reflected)
         return result
 
     def add_faces(self, face: int, cut: Triangulation, outline: Outline, positions: Complexes) -> None:

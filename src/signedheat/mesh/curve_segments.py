@@ -295,8 +295,6 @@ def in_layout(triangles: IntrinsicMesh, positions: Floats, faces: Ints, vectors:
 
 def interpolation_at(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:
     """Return the sparse (n, n_vertices) map from values at vertices to values at points: the rows of A in Eq. 14."""
-    weights = located.barycentric
-    index = np.repeat(np.arange(len(located)), 3).reshape(-1, 3)
-    used = weights > 0
-    columns = triangles.corner_vertices[located.faces]
-    return csr_matrix((weights[used], (index[used], columns[used])), shape=(len(located), triangles.n_vertices))
+    rows, corners = np.nonzero(located.barycentric > 0)
+    places = rows, triangles.corner_vertices[located.faces[rows], corners]
+    return csr_matrix((located.barycentric[rows, corners], places), shape=(len(located), triangles.n_vertices))

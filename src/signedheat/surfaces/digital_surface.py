@@ -312,7 +312,7 @@ def boundary_surfels(volume: Bools) -> Surfels:
 
 def count_surfels(volume: Bools) -> int:
     """Count the boundary squares of a set of voxels."""
-    return sum(np.count_nonzero(np.diff(volume, axis=axis, prepend=False, append=False)) for axis in range(3))
+    return sum(int(np.diff(volume, axis=axis, prepend=False, append=False).sum()) for axis in range(3))
 
 
 def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: float) -> Floats:

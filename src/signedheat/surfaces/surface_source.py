@@ -12,7 +12,7 @@ from scipy.sparse import csr_array, csr_matrix, vstack
 
 from ..arrays import Bools, Complexes, Floats, Frozen, Ints, mask_of
 from ..errors import CancellingNormalsError, SourceError
-from ..mesh.components import connected_components
+from ..mesh.components import connected_components, grouped
 from ..mesh.curve_segments import CurveSegments, interpolation_at
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import (
@@ -221,13 +221,9 @@ def free_end_arcs(triangles: IntrinsicMesh, edges: Ints, vertices: Ints, least: 
     least.)
     """
     faces, vectors = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.complex128)]
-    all_faces, all_corners = np.nonzero(mask_of(triangles.n_vertices, vertices)[triangles.corner_vertices])
-    owner = triangles.corner_vertices[all_faces, all_corners]
-    order = np.argsort(owner, kind="stable")
-    all_faces, all_corners, owner = all_faces[order], all_corners[order], owner[order]
-    begin, stop = np.searchsorted(owner, vertices), np.searchsorted(owner, vertices, side="right")
-    for edge, lo, hi in zip(edges, begin, stop, strict=True):
-        face, corner = all_faces[lo:hi], all_corners[lo:hi]
+    starts, members = grouped(triangles.corner_vertices.ravel(), triangles.n_vertices)
+    for edge, vertex in zip(edges, vertices, strict=True):
+        face, corner = np.divmod(members[starts[vertex] : starts[vertex + 1]], 3)
         leaving = triangles.edge_vectors[face, corner]
         arriving = -triangles.edge_vectors[face, (corner + 2) % 3]
         angle = np.angle(arriving * np.conj(leaving))
