@@ -50,6 +50,9 @@ THINGS = {
 BARE = {
     "grid": lambda: GRID,
     "triangulation": lambda: sh.intrinsic_delaunay(BALL),
+    "grid without values": lambda: sh.GridField(GRID, np.full(GRID.shape, np.nan)),
+    "tets without values": lambda: sh.TetField(TETS, np.full(TETS.n_vertices, np.nan)),
+    "mesh without values": lambda: sh.VertexField(BALL, np.full(BALL.n_vertices, np.nan)),
 }
 
 

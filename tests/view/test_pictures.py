@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat import samples, view
 
 STORED = Path(__file__).parent / "pictures"
@@ -97,3 +98,23 @@ def test_sources_are_drawn_where_they_are_whatever_triangles_the_field_has():
         both = np.isfinite(line).all(axis=1) & np.isfinite(drawn[0]).all(axis=1)
         assert both.sum() > 5
         assert np.abs(line - drawn[0])[both].max() < 1
+
+
+@pytest.mark.parametrize("thing", [None, sh.Grid((0, 0), 1.0, (2, 2)), samples.sphere(1).points_at(0)])
+def test_rows_have_no_empty_panels(tmp_path, thing):
+    with refused(sh.errors.UnsupportedTypeError, "odd"):
+        view.save_row(tmp_path / "row.png", ("ball", samples.sphere(1)), ("odd", thing))
+
+
+def test_infinite_values_are_refused(tmp_path):
+    grid = sh.Grid((0, 0), 1.0, (3, 3))
+    with refused(sh.errors.GeometryError, "field"):
+        view.save_slices(sh.GridField(grid, [[0.0, 1, 2], [1, 2, np.inf], [3, 4, 5]]), tmp_path / "a.png")
+
+
+def test_a_single_source_is_drawn_as_a_list_of_it_is(tmp_path):
+    ball = samples.sphere(1)
+    field, source = sh.VertexField(ball, ball.vertices[:, 2]), ball.points_at(0)
+    for name, given in (("one", source), ("list", [source])):
+        view.save_surface(field, tmp_path / f"{name}.png", given)
+    assert (tmp_path / "one.png").read_bytes() == (tmp_path / "list.png").read_bytes()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..curves.piecewise_field import PiecewiseField
-from ..errors import MissingPackageError
+from ..errors import GeometryError, MissingPackageError, UnsupportedTypeError
 from ..foreign import converted
 from ..grids.grid import Grid
 from ..grids.grid_field import GridField
@@ -54,11 +54,15 @@ def save_row(path: PathLike, *panels: tuple[Any, ...]) -> None:
     ------
     FileFormatError
         If the picture cannot be written.
+    UnsupportedTypeError
+        If something is neither a shape nor a field.
     """
     with picture(path, PANEL * len(panels), PANEL, dpi=110) as figure:
         for k, (title, thing, *options) in enumerate(panels):
             axes = figure.add_subplot(1, len(panels), k + 1)
-            draw(thing, axes, **(options[0] if options else {}))
+            if not draw(thing, axes, **(options[0] if options else {})):
+                kind = type(thing).__name__
+                raise UnsupportedTypeError(f"a {kind} cannot be drawn", remedy="pass a shape or a field", element=title)
             axes.set_title(title, fontsize=11)
 
 
@@ -68,7 +72,7 @@ def html_of(thing: object) -> str:
     try:
         figure = new_figure(SIDE * 1.25, SIDE)
         drawn = draw(thing, figure.add_subplot())
-    except MissingPackageError:
+    except (MissingPackageError, GeometryError):  # the latter of fields without a value
         return text
     if not drawn:
         return text
@@ -110,7 +114,7 @@ def _(line: Polyline, axes: Any, **options: Any) -> bool:
 
 @draw.register
 def _(field: GridField, axes: Any, **options: Any) -> bool:
-    if field.grid.dimension not in (2, 3) or np.isnan(field.values).all():
+    if field.grid.dimension not in (2, 3):
         return False
     if field.grid.dimension == 2:
         draw_plane(field, axes, **options)

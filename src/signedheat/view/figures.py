@@ -78,10 +78,13 @@ def signed_root(values: Any) -> Any:
 
 
 def range_of(values: Floats) -> tuple[float, float]:
-    """Return the least and the greatest value of a field; raise `GeometryError` if it has none."""
+    """Return the least and the greatest value of a field; raise `GeometryError` if it has none, or infinite ones."""
     if np.isnan(values).all():
         raise GeometryError("the field has no value anywhere", remedy="compute it anew", element="field")
-    return float(np.nanmin(values)), float(np.nanmax(values))
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    if not (np.isfinite(low) and np.isfinite(high)):
+        raise GeometryError("the field has infinite values", remedy="put NaN in their place", element="field")
+    return low, high
 
 
 def isolines_between(low: float, high: float, most: int = 16) -> tuple[Floats, float]:

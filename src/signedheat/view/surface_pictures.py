@@ -236,7 +236,7 @@ def triangulated(mesh: TriangleMesh | PolygonMesh) -> TriangleMesh:
 def save_surface(
     field: VertexField | PiecewiseField,
     path: PathLike,
-    sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]] = (),
+    sources: CurveOrPoints | Sequence[CurveOrPoints | Sequence[CurveOrPoints]] = (),
     n_contours: int = 20,
     up: int = 2,
 ) -> None:
@@ -250,7 +250,7 @@ def save_surface(
         Distance on a surface.
     path : str or path
         The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
-    sources : sequence of Curve and SurfacePoints
+    sources : Curve, SurfacePoints or a sequence of them
         The sources to draw.
     n_contours : int
         Approximate number of isolines.
@@ -274,7 +274,7 @@ def save_surface(
 def draw_surface(
     field: VertexField | PiecewiseField,
     axes: Axes,
-    sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]] = (),
+    sources: CurveOrPoints | Sequence[CurveOrPoints | Sequence[CurveOrPoints]] = (),
     n_contours: int = 20,
     view: Floats | None = None,
     up: int = 2,
@@ -285,7 +285,8 @@ def draw_surface(
     `view` is a direction from the surface to the eye.
     """
     own, mesh, values = _own_and_painted(field)
-    flat = [item for source in sources for item in (source if isinstance(source, Sequence) else [source])]
+    given = sources if isinstance(sources, Sequence) else [sources]
+    flat = [item for source in given for item in (source if isinstance(source, Sequence) else [source])]
     direction = toward_sources(own, flat, up) if view is None else view
     camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
     corners = camera.pixels(mesh.vertices)[mesh.faces]
