@@ -46,19 +46,17 @@ SINGLY = 16
 speed. Halved and doubled, none of 46 drawings changes."""
 TURNED = 0.34
 """Turning whole loops is a guess if they make up more than this share of the length; a loop is turned as a whole if no
-more than this share of it is not. Of 648 drawings (`benchmarks/strokes.py`, seeds from 20000 on) 4 are wrong in silence
-and 8 right with a warning; at .25 3 and 10, at .4 5 and 8."""
+more than this share of it is not. Of 778 drawings (`benchmarks/strokes.py`, seeds 20000 to 20077) 5 are wrong in
+silence and 12 right with a warning; at .25 4 and 13, at .4 6 and 11."""
 NEARLY = 0.0025
 """Two insides are equally likely if their costs differ by less than this share of the length of all strokes, as for two
-copies of a stroke that face either way. Zero or halved, nothing changes on these drawings; at .01 4 and 10."""
-WORTH = 0.4
-"""The inside is a guess if it depends on a stroke worth less than this, relative to its length: halved 6 and 8 of these
-drawings, doubled 3 and 42. Of 30 closed curves none is worth less than .41 if three tenths are gone, and none of those
-is wrong; of those of which six tenths are gone, three of the seven nearly closed ones are wrong, and worth at most
-.17."""
+copies of a stroke that face either way. At zero nothing changes on these drawings; at .01 5 and 14."""
+WORTH = 0.5
+"""The inside is a guess if it depends on a stroke worth less than this, relative to its length. At .4 one more of these
+drawings is wrong in silence, and one fewer is right with a warning; halved 8 and 11, at .6 5 and 18."""
 OTHERWISE = 0.05
-"""The inside depends on a stroke if this share of the area changes sides without it: halved 4 and 15 of these drawings,
-doubled 8 and 8."""
+"""The inside depends on a stroke if this share of the area changes sides without it: halved 4 and 18 of these drawings,
+doubled 9 and 12."""
 
 
 @dataclass(frozen=True, eq=False)
