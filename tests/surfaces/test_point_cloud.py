@@ -90,7 +90,7 @@ def test_points_on_a_lattice_are_covered_once_however_ambiguous():
 
 
 def test_a_noisy_cloud_hardly_has_holes_and_no_edge_has_three_faces():
-    points = cases.sphere_points(4000) + 0.006 * np.random.default_rng(1).normal(size=(6000, 3))
+    points = cases.sphere_points(4000) + 0.006 * np.random.default_rng(1).normal(size=(4000, 3))
     counts = sh.PointCloud(points).triangulation.edges.face_counts
     assert counts.max() == 2
     assert (counts == 1).mean() < 0.005
