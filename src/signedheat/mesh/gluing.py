@@ -78,22 +78,6 @@ def tangent_at(g: Gluing, h: int) -> tuple[float, float]:
 
 
 @kernel
-def is_interior(g: Gluing, h: int) -> bool:
-    """Return whether exactly two different faces meet at the halfedge's edge."""
-    other: int = g.sibling[h]
-    back: int = g.sibling[other]
-    return other != h and back == h and other // 3 != h // 3
-
-
-@kernel
-def violates_delaunay(g: Gluing, h: int) -> bool:
-    """Return whether the two angles opposite an interior edge sum to more than π, beyond rounding."""
-    n, d = tangent_at(g, preceding(h))
-    m, e = tangent_at(g, preceding(g.sibling[h]))
-    return n * m > d * e * (1.0 + 1e-10)
-
-
-@kernel
 def move(g: Gluing, old: tuple[int, ...], new: tuple[int, ...]) -> None:
     """Renumber halfedges old[k] to new[k], a permutation of them, all at once; tails stay where they are."""
     successors, predecessors, edges, flags = g.scratch[0], g.scratch[1], g.scratch[2], g.scratch[3]
@@ -212,9 +196,12 @@ def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
         e = stack[g.counts[4]]
         stacked[e] = False
         h = g.start[e]
-        if g.fixed[e] or g.flips[e] >= MOST_FLIPS or not is_interior(g, h) or not violates_delaunay(g, h):
+        t = g.sibling[h]
+        if g.fixed[e] or g.flips[e] >= MOST_FLIPS or t == h or g.sibling[t] != h or t // 3 == h // 3:
             continue
-        if not flip(g, h):
+        n, d = tangent_at(g, preceding(h))
+        m, c = tangent_at(g, preceding(t))
+        if not n * m > d * c * (1.0 + 1e-10) or not flip(g, h):  # the opposite angles sum to π at most
             continue
         g.flips[e] += 1
         t = g.sibling[h]
