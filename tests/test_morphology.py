@@ -59,6 +59,15 @@ def test_a_broken_ball_grows_as_if_it_were_whole():
     np.testing.assert_allclose(radii(grown), 1.3, atol=0.1)
 
 
+def test_there_is_room_for_distances_that_are_larger_within_a_face():
+    def bump(places):
+        return 0.05 + 0.6 * np.exp(-((places[:, :2] - 0.5) ** 2).sum(axis=1) / 0.08) * (places[:, 2] > 0.5)
+
+    made = sh.offset(box((0, 0, 0), (1, 1, 1)), bump, resolution=14)
+    assert_closed_manifold(made)
+    assert made.bounds[1, 2] == pytest.approx(1.65, abs=0.02)
+
+
 @pytest.mark.parametrize("step", [1, -1])
 def test_outlines_that_overlap_are_one_whichever_way_they_run(step):
     square = np.array([[0.0, 0.0], [1, 0], [1, 1], [0, 1]])

@@ -38,7 +38,8 @@ from .mesh.triangles import part_volumes
 from .search.face_tree import FaceFeatures, FaceTree
 from .search.nearest_triangles import weights_in
 from .solids.completion import complete
-from .solids.contouring import sharp_surface
+from .solids.contouring import SAMPLED, sharp_surface
+from .solids.gauss import Pieces, sampled
 from .solids.implicit_surfaces import contour
 from .solids.offsets import Offset, Reach, SheetWall, checked_reach
 from .solids.solid import Solid
@@ -241,7 +242,8 @@ def offset(
         A shape, broken or not; completed here unless it is a solid.
     distance : float, (n,) float or callable
         Positive outside, negative inside. An array has a distance for each vertex of a mesh or point of a cloud, and is
-        interpolated linearly; a function maps (n, 3) places on the shape to distances.
+        interpolated linearly; a function maps (n, 3) places on the shape to distances. The grid has room for its values
+        at vertices and at some thousand places between them.
     corners : {"round", "mitre", "sharp"}
         Shape of edges that the surface moves away from: round at the distance; or the offset planes of the faces,
         extended up to two distances ("mitre", which keeps boxes) or ten ("sharp").
@@ -277,7 +279,8 @@ def offset(
     reach: float | Reach
     if callable(distance):
         reach = checked_reach(distance)
-        largest = float(reach(solid.triangles.reshape(-1, 3)).max())
+        between = sampled(Pieces(solid.triangles, np.zeros(len(solid.triangles), dtype=np.int64)), SAMPLED)[1]
+        largest = float(reach(np.concatenate([solid.triangles.reshape(-1, 3), between])).max())
     elif (values := numbers(distance, "distance", SignedHeatError)).ndim:
         reach, largest = checked_reach(_linear(shape, values)), float(values.max(initial=0.0))
     else:
