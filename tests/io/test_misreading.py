@@ -404,3 +404,24 @@ def test_what_is_no_name_of_a_file_is_refused(name):
     for use in (sh.read, sh.load_field, sh.io.load, ball.save, sh.io.read_polylines):
         with refused(sh.SignedHeatError):
             use(name)
+
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg">{}<path d="M0,0 L2,0"/></svg>'
+
+
+def test_symbols_of_drawings_are_drawn_where_they_are_used(tmp_path):
+    symbol = '<symbol id="a"><path d="M0,0 L1,0 L1,1"/></symbol>'
+    (tmp_path / "a.svg").write_text(SVG.format(symbol + '<use href="#a" x="3"/>'))
+    used, line = sh.io.read_polylines(tmp_path / "a.svg")
+    assert used.points.tolist() == [[3, 0], [4, 0], [4, -1]] and line.points.tolist() == [[0, 0], [2, 0]]
+    (tmp_path / "a.svg").write_text(SVG.format(symbol))
+    assert len(sh.io.read_polylines(tmp_path / "a.svg")) == 1
+
+
+@pytest.mark.parametrize(
+    "inner", ['<svg x="1">{}</svg>', '<symbol id="a" viewBox="0 0 9 9">{}</symbol><use href="#a"/>']
+)
+def test_drawings_in_drawings_with_coordinates_of_their_own_are_refused(tmp_path, inner):
+    (tmp_path / "a.svg").write_text(SVG.format(inner.format('<path d="M0,0 L1,1"/>')))
+    with refused(FileFormatError):
+        sh.io.read_polylines(tmp_path / "a.svg")

@@ -32,6 +32,8 @@ UNITS = {"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm": 96 
 """User units per unit of length; ems are those of the default font."""
 UNITS |= {"em": 16.0, "ex": 8.0}
 CONTAINERS = ("svg", "g", "a", "switch")
+PLACED = {"svg": ("viewBox", "x", "y"), "symbol": ("viewBox",)}
+"""Attributes of drawings within a drawing that give them coordinates of their own."""
 AXES = {"x": 0, "x1": 0, "x2": 0, "cx": 0, "rx": 0, "width": 0, "y": 1, "y1": 1, "y2": 1, "cy": 1, "ry": 1, "height": 1}
 """Axes of attributes that are lengths along an axis."""
 DEPTH, MOST_USES = 100, 10**5
@@ -75,7 +77,9 @@ class _Drawing:
         matrix = outer @ _transform(element.get("transform", ""))
         stated = FILL_RULE.search(element.get("style", ""))
         rule = stated[1] if stated else element.get("fill-rule", rule)
-        if kind in CONTAINERS:
+        if kind in CONTAINERS or (kind == "symbol" and is_used):
+            if depth and any(name in element.attrib for name in PLACED.get(kind, ())):
+                raise FileFormatError(f"a {kind} in it has coordinates of its own", remedy="turn it into paths first")
             for child in element:
                 yield from self.drawn(child, matrix, depth + 1, is_used, rule)
         elif kind == "use":
