@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat import samples
 
 BALL = samples.sphere(2)
@@ -50,13 +51,15 @@ THINGS = {
 BARE = {
     "grid": lambda: GRID,
     "triangulation": lambda: sh.intrinsic_delaunay(BALL),
+}
+EMPTY = {
     "grid without values": lambda: sh.GridField(GRID, np.full(GRID.shape, np.nan)),
     "tets without values": lambda: sh.TetField(TETS, np.full(TETS.n_vertices, np.nan)),
     "mesh without values": lambda: sh.VertexField(BALL, np.full(BALL.n_vertices, np.nan)),
 }
 
 
-@pytest.mark.parametrize("make", [*THINGS.values(), *BARE.values()], ids=[*THINGS, *BARE])
+@pytest.mark.parametrize("make", [*THINGS.values(), *BARE.values(), *EMPTY.values()], ids=[*THINGS, *BARE, *EMPTY])
 def test_text_is_short(make):
     thing = make()
     assert len(repr(thing)) < 160
@@ -80,7 +83,7 @@ def test_notebooks_show_a_small_picture(make):
     assert type(thing).__name__ in shown
 
 
-@pytest.mark.parametrize("make", BARE.values(), ids=BARE)
+@pytest.mark.parametrize("make", [*BARE.values(), *EMPTY.values()], ids=[*BARE, *EMPTY])
 def test_what_has_no_picture_is_text(make):
     assert make()._repr_html_() == f"<code>{make()!r}</code>"
 
@@ -131,6 +134,13 @@ def test_grids_go_to_pyvista():
     with pytest.raises(sh.errors.GeometryError) as told:
         sh.Grid((0.0,), 1.0, (4,)).to_pyvista()
     assert told.value.element == "grid"
+
+
+@pytest.mark.parametrize("make", EMPTY.values(), ids=EMPTY)
+def test_windows_refuse_fields_without_values(make):
+    pytest.importorskip("pyvista")
+    with refused(sh.GeometryError, element="field"):
+        make().plotter()
 
 
 @pytest.mark.parametrize("make", [*THINGS.values(), *BARE.values()], ids=[*THINGS, *BARE])
