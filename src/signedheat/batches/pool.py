@@ -338,8 +338,7 @@ def run(
     FileFormatError
         If there is no input, the folder cannot be made, or results of two shapes would have the same name.
     SignedHeatError
-        If the job cannot be sent to workers, no worker can be started, a number is out of range, or another batch is
-        writing into the folder.
+        If the job cannot be sent to workers, a number is out of range, or another batch is writing into the folder.
     MissingPackageError
         If a scheduler is given and Dask is not installed.
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, mask_of
 from ..errors import FileFormatError, SignedHeatError, SourceError, UnsupportedTypeError
 from ..foreign import ForeignShape, converted
 from ..geodesics.shortest_paths import gaps
@@ -177,9 +177,8 @@ def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[Ints, Floa
     if points is not None:
         faces[alone], weights[alone] = points.faces, points.barycentric
     several = np.flatnonzero(count > 1).tolist()
-    wanted = np.zeros(mesh.n_vertices + 1, dtype=bool)
     named = np.array([v for k in several for v in nodes[k].vertices], dtype=np.int64)
-    wanted[named[(named >= 0) & (named < mesh.n_vertices)]] = True
+    wanted = mask_of(mesh.n_vertices, named[(named >= 0) & (named < mesh.n_vertices)])
     around: dict[int, list[int]] = {}
     for face in np.flatnonzero(wanted[mesh.faces].any(axis=1)).tolist() if several else []:
         for v in mesh.faces[face].tolist():
