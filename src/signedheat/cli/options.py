@@ -33,7 +33,7 @@ IMAGES = (".npy", ".nrrd", ".vti", ".nii", ".nii.gz")
 SURFACES = "surface: .stl .obj .ply .off .vtp"
 UNITS = ("micron", "mm", "millimeter", "cm", "centimeter", "inch", "foot", "m", "meter")
 """Units of length."""
-CONSTRAINTS = ("free", "zero-set", "hard", "each-component")
+CONSTRAINTS = ("free", "zero-set", "hard", "each-component", "soft", "soft:WEIGHT")
 """Names of the constraints without a number."""
 ABSENT: Mapping[str, Any] = {
     **dict.fromkeys(("origin", "grid_shape", "spacing", "padding", "resolution", "band", "preview")),
@@ -281,14 +281,14 @@ def units(word: str) -> str:
     return word
 
 
-def constraint(word: str, with_numbers: str = "soft, soft:WEIGHT") -> str:
-    """Check the name of a constraint and its number; error messages also list `with_numbers`."""
+def constraint(word: str, known: tuple[str, ...] = CONSTRAINTS) -> str:
+    """Check that a word is one of the constraints that are known, and the weight of a soft one."""
     name, _, weight = word.partition(":")
     if name == "soft":
         if weight:
             positive(weight)
-    elif word not in CONSTRAINTS:
-        raise argparse.ArgumentTypeError(f"'{word}' is not one of {', '.join(CONSTRAINTS)}, {with_numbers}")
+    elif word not in known:
+        raise argparse.ArgumentTypeError(f"'{word}' is not one of {', '.join(known)}")
     return word
 
 
@@ -299,7 +299,7 @@ def surface_constraint(word: str) -> str:
         for value in values.split(","):
             finite(value)
         return word
-    return constraint(word, with_numbers="soft, soft:WEIGHT, levels:V,V,…")
+    return constraint(word, (*CONSTRAINTS, "levels:V,V,…"))
 
 
 def shape_option(planar: str = "") -> Option:

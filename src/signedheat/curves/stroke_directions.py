@@ -123,13 +123,14 @@ class Decision:
         return movable & ~explained & explained.any()
 
     def loops_left_out(self) -> Ints:
-        """Numbers of the curves left out although they are likely to be a closed curve, and bound something alone."""
+        """Numbers of the curves of loops all of whose strokes bound nothing, but would if there were no others."""
         strokes = self.pieces.strokes
         found = np.zeros(len(self.loose), dtype=bool)
-        for loop in np.flatnonzero(strokes.whole_loops(self.loose)).tolist():
-            chosen = strokes.group == loop
-            alone = strokes.inside(np.where(chosen, self.best.signs, 0.0))
-            found |= chosen & bool((alone.explained[chosen] >= EXPLAINED).any())
+        for group in np.flatnonzero(strokes.whole_loops(self.loose)).tolist():
+            in_loop = strokes.group == group
+            alone = strokes.inside(np.where(in_loop, self.best.signs, 0.0))
+            if (alone.explained[in_loop] >= EXPLAINED).any():
+                found |= in_loop
         return self.pieces.curves(found)
 
     @property

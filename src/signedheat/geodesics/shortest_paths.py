@@ -42,12 +42,10 @@ def join(
     middle = located[apart[:0]]
     if len(apart):
         middle, added[apart] = geodesic_paths(triangles, located[start[apart]], located[end[apart]], name)
-    pair = np.repeat(np.arange(len(start)), added + 1)
-    step = np.arange(len(pair)) - np.repeat(np.cumsum(added + 1) - added - 1, added + 1)
-    after = len(located) + np.repeat(np.cumsum(added) - added, added + 1) + step
-    starts = np.where(step == 0, start[pair], after - 1)
-    ends = np.where(step == added[pair], end[pair], after)
-    return concatenated([located, middle]), starts, ends, pair
+    numbers, last = len(located) + np.arange(len(middle)), np.cumsum(added)
+    starts = np.insert(numbers, last - added, start)  # before the points that are added to each pair
+    ends = np.insert(numbers, last, end)  # after them
+    return concatenated([located, middle]), starts, ends, np.repeat(np.arange(len(start)), added + 1)
 
 
 def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> Ints:
@@ -281,40 +279,38 @@ def other_way(
     faces: Faces, left: Ints, entered: Ints, portals: Complexes, bend: int, point: complex
 ) -> tuple[Ints, Ints]:
     """Return the sleeve that passes the vertex of a bend on its other side; empty where no faces connect there."""
-    first = last = bend
+    first = last = bend  # portals that end at the vertex
     while first > 0 and (portals[first - 1, 0] == point or portals[first - 1, 1] == point):
         first -= 1
     while last + 1 < len(left) and (portals[last + 1, 0] == point or portals[last + 1, 1] == point):
         last += 1
     goal, at_tail = entered[last] // 3, portals[first, 0] == point
-    # walk around the vertex in all directions, breadth first: halfedges through which faces are left, and entered
-    out, into, before = [turned(left[first], at_tail)], [left[first]], [-1]
-    tail_there = [np.int64(not at_tail)]
+    # walk around the vertex in all directions, breadth first: of each face reached, the two halfedges at the vertex, by
+    # which it is entered and left; whether the vertex is the tail of the second; and the face before it
+    ways_in, ways_out, tail_there, before = [left[first]], [turned(left[first], at_tail)], [not at_tail], [-1]
     k = 0
-    while k < len(out):
-        h = out[k]
+    while k < len(ways_out):
+        h = ways_out[k]
         e = faces.edges[h // 3, h % 3]
         for across in faces.halfedges[faces.first_halfedge[e] : faces.first_halfedge[e + 1]]:
-            if across // 3 == h // 3 or across in into or (left[first : last + 1] == across).any():
+            if across // 3 == h // 3 or across in ways_in or (left[first : last + 1] == across).any():
                 continue
             if across // 3 == goal:
-                steps, j = 1, k
-                while before[j] >= 0:
-                    steps, j = steps + 1, before[j]
-                new_left, new_entered = np.empty(steps, np.int64), np.empty(steps, np.int64)
-                for i in range(steps - 1, -1, -1):
-                    new_left[i], new_entered[i] = out[k], across
-                    across, k = into[k], before[k]
+                new_left, new_entered = [h], [across]
+                while before[k] >= 0:  # back to the first face
+                    new_entered.append(ways_in[k])
+                    k = before[k]
+                    new_left.append(ways_out[k])
                 return (
-                    np.concatenate((left[:first], new_left, left[last + 1 :])),
-                    np.concatenate((entered[:first], new_entered, entered[last + 1 :])),
+                    np.concatenate((left[:first], np.array(new_left)[::-1], left[last + 1 :])),
+                    np.concatenate((entered[:first], np.array(new_entered)[::-1], entered[last + 1 :])),
                 )
-            same = faces.forward[h // 3, h % 3] == faces.forward[across // 3, across % 3]
-            at_tail = (tail_there[k] == 1) == same
-            out.append(turned(across, at_tail))
-            into.append(across)
+            same_way = faces.forward[h // 3, h % 3] == faces.forward[across // 3, across % 3]
+            at_tail = tail_there[k] == same_way
+            ways_in.append(across)
+            ways_out.append(turned(across, at_tail))
+            tail_there.append(not at_tail)
             before.append(k)
-            tail_there.append(np.int64(not at_tail))
         k += 1
     return left[:0], entered[:0]
 

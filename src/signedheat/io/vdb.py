@@ -189,13 +189,13 @@ def _write_topology(file: BinaryIO, tree: _Tree, kind: np.dtype) -> None:
 
 
 def _node(place: Ints, level: int, children: Ints, outside: Outside, kind: np.dtype) -> bytes:
-    """Return a node: a mask of places with children, of active ones (none), and values of all places, 0 at children."""
-    side, size = SIDES[level], SIZES[level]
-    inner = place + size * np.stack(np.unravel_index(np.arange(side**3), (side,) * 3), axis=1)
-    has_child = np.zeros(side**3, dtype=bool)
-    has_child[np.ravel_multi_index(tuple((children - place).T // size), (side,) * 3)] = True
-    values = np.where(has_child, np.float32(0), outside(inner, size))
-    return _mask(has_child) + _mask(np.zeros(side**3, dtype=bool)) + _packed(values, kind)
+    """Return a node at a place: masks of its cubes with children and of active ones (none); values, 0 at children."""
+    size, shape = SIZES[level], (SIDES[level],) * 3
+    cubes = place + size * np.indices(shape).reshape(3, -1).T
+    has_child = np.zeros(shape, dtype=bool)
+    has_child[tuple((children - place).T // size)] = True
+    values = np.where(has_child.ravel(), np.float32(0), outside(cubes, size))
+    return _mask(has_child) + _mask(np.zeros(shape, dtype=bool)) + _packed(values, kind)
 
 
 def _transform(origin: Floats, step: Floats) -> bytes:

@@ -148,15 +148,19 @@ class Triangulation:
             u = apex[u, a]
 
     def connect(self, a: int, b: int) -> list[int]:
-        """Make a segment edges, through points nearer than rounding; return the points along it, with crossings."""
-        way, line, patience = [a], _Line(self.points[a], self.points[b]), 100 + len(self.apex)
-        while way[-1] != b and patience:
-            patience -= 1
+        """Make edges along a segment; return the points on it, with new ones where it crosses other segments.
+
+        They end before b if rounding is in the way for too long.
+        """
+        way, line = [a], _Line(self.points[a], self.points[b])
+        for _ in range(100 + len(self.apex)):
             tail = way[-1]
+            if tail == b:
+                break
             head, crossed = self.aim(tail, b, line)
             if crossed is not None:
                 head = self.clear(tail, b, crossed, line)
-            if head >= 0:
+            if head >= 0:  # else `clear` has made a point, and the next round finds it
                 self.parts.setdefault((tail, head), [head])
                 self.parts.setdefault((head, tail), [tail])
                 way.append(head)

@@ -450,7 +450,7 @@ def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
         return np.empty((0, 3)), np.array([[0, 1, 2]])
     if not bent and lids.is_flat(corners) and (flat := lids.flat_lid(corners)):
         return flat
-    for frame in (frame_of(corners), None):
+    for frame in (frame_of(corners), None):  # in the plane of the loop, else in a disc
         if lid := _spanned(surface, loop, frame, bent):
             return lid
     raise AssertionError("a disc has room for every loop")

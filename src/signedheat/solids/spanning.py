@@ -124,20 +124,19 @@ def spanned(loop: Floats, inner: Floats) -> Spanned | None:
 
 
 def _to_the_left(faces: Ints, n: int) -> Ints | None:
-    """Those of the triangles of a plane that a loop around points 0 to n − 1 encloses; None if it crosses itself."""
+    """Those of the triangles of a plane to the left of a loop, points 0 to n − 1; None if it crosses itself."""
     table = edge_table(faces)
     tails, heads = table.vertices.T
-    ahead = (tails < n) & (heads == (tails + 1) % n)
-    back = (heads < n) & (tails == (heads + 1) % n)
-    wall = ahead | back
-    open_pairs = table.pairs[~wall[table.face_edges.ravel()[table.pairs[:, 0]]]] // 3
-    labels = connected_components(len(faces), *open_pairs.T)
-    at_rim = wall[table.face_edges]
-    leftward = at_rim & (ahead[table.face_edges] == table.forward)
-    left, right = labels[leftward.any(axis=1)], labels[(at_rim & ~leftward).any(axis=1)]
-    if int(leftward.sum()) != n or np.isin(left, right).any():
+    with_loop = (tails < n) & (heads == (tails + 1) % n)
+    on_loop = with_loop | ((heads < n) & (tails == (heads + 1) % n))
+    inner_pairs = table.pairs[~on_loop[table.face_edges.ravel()[table.pairs[:, 0]]]]
+    regions = connected_components(len(faces), *inner_pairs.T // 3)
+    at_loop = on_loop[table.face_edges]
+    on_left = at_loop & (with_loop[table.face_edges] == table.forward)  # faces are left of the edges they run along
+    left, right = regions[on_left.any(axis=1)], regions[(at_loop & ~on_left).any(axis=1)]
+    if int(on_left.sum()) != n or np.isin(left, right).any():
         return None
-    return faces[np.isin(labels, left)]
+    return faces[np.isin(regions, left)]
 
 
 def counterclockwise(points: Floats) -> Ints:

@@ -339,13 +339,14 @@ def has_room(g: Gluing, agenda: Agenda, ring: int) -> bool:
 
 @kernel
 def look_around(g: Gluing, agenda: Agenda, step: int) -> None:
-    """Push the edges of all faces that the steps from `step` on have changed on the stack."""
+    """Push onto the stack the edges of all faces that steps of the history, from number `step` on, have changed."""
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     for n in range(step, g.counts[3]):
         faces_around(g.steps, n, around, start)
         for f in around:
-            for k in range(3 if f >= 0 else 0):
-                look_at(g, agenda.stack, agenda.stacked, g.edge[3 * f + k])
+            if f >= 0:
+                for k in range(3):
+                    look_at(g, agenda.stack, agenda.stacked, g.edge[3 * f + k])
 
 
 @kernel

@@ -401,7 +401,7 @@ MOST_SIDES = 12
 
 
 def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
-    """Fill holes of at most `MOST_SIDES` sides, which faces surround, by triangles without edges that exist already."""
+    """Fill holes of at most `MOST_SIDES` sides, which faces surround, by triangles; no diagonal is an edge already."""
     edges = edge_table(faces)
     face, side = np.nonzero(edges.face_counts[edges.face_edges] == 1)
     tails, heads = faces[face, side], faces[face, (side + 1) % 3]
@@ -411,10 +411,10 @@ def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
     fillings: list[tuple[int, int, int]] = []
     passed = np.zeros(len(tails), dtype=bool)
     for start in range(len(tails)):
-        loop = [] if passed[start] else _loop_from(start, following)
-        passed[loop] = True
-        if loop:
-            fillings += _ears(points, normals, tails[loop[::-1]].tolist(), existing)
+        if not passed[start]:
+            clockwise = _loop_from(start, following)  # faces are left of their edges, and the hole is to the right
+            passed[clockwise] = True
+            fillings += _ears(points, normals, tails[clockwise[::-1]].tolist(), existing)
     return np.array(fillings, dtype=np.int64).reshape(-1, 3)
 
 

@@ -128,16 +128,17 @@ def planes_near(
     *,
     on_surface: bool,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Fit planes near `chosen` points (c,): through them, if `on_surface`, else where their neighbours are.
+    """Fit planes near `chosen` points (c,) to their neighbours, without those beyond `heights`, one after the other.
 
-    Returns (c, 3) normals, (c, 3) centres, (c,) reaches and (c,) root mean square heights, in reaches as `heights` are.
+    Heights are over the plane through the point, if `on_surface`, else over that through the mean of the neighbours.
+    Returns (c, 3) normals, (c, 3) means, (c,) reaches (distances to the last neighbour), and (c,) root mean square
+    heights, in reaches as `heights` are.
     """
 
     def fit(ids: Ints) -> tuple[Floats, Floats, Floats, Floats]:
         distances, neighbors = tree.query(tree.data[ids], k=n_neighbors + 1)
-        neighbors[:, 0] = ids
-        axes, centers, deviations = np.zeros((len(ids), 3)), points[ids], np.zeros(len(ids))
-        fitted = axes, centers, deviations
+        neighbors[:, 0] = ids  # the point itself
+        fitted = axes, centers, deviations = np.zeros((len(ids), 3)), points[ids], np.zeros(len(ids))
         robust_planes(points, neighbors, distances, np.array(heights), on_surface, STARTS if on_surface else 1, *fitted)
         return axes, centers, distances[:, -1], deviations
 

@@ -89,7 +89,7 @@ def _(
 ) -> Nearest:
     if given is None:
         return nearest_zero(surface, values, source, tolerance, report)
-    curves, _ = given_curves(surface.domain, as_list(given))
+    curves, _left_out = given_curves(surface.domain, as_list(given))
     parts = list(chain.from_iterable(surface.segments(curves)))
     if not parts:
         raise SourceError("there are no curves to sharpen to", remedy="leave them out", element="curves")

@@ -67,15 +67,14 @@ class VectorHeat:
         return restart(solve, self._border_forces, start, Stage(values, 0.0), float(self.mass.min()))
 
     def _border_forces(self, columns: Complexes, faint: Bools) -> tuple[Bools, Complexes]:
-        """Apply the inverse of `_solve` to columns, at the edges of faces that are faint in part."""
+        """Return the edges of faces only some of whose edges are faint, and X₀_j of `_solve` there for columns X_j."""
         edges = self.triangles.edges.face_edges
-        of_face = faint[edges]
-        border = mask_of(len(faint), edges[of_face.any(axis=1) & ~of_face.all(axis=1)])
-        around = np.flatnonzero(border[edges].any(axis=1))
-        forces = [vector_heat_forces(self.triangles, self.time, column, around) for column in columns.T]
-        for k in range(1, len(forces)):
-            forces[k] -= self.mass * columns[:, k - 1]
-        return border, np.stack(forces, axis=1)
+        is_faint = faint[edges]
+        border = mask_of(len(faint), edges[is_faint.any(axis=1) & ~is_faint.all(axis=1)])
+        at_border = np.flatnonzero(border[edges].any(axis=1))
+        forces = np.stack([vector_heat_forces(self.triangles, self.time, x, at_border) for x in columns.T], axis=1)
+        forces[:, 1:] -= self.mass[:, None] * columns[:, :-1]
+        return border, forces
 
     def _solve(self, loads: Complexes) -> Complexes:
         """(n_edges, k, c) ``(M + tL) X_j = X₀_j + M X_{j-1}`` along the last axis, for each of k columns."""
