@@ -279,7 +279,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         (True, 0.75)
         """
         grid, level = self.grid, finite_number(level, "level")
-        refine = self._refined(level)
+        refine = self._onto_level(level)
         if grid.dimension == 2:
             lines = level_lines(self.values, grid.origin, grid.spacing, level)
             return [Polyline(points if refine is None else refine(points), closed) for points, closed in lines]
@@ -287,12 +287,13 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             vertices, faces = closed_surface(self.values, grid.origin, grid.spacing, level, refine)
         else:
             self._refuse_beyond_band(level)
-            vertices, faces = block_contour(
-                BlockValues(self.blocks, self.values), grid.spacing, level, self._placed(refine)
-            )
-        return TriangleMesh(vertices, faces if refine is None else flipped_along_creases(vertices, faces))
+            values = BlockValues(self.blocks, self.values)
+            vertices, faces = block_contour(values, grid.spacing, level, self._into_space(refine))
+        if refine is not None:  # points of the solid's level, which has creases, unlike what is interpolated
+            faces = flipped_along_creases(vertices, faces)
+        return TriangleMesh(vertices, faces)
 
-    def _refined(self, level: float) -> Refine | None:
+    def _onto_level(self, level: float) -> Refine | None:
         """Return a function that moves points of a level onto it; None if the field has no solid."""
         if self.solid is None:
             return None
@@ -300,7 +301,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         values = self.values if self.blocks is None else BlockValues(self.blocks, self.values)
         return lambda points: on_level(distance, points, values, self.grid, level)
 
-    def _placed(self, refine: Refine | None) -> Refine:
+    def _into_space(self, refine: Refine | None) -> Refine:
         """Return a function from points in cells to places in space, moved onto the level if `refine` does that."""
 
         def placed(cells: Floats) -> Floats:
@@ -357,7 +358,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             parts = iter([(surface.vertices, surface.faces)])
         else:
             self._refuse_beyond_band(level)
-            placed = self._placed(self._refined(level))
+            placed = self._into_space(self._onto_level(level))
             parts = contour_parts(BlockValues(self.blocks, self.values), self.grid.spacing, level, placed)
         return ply.write_parts(parts, path)
 

@@ -107,15 +107,15 @@ class Solid(Displayed, Represented, Frozen):
 
     @cached_property
     def features(self) -> FaceFeatures:
-        """The triangles with their neighbourhoods; edges and vertices are regular between bounding triangles only."""
-        corners = np.arange(3 * len(self.triangles)).reshape(-1, 3)
-        features = FaceFeatures.of(self.triangles.reshape(-1, 3), corners, self.confidence)
-        idle = ~self.bounding[features.ids]
-        if not idle.any():
+        """The triangles with their neighbourhoods; no edge or vertex of one that bounds nothing is regular there."""
+        faces = np.arange(3 * len(self.triangles)).reshape(-1, 3)
+        features = FaceFeatures.of(self.triangles.reshape(-1, 3), faces, self.confidence)
+        bounds_nothing = ~self.bounding[features.ids]
+        if not bounds_nothing.any():
             return features
         edges, vertices = features.edge_regular.copy(), features.vertex_regular.copy()
-        edges[features.edges[idle]] = False
-        vertices[features.faces[idle]] = False
+        edges[features.edges[bounds_nothing]] = False
+        vertices[features.faces[bounds_nothing]] = False
         return features._replace(edge_regular=edges, vertex_regular=vertices)
 
     @cached_property

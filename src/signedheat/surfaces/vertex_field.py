@@ -338,10 +338,9 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
 
 
 def on_simple_surface(field: VertexField) -> VertexField[SurfaceShape]:
-    """Put a field on a surface that files support: voxel faces become triangles."""
-    domain = field.domain
+    """Put a field on a surface that files support: a triangulation's own mesh; triangles in place of voxel faces."""
+    embedded = field._embedded
+    domain = embedded.domain
     if isinstance(domain, TriangleMesh | PolygonMesh | PointCloud):
-        return VertexField(domain, field.values)
-    if isinstance(domain, IntrinsicTriangulation):
-        return on_simple_surface(field.restrict())
-    return VertexField(domain.triangulation, domain.on_triangulation(field.values))
+        return VertexField(domain, embedded.values)
+    return VertexField(domain.triangulation, domain.on_triangulation(embedded.values))
