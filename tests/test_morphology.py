@@ -124,7 +124,8 @@ def test_boards_that_stand_on_each_other_have_no_slit():
     upright = sh.TriangleMesh([[0.0, -1, 0], [0, 1, 0], [0, 1, 1], [0, -1, 1]], [[0, 1, 2], [0, 2, 3]])
     solid = sh.morphology.thicken([lying, upright], 0.1, resolution=41)
     assert_closed_manifold(solid)
-    assert enclosed_volume(solid) == pytest.approx(4 * 0.2 + 2 * 0.9 * 0.2, rel=1e-5)
+    # a slit of a hundredth of a cell would take three times that
+    assert enclosed_volume(solid) == pytest.approx(4 * 0.2 + 2 * 0.9 * 0.2, rel=5e-5)
 
 
 def test_some_faces_of_a_part_are_thickened():
