@@ -175,7 +175,7 @@ def test_intrinsic_triangulations_keep_the_area_or_refuse(flatness, refine):
         squashed = sh.TriangleMesh(square(5, 0.2).vertices * [1.0, flatness, 1.0], square(5).faces)
         made = sh.intrinsic_delaunay(squashed, refine=refine, max_vertices=500)
     except sh.errors.GeometryError as error:
-        assert flatness < 1e-6 and error.element == "faces"
+        assert flatness <= 1e-6 and error.element == "faces"  # rims as near as that are joined
     else:
         assert made.triangles.face_areas.sum() == pytest.approx(squashed.face_areas.sum(), rel=1e-4)
 
