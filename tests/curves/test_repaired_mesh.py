@@ -132,6 +132,16 @@ def test_seams_are_joined_for_the_method_alone(measured, lift):
     np.testing.assert_allclose(field.values, measured(BALL, strokes(BALL, turned=())).values[same], atol=1e-6)
 
 
+def test_level_sets_pass_through_seams_on_both_sides_of_which_the_function_is_the_same():
+    mesh = with_seam()
+    height = mesh.vertices[:, 2]
+    assert [line.closed for line in mesh.level_set(height, 0.2)] == [True]
+    half = mesh.faces[mesh.vertices[mesh.faces].mean(axis=1)[:, 0] > 0.3]
+    higher = height + np.isin(np.arange(mesh.n_vertices), half)
+    assert not any(line.closed for line in mesh.level_set(higher, 0.2))
+    assert [line.closed for line in sh.signed_distance(strokes(mesh), mesh).contour(0.1)] == [True]
+
+
 def test_curves_are_closed_across_seams():
     mesh = with_seam()
     [whole] = sh.close_curves(mesh, strokes(mesh))

@@ -309,7 +309,8 @@ class Surface(Frozen):
         Returns
         -------
         list of Curve
-            One for each connected component, open or closed; larger values are to its left.
+            One for each connected component, open or closed; larger values are to its left. They pass through seams
+            on both sides of which the function is the same.
 
         Raises
         ------
@@ -323,7 +324,9 @@ class Surface(Frozen):
         [Curve(2 points, open, oriented)]
         """
         at_vertices, height = checked_levels(values, level, self.n_vertices)
-        return level_set(self.triangulation, self.on_triangulation(at_vertices), height)
+        mesh, at_corners = self.triangulation, self.on_triangulation(at_vertices)
+        seams_agree = np.array_equal(at_corners[mesh.places], at_corners, equal_nan=True)
+        return level_set(mesh.joined if seams_agree else mesh, at_corners, height)
 
     def region_boundary(self, face_mask: ArrayLike) -> list[Curve]:
         """Find the boundary of a region of faces, with the region to the left, so that φ > 0 in it.
@@ -400,6 +403,10 @@ def check_mask(face_mask: Bools, n_faces: int) -> None:
 class PlaceableTriangles(Triangles, Protocol):
     """Triangles on which points in space are placed and joined; see `TriangleMesh` for what the properties mean."""
 
+    @property
+    def places(self) -> Ints: ...
+    @property
+    def joined(self) -> Triangles: ...
     @property
     def intrinsic(self) -> IntrinsicMesh: ...
     @property
