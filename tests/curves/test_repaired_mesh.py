@@ -86,6 +86,14 @@ def test_strokes_are_repaired_on_broken_meshes(name, whole):
     assert (field.diagnostics.note(MeshRepaired) is None) == name.startswith(("fin", "seam"))
 
 
+@pytest.mark.parametrize("name", [name for name in BROKEN if "tents" not in name])  # lines branch where those stand
+def test_strokes_are_completed_on_broken_meshes(name):
+    mesh = BROKEN[name]()
+    [line] = sh.close_curves(mesh, strokes(mesh))
+    assert line.closed
+    np.testing.assert_allclose(mesh.positions(line)[:, 2], 0.2, atol=0.02)
+
+
 def with_rounded_seam(units, seed):
     """The ball with a seam, all vertices moved at random by up to some units of single precision of its size."""
     mesh = with_seam()

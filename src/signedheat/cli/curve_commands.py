@@ -166,8 +166,9 @@ def close(arguments: Namespace) -> Summary:
         constraint = shapes.constraint_of(arguments.constraint)
         if arguments.plain and not arguments.intrinsic:
             field = sh.SignedHeatSolver(domain, arguments.diffusion, progress).distance(sources, constraint)
+            completed = closing.zero_set(field, sources)
         else:
-            field = closing.conforming_distance(
+            field, completed = closing.completion(
                 domain,
                 sources,
                 constraint,
@@ -176,7 +177,6 @@ def close(arguments: Namespace) -> Summary:
                 arguments.as_oriented or arguments.plain,
                 arguments.every_piece,
             )
-        completed = closing.zero_set(field, sources)
     sh.io.write_curves(arguments.output, completed, domain)
     if arguments.preview:
         sh.view.save_surface(field, arguments.preview, completed, up="xyz".index(arguments.up))

@@ -26,7 +26,7 @@ from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField
 from ..validation import flag
-from .curve_distance import distance_to_pieces
+from .curve_distance import RepairedMesh, distance_to_pieces, warn_of_gaps
 from .resolution import flattened, on_resolving_triangles
 from .stroke_directions import pieces_for_all
 
@@ -50,8 +50,8 @@ def close_curves(
     """Complete broken curves: the zero set of the signed distance to them, which has no gaps.
 
     On triangle meshes the method runs on an intrinsic triangulation along whose edges the curves run, so that curves
-    may be smaller than the triangles, and the result follows them where they are there. Pieces are first turned until
-    they agree, and those left out that belong to no other, as by `signed_distance`.
+    may be smaller than the triangles, and the result follows them where they are there. The mesh is
+    repaired and pieces are turned and left out as by `signed_distance`.
 
     Parameters
     ----------
@@ -99,8 +99,28 @@ def close_curves(
     surface = cast("SurfaceDomain", converted(domain))
     listed = as_curves(surface, as_list(curves))
     refuse_without_sides(listed)
-    field = conforming_distance(surface, listed, constraint, diffusion, None, as_oriented, every_piece)
-    return zero_set(field, listed)
+    return completion(surface, listed, constraint, diffusion, None, as_oriented, every_piece)[1]
+
+
+def completion(
+    surface: SurfaceDomain,
+    curves: CurvesAndPoints,
+    constraint: Constraint | None,
+    diffusion: float,
+    progress: Progress | None = None,
+    as_oriented: bool = False,
+    every_piece: bool = False,
+) -> tuple[VertexField[SurfaceDomain], list[Curve]]:
+    """Distance to broken curves, measured on a repaired mesh, and its zero set."""
+    warn_of_gaps(surface)
+    repaired = RepairedMesh.of(surface)
+    if repaired is not None:
+        surface, curves = repaired.mesh, repaired.on_it(curves)
+    field = conforming_distance(surface, curves, constraint, diffusion, progress, as_oriented, every_piece)
+    completed = zero_set(field, curves)
+    if repaired is None:
+        return field, completed
+    return repaired.on_given(field), [repaired.curve_on_given(curve) for curve in completed]
 
 
 def conforming_distance(

@@ -95,6 +95,12 @@ class RepairedMesh:
         diagnostics = replace(field.diagnostics, unreached=np.flatnonzero(np.isnan(values))).noting(*self.notes)
         return VertexField(self.given, values, diagnostics)
 
+    def curve_on_given(self, curve: Curve) -> Curve:
+        """Return a curve on the repaired mesh as one on the given mesh, in the first of copies."""
+        faces = np.unique(self.faces, return_index=True)[1][curve.faces]
+        weights = np.take_along_axis(curve.barycentric, self.corners[faces], axis=1)
+        return Curve(faces, weights, curve.closed, curve.oriented, curve.normals)
+
 
 def warn_of_gaps(mesh: object) -> None:
     """Warn of vertices of rims that are nearly, but not, at the place of others."""
