@@ -44,19 +44,17 @@ ROUNDS = 20
 SINGLY = 16
 """Number of strokes, the longest first, that are turned or left out one by one where they explain nothing; limited for
 speed. Halved and doubled, none of 46 drawings changes."""
-TURNED = 0.34
-"""Turning whole loops is a guess if they make up more than this share of the length; a loop is turned as a whole if no
-more than this share of it is not. Of 778 drawings (`benchmarks/strokes.py`, seeds 20000 to 20077) 5 are wrong in
-silence and 12 right with a warning; at .25 4 and 13, at .4 6 and 11."""
-NEARLY = 0.0025
-"""Two insides are equally likely if their costs differ by less than this share of the length of all strokes, as for two
-copies of a stroke that face either way. At zero nothing changes on these drawings; at .01 5 and 14."""
+HALF, TURNED = 0.49, 0.34
+"""Turning loops, this share of each or more, is a guess if they make up more than that share of the length. Of 778
+drawings (`benchmarks/strokes.py`, seeds 20000 to 20077) 5 are wrong in silence and 16 right with a warning; at .45 of
+each 5 and 18, at two thirds 5 and 12, but then two halves of a circle that contradict each other are no guess if a dot
+decides between them; at .25 of the length 4 and 23, at .4 6 and 11."""
 WORTH = 0.5
-"""The inside is a guess if it depends on a stroke worth less than this, relative to its length. At .4 one more of these
-drawings is wrong in silence, and one fewer is right with a warning; halved 8 and 11, at .6 5 and 18."""
+"""The inside is a guess if it depends on a stroke worth less than this, relative to its length. At .4 6 and 15 of these
+drawings, halved 8 and 15, at .6 5 and 22."""
 OTHERWISE = 0.05
-"""The inside depends on a stroke if this share of the area changes sides without it: halved 4 and 18 of these drawings,
-doubled 9 and 12."""
+"""The inside depends on a stroke if this share of the area changes sides without it: halved 5 and 23 of these drawings,
+doubled 9 and 15."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +106,7 @@ class Decision:
     best: Inside  # the best directions that were found, and what is inside then
     # whether most of the length bounds nothing in the least energy, so that sides were taken to be smooth
     bounds_nothing: bool = False
-    tied: bool = False  # whether something else is inside in another answer that costs nearly the same
+    tied: bool = False  # whether something else is inside in another answer that costs the same
 
     def turned(self, n: int) -> Bools:
         """(n,) which of all curves given are turned."""
@@ -139,11 +137,11 @@ class Decision:
         return not self.bounds_nothing and bool((self.best.explained[~self.loose] >= EXPLAINED).all())
 
     def turned_loops(self) -> Ints:
-        """Numbers of the curves turned of loops that are mostly turned, unless they are few."""
+        """Numbers of the curves turned of loops half of which or more is turned, unless they are few."""
         strokes, best = self.pieces.strokes, self.best
         lengths = np.where(best.explained >= EXPLAINED, strokes.lengths, 0.0)
         turned, total = (np.bincount(strokes.group, lengths * way) for way in (best.signs < 0, 1))
-        against = (turned > (1 - TURNED) * total)[strokes.group] & (best.signs < 0) & (lengths > 0)
+        against = (turned > HALF * total)[strokes.group] & (best.signs < 0) & (lengths > 0)
         few = lengths[against].sum() < TURNED * lengths[against | (best.signs > 0)].sum()  # others turned prove nothing
         return self.pieces.curves(against & (not few))
 
@@ -224,16 +222,11 @@ def decide(pieces: CurvePieces) -> Decision:
         best = better
     if mostly_loose(strokes, best):
         return Decision(pieces, strokes.inside(smooth), bounds_nothing=True)
-    near, equal = (rivals(strokes, best, share) for share in (NEARLY, TIE))
-    best = min(equal, key=lambda inside: (int((inside.signs < 0).sum()), (inside.signs < 0).tolist()))
-    otherwise = [strokes.either_way(best), *(strokes.areas[inside.sides != best.sides].sum() for inside in near)]
+    most = misfit(strokes, best) + TIE * strokes.lengths.sum()
+    rivals = [inside for inside in strokes.seen if misfit(strokes, inside) <= most]
+    best = min(rivals, key=lambda inside: (int((inside.signs < 0).sum()), (inside.signs < 0).tolist()))
+    otherwise = [strokes.either_way(best), *(strokes.areas[inside.sides != best.sides].sum() for inside in rivals)]
     return Decision(pieces, best, tied=bool(max(otherwise) > OTHERWISE * strokes.areas.sum()))
-
-
-def rivals(strokes: Strokes, best: Inside, share: float) -> list[Inside]:
-    """Insides seen that cost more by at most this share of the length of all strokes."""
-    most = misfit(strokes, best) + share * strokes.lengths.sum()
-    return [inside for inside in strokes.seen if misfit(strokes, inside) <= most]
 
 
 def least_of(strokes: Strokes, insides: list[Inside]) -> Inside:
