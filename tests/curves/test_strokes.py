@@ -11,7 +11,7 @@ import pytest
 import signedheat as sh
 from shapes import strokes
 from shapes.surfaces import disk
-from signedheat.curves.curve_completion import conforming_distance
+from signedheat.curves.curve_completion import completion
 from signedheat.curves.curve_distance import CurvesTaken
 from signedheat.curves.stroke_directions import CurvePieces
 from signedheat.curves.strokes import CutGraph
@@ -226,7 +226,7 @@ def test_what_is_turned_and_left_out_does_not_depend_on_the_triangles_of_the_met
     """Copies of strokes within the width of triangles are left out or not as these happen to lie."""
     drawing = strokes.drawing(np.random.default_rng([seed, list(strokes.DAMAGES).index(damage)]), damage)
     fields = [sh.signed_distance(drawing.given, drawing.mesh, intrinsic=way) for way in ("auto", True, False)]
-    fields.append(conforming_distance(drawing.mesh, drawing.given, None, 1.0))
+    fields.append(completion(drawing.mesh, drawing.given, None, 1.0)[0])
     taken = [field.diagnostics.note(CurvesTaken) for field in fields]
     assert taken[0].turned or taken[0].left_out
     assert all((note.turned, note.left_out) == (taken[0].turned, taken[0].left_out) for note in taken)

@@ -103,27 +103,6 @@ def close_curves(
 
 
 def completion(
-    surface: SurfaceDomain,
-    curves: CurvesAndPoints,
-    constraint: Constraint | None,
-    diffusion: float,
-    progress: Progress | None = None,
-    as_oriented: bool = False,
-    every_piece: bool = False,
-) -> tuple[VertexField[SurfaceDomain], list[Curve]]:
-    """Distance to broken curves, measured on a repaired mesh, and its zero set."""
-    warn_of_gaps(surface)
-    repaired = RepairedMesh.of(surface)
-    if repaired is not None:
-        surface, curves = repaired.mesh, repaired.on_it(curves)
-    field = conforming_distance(surface, curves, constraint, diffusion, progress, as_oriented, every_piece)
-    completed = zero_set(field, curves)
-    if repaired is None:
-        return field, completed
-    return repaired.on_given(field), [repaired.curve_on_given(curve) for curve in completed]
-
-
-def conforming_distance(
     domain: SurfaceDomain | ForeignShape,
     curves: CurvesAndPoints,
     constraint: Constraint | None,
@@ -131,11 +110,15 @@ def conforming_distance(
     progress: Progress | None = None,
     as_oriented: bool = False,
     every_piece: bool = False,
-) -> VertexField:
-    """Distance on triangles that have the curves along their edges, where such can be made."""
+) -> tuple[VertexField[SurfaceDomain], list[Curve]]:
+    """Distance to broken curves, on a repaired mesh that has them along edges where such can be made; its zero set."""
     as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
     own_levels = isinstance(constraint, EachComponent | LevelValues)
     surface = cast("SurfaceDomain", converted(domain))
+    warn_of_gaps(surface)
+    repaired = RepairedMesh.of(surface)
+    if repaired is not None:
+        surface, curves = repaired.mesh, repaired.on_it(curves)
     kept, left_out = given_curves(surface, as_list(curves))
 
     pieces = None if as_oriented or own_levels else pieces_for_all(surface, flattened(kept))
@@ -146,7 +129,11 @@ def conforming_distance(
         field = distance_to_pieces(solver, kept, constraint, every_piece, numbers_given(kept, left_out), pieces)[0]
         return field if left_out is None else replace(field, diagnostics=field.diagnostics.noting(left_out))
 
-    return on_resolving_triangles(measured, SignedHeatSolver(surface, diffusion, progress), kept, always=True)
+    field = on_resolving_triangles(measured, SignedHeatSolver(surface, diffusion, progress), kept, always=True)
+    completed = zero_set(field, curves)
+    if repaired is None:
+        return field, completed
+    return repaired.on_given(field), [repaired.curve_on_given(curve) for curve in completed]
 
 
 def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> None:
