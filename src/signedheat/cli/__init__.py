@@ -16,7 +16,13 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import SignedHeatError, printable
-from .options import parser_of, refuse_output_over_input, refuse_unused_formats, without_exponents
+from .options import (
+    parser_of,
+    refuse_contradictions,
+    refuse_output_over_input,
+    refuse_unused_formats,
+    without_exponents,
+)
 from .terminal import Signals, open_standard_streams, say, standard_files, write_out
 
 FAILED, BUG = 1, 70
@@ -46,11 +52,13 @@ def _run(argv: Sequence[str] | None) -> int:
     if "_ARGCOMPLETE" in os.environ:  # set by argcomplete's shell function
         import_module("argcomplete").autocomplete(parser)
     arguments = parser.parse_args(without_exponents(sys.argv[1:] if argv is None else argv))
-    if "run" not in arguments:
+    if "command" not in arguments:
         parser.print_help()
         return 0
-    if arguments.check is not None:
-        arguments.check(arguments)
+    command = arguments.command
+    refuse_contradictions(arguments)
+    if command.check is not None:
+        command.check(arguments)
     refuse_unused_formats(arguments)
     refuse_output_over_input(arguments)
     public = import_module("signedheat.public")
@@ -58,7 +66,7 @@ def _run(argv: Sequence[str] | None) -> int:
         public.view.ensure_picture_writable(arguments.preview)
     import_module("signedheat.jobs").Announcement.are_wanted = not (arguments.quiet or arguments.json)
     with standard_files(arguments) as standard:
-        summary, text = arguments.run(arguments)
+        summary, text = command.run(arguments)
     if arguments.json and not standard.takes_output:
         write_out(standard.named(json.dumps(summary)))
     elif text and not (arguments.quiet or standard.takes_output):

@@ -25,7 +25,6 @@ from .options import (
     STEPS,
     UNITS_OPTION,
     Summary,
-    check_grid,
     command,
     finite,
     group,
@@ -33,8 +32,6 @@ from .options import (
     option,
     output,
     positive,
-    refuse_together,
-    refuse_without,
     whole_number,
     workers,
 )
@@ -68,10 +65,7 @@ RUNNING = group(
 
 
 def check_batch(arguments: Namespace) -> None:
-    """Reject a batch without results, and options that contradict each other."""
-    check_grid(arguments)
-    refuse_without(arguments, "--sample", "--near", "--widths", "--seed", "--normalize", "--layout")
-    refuse_without(arguments, "--offset", "--surface")
+    """Reject a batch without results, and results that contradict each other."""
     try:
         job_of(arguments)
     except SignedHeatError as problem:
@@ -117,9 +111,7 @@ def names_surface(output: str) -> bool:
 
 
 def check_watertight(arguments: Namespace) -> None:
-    """Reject options that contradict each other, and take the format from the name of the output."""
-    refuse_together(arguments, "--spacing", "--resolution")
-    refuse_without(arguments, "--sample", "--normalize")
+    """Take the format from the name of the output; reject another one."""
     if names_surface(arguments.output):
         ending = Path(arguments.output).suffix.lower().lstrip(".")
         if arguments.surface not in (None, ending):

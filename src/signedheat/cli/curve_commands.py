@@ -14,6 +14,7 @@ from .late_imports import diagnostics, numpy
 from .late_imports import operands as shapes
 from .late_imports import surface_discretization as discretization
 from .options import (
+    PLAIN,
     UP,
     Option,
     Summary,
@@ -24,7 +25,6 @@ from .options import (
     output,
     positive,
     refuse_together,
-    refuse_without,
     surface_constraint,
     whole_number,
 )
@@ -72,19 +72,9 @@ def about_curves(written: str) -> tuple[Option, ...]:
     )
 
 
-def check_close(arguments: Namespace) -> None:
-    """Reject options without effect beside others."""
-    refuse_together(arguments, "--plain", "--as-oriented", "--every-piece")
-    refuse_without(arguments, "--preview", "--up")
-
-
-def check_surface(arguments: Namespace) -> None:
-    """Reject options without effect beside others, and isolines next to standard output."""
-    check_close(arguments)
-    if arguments.constraint.partition(":")[0] in ("each-component", "levels"):  # curves are taken as they are
-        refuse_together(arguments, "--constraint", "--as-oriented", "--every-piece")
-    if arguments.output == "-" and arguments.contours:
-        arguments.parser.error("--contours writes a file next to the output: name a file instead of standard output")
+def check_curves(arguments: Namespace) -> None:
+    """Reject turning none of the curves that are taken as they are anyway."""
+    refuse_together(arguments, "--as-oriented", PLAIN)
 
 
 @command(
@@ -106,8 +96,7 @@ def check_surface(arguments: Namespace) -> None:
         "triangles than those of the mesh, whose vertices come first",
     ),
     *(option("--preview", metavar="PNG", help="draw the result"), UP, format_option("ply")),
-    check=check_surface,
-    diffusion=None,
+    check=check_curves,
 )
 def surface(arguments: Namespace) -> Summary:
     """Read, check that the results can be written, compute, write."""
@@ -154,8 +143,7 @@ def surface(arguments: Namespace) -> Summary:
     *about_curves("completed curves: .obj .json"),
     option("--preview", metavar="PNG", help="draw the distance, with the completed curves"),
     *(UP, format_option("json")),
-    check=check_close,
-    diffusion=None,
+    check=check_curves,
 )
 def close(arguments: Namespace) -> Summary:
     """Read, check that the results can be written, complete, write."""

@@ -11,7 +11,7 @@ import os
 import re
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
@@ -35,18 +35,6 @@ UNITS = ("micron", "mm", "millimeter", "cm", "centimeter", "inch", "foot", "m", 
 """Units of length."""
 CONSTRAINTS = ("free", "zero-set", "hard", "each-component", "soft", "soft:WEIGHT")
 """Names of the constraints without a number."""
-ABSENT: Mapping[str, Any] = {
-    **dict.fromkeys(("origin", "grid_shape", "spacing", "padding", "resolution", "band", "preview")),
-    **dict.fromkeys(("tiles", "workers", "scheduler", "label", "units", "transform")),
-    **dict.fromkeys(("as_oriented", "keep_overlaps", "plain"), False),
-    "lids": "bent",
-    "nested": "given",
-    "constraint": "zero-set",
-    "diffusion": 1.0,
-}
-"""Defaults of options that a command lacks, so that all commands can share the functions that read them."""
-OF_SOLIDS = ("band", "lids", "nested", "keep_overlaps")
-"""Options that only solids have."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -68,6 +56,16 @@ class Option:
     names: tuple[str, ...]
     settings: Mapping[str, Any]
 
+    @property
+    def attribute(self) -> str:
+        """The name of its value among the arguments."""
+        return str(self.settings.get("dest", self.names[-1].lstrip("-").replace("-", "_")))
+
+    @property
+    def default(self) -> Any:
+        """Its value where it is not given."""
+        return self.settings.get("default", False if self.settings.get("action") == "store_true" else None)
+
 
 @dataclass(frozen=True)
 class Group:
@@ -88,27 +86,23 @@ class Command:
     options: tuple[Option | Group, ...] = ()
     check: Check | None = None
     usage: str | None = None
-    absent: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def declared(self) -> dict[str, Option]:
+        """All of its options by name."""
+        groups = (entry.options if isinstance(entry, Group) else (entry,) for entry in (*COMMON, *self.options))
+        return {option.names[-1]: option for options in groups for option in options}
 
     def add_to(self, commands: Any) -> None:
         """Add it to the commands of a parser."""
         parser = commands.add_parser(self.name, help=self.help, description=self.description)
         if self.usage is not None:
             parser.usage = f"%(prog)s {self.usage}"
-        parser.set_defaults(**{**ABSENT, **self.absent}, run=self.run, parser=parser, check=self.check)
-        parser.add_argument("--json", action="store_true", help="print a summary as JSON")
-        parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
-        parser.add_argument(
-            "--from",
-            type=ending,
-            dest="input_format",
-            metavar="EXT",
-            help="format of standard input, where - stands for a file",
-        )
-        for entry in self.options:
+        parser.set_defaults(**ABSENT, command=self, parser=parser)
+        for entry in (*COMMON, *self.options):
             section = parser.add_argument_group(entry.title) if isinstance(entry, Group) else parser
             for argument in entry.options if isinstance(entry, Group) else (entry,):
-                section.add_argument(*argument.names, **argument.settings)
+                section.add_argument(*argument.names, **{"default": argument.default, **argument.settings})
 
 
 def command(
@@ -118,7 +112,6 @@ def command(
     *options: Option | Group,
     check: Check | None = None,
     usage: str | None = None,
-    **absent: Any,
 ) -> Callable[[Run], Command]:
     """Decorate the function that runs a command, and so declare the command.
 
@@ -129,13 +122,11 @@ def command(
     *options : Option or Group
         In the order of the help, after the options that all commands have.
     check : callable, optional
-        Exits with status 2 if arguments contradict each other.
+        Exits with status 2 if arguments contradict each other in ways that `refuse_contradictions` does not know.
     usage : str, optional
         Text after the name of the command in the first line of its help.
-    **absent
-        Values for options that the command lacks, where they differ from `ABSENT`.
     """
-    return lambda run: Command(name, run, help, description, options, check, usage, absent)
+    return lambda run: Command(name, run, help, description, options, check, usage)
 
 
 def parser_of(commands: Iterable[Command]) -> Parser:
@@ -439,58 +430,82 @@ def is_planar(path: Any) -> bool:
     return Path(path).suffix.lower() in PLANAR
 
 
-def is_given(arguments: Namespace, option: str) -> bool:
-    """Whether an option has another value than its default."""
-    name = {"--shape": "grid_shape", "--from": "input_format"}.get(option, option.lstrip("-").replace("-", "_"))
-    return getattr(arguments, name, None) is not arguments.parser.get_default(name)
+COMMON = (
+    option("--json", action="store_true", help="print a summary as JSON"),
+    option("--quiet", action="store_true", help="print nothing but errors"),
+    option(
+        "--from",
+        type=ending,
+        dest="input_format",
+        metavar="EXT",
+        help="format of standard input, where - stands for a file",
+    ),
+)
+"""Options of all commands."""
+SHARED = (LABEL, SLICES, *(one for each in (PLACE, GRID, STEPS, METHOD, TILES) for one in each.options))
+ABSENT: Mapping[str, Any] = {"operation": "", "shape": "", **{option.attribute: option.default for option in SHARED}}
+"""Defaults of options that a command lacks, so that all commands can share the functions that read them."""
+
+DRAWING, THICKEN = "a drawing", "thicken"
+PLAIN = ("--plain", "--constraint each-component", "--constraint levels")
+"""Options with which the method takes a shape or curves as they are."""
+NEEDED = {
+    "--tiles": "--band",
+    **dict.fromkeys(("--workers", "--scheduler"), "--tiles"),
+    **dict.fromkeys(("--near", "--widths", "--seed", "--normalize", "--layout"), "--sample"),
+    "--surface": "--offset",
+    "--up": "--preview",
+}
+"""Options that have an effect only with another one, in commands that have both."""
+EXCLUDED = {
+    "--spacing": ("--resolution",),
+    "--origin": ("--resolution", "--padding"),
+    "--scheduler": ("--workers",),
+    "--tets": ("--spacing", "--origin", "--shape", "--band", "--label"),
+    "--contours": ("--output -",),
+    "--every-piece": PLAIN,
+}
+"""Options that contradict others, or others with a value that begins so."""
+WITHOUT_SOLIDS = {
+    **dict.fromkeys(("--band", "--lids", "--nested", "--keep-overlaps"), (*PLAIN, DRAWING, THICKEN)),
+    **dict.fromkeys(("--as-oriented", "--plain", "--constraint", "--diffusion"), (THICKEN,)),
+}
+"""Options of solids, and what makes none of a shape."""
 
 
-def refuse_together(arguments: Namespace, first: str, *others: str) -> None:
+def is_given(arguments: Namespace, named: str) -> bool:
+    """Whether an option has another value than its default, or one that begins as named; or another fact holds."""
+    if not named.startswith("-"):
+        return named in (arguments.operation, DRAWING if is_planar(arguments.shape or "") else None)
+    name, _, beginning = named.partition(" ")
+    option = arguments.command.declared.get(name)
+    value = None if option is None else getattr(arguments, option.attribute)
+    return option is not None and (str(value).startswith(beginning) if beginning else value is not option.default)
+
+
+def refuse_together(arguments: Namespace, name: str, others: Iterable[str]) -> None:
     """Exit with an error if an option is given together with one of some others."""
     for other in others:
-        if is_given(arguments, first) and is_given(arguments, other):
-            arguments.parser.error(f"{other} and {first} do not go together: give one of them")
+        if is_given(arguments, name) and is_given(arguments, other):
+            arguments.parser.error(f"{name} and {other} do not go together: give one of them")
 
 
-def refuse_without(arguments: Namespace, needed: str, *others: str) -> None:
-    """Exit with an error if some options are given without the one that they belong to."""
-    for other in others:
-        if is_given(arguments, other) and not is_given(arguments, needed):
-            arguments.parser.error(f"{other} goes with {needed}")
-
-
-def refuse_of_solids(arguments: Namespace, what: str, *others: str) -> None:
-    """Exit with an error if an option of solids, or one of some others, is given for `what`, which uses no solid."""
-    for name in (*OF_SOLIDS, *others):
-        if getattr(arguments, name) != ABSENT[name]:
-            arguments.parser.error(f"--{name.replace('_', '-')} is for solids, and {what} uses none")
-
-
-def check_grid(arguments: Namespace) -> None:
-    """Reject options that contradict each other, and numbers for another dimension."""
-    error = arguments.parser.error
-    dimension = 2 if is_planar(getattr(arguments, "shape", "")) else 3
-    for name, numbers, counts in (
-        ("--spacing", arguments.spacing, (1, dimension)),
-        ("--origin", arguments.origin, (dimension,)),
-        ("--shape", arguments.grid_shape, (dimension,)),
-    ):
-        if numbers is not None and len(numbers) not in counts:
+def refuse_contradictions(arguments: Namespace) -> None:
+    """Exit with an error if an option has no effect beside another one, or without it."""
+    error, declared = arguments.parser.error, arguments.command.declared
+    for name in (name for name in declared if is_given(arguments, name)):
+        refuse_together(arguments, name, EXCLUDED.get(name, ()))
+        for other in WITHOUT_SOLIDS.get(name, ()):
+            if is_given(arguments, other):
+                error(f"{name} is for solids, and {other} uses none")
+        needed = NEEDED.get(name)
+        if needed in declared and not is_given(arguments, needed):
+            error(f"{name} goes with {needed}")
+    dimension = 2 if is_given(arguments, DRAWING) else 3
+    for name, counts in (("--spacing", (1, dimension)), ("--origin", (dimension,)), ("--shape", (dimension,))):
+        numbers = getattr(arguments, declared[name].attribute) if name in declared else None
+        if isinstance(numbers, list) and len(numbers) not in counts:
             error(f"argument {name}: {' or '.join(map(str, counts))} numbers, not {len(numbers)}")
-    refuse_together(arguments, "--origin", "--resolution", "--padding")
-    refuse_together(arguments, "--spacing", "--resolution")
-    if arguments.plain or arguments.constraint == "each-component":
-        refuse_of_solids(arguments, "--plain" if arguments.plain else "--constraint each-component")
-    if dimension == 2:
-        refuse_of_solids(arguments, "a drawing")
-    refuse_together(arguments, "--scheduler", "--workers")
     own_grid = (arguments.origin, arguments.spacing, arguments.grid_shape)
     if (arguments.origin, arguments.grid_shape) != (None, None) and None in own_grid:
         error("a custom grid needs all of --origin, --spacing and --shape")
-
-
-def check_tiles(arguments: Namespace) -> None:
-    """Reject what `check_grid` does, tiles without a band, and workers without tiles."""
-    check_grid(arguments)
-    refuse_without(arguments, "--band", "--tiles")
-    refuse_without(arguments, "--tiles", "--workers", "--scheduler")

@@ -31,8 +31,6 @@ from .options import (
     UNITS_OPTION,
     Command,
     Summary,
-    check_grid,
-    check_tiles,
     command,
     finite,
     format_option,
@@ -41,8 +39,6 @@ from .options import (
     option,
     output,
     positive,
-    refuse_of_solids,
-    refuse_together,
     shape_option,
     whole_number,
 )
@@ -59,11 +55,9 @@ DISTANCES = {
 
 
 def check_volume(arguments: Namespace) -> None:
-    """Reject options that contradict each other."""
-    refuse_together(arguments, "--tets", "--spacing", "--origin", "--shape", "--band", "--label")
-    if arguments.tets:  # a mesh of one's own
-        refuse_together(arguments, "--tets", "--resolution", "--padding")
-    check_tiles(arguments)
+    """Reject sizes for tets that are given."""
+    if arguments.tets and (arguments.resolution, arguments.padding) != (None, None):
+        arguments.parser.error("--resolution and --padding are for tets around the shape, and --tets names others")
 
 
 @command(
@@ -124,8 +118,7 @@ def _on_tets(arguments: Namespace) -> Summary:
 
 
 def check_offset(arguments: Namespace) -> None:
-    """Reject options that contradict each other, and distances beyond a band."""
-    check_tiles(arguments)
+    """Reject distances beyond a band, and several surfaces on standard output."""
     if arguments.output == "-" and len(arguments.distances) > 1:
         arguments.parser.error("standard output takes one surface: name a file, or give one distance")
     reach = max(map(abs, arguments.distances))
@@ -183,10 +176,7 @@ def offset(arguments: Namespace) -> Summary:
 
 
 def check_morph(arguments: Namespace) -> None:
-    """Reject a wrong number of distances, and options that contradict each other."""
-    check_grid(arguments)
-    if arguments.operation == "thicken":
-        refuse_of_solids(arguments, "thicken", "as_oriented", "plain", "constraint", "diffusion")
+    """Reject a wrong number of distances, and options of other operations."""
     if arguments.operation != "shell" and (arguments.keep_outside or arguments.drain is not None):
         arguments.parser.error("--keep-outside and --drain are for shells")
     if arguments.operation != "thicken" and (arguments.side != "both" or arguments.faces):
