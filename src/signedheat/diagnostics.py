@@ -18,10 +18,12 @@ SMALL = 0.005
 class Note(Frozen, ShortRepr):
     """A note on a computation, whose values are numbers and lists; ``str(note)`` is its text.
 
-    `text` is a format string in which ``{0.name}`` is a value of the note.
+    `text` is a format string in which ``{0.name}`` is a value of the note. `limits` are the greatest values, by name,
+    with which a note need not be read.
     """
 
     text: ClassVar[str] = ""
+    limits: ClassVar[Mapping[str, float]] = {}
 
     def __str__(self) -> str:
         return self.text.format(self)
@@ -29,7 +31,7 @@ class Note(Frozen, ShortRepr):
     @property
     def important(self) -> bool:
         """Whether it should be read before the result is trusted: commands print it."""
-        return False
+        return any(getattr(self, name) > limit for name, limit in self.limits.items())
 
     def __post_init__(self) -> None:
         for entry in fields(self):  # counts and areas are often scalars of NumPy
@@ -158,10 +160,7 @@ class ShapeOriented(Note):
     undecided_area: float
     nested_bodies: int
     cavities: int
-
-    @property
-    def important(self) -> bool:
-        return self.turned_faces > 0 or self.merged_faces > 0
+    limits: ClassVar[Mapping[str, float]] = {"turned_faces": 0, "merged_faces": 0}
 
     def __str__(self) -> str:
         texts = [
@@ -181,11 +180,8 @@ class OrientedPoints(Note):
 
     normals_fitted: int
     normals_turned: int
+    limits: ClassVar[Mapping[str, float]] = {"normals_fitted": 0, "normals_turned": 0}
     text: ClassVar[str] = "{0.normals_fitted} normals fitted, {0.normals_turned} turned"
-
-    @property
-    def important(self) -> bool:
-        return self.normals_fitted > 0 or self.normals_turned > 0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -195,14 +191,11 @@ class LeftOut(Note):
     covered_faces: int = 0  # faces, or points, that lie inside other bodies, wholly or in part
     covered_area: float = 0.0  # fraction of the area that does
     cut_faces: int = 0  # faces that lie inside in part, and were cut
+    limits: ClassVar[Mapping[str, float]] = {"covered_faces": 0}
     text: ClassVar[str] = (
         "left out: {0.covered_faces} faces, {0.covered_area:.1%} of the area, that lie inside other bodies "
         "({0.cut_faces} of them in part)"
     )
-
-    @property
-    def important(self) -> bool:
-        return self.covered_faces > 0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -211,11 +204,8 @@ class FacesRestored(Note):
 
     restored_faces: int
     restored_area: float
+    limits: ClassVar[Mapping[str, float]] = {"restored_faces": 0}
     text: ClassVar[str] = "lost faces restored: {0.restored_faces}, {0.restored_area:.1%} of the area"
-
-    @property
-    def important(self) -> bool:
-        return True
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -233,10 +223,7 @@ class CompletedArea(Note):
     completed_area: float  # in squared units of length
     completed_share: float  # over the area of the whole surface
     where: list[list[list[float]]]  # (k, 2, d) lower and upper corners of boxes around it
-
-    @property
-    def important(self) -> bool:
-        return self.completed_share > SMALL
+    limits: ClassVar[Mapping[str, float]] = {"completed_share": SMALL}
 
     def __str__(self) -> str:
         text = f"{self.completed_share:.1%} of the surface is completed"
@@ -251,11 +238,8 @@ class BoundsNothing(Note):
     """Fraction of the area that bounds nothing: both of its sides are outside, and distance to it is positive."""
 
     open_area: float
+    limits: ClassVar[Mapping[str, float]] = {"open_area": SMALL}
     text: ClassVar[str] = "{0.open_area:.1%} of the area bounds nothing: distance to it is positive on both sides"
-
-    @property
-    def important(self) -> bool:
-        return self.open_area > SMALL
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -10,7 +10,7 @@ from typing import Any, Literal, cast, get_args, overload
 from numpy.typing import ArrayLike
 
 from .area_elements import bounds_around
-from .constraints import Constraint, Free, Soft, ZeroSet
+from .constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from .curves.curve_distance import distance_to_curves
 from .curves.drawings import distance_to_lines
 from .errors import SourceError, UnsupportedTypeError
@@ -250,13 +250,28 @@ def distance_to_solid(
     return completed_distance(solid, domain, Completion(), Heat(), band, progress)
 
 
-def plain_distance(
-    shape: Any, domain: Grid | TetMesh, method: Heat, as_oriented: bool, progress: Progress | None = None
+def is_plain(plain: bool, method: Heat) -> bool:
+    """Whether a field is the method's own: distance is zero on the whole shape, which some constraints deny."""
+    return plain or isinstance(method.constraint, EachComponent | LevelValues)
+
+
+def measured_distance(
+    shape: Any,
+    domain: Grid | TetMesh,
+    options: Completion,
+    method: Heat,
+    plain: bool,
+    progress: Progress | None = None,
+    **in_band: Any,
 ) -> Any:
-    """Run the method alone on a shape in space, whose faces are oriented but not completed; nothing is sharpened."""
-    if isinstance(shape, TriangleMesh | PolygonMesh) and not as_oriented:
-        shape = orient(shape)
-    return SignedHeatSolver[Any](domain, method.diffusion, progress).distance(shape, method.constraint)
+    """Measure distance to a shape or to lines; or run the method alone on the oriented shape, and sharpen nothing."""
+    if is_plain(plain, method):
+        if isinstance(shape, TriangleMesh | PolygonMesh) and not options.as_oriented:
+            shape = orient(shape)
+        return SignedHeatSolver[Any](domain, method.diffusion, progress).distance(shape, method.constraint)
+    if isinstance(domain, Grid) and domain.dimension == 2:
+        return distance_to_lines(shape, domain, **vars(method), as_oriented=options.as_oriented, progress=progress)
+    return completed_distance(shape, domain, options, method, progress=progress, **in_band)
 
 
 def grid_around(
@@ -335,13 +350,14 @@ def completed_distance(
     method: Heat,
     band: float | None = None,
     progress: Progress | None = None,
+    **tiles: Any,
 ) -> GridField | TetField:
-    """Complete a shape, then measure the distance to it on a grid in space or on tets."""
+    """Complete a shape, then measure the distance to it: on a grid in space as `Solid.field` does, or on tets."""
     if band is not None and not isinstance(domain, Grid):
         raise UnsupportedTypeError("a band is computed around solids, on a grid in space", remedy="leave out the band")
     solid = completed(shape, options, method, within(progress, 0.0, 0.5))
     progress = within(progress, 0.5, 1.0)
     if isinstance(domain, Grid):
-        return solid.field(grid=domain, band=band, progress=progress)
+        return solid.field(grid=domain, band=band, progress=progress, **tiles)
     phi = sharpen(TetField(domain, solid.distance(domain.vertices)), solid.boundary, progress=progress)
     return replace(phi, diagnostics=phi.diagnostics.noting(*solid.diagnostics.notes))

@@ -11,8 +11,8 @@ from typing import cast
 import numpy as np
 
 from ..arrays import Floats
-from ..constraints import Constraint, EachComponent, LevelValues, ZeroSet
-from ..distances import completed_distance, grid_around, plain_distance
+from ..constraints import Constraint, ZeroSet
+from ..distances import grid_around, is_plain, measured_distance
 from ..errors import (
     FileFormatError,
     GeometryError,
@@ -158,14 +158,15 @@ class Job:
             kind = type(self.samples).__name__
             raise UnsupportedTypeError(f"a {kind} is no Sampling", remedy="pass Sampling(n=…)", element="samples")
         reach = max(map(abs, self.offsets), default=0.0)
+        plain = is_plain(self.plain, self._method)
         cause = remedy = ""
         if not (self._measures or self.info):
             cause, remedy = "the job has no results", "ask for a volume, offsets, samples or info"
-        elif self._is_plain and (self.samples is not None or self.band is not None):
+        elif plain and (self.samples is not None or self.band is not None):
             result = "samples" if self.samples is not None else "a band"
             cause = f"a plain field has no distances to the shape, as {result} would need"
             remedy = "leave out plain" if self.plain else "take another constraint"
-        elif self._is_plain and replace(self._completion, as_oriented=False) != Completion():
+        elif plain and replace(self._completion, as_oriented=False) != Completion():
             cause = "a plain field has no solid, as lids, nested and keep_overlaps would need"
             remedy = "leave out plain" if self.plain else "take another constraint"
         elif self.band is not None and self.volume not in (None, *BAND_FORMATS):
@@ -177,9 +178,8 @@ class Job:
             raise SignedHeatError(cause, remedy=remedy)
 
     @property
-    def _is_plain(self) -> bool:
-        """Whether the field is the method's own: distance is zero on the whole shape, which some constraints deny."""
-        return self.plain or isinstance(self.constraint, EachComponent | LevelValues)
+    def _method(self) -> Heat:
+        return Heat(checked(self.constraint), positive_number(self.diffusion, "diffusion"))
 
     @property
     def _completion(self) -> Completion:
@@ -235,7 +235,8 @@ class Job:
         if isinstance(shape, DigitalSurface):
             shape = shape.smooth_surface
         reach = max(map(abs, self.offsets), default=0.0)
-        phi = self._distance(shape, grid_around(shape, reach, self.resolution, self.padding, self.spacing))
+        grid = grid_around(shape, reach, self.resolution, self.padding, self.spacing)
+        phi: GridField = measured_distance(shape, grid, self._completion, self._method, self.plain, band=self.band)
         figures |= {"notes": [str(note) for note in phi.diagnostics.important], "field": describe(phi)}
         if self.volume is not None:
             phi.save(f"{stem}{self.volume}")
@@ -252,12 +253,6 @@ class Job:
             (taken.normalized() if how.normalize else taken).save(f"{stem}{self._of_samples}", how.layout)
             figures["samples"] = taken.figures
         return figures
-
-    def _distance(self, shape: ShapeLike, grid: Grid) -> GridField:
-        method = Heat(checked(self.constraint), positive_number(self.diffusion, "diffusion"))
-        if self._is_plain:
-            return cast("GridField", plain_distance(shape, grid, method, self.as_oriented))
-        return cast("GridField", completed_distance(shape, grid, self._completion, method, self.band))
 
 
 @dataclass(frozen=True)

@@ -26,12 +26,9 @@ if TYPE_CHECKING:
     from . import reports as reports
 else:
     numpy = lazy_module("numpy", "commands")
-    PARTS = {
-        **{"compiled": "compiled", "diagnostics": "diagnostics", "parallel": "parallel", "samples": "samples"},
-        **{"inputs": "batches.inputs", "pool": "batches.pool"},
-        **{"inspection": "inspection", "files": "io.files"},
-        **{"curve_completion": "curves.curve_completion", "curve_distance": "curves.curve_distance"},
-        **{"surface_discretization": "surfaces.surface_discretization", "windows": "view.windows"},
-        **{"kernel_runs": "cli.kernel_runs", "reports": "cli.reports", "operands": "cli.operands"},
-    }
-    globals().update({name: lazy_module(f"signedheat.{path}", "commands") for name, path in PARTS.items()})
+    for path in (
+        *("compiled", "diagnostics", "inspection", "parallel", "samples", "batches.inputs", "batches.pool", "io.files"),
+        *("cli.kernel_runs", "cli.operands", "cli.reports", "curves.curve_completion", "curves.curve_distance"),
+        *("surfaces.surface_discretization", "view.windows"),
+    ):
+        globals()[path.rpartition(".")[2]] = lazy_module(f"signedheat.{path}", "commands")

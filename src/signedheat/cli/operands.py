@@ -6,7 +6,7 @@ import math
 from argparse import Namespace
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, overload
 
@@ -14,9 +14,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
-from ..curves.drawings import distance_to_lines
 from ..diagnostics import Diagnostics, SampledSource
-from ..distances import completed_distance, grid_around, plain_distance
+from ..distances import grid_around, measured_distance
 from ..errors import FileFormatError, GeometryError, SignedHeatError, SourceError, printable
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_field import GridField
@@ -39,9 +38,8 @@ from ..io.key_figures import describe as describe
 from ..io.scenes import scale_to, unit_of
 from ..io.solid_arrays import holds_solid
 from ..io.voxel_files import LabelImage, read_labels
-from ..jobs import Progress, within
 from ..memory import refuse_beyond_memory
-from ..solids.completion import Completion, complete, completed
+from ..solids.completion import Completion, completed
 from ..solids.heat_surfaces import Heat
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.polygon_mesh import PolygonMesh
@@ -54,8 +52,6 @@ from .options import IMAGES, is_planar, is_quiet
 from .terminal import ProgressBar, say
 
 TET_RESOLUTION = 32
-COMPLETED = 0.3
-"""Share of the progress of a band that is spent on completing the shape."""
 CANCELLED = 0.9
 """Fraction of the area that may cancel without a warning."""
 LISTED = 40
@@ -116,11 +112,8 @@ def place(coordinates: Iterable[float]) -> str:
 
 def solid_of(arguments: Namespace, path: str) -> Any:
     """Complete the shape in a file as the options say, and print important notes on standard error."""
-    names = ("as_oriented", "keep_overlaps", "lids", "nested", "diffusion")
-    options = {name: getattr(arguments, name) for name in names}
-    options["constraint"] = constraint_of(arguments.constraint)
     with prefix_errors(path), ProgressBar(is_quiet(arguments)) as progress:
-        solid = complete(read_shape(arguments, path), **options, progress=progress)
+        solid = completed(read_shape(arguments, path), *method_of(arguments), progress)
     say_important(arguments, solid.diagnostics, path)
     return solid
 
@@ -213,28 +206,25 @@ def measured(
         return shape, compute(shape, grid_for(shape, arguments, reach, image), arguments)
 
 
+def method_of(arguments: Namespace) -> tuple[Completion, Heat]:
+    """Return the options of a command for completing shapes, and for the method."""
+    names = ("lids", "nested", "as_oriented", "keep_overlaps")
+    completion = Completion(**{name: getattr(arguments, name) for name in names})
+    return completion, Heat(constraint_of(arguments.constraint), arguments.diffusion)
+
+
 @overload
 def compute(shape: Any, domain: Grid, arguments: Namespace) -> GridField: ...
 @overload
 def compute(shape: Any, domain: TetMesh, arguments: Namespace) -> TetField: ...
 def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridField | TetField:
     """Distance to a solid in space, to polylines in the plane; what matters about it goes to standard error."""
-    field: GridField | TetField
-    method = Heat(constraint_of(arguments.constraint), arguments.diffusion)
-    as_oriented = arguments.as_oriented
-    options = Completion(
-        lids=arguments.lids, nested=arguments.nested, as_oriented=as_oriented, keep_overlaps=arguments.keep_overlaps
+    where: Any = (
+        nullcontext(arguments.scheduler) if arguments.workers is None else ThreadPoolExecutor(arguments.workers)
     )
-    with ProgressBar(is_quiet(arguments)) as progress:
-        if isinstance(domain, Grid) and arguments.band is not None:
-            solid = completed(shape, options, method, within(progress, 0.0, COMPLETED))
-            field = in_band(solid, domain, arguments, within(progress, COMPLETED, 1.0))
-        elif arguments.plain or isinstance(method.constraint, EachComponent | LevelValues):
-            field = plain_distance(shape, domain, method, as_oriented, progress)
-        elif isinstance(domain, Grid) and domain.dimension == 2:
-            field = distance_to_lines(shape, domain, **vars(method), as_oriented=as_oriented, progress=progress)
-        else:
-            field = completed_distance(shape, domain, options, method, progress=progress)
+    with ProgressBar(is_quiet(arguments)) as progress, where as scheduler:
+        in_band = {"band": arguments.band, "store": arguments.tiles, "scheduler": scheduler}
+        field = measured_distance(shape, domain, *method_of(arguments), arguments.plain, progress, **in_band)
     say_important(arguments, field.diagnostics)
     return field
 
@@ -243,16 +233,6 @@ def say_important(arguments: Namespace, diagnostics: Diagnostics, path: str | No
     """Print the important notes of a result on standard error, with the file's name if there are several files."""
     for note in () if arguments.quiet else diagnostics.important:
         say(printable(f"signedheat: {note}" if path is None else f"signedheat: {path}: {note}"))
-
-
-def in_band(solid: Any, grid: Grid, arguments: Namespace, progress: Progress | None) -> GridField:
-    """Compute distance in a band, in memory or tile by tile."""
-    options = {"grid": grid, "band": arguments.band, "store": arguments.tiles, "progress": progress}
-    if arguments.tiles is None or arguments.workers is None:
-        return solid.field(scheduler=arguments.scheduler, **options)
-    with ThreadPoolExecutor(arguments.workers) as pool:
-        field = solid.field(scheduler=pool, **options)
-        return field
 
 
 def hint(field: GridField) -> str:

@@ -73,22 +73,6 @@ def run_job(name: str) -> None:
 
 
 COMMANDS: tuple[Command, ...] = (
-    *(
-        volume,
-        surface,
-        close,
-        offset,
-        watertight,
-        fill,
-        contour,
-        morph,
-        union,
-        intersect,
-        subtract,
-        sample,
-        deviation,
-        thickness,
-        batch,
-    ),
-    *(info, view, demo, warmup),
-)
+    volume, surface, close, offset, watertight, fill, contour, morph, union, intersect, subtract, sample, deviation,
+    thickness, batch, info, view, demo, warmup,
+)  # fmt: skip

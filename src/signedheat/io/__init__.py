@@ -19,28 +19,8 @@ from .vdb import write_vdb
 from .voxel_files import LabelImage, read_labels, read_volume
 
 __all__ = [
-    "CURVE_FORMATS",
-    "FIELD_FORMATS",
-    "POLYLINE_FORMATS",
-    "SAMPLE_FORMATS",
-    "SHAPE_FORMATS",
-    "TET_FIELD_FORMATS",
-    "VALUE_FORMATS",
-    "VERTEX_FIELD_FORMATS",
-    "LabelImage",
-    "ensure_field_writable",
-    "ensure_writable",
-    "load",
-    "load_field",
-    "read",
-    "read_curves",
-    "read_labels",
-    "read_polylines",
-    "read_step",
-    "read_volume",
-    "save",
-    "save_field",
-    "write_curves",
-    "write_polylines",
-    "write_vdb",
-]
+    "CURVE_FORMATS", "FIELD_FORMATS", "POLYLINE_FORMATS", "SAMPLE_FORMATS", "SHAPE_FORMATS", "TET_FIELD_FORMATS",
+    "VALUE_FORMATS", "VERTEX_FIELD_FORMATS", "LabelImage", "ensure_field_writable", "ensure_writable", "load",
+    "load_field", "read", "read_curves", "read_labels", "read_polylines", "read_step", "read_volume", "save",
+    "save_field", "write_curves", "write_polylines", "write_vdb",
+]  # fmt: skip
