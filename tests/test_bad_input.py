@@ -319,6 +319,7 @@ CLOSE = [
     ("ball.ply ring.json -o out.obj --diffusion -1", 2, "not positive"),
     ("ball.ply ring.json -o out.obj --diffusion nan", 2, "not a finite number"),
     ("ball.ply ring.json -o out.obj --constraint hopeful", 2, "not one of"),
+    ("ball.ply ring.json -o out.obj --constraint each-component --every-piece", 2, "do not go together"),
     ("ball.ply ring.json -o out.obj --constraint levels:1,2,3", 1, "ring.json: 3 level values"),
 ]
 
@@ -381,10 +382,12 @@ OTHERS = [
     ("batch ball.ply -o made --volume --spacing 0.1 0.1", 2, "--spacing"),
     ("batch ball.ply -o made --volume stl", 2, "invalid choice"),
     ("batch ball.ply -o made --volume --seed 3", 2, "--seed goes with --sample"),
+    ("batch ball.ply -o made --info --band 1", 2, "--band goes with --volume, --offset or --sample"),
     ("batch ball.ply -o made --volume --surface ply", 2, "--surface goes with --offset"),
     ("watertight ball.ply -o made.stl --label 2", 1, "only images have labels"),
     ("watertight ball.ply -o made --resolution 9 --spacing 1", 2, "do not go together"),
     ("watertight ball.ply -o made --thickness=-1", 2, "not positive"),
+    ("watertight ball.ply -o made.glb", 2, "closed meshes are written as"),
     ("watertight ball.ply -o made --surface txt", 2, "invalid choice"),
 ]
 TABLES = {"morph ": MORPH, "close ": CLOSE, "surface ": SURFACE, "volume ": VOLUME, "": OTHERS}

@@ -187,3 +187,12 @@ def test_curves_lie_on_the_surface_of_a_solid(tmp_path, capsys):
     names = [str(tmp_path / name) for name in ("ball.npz", "curve.json", "phi.vtp")]
     assert main(["surface", *names[:2], "-o", names[2], "--quiet"]) == 0
     assert sh.load_field(names[2]).values.shape == (len(solid.boundary.vertices),)
+
+
+def test_options_of_completion_are_refused_of_solids(tmp_path, capsys):
+    """They had no effect on what is complete, without a word."""
+    sh.complete(samples.sphere(1)).save(tmp_path / "solid.npz")
+    for command in ("volume", "thickness"):
+        output = str(tmp_path / "made.npz")
+        assert main([command, str(tmp_path / "solid.npz"), "-o", output, "--resolution", "9", "--lids", "flat"]) == 1
+        assert "--lids is for shapes that are completed" in capsys.readouterr().err

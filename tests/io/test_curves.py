@@ -47,6 +47,16 @@ def test_strict_reading_refuses_points_that_share_no_face(tmp_path):
         sh.io.read_curves(tmp_path / "jump.json", mesh, strict=True)
 
 
+def test_curves_across_a_seam_have_no_gap_there(tmp_path):
+    """The method runs through seams, whose vertices lie in pairs at one place."""
+    corners = [[x, y, 0] for left in (0, 1) for x, y in ((left, 0), (left + 1, 0), (left + 1, 1), (left, 1))]
+    mesh = sh.TriangleMesh(corners, [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    nodes = [{"v": [vertex], "w": [1]} for vertex in (0, 1, 5)]
+    group = {"kind": "signed_curve", "nodes": nodes, "segments": [[0, 1], [1, 2]]}
+    (tmp_path / "across.json").write_text(json.dumps({"groups": [group]}))
+    assert sh.io.read_curves(tmp_path / "across.json", mesh, strict=True)[0].n_points == 3
+
+
 def test_obj_lines_read_back_as_the_same_lines(tmp_path):
     mesh = sphere(2)
     curves = [c for c in some_curves(mesh) if not isinstance(c, sh.Curve) or c.oriented][1:]

@@ -13,7 +13,7 @@ from typing import Any
 import signedheat as sh
 
 from ..errors import SignedHeatError, SourceError, printable
-from .late_imports import files, inputs, pool
+from .late_imports import files, inputs, pool, shape_files
 from .late_imports import operands as shapes
 from .options import (
     LABEL,
@@ -28,6 +28,7 @@ from .options import (
     command,
     finite,
     group,
+    is_given,
     is_quiet,
     option,
     output,
@@ -65,11 +66,15 @@ RUNNING = group(
 
 
 def check_batch(arguments: Namespace) -> None:
-    """Reject a batch without results, and results that contradict each other."""
+    """Reject a batch without results, results that contradict each other, and options of distance where none is."""
     try:
         job_of(arguments)
     except SignedHeatError as problem:
         arguments.parser.error(str(problem))
+    if not (arguments.volume or arguments.offset or arguments.sample):
+        for option in (*ROOM.options, *STEPS.options, *METHOD.options):
+            if is_given(arguments, option.names[-1]):
+                arguments.parser.error(f"{option.names[-1]} goes with --volume, --offset or --sample")
 
 
 @command(
@@ -104,16 +109,19 @@ def batch(arguments: Namespace) -> Summary:
     return summary, f"{printable(str(done.manifest))}: {counted}"
 
 
-def names_surface(output: str) -> bool:
-    """Whether an output names a file of a surface rather than a folder."""
+def names_file(output: str) -> bool:
+    """Whether an output names a file of a shape rather than a folder."""
     is_folder = output.endswith(("/", os.sep)) or os.path.isdir(output)
-    return not is_folder and Path(output).suffix.lower().lstrip(".") in SURFACE_FILES
+    return not is_folder and Path(output).suffix.lower() in shape_files.READERS
 
 
 def check_watertight(arguments: Namespace) -> None:
     """Take the format from the name of the output; reject another one."""
-    if names_surface(arguments.output):
+    if names_file(arguments.output):
         ending = Path(arguments.output).suffix.lower().lstrip(".")
+        if ending not in SURFACE_FILES:
+            formats = ", ".join(SURFACE_FILES)
+            arguments.parser.error(f"closed meshes are written as {formats}: a folder named .{ending} ends with /")
         if arguments.surface not in (None, ending):
             arguments.parser.error(f"--surface {arguments.surface} and -o {arguments.output} do not go together")
         arguments.surface = ending
@@ -158,7 +166,7 @@ def watertight(arguments: Namespace) -> Summary:
         label=arguments.label,
         units=arguments.units,
     )
-    if names_surface(arguments.output):
+    if names_file(arguments.output):
         return one_watertight(arguments, job)
     done = made_of_each(arguments, arguments.output, job, in_words)
     summary = {

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..curves import curve_completion as curve_completion
     from ..curves import curve_distance as curve_distance
     from ..io import files as files
+    from ..io import shape_files as shape_files
     from ..surfaces import surface_discretization as surface_discretization
     from ..view import windows as windows
     from . import kernel_runs as kernel_runs
@@ -29,6 +30,6 @@ else:
     for path in (
         *("compiled", "diagnostics", "inspection", "parallel", "samples", "batches.inputs", "batches.pool", "io.files"),
         *("cli.kernel_runs", "cli.operands", "cli.reports", "curves.curve_completion", "curves.curve_distance"),
-        *("surfaces.surface_discretization", "view.windows"),
+        *("io.shape_files", "surfaces.surface_discretization", "view.windows"),
     ):
         globals()[path.rpartition(".")[2]] = lazy_module(f"signedheat.{path}", "commands")

@@ -12,43 +12,25 @@ from typing import Any, overload
 
 import numpy as np
 
+import signedheat as sh
+
 from ..arrays import Floats
-from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
+from ..constraints import Constraint
 from ..diagnostics import Diagnostics, SampledSource
 from ..distances import grid_around, measured_distance
 from ..errors import FileFormatError, GeometryError, SignedHeatError, SourceError, printable
-from ..grids.grid import RESOLUTION, Grid
-from ..grids.grid_field import GridField
-from ..grids.polyline import Polyline
-from ..io import (
-    FIELD_FORMATS,
-    POLYLINE_FORMATS,
-    SHAPE_FORMATS,
-    ensure_writable,
-    load_field,
-    read,
-    read_polylines,
-    save,
-    write_polylines,
-)
+from ..grids.grid import RESOLUTION
 from ..io.field_files import VALUE_FORMATS, save_with_values
 from ..io.files import contents, distinct_names, extension
 from ..io.image_files import CONFIDENCE, NIFTI
 from ..io.key_figures import describe as describe
 from ..io.scenes import scale_to, unit_of
 from ..io.solid_arrays import holds_solid
-from ..io.voxel_files import LabelImage, read_labels
 from ..memory import refuse_beyond_memory
 from ..solids.completion import Completion, completed
 from ..solids.heat_surfaces import Heat
-from ..surfaces.digital_surface import DigitalSurface
-from ..surfaces.polygon_mesh import PolygonMesh
-from ..tets.lattice import tetrahedralize
 from ..tets.tet_discretization import memory_estimate
-from ..tets.tet_field import TetField
-from ..tets.tet_mesh import TetMesh
-from ..transforms import transform
-from .options import IMAGES, is_planar, is_quiet
+from .options import IMAGES, REPAIR, is_given, is_planar, is_quiet
 from .terminal import ProgressBar, say
 
 TET_RESOLUTION = 32
@@ -69,22 +51,36 @@ def prefix_errors(path: Any) -> Iterator[None]:
         raise error.at(path) from error
 
 
-def read_lines(arguments: Namespace) -> list[Polyline]:
+def read_lines(arguments: Namespace) -> list[sh.Polyline]:
     """Read the polylines in the plane that a command measures distance to."""
     if arguments.transform is not None:
         raise SourceError("a matrix moves shapes in space, not drawings", element="--transform", path=arguments.shape)
     scale = 1.0 if arguments.units is None else unit_scale(arguments, arguments.shape)
-    return [Polyline(scale * line.points, line.closed) for line in read_polylines(arguments.shape)]
+    return [sh.Polyline(scale * line.points, line.closed) for line in sh.io.read_polylines(arguments.shape)]
 
 
 def read_shape(arguments: Namespace, path: str) -> Any:
     """Read a shape in space, and place it."""
-    shape = read(path)
-    if isinstance(shape, DigitalSurface):
+    shape = sh.read(path)
+    if isinstance(shape, sh.Solid) and path == arguments.shape:
+        refuse_completing(arguments)
+    if isinstance(shape, sh.DigitalSurface):
         shape = shape.smooth_surface
     matrix = placement(arguments, path)
     with prefix_errors(path):
-        return shape if matrix is None else transform(shape, matrix)
+        return shape if matrix is None else sh.transform(shape, matrix)
+
+
+def refuse_completing(arguments: Namespace) -> None:
+    """Refuse options that have no effect on a solid."""
+    for option in REPAIR.options:
+        if is_given(arguments, option.names[-1]):
+            raise SourceError(
+                f"{option.names[-1]} is for shapes that are completed, and a solid is complete",
+                remedy="leave it out",
+                element=option.names[-1],
+                path=arguments.shape,
+            )
 
 
 def unit_in_use(arguments: Namespace, *paths: str) -> str | None:
@@ -158,13 +154,15 @@ def matrix_of(words: list[str]) -> Floats:
     return matrix
 
 
-def grid_for(shape: Any, arguments: Namespace, reach: float | None = None, image: LabelImage | None = None) -> Grid:
+def grid_for(
+    shape: Any, arguments: Namespace, reach: float | None = None, image: sh.io.LabelImage | None = None
+) -> sh.Grid:
     """Make the grid of the options; by default the grid of the image, or one around the shape with room for offsets."""
     spacing = arguments.spacing
     if spacing is not None and len(spacing) == 1:
         spacing = spacing[0]
     if arguments.origin is not None:
-        return Grid(arguments.origin, spacing, arguments.grid_shape)
+        return sh.Grid(arguments.origin, spacing, arguments.grid_shape)
     if image is not None and (arguments.resolution, spacing, arguments.padding) == (None, None, None):
         if reach is None:
             return image.grid
@@ -182,21 +180,21 @@ def constraint_of(word: str) -> Constraint:
     """
     name, _, values = word.partition(":")
     if name == "levels":
-        return LevelValues([float(value) for value in values.split(",")])
+        return sh.LevelValues([float(value) for value in values.split(",")])
     if name == "soft":
-        return Soft(float(values)) if values else Soft()
+        return sh.Soft(float(values)) if values else sh.Soft()
     named: dict[str, Constraint] = {
-        "free": Free(),
-        "zero-set": ZeroSet(),
-        "hard": ZeroSet(hard=True),
-        "each-component": EachComponent(),
+        "free": sh.Free(),
+        "zero-set": sh.ZeroSet(),
+        "hard": sh.ZeroSet(hard=True),
+        "each-component": sh.EachComponent(),
     }
     return named[word]
 
 
 def measured(
-    arguments: Namespace, image: LabelImage | None = None, reach: float | None = None
-) -> tuple[Any, GridField]:
+    arguments: Namespace, image: sh.io.LabelImage | None = None, reach: float | None = None
+) -> tuple[Any, sh.GridField]:
     """Return the shape of a command, from a file or an image, and the distance to it, with room for offsets."""
     with prefix_errors(arguments.shape):
         if image is not None:
@@ -214,10 +212,10 @@ def method_of(arguments: Namespace) -> tuple[Completion, Heat]:
 
 
 @overload
-def compute(shape: Any, domain: Grid, arguments: Namespace) -> GridField: ...
+def compute(shape: Any, domain: sh.Grid, arguments: Namespace) -> sh.GridField: ...
 @overload
-def compute(shape: Any, domain: TetMesh, arguments: Namespace) -> TetField: ...
-def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridField | TetField:
+def compute(shape: Any, domain: sh.TetMesh, arguments: Namespace) -> sh.TetField: ...
+def compute(shape: Any, domain: sh.Grid | sh.TetMesh, arguments: Namespace) -> sh.GridField | sh.TetField:
     """Distance to a solid in space, to polylines in the plane; what matters about it goes to standard error."""
     where: Any = (
         nullcontext(arguments.scheduler) if arguments.workers is None else ThreadPoolExecutor(arguments.workers)
@@ -235,7 +233,7 @@ def say_important(arguments: Namespace, diagnostics: Diagnostics, path: str | No
         say(printable(f"signedheat: {note}" if path is None else f"signedheat: {path}: {note}"))
 
 
-def hint(field: GridField) -> str:
+def hint(field: sh.GridField) -> str:
     """Return another line of output about sources that may have been given twice, or nothing."""
     note = field.diagnostics.note(SampledSource)
     cancelled = note.area_cancelled if note else 0.0
@@ -252,10 +250,10 @@ def range_in_words(summary: dict[str, Any], unit: str | None) -> str:
     return f"φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}{named(unit)}"
 
 
-def on_tets(arguments: Namespace) -> tuple[Any, TetField]:
+def on_tets(arguments: Namespace) -> tuple[Any, sh.TetField]:
     """Return the shape of a command, and the distance to it on tets from a file or around the shape."""
-    shape, mesh = read_shape(arguments, arguments.shape), read(arguments.tets) if arguments.tets else None
-    if mesh is not None and not isinstance(mesh, TetMesh):
+    shape, mesh = read_shape(arguments, arguments.shape), sh.read(arguments.tets) if arguments.tets else None
+    if mesh is not None and not isinstance(mesh, sh.TetMesh):
         raise GeometryError(
             f"{arguments.tets} holds no tets, but a {type(mesh).__name__}",
             remedy="use a .mesh, .msh, .vtu or .ele file",
@@ -263,7 +261,7 @@ def on_tets(arguments: Namespace) -> tuple[Any, TetField]:
     with prefix_errors(arguments.shape):
         if mesh is None:
             resolution = arguments.resolution or TET_RESOLUTION
-            mesh = tetrahedralize(shape, resolution=resolution, padding=arguments.padding)
+            mesh = sh.tetrahedralize(shape, resolution=resolution, padding=arguments.padding)
             n = mesh.n_tets
             refuse_beyond_memory(  # the number of tets grows at least with the square of the resolution
                 f"distance on {n:,} tets",
@@ -279,36 +277,36 @@ def field_or_image(path: str) -> Any:
     ending = extension(path)
     alone = ending == ".npy" and not Path(path).with_suffix(".json").is_file()
     if ending in NIFTI or alone:
-        image = read_labels(path)
+        image = sh.io.read_labels(path)
         labels = labels_of(image) if alone else None
         return None if labels and set(labels) <= {0, 1} else image  # a set of voxels is a shape
-    if ending not in FIELD_FORMATS or (ending == ".npz" and holds_solid(path)):
+    if ending not in sh.io.FIELD_FORMATS or (ending == ".npz" and holds_solid(path)):
         return None
     if ending not in IMAGES:
-        return load_field(path)
+        return sh.load_field(path)
     try:
-        image = read_labels(path)
+        image = sh.io.read_labels(path)
     except FileFormatError:  # a field in the plane, or none
-        return load_field(path)
+        return sh.load_field(path)
     along = np.array_equal(image.axes, np.diag(image.spacing))
-    return load_field(path) if along and image.labels.dtype.kind == "f" else image
+    return sh.load_field(path) if along and image.labels.dtype.kind == "f" else image
 
 
-def image_of(arguments: Namespace) -> LabelImage | None:
+def image_of(arguments: Namespace) -> sh.io.LabelImage | None:
     """Return the image of labels of a command, placed as its options say, if there is one."""
     if extension(arguments.shape) not in IMAGES:
         if arguments.label is not None:
             raise SourceError("only images have labels", element="--label", remedy="leave it out", path=arguments.shape)
         return None
-    image, matrix = read_labels(arguments.shape), placement(arguments, arguments.shape)
+    image, matrix = sh.io.read_labels(arguments.shape), placement(arguments, arguments.shape)
     if matrix is None:
         return image
     turn = matrix[:3, :3]
     with prefix_errors(arguments.shape):
-        return LabelImage(image.labels, turn @ image.axes, turn @ image.origin + matrix[:3, 3], image.space)
+        return sh.io.LabelImage(image.labels, turn @ image.axes, turn @ image.origin + matrix[:3, 3], image.space)
 
 
-def labels_of(image: LabelImage) -> list[int] | None:
+def labels_of(image: sh.io.LabelImage) -> list[int] | None:
     """Return the labels, if these are few whole numbers; otherwise the image holds a field."""
     values = image.labels.astype(np.int8) if image.labels.dtype == bool else image.labels
     distinct = np.unique(values[np.isfinite(values)])
@@ -317,19 +315,19 @@ def labels_of(image: LabelImage) -> list[int] | None:
     return [int(label) for label in distinct]
 
 
-def field_of(image: LabelImage) -> GridField:
+def field_of(image: sh.io.LabelImage) -> sh.GridField:
     """Return the values of an image as a field along its own axes."""
-    return GridField(image.grid, image.labels.astype(np.float64))
+    return sh.GridField(image.grid, image.labels.astype(np.float64))
 
 
-def thing_of(image: LabelImage) -> GridField | PolygonMesh:
+def thing_of(image: sh.io.LabelImage) -> sh.GridField | sh.PolygonMesh:
     """Return what an image shows, along its own axes: a field, or the boundary of all voxels with a label."""
     if labels_of(image) is None:
         return field_of(image)
-    return DigitalSurface(image.labels != 0, image.spacing).squares
+    return sh.DigitalSurface(image.labels != 0, image.spacing).squares
 
 
-def place_of(image: LabelImage | None) -> dict[str, Any]:
+def place_of(image: sh.io.LabelImage | None) -> dict[str, Any]:
     """Describe the place of an image, for ``--json``."""
     if image is None:
         return {}
@@ -339,23 +337,23 @@ def place_of(image: LabelImage | None) -> dict[str, Any]:
 def ensure_surface_writable(path: str, planar: bool = False) -> None:
     """Check before computing that a surface, or polylines in the plane, can be written."""
     if planar:
-        ensure_writable(path, POLYLINE_FORMATS, "lines in the plane")
+        sh.io.ensure_writable(path, sh.io.POLYLINE_FORMATS, "lines in the plane")
     else:
-        ensure_writable(path, SHAPE_FORMATS - {".xyz", ".pc"}, "a surface")
+        sh.io.ensure_writable(path, sh.io.SHAPE_FORMATS - {".xyz", ".pc"}, "a surface")
 
 
-def save_level(what: Any, path: str, image: LabelImage | None = None, field: GridField | None = None) -> None:
+def save_level(what: Any, path: str, image: sh.io.LabelImage | None = None, field: sh.GridField | None = None) -> None:
     """Write a surface, or polylines in the plane; a surface from an image gets the image's place.
 
     Where the field has a confidence, and the format has room for it, that is written at each vertex.
     """
     if isinstance(what, list):
-        return write_polylines(path, what)
+        return sh.io.write_polylines(path, what)
     placed = what if image is None else image.to_world(what)
     if field is not None and field.confidence is not None and extension(path) in VALUE_FORMATS:
         save_with_values(placed, path, CONFIDENCE, field.confidence_at(what.vertices))
     else:
-        save(placed, path)
+        sh.save(placed, path)
 
 
 def counts(what: Any) -> dict[str, Any]:

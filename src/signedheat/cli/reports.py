@@ -9,32 +9,25 @@ from typing import Any
 
 import numpy as np
 
+import signedheat as sh
+
 from ..area_elements import bounds_around
 from ..errors import SourceError, printable
-from ..foreign import as_shape
 from ..geodesics.shortest_paths import gaps
-from ..grids.grid import Grid
 from ..grids.grid_discretization import fitting_spacing, memory_estimate
 from ..inspection import CloudReport, SurfaceReport, TetReport, inspect
-from ..io import read, read_curves, read_polylines
 from ..io.files import extension
 from ..io.mesh_files import read_obj_elements
 from ..io.scenes import unit_of
-from ..io.voxel_files import LabelImage
 from ..memory import available_memory
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import EDGE, FACE, VERTEX, locate_points
 from ..mesh.triangles import face_areas
 from ..mesh.welding import indexed
 from ..solids.mesh_orientation import Orientation, orientation
-from ..solids.solid import Solid
 from ..solids.thickness import Widths, widths
 from ..solids.tiles import BYTES_AT_WORK, BYTES_PER_NODE
-from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.source_segments import segments_of
-from ..surfaces.surface_curves import Curve
-from ..surfaces.triangle_mesh import TriangleMesh
-from ..tets.tet_mesh import TetMesh
 from .operands import describe, field_or_image, labels_of
 from .options import Summary, is_planar
 
@@ -48,7 +41,7 @@ def report(file: str, arguments: Namespace) -> Summary:
     field = field_or_image(file)
     if arguments.curves and (field is not None or is_planar(file)):
         raise SourceError("curves lie on surfaces, and this file holds none", element="--curves", path=file)
-    if isinstance(field, LabelImage):
+    if isinstance(field, sh.io.LabelImage):
         summary = image_report(file, field)
         return summary, _table(summary)
     if field is not None:
@@ -57,11 +50,11 @@ def report(file: str, arguments: Namespace) -> Summary:
         return summary, _table(summary)
     if is_planar(file):
         return lines_report(file)
-    held = read(file)
-    shape = as_shape(held)
+    held = sh.read(file)
+    shape = sh.as_shape(held)
     counts = inspect(shape)
-    solid = held if isinstance(held, Solid) else None
-    found = orientation(shape) if solid is None and isinstance(shape, TriangleMesh | PolygonMesh) else None
+    solid = held if isinstance(held, sh.Solid) else None
+    found = orientation(shape) if solid is None and isinstance(shape, sh.TriangleMesh | sh.PolygonMesh) else None
     told = verdict(counts, found) if solid is None else verdict_of_solid(solid)
     summary = {"verdict": told, "file": file, "kind": type(held).__name__, **asdict(counts)}
     if (unit := unit_of(file)) is not None:
@@ -74,7 +67,7 @@ def report(file: str, arguments: Namespace) -> Summary:
         rows["orientation"] = orientation_text(found)
     outwards = None if found is None else found.shape
     if solid is not None and solid.bounding.any():
-        outwards = TriangleMesh(*indexed(solid.outward))
+        outwards = sh.TriangleMesh(*indexed(solid.outward))
     if outwards is not None:
         measured = widths(outwards)
         summary["thickness"] = {**asdict(measured), "spacing": measured.spacing}
@@ -84,20 +77,22 @@ def report(file: str, arguments: Namespace) -> Summary:
     summary |= extra
     text = _table(rows | extra)
     if arguments.curves:
-        if isinstance(shape, TetMesh):
+        if isinstance(shape, sh.TetMesh):
             raise SourceError(
                 f"curves lie on meshes and point clouds, not a {type(shape).__name__}",
                 element="shape",
                 path=arguments.curves,
             )
-        summary["curves"] = curve_reports(shape, read_curves(arguments.curves, shape))
+        triangles = shape.triangulation.intrinsic
+        sources = sh.io.read_curves(arguments.curves, shape)
+        summary["curves"] = [curve_report(triangles, source, number) for number, source in enumerate(sources)]
         text += f"\n\n{printable(arguments.curves)}\n{curves_text(summary['curves'])}"
     return summary, text
 
 
 def lines_report(file: str) -> Summary:
     """Inspect polylines in the plane."""
-    lines = read_polylines(file)
+    lines = sh.io.read_polylines(file)
     bounds = bounds_around(lines)
     summary = {
         "file": file,
@@ -112,7 +107,7 @@ def lines_report(file: str) -> Summary:
     return summary, _table(summary)
 
 
-def image_report(file: str, image: LabelImage) -> dict[str, Any]:
+def image_report(file: str, image: sh.io.LabelImage) -> dict[str, Any]:
     """Report the place of an image, and its labels or the range of its values."""
     values, labels = image.labels, labels_of(image)
     figures: dict[str, Any] = {
@@ -168,7 +163,7 @@ def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation 
     return f"broken: {', '.join(said)}; every command takes it as it is"
 
 
-def verdict_of_solid(solid: Solid) -> str:
+def verdict_of_solid(solid: sh.Solid) -> str:
     """Say in one line that a solid is complete.
 
     Examples
@@ -218,16 +213,8 @@ def orientation_text(found: Orientation) -> str:
     return "; ".join(said)
 
 
-def curve_reports(surface: Any, sources: Sequence[Any]) -> list[dict[str, Any]]:
-    """Make a row for each source: elements with its points, kinds of segments, length, open ends."""
-    mesh = surface.triangulation
-    lengths = mesh.edge_lengths[mesh.edges.face_edges]
-    triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
-    return [curve_report(triangles, source, number) for number, source in enumerate(sources)]
-
-
 def curve_report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str, Any]:
-    """Make the row of one source."""
+    """Make the row of a source: elements with its points, kinds of segments, length, open ends."""
     places = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
     kinds = np.bincount(places.kinds, minlength=3)
     row: dict[str, Any] = {
@@ -237,7 +224,7 @@ def curve_report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str
         "on_edges": int(kinds[EDGE]),
         "in_faces": int(kinds[FACE]),
     }
-    if not isinstance(source, Curve):
+    if not isinstance(source, sh.Curve):
         return row
     apart = gaps(triangles, places, source.closed)
     parts = segments_of(source, triangles, number=number)
@@ -311,7 +298,7 @@ def _least_spacing(shape: Any) -> float | None:
     available = available_memory()
     if available is None or not (shape.bounds[1] > shape.bounds[0]).any():
         return None
-    grid = Grid.around(shape.bounds, 128)
+    grid = sh.Grid.around(shape.bounds, 128)
     spacing = fitting_spacing(grid, available, BYTES_PER_NODE, BYTES_AT_WORK, 0.0)
     return float(spacing.max()) if (spacing < grid.upper - grid.origin).all() else None
 
@@ -320,7 +307,7 @@ def _memory(shape: Any, resolution: int) -> int | None:
     """Estimate memory for a grid around the shape; None if the shape is a single place."""
     if not (shape.bounds[1] > shape.bounds[0]).any():
         return None
-    return memory_estimate(Grid.around(shape.bounds, resolution), BYTES_PER_NODE, BYTES_AT_WORK)
+    return memory_estimate(sh.Grid.around(shape.bounds, resolution), BYTES_PER_NODE, BYTES_AT_WORK)
 
 
 def _table(summary: dict[str, Any]) -> str:

@@ -13,7 +13,6 @@ from ..errors import FileFormatError, SignedHeatError, SourceError, UnsupportedT
 from ..foreign import ForeignShape, converted
 from ..geodesics.shortest_paths import gaps
 from ..kinds import EmbeddedSurface
-from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.polylines import assemble_polylines
 from ..mesh.surface_points import locate_points, refuse_missing
 from ..surfaces.digital_surface import DigitalSurface
@@ -95,12 +94,10 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
 
 def refuse_gaps(sources: Sequence[CurveOrPoints], mesh: TriangleMesh) -> None:
     """Raise a `SourceError` if consecutive points of a curve share no face."""
-    lengths = mesh.edge_lengths[mesh.edges.face_edges]
-    triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
     for number, source in enumerate(sources):
         if isinstance(source, Curve):
-            places = locate_points(triangles, source.faces, source.barycentric, f"curve {number}: point")
-            apart = gaps(triangles, places, source.closed)
+            places = locate_points(mesh.intrinsic, source.faces, source.barycentric, f"curve {number}: point")
+            apart = gaps(mesh.intrinsic, places, source.closed)
             if len(apart):
                 raise SourceError(
                     f"curve {number}: points {apart[0]} and {(apart[0] + 1) % source.n_points} share no face, "

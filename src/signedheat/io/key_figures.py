@@ -14,7 +14,6 @@ from ..inspection import inspect
 from ..kinds import Shape
 from ..solids.mesh_orientation import orientation
 from ..solids.thickness import widths
-from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 
@@ -57,8 +56,7 @@ def snake(name: str) -> str:
 
 def shape_figures(shape: Shape) -> dict[str, object]:
     """Return counts and defects of a shape; for meshes also their orientation, walls and gaps."""
-    counted = shape.squares if isinstance(shape, DigitalSurface) else shape
-    figures: dict[str, object] = {"kind": type(shape).__name__, **asdict(inspect(counted))}
+    figures: dict[str, object] = {"kind": type(shape).__name__, **asdict(inspect(shape))}
     if isinstance(shape, TriangleMesh | PolygonMesh):
         oriented = orientation(shape)
         found_widths = widths(oriented.shape)
