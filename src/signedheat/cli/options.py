@@ -498,7 +498,7 @@ def refuse_contradictions(arguments: Namespace) -> None:
         for other in WITHOUT_SOLIDS.get(name, ()):
             if is_given(arguments, other):
                 error(f"{name} is for solids, and {other} uses none")
-        needed = NEEDED.get(name)
+        needed = NEEDED.get(name, name)
         if needed in declared and not is_given(arguments, needed):
             error(f"{name} goes with {needed}")
     dimension = 2 if is_given(arguments, DRAWING) else 3
