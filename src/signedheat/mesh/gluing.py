@@ -21,6 +21,8 @@ kernel = compiled(error_model="numpy")  # without exceptions, compilation takes 
 
 FLIP, TURN, SPLIT_FACE, SPLIT_EDGE = 0, 1, 2, 3
 """Kinds of steps in a history."""
+FACES, EDGES, VERTICES, STEPS, STACKED = range(5)
+"""Places in `Gluing.counts`: numbers of faces, edges, vertices, steps of the history, and edges on the stack."""
 MOST_FLIPS = 1000
 """Number of flips after which an edge is left as it is: rounding makes it flip back and forth."""
 
@@ -40,7 +42,7 @@ class Gluing(NamedTuple):
     length: Floats  # (e,) length of every edge, in multiples of `unit`
     fixed: Bools  # (e,) edges that must not be flipped
     flips: Ints  # (e,) how often each edge has been flipped
-    counts: Ints  # (5,) numbers of faces, edges, vertices, steps of the history, and edges on the stack
+    counts: Ints  # (5,) how many there are of each: see `FACES`
     steps: Ints  # (s, 4) the history: kind of each step, two halfedges or faces, and the new vertex
     weights: Floats  # (s, 4) the affine dependency of the points of each step
     scratch: Ints  # work array
@@ -106,10 +108,10 @@ def move(g: Gluing, old: tuple[int, ...], new: tuple[int, ...]) -> None:
 @kernel
 def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float, b: float, c: float, d: float) -> None:
     """Write one step into the history."""
-    n = g.counts[3]
+    n = g.counts[STEPS]
     g.steps[n, 0], g.steps[n, 1], g.steps[n, 2], g.steps[n, 3] = kind, first, second, vertex
     g.weights[n, 0], g.weights[n, 1], g.weights[n, 2], g.weights[n, 3] = a, b, c, d
-    g.counts[3] = n + 1
+    g.counts[STEPS] = n + 1
 
 
 @kernel
@@ -189,11 +191,11 @@ def flip(g: Gluing, h: int) -> bool:
 @kernel
 def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
     """Flip stacked edges until all that are not fixed are Delaunay; return False if the history is full before."""
-    while g.counts[4] > 0:
-        if g.counts[3] + 2 > len(g.steps):
+    while g.counts[STACKED] > 0:
+        if g.counts[STEPS] + 2 > len(g.steps):
             return False
-        g.counts[4] -= 1
-        e = stack[g.counts[4]]
+        g.counts[STACKED] -= 1
+        e = stack[g.counts[STACKED]]
         stacked[e] = False
         h = g.start[e]
         t = g.sibling[h]
@@ -214,42 +216,51 @@ def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
 def look_at(g: Gluing, stack: Ints, stacked: Bools, e: int) -> None:
     """Push an edge on the stack of edges to be checked."""
     if not stacked[e]:
-        stack[g.counts[4]] = e
+        stack[g.counts[STACKED]] = e
         stacked[e] = True
-        g.counts[4] += 1
+        g.counts[STACKED] += 1
 
 
 @kernel
 def new_edge(g: Gluing, length: float, fixed: bool) -> int:
     """Add an edge; return its id."""
-    e: int = g.counts[1]
-    g.counts[1] = e + 1
+    e: int = g.counts[EDGES]
+    g.counts[EDGES] = e + 1
     g.length[e], g.fixed[e], g.flips[e] = length, fixed, 0
     return e
 
 
 @kernel
-def apex_position(g: Gluing, h: int) -> tuple[float, float]:
-    """Return (x, y ≥ 0) of the face's third corner, with the halfedge along the positive x axis from the origin."""
+def apex(g: Gluing, h: int) -> complex:
+    """Return the face's third corner, above the halfedge, which runs along the positive real axis from the origin."""
     base, right, left = g.length[g.edge[h]], g.length[g.edge[following(h)]], g.length[g.edge[preceding(h)]]
     n, d = half_tangent(right, base, left)
-    return 0.5 * (base + (left - right) * (left + right) / base), 0.5 * np.sqrt(n * d) / base
+    return complex(0.5 * (base + (left - right) * (left + right) / base), 0.5 * np.sqrt(n * d) / base)
+
+
+@kernel
+def cross(a: complex, b: complex) -> float:
+    """Return the cross product of plane vectors, which is positive where b is counter-clockwise of a."""
+    return a.real * b.imag - a.imag * b.real
 
 
 @kernel
 def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
     """Insert a vertex x at (u, v, w) into a face (a, b, c), which becomes (a, b, x), (b, c, x), (c, a, x); return x."""
     h = 3 * f
-    n: int = g.counts[0]
-    x: int = g.counts[2]
+    n: int = g.counts[FACES]
+    x: int = g.counts[VERTICES]
     a, b, c = g.tail[h], g.tail[h + 1], g.tail[h + 2]
     base = g.length[g.edge[h]]
-    apex_x, apex_y = apex_position(g, h)
-    px, py = v * base + w * apex_x, w * apex_y
+    top = apex(g, h)
+    place = v * base + w * top
     record(g, SPLIT_FACE, f, n, x, u, v, w, 1.0)
-    to_a, to_b = new_edge(g, np.hypot(px, py), False), new_edge(g, np.hypot(px - base, py), False)
-    to_c = new_edge(g, np.hypot(px - apex_x, py - apex_y), False)
-    g.counts[2], g.counts[0] = x + 1, n + 2
+    to_a, to_b, to_c = (
+        new_edge(g, abs(place), False),
+        new_edge(g, abs(place - base), False),
+        new_edge(g, abs(place - top), False),
+    )
+    g.counts[VERTICES], g.counts[FACES] = x + 1, n + 2
     k, l = 3 * n, 3 * n + 3
     move(g, (h + 1, h + 2), (k, l))
     g.tail[k], g.tail[l] = b, c
@@ -272,24 +283,23 @@ def split_edge(g: Gluing, h: int, fraction: float) -> int:
         around[k] = y
         y = g.sibling[y]
     e: int = g.edge[h]
-    x: int = g.counts[2]
-    g.counts[2] = x + 1
+    x: int = g.counts[VERTICES]
+    g.counts[VERTICES] = x + 1
     along = fraction if g.forward[h] else 1.0 - fraction
     whole = g.length[e]
     far_edge = new_edge(g, (1.0 - along) * whole, g.fixed[e])
     for k in range(count):
-        y, n = around[k], g.counts[0]
-        g.counts[0] = n + 1
+        y, n = around[k], g.counts[FACES]
+        g.counts[FACES] = n + 1
         share = along if g.forward[y] else 1.0 - along
-        apex_x, apex_y = apex_position(g, y)
         record(g, SPLIT_EDGE, y, n, x, 1.0 - share, share, 0.0, 1.0)
-        cut = new_edge(g, np.hypot(apex_x - share * whole, apex_y), False)
-        second, first, last = 3 * n, following(y), preceding(y)
-        head, apex = g.tail[first], g.tail[last]
+        cut = new_edge(g, abs(apex(g, y) - share * whole), False)
+        second, first = 3 * n, following(y)
+        head, opposite = g.tail[first], g.tail[preceding(y)]
         move(g, (first,), (second + 1,))
         g.tail[second], g.tail[second + 1] = x, head
         g.forward[second], g.front[second] = g.forward[y], g.front[y]
-        pair(g, first, x, second + 2, apex, cut)
+        pair(g, first, x, second + 2, opposite, cut)
         seconds[k] = second
     g.length[e] = along * whole
     for k in range(count):
@@ -355,8 +365,8 @@ def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
 
 def flip_all(gluing: Gluing) -> Gluing:
     """Flip all edges that are not fixed to Delaunay, in place; return the gluing, with room for its history."""
-    n_edges = int(gluing.counts[1])
-    gluing.counts[4] = n_edges
+    n_edges = int(gluing.counts[EDGES])
+    gluing.counts[STACKED] = n_edges
     stack, stacked = np.arange(n_edges)[::-1].copy(), np.ones(n_edges, dtype=bool)
     while not flip_until_delaunay(gluing, stack, stacked):
         gluing = gluing._replace(steps=doubled(gluing.steps), weights=doubled(gluing.weights))

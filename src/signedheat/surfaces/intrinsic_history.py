@@ -22,7 +22,7 @@ from ..mesh.gluing import (
     SPLIT_FACE,
     TURN,
     Gluing,
-    apex_position,
+    apex,
     diamond,
     faces_around,
     following,
@@ -57,22 +57,42 @@ class History(Frozen):
 
     def forward(self, faces: Ints, barycentric: Floats, vectors: Floats | None = None) -> tuple[Ints, Floats, Floats]:
         """Transfer points of `before`, and vectors (p, k, 3) at them, to `after`."""
-        faces, barycentric, vectors = copied(faces, barycentric, vectors)
-        transfer_forward(self.steps, self.weights, *self._successors, faces, barycentric, vectors)
-        return faces, barycentric, vectors
+        return self._transferred(self._later, faces, rows_of(barycentric, vectors))
 
     def backward(self, faces: Ints, barycentric: Floats, vectors: Floats | None = None) -> tuple[Ints, Floats, Floats]:
         """Transfer points of `after`, and vectors (p, k, 3) at them, to `before`."""
-        faces, barycentric, vectors = copied(faces, barycentric, vectors)
-        n_faces = max(self.before.n_faces, self.after.n_faces)
-        transfer_backward(self.steps, self.weights, n_faces, faces, barycentric, vectors)
-        return faces, barycentric, vectors
+        return self._transferred(self._earlier, faces, rows_of(barycentric, vectors))
+
+    def inserted(self) -> tuple[Ints, Floats]:
+        """Places, on `before`, of the vertices that were inserted, in order: faces, and barycentric coordinates."""
+        vertex = self.steps[:, 3]
+        rows = np.flatnonzero((vertex >= 0) & (np.diff(vertex, prepend=-1) != 0))  # several steps split one edge
+        is_edge = self.steps[rows, 0] == SPLIT_EDGE
+        faces = np.where(is_edge, self.steps[rows, 1] // 3, self.steps[rows, 1])
+        corners = (np.where(is_edge, self.steps[rows, 1] % 3, 0)[:, None] + np.arange(3)) % 3
+        weights = np.empty((len(rows), 1, 3))
+        np.put_along_axis(weights[:, 0], corners, self.weights[rows, :3], axis=1)
+        return self._transferred(self._earlier, faces, weights, self._earlier.next_of_face[rows, 0])[:2]
+
+    def _transferred(
+        self, links: Links, faces: Ints, rows: Floats, begin: NDArray[np.int32] | None = None
+    ) -> tuple[Ints, Floats, Floats]:
+        """Carry points through the steps from `begin` on, by default through all that change their faces."""
+        faces = np.array(faces, dtype=np.int64)
+        transfer(self.steps, self.weights, links, links.first[faces] if begin is None else begin, faces, rows)
+        return faces, rows[:, 0].copy(), rows[:, 1:].copy()
 
     @cached_property
-    def _successors(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Which steps change each face, one after the other."""
-        first, later = find_successors(self.steps, max(self.before.n_faces, self.after.n_faces))
-        return first, later
+    def _later(self) -> Links:
+        return Links(True, *linked_steps(self.steps, self._most_faces, True))
+
+    @cached_property
+    def _earlier(self) -> Links:
+        return Links(False, *linked_steps(self.steps, self._most_faces, False))
+
+    @property
+    def _most_faces(self) -> int:
+        return max(self.before.n_faces, self.after.n_faces)
 
     @cached_property
     def gluing_before(self) -> Gluing:
@@ -93,10 +113,18 @@ class History(Frozen):
         return straight_lines(self.gluing_after, *self.forward(*edge_middles(self.before)))
 
 
-def copied(faces: Ints, barycentric: Floats, vectors: Floats | None) -> tuple[Ints, Floats, Floats]:
-    """Copy points and vectors at them, none by default, for kernels that change them."""
-    vectors = np.zeros((len(faces), 0, 3)) if vectors is None else np.array(vectors, dtype=np.float64)
-    return np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64), vectors
+class Links(NamedTuple):
+    """Which steps change each face, one after the other, so that a point visits only those that change its face."""
+
+    forward: bool  # from the first step to the last, or back
+    first: NDArray[np.int32]  # (m,) first step that changes each face, −1 if there is none
+    next_of_face: NDArray[np.int32]  # (n, 3) the next one, for each face of a step
+
+
+def rows_of(barycentric: Floats, vectors: Floats | None) -> Floats:
+    """(p, 1 + k, 3) points and vectors at them, in rows: both change alike where triangles are exchanged."""
+    points = np.asarray(barycentric, dtype=np.float64)[:, None]
+    return points.copy() if vectors is None else np.concatenate([points, vectors], axis=1)
 
 
 def edge_middles(triangles: IntrinsicMesh) -> tuple[Ints, Floats, Floats]:
@@ -167,139 +195,67 @@ ROUNDING = 1e-10
 
 
 @kernel
-def find_successors(steps: Ints, n_faces: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """First step that changes each face, and (n, 3) the next that changes each face of a step; −1 if there is none."""
+def linked_steps(steps: Ints, n_faces: int, forward: bool) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Link the steps that change each face: see `Links`."""
     first = np.full(n_faces, -1, np.int32)
-    later = np.full((len(steps), 3), -1, np.int32)
+    following_step = np.full((len(steps), 3), -1, np.int32)
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     for m in range(len(steps)):
-        n = len(steps) - 1 - m
+        n = len(steps) - 1 - m if forward else m
         faces_around(steps, n, around, start)
         for k in range(3):
             if around[k] >= 0:
-                later[n, k] = first[around[k]]
+                following_step[n, k] = first[around[k]]
         for k in range(3):
             if around[k] >= 0:
                 first[around[k]] = n
-    return first, later
+    return first, following_step
 
 
 @kernel
-def transfer_forward(
-    steps: Ints,
-    weights: Floats,
-    first: NDArray[np.int32],
-    later: NDArray[np.int32],
-    faces: Ints,
-    barycentric: Floats,
-    vectors: Floats,
-) -> None:
-    """Carry points of the first triangulation, and vectors (p, k, 3) at them, through all steps, in place.
-
-    Each point visits only the steps that change its face, by `find_successors`.
-    """
+def transfer(steps: Ints, weights: Floats, links: Links, begin: NDArray[np.int32], faces: Ints, rows: Floats) -> None:
+    """Carry points and vectors (p, 1 + k, 3) through the steps that change their faces, from `begin` on, in place."""
     around, start = np.empty(3, np.int64), np.zeros(3, np.int64)
     for p in range(len(faces)):
-        n = first[faces[p]]
+        n = begin[p]
         while n >= 0:
             faces_around(steps, n, around, start)
-            kind, side = steps[n, 0], 1 if faces[p] == around[1] else 0
-            old = BEFORE[kind, side]
-            place = exchange(kind, weights[n], True, old, start[side], AFTER[kind], start, barycentric[p], vectors[p])
+            kind, side = steps[n, 0], 0
+            while around[side] != faces[p]:
+                side += 1
+            old, new = (BEFORE[kind], AFTER[kind]) if links.forward else (AFTER[kind], BEFORE[kind])
+            place = exchange(kind, weights[n], links.forward, old[side], start[side], new, start, rows[p])
             faces[p] = around[place]
-            n = later[n, place]
-
-
-@kernel
-def transfer_backward(
-    steps: Ints, weights: Floats, n_faces: int, faces: Ints, barycentric: Floats, vectors: Floats
-) -> None:
-    """Carry points of the last triangulation, and vectors (p, k, 3) at them, back through all steps, in place.
-
-    Points at the end without a face (−1) are the inserted vertices, in order: they join where they were inserted.
-    """
-    # the points in each face, as a list: its first point, and the point after each
-    in_face, next_point = np.full(n_faces, -1), np.full(len(faces), -1)
-    unborn = len(faces) - 1
-    for p in range(len(faces)):
-        if faces[p] >= 0:
-            next_point[p] = in_face[faces[p]]
-            in_face[faces[p]] = p
-    around, start, moving = np.empty(3, np.int64), np.zeros(3, np.int64), np.empty(3, np.int64)
-    for n in range(len(steps) - 1, -1, -1):
-        kind = steps[n, 0]
-        faces_around(steps, n, around, start)
-        for k in range(3):  # empty the faces that the step made, before any point goes back into one of them
-            moving[k] = -1
-            if AFTER[kind, k, 0] >= 0:
-                moving[k] = in_face[around[k]]
-                in_face[around[k]] = -1
-        for k in range(3):
-            while moving[k] >= 0:
-                p = moving[k]
-                moving[k] = next_point[p]
-                new = AFTER[kind, k]
-                place = exchange(
-                    kind, weights[n], False, new, start[k], BEFORE[kind], start, barycentric[p], vectors[p]
-                )
-                faces[p] = around[place]
-                next_point[p] = in_face[faces[p]]
-                in_face[faces[p]] = p
-        inserts = steps[n, 3] >= 0 and (n == 0 or steps[n - 1, 3] != steps[n, 3])  # several steps split one edge
-        if inserts and unborn >= 0 and faces[unborn] < 0:
-            faces[unborn] = around[0]
-            for k in range(3):
-                barycentric[unborn, (start[0] + k) % 3] = weights[n, k]
-            next_point[unborn] = in_face[around[0]]
-            in_face[around[0]] = unborn
-            unborn -= 1
+            n = links.next_of_face[n, place]
 
 
 @kernel
 def exchange(
-    kind: int,
-    c: Floats,
-    forward: bool,
-    corners: Ints,
-    start: int,
-    new_corners: Ints,
-    new_start: Ints,
-    w: Floats,
-    vectors: Floats,
+    kind: int, c: Floats, forward: bool, corners: Ints, start: int, new_corners: Ints, new_start: Ints, rows: Floats
 ) -> int:
-    """Transfer one point, and vectors at it, over one step; returns which of the step's new faces contains it."""
+    """Transfer a point, the first row, and vectors over one step; return which of the step's new faces contains it."""
     lead = 3 if kind == SPLIT_FACE else 2  # the points before it are on one side of the dependency
     x = np.zeros(4)
-    for k in range(3):
-        x[corners[k]] = w[(start + k) % 3]
-    gone, amount = -1, np.inf
-    for l in range(4):
-        if (l < lead) == forward and c[l] > 0.0 and x[l] / c[l] < amount:
-            gone, amount = l, x[l] / c[l]
-    place = 0
-    while gone >= 0 and (new_corners[place] == gone).any():
-        place += 1
-    if gone >= 0:  # no point goes where a face is only turned over
-        shift(x, c, lead, gone, amount if forward else -amount)
-    for k in range(3):
-        w[(new_start[place] + k) % 3] = x[new_corners[place, k]]
-    for v in range(len(vectors)):
+    gone, place = -1, 0
+    for r in range(len(rows)):
         x[:] = 0.0
         for k in range(3):
-            x[corners[k]] = vectors[v, (start + k) % 3]
-        if gone >= 0:
-            shift(x, c, lead, gone, x[gone] / c[gone] if forward else -x[gone] / c[gone])
+            x[corners[k]] = rows[r, (start + k) % 3]
+        if r == 0:
+            least = np.inf
+            for l in range(4):
+                if (l < lead) == forward and c[l] > 0.0 and x[l] / c[l] < least:
+                    gone, least = l, x[l] / c[l]
+            while gone >= 0 and (new_corners[place] == gone).any():
+                place += 1
+        if gone >= 0:  # no point goes where a face is only turned over
+            amount = x[gone] / c[gone] if forward else -x[gone] / c[gone]
+            for l in range(4):
+                x[l] += -amount * c[l] if l < lead else amount * c[l]
+            x[gone] = 0.0
         for k in range(3):
-            vectors[v, (new_start[place] + k) % 3] = x[new_corners[place, k]]
+            rows[r, (new_start[place] + k) % 3] = x[new_corners[place, k]]
     return place
-
-
-@kernel
-def shift(x: Floats, c: Floats, lead: int, gone: int, amount: float) -> None:
-    """Move weights along the affine dependency c, so that the one of point `gone` vanishes."""
-    for l in range(4):
-        x[l] += -amount * c[l] if l < lead else amount * c[l]
-    x[gone] = 0.0
 
 
 @kernel
@@ -365,8 +321,8 @@ def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, s
         i, j, a = h % 3, following(h) % 3, leaving
         slides = 0 if step > 0.0 else slides
         if t == h or g.sibling[t] != h:  # where no single face goes on; only rounding leads out: go along the edge
-            x, y = apex_position(g, h)
-            base = g.length[g.edge[h]]
+            top, base = apex(g, h), g.length[g.edge[h]]
+            x, y = top.real, top.imag
             if slides == 2 or y * abs(v[0, a]) > OUTWARD * abs(base * v[0, j] + x * v[0, a]):
                 break
             slides += 1

@@ -12,10 +12,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Complexes, Floats, Ints
 from ..mesh.gluing import (
+    EDGES,
+    FACES,
+    STEPS,
+    VERTICES,
     Gluing,
-    apex_position,
+    apex,
+    cross,
     doubled,
     faces_around,
     flip_until_delaunay,
@@ -54,7 +59,7 @@ def refine_all(
         goal = goal._replace(radius=coarsest * mean_radius)
         report = None if progress is None else lambda _: progress(1.0)  # it may cancel
         gluing, agenda, status = refined(gluing, agenda, goal, report)
-    n_edges = int(gluing.counts[1])
+    n_edges = int(gluing.counts[EDGES])
     origin = np.full(n_edges, -1)
     fixed = np.flatnonzero(gluing.fixed[:n_edges])
     origin[fixed] = segments[agenda.segment[fixed]]
@@ -83,7 +88,7 @@ def refined(
 
 def close_faces(gluing: Gluing, agenda: Agenda) -> Bools:
     """(m,) faces whose shortest side joins vertices that nearly coincide."""
-    n_faces = int(gluing.counts[0])
+    n_faces = int(gluing.counts[FACES])
     faces = np.arange(n_faces)
     lengths = gluing.length[gluing.edge[: 3 * n_faces]].reshape(-1, 3)
     group = agenda.group[gluing.tail[: 3 * n_faces]].reshape(-1, 3)
@@ -118,9 +123,9 @@ def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
         narrow=narrow_vertices(gluing),
         group=group,
         extent=extent,
-        seen=np.array([gluing.counts[3], N_BINS]),
-        room=np.empty((4096, 5)),
-        halfedges=np.empty(4096, dtype=np.int64),
+        seen=np.array([gluing.counts[STEPS], N_BINS]),
+        seen_sides=np.empty((4096, 2), dtype=np.complex128),
+        halfedges=np.empty((4096, 2), dtype=np.int64),
     )
 
 
@@ -148,7 +153,9 @@ class Agenda(NamedTuple):
     group: Ints  # (n,) vertices that nearly coincide, and the size of each group, from `coinciding`
     extent: Floats
     seen: Ints  # number of steps of the history whose faces have been listed, and the bin that the last face came from
-    room: Floats  # work arrays for the search around a new vertex
+    seen_sides: (
+        Complexes  # work arrays of `encroached`: ends of halfedges; and these, and whether their side is 1 or −1
+    )
     halfedges: Ints
 
 
@@ -163,21 +170,21 @@ class Goal(NamedTuple):
 @kernel
 def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
     """Insert vertices until every face meets the goal, where possible; pause after `patience` of them."""
-    pause = g.counts[2] + patience
+    pause = g.counts[VERTICES] + patience
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     while flip_until_delaunay(g, agenda.stack, agenda.stacked):
-        for n in range(agenda.seen[0], g.counts[3]):
+        for n in range(agenda.seen[0], g.counts[STEPS]):
             faces_around(g.steps, n, around, start)
             for k in range(3):
                 if around[k] >= 0:
                     list_face(g, agenda, around[k], goal)
-        agenda.seen[0] = g.counts[3]
+        agenda.seen[0] = g.counts[STEPS]
         f = next_bad(g, agenda, goal)
         if f < 0:
             return DONE
-        if g.counts[2] >= goal.max_vertices:
+        if g.counts[VERTICES] >= goal.max_vertices:
             return FULL
-        if g.counts[2] >= pause:
+        if g.counts[VERTICES] >= pause:
             list_face(g, agenda, f, goal)
             return PAUSED
         if not improve(g, agenda, f, goal):
@@ -214,7 +221,7 @@ def list_face(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> None:
 @kernel
 def list_all(g: Gluing, agenda: Agenda, goal: Goal) -> None:
     """Put every bad face on the lists."""
-    for f in range(g.counts[0]):
+    for f in range(g.counts[FACES]):
         list_face(g, agenda, f, goal)
 
 
@@ -242,28 +249,34 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     close = coincide(g, agenda, h)
     if is_hopeless(g, agenda, h) or (close and not is_cap(g, agenda, f)):
         return True
-    outcome, place, x, y = find_circumcenter(g, f)  # the place is the face that has it, or the halfedge in the way
+    outcome, place, center = find_circumcenter(g, f)  # the place is the face that has it, or the halfedge in the way
     if outcome == LOST:
         return True
-    segment = place if outcome == BLOCKED else encroached(g, place, x, y, agenda.room, agenda.halfedges)
+    segment = place if outcome == BLOCKED else encroached(g, agenda, place, center)
     if segment >= 0:
         return close or coincide(g, agenda, segment) or split_segment(g, agenda, segment, f, goal)
-    if too_near(g, h, place, x, y):
+    if too_near(g, h, place, center):
         return True
     if not has_room(g, agenda, 2):
         return False
-    insert(g, agenda, place, x, y)
+    insert(g, agenda, place, center)
     return True
 
 
 @kernel
-def too_near(g: Gluing, h: int, f: int, px: float, py: float) -> bool:
+def corners_of(g: Gluing, f: int) -> Complexes:
+    """(3,) the corners of a face in its frame: its first halfedge runs along the positive real axis from the origin."""
+    corners = np.zeros(3, np.complex128)
+    corners[1], corners[2] = g.length[g.edge[3 * f]], apex(g, 3 * f)
+    return corners
+
+
+@kernel
+def too_near(g: Gluing, h: int, f: int, p: complex) -> bool:
     """Whether p, the circumcentre for shortest side h, is too near a corner of face f, which only rounding can do."""
     n, d = tangent_at(g, preceding(h))
     radius = 0.25 * g.length[g.edge[h]] * (n + d) / np.sqrt(n * d)
-    x, y = apex_position(g, 3 * f)
-    nearest = min(np.hypot(px, py), np.hypot(px - g.length[g.edge[3 * f]], py), np.hypot(px - x, py - y))
-    return not nearest > 0.5 * radius
+    return not np.abs(corners_of(g, f) - p).min() > 0.5 * radius
 
 
 @kernel
@@ -323,8 +336,8 @@ def sector(g: Gluing, corner: int) -> float:
 @kernel
 def narrow_vertices(g: Gluing) -> Bools:
     """(n,) vertices at which two segments meet at less than 60°, or with a total angle of less than 60°."""
-    narrow = np.zeros(g.counts[2], dtype=np.bool_)
-    for corner in range(3 * g.counts[0]):
+    narrow = np.zeros(g.counts[VERTICES], dtype=np.bool_)
+    for corner in range(3 * g.counts[FACES]):
         if not narrow[g.tail[corner]]:
             narrow[g.tail[corner]] = sector(g, corner) < NARROW
     return narrow
@@ -333,15 +346,15 @@ def narrow_vertices(g: Gluing) -> Bools:
 @kernel
 def has_room(g: Gluing, agenda: Agenda, ring: int) -> bool:
     """Whether splitting an edge with so many faces fits into the arrays (splitting a face needs less)."""
-    fits: bool = 3 * (g.counts[0] + ring + 2) <= len(g.tail) and g.counts[1] + ring + 4 <= len(g.length)
-    return fits and g.counts[2] + 1 <= len(agenda.on_segment) and g.counts[3] + ring + 2 <= len(g.steps)
+    fits: bool = 3 * (g.counts[FACES] + ring + 2) <= len(g.tail) and g.counts[EDGES] + ring + 4 <= len(g.length)
+    return fits and g.counts[VERTICES] + 1 <= len(agenda.on_segment) and g.counts[STEPS] + ring + 2 <= len(g.steps)
 
 
 @kernel
 def look_around(g: Gluing, agenda: Agenda, step: int) -> None:
     """Push onto the stack the edges of all faces that steps of the history, from number `step` on, have changed."""
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
-    for n in range(step, g.counts[3]):
+    for n in range(step, g.counts[STEPS]):
         faces_around(g.steps, n, around, start)
         for f in around:
             if f >= 0:
@@ -350,33 +363,30 @@ def look_around(g: Gluing, agenda: Agenda, step: int) -> None:
 
 
 @kernel
-def insert(g: Gluing, agenda: Agenda, f: int, px: float, py: float) -> None:
+def insert(g: Gluing, agenda: Agenda, f: int, p: complex) -> None:
     """Insert a vertex at p (in the frame of face f), or on the edge of the face that p nearly lies on."""
-    step = g.counts[3]
-    x, y = np.zeros(3), np.zeros(3)
-    x[1] = g.length[g.edge[3 * f]]
-    x[2], y[2] = apex_position(g, 3 * f)
-    area = x[1] * y[2]
-    nearest = np.inf
-    for k in range(3):
-        nearest = min(nearest, np.hypot(px - x[k], py - y[k]))
+    step = g.counts[STEPS]
+    corners = corners_of(g, f)
+    area = corners[1].real * corners[2].imag
+    nearest = np.abs(corners - p).min()
     weights = np.empty(3)
     on_edge, fraction = -1, 0.0
     for k in range(3):
-        l = (k + 1) % 3
-        length = g.length[g.edge[3 * f + k]]
-        above = cross(x[k], y[k], x[l], y[l], px, py)
+        tail, head = corners[k], corners[(k + 1) % 3]
+        edge = g.edge[3 * f + k]
+        length = g.length[edge]
+        above = cross(head - tail, p - tail)
         weights[(k + 2) % 3] = max(above / area, 0.0)
         t = g.sibling[3 * f + k]
-        if above / length < min(0.01 * length, 0.25 * nearest) and t // 3 != f and not g.fixed[g.edge[3 * f + k]]:
+        if above / length < min(0.01 * length, 0.25 * nearest) and t // 3 != f and not g.fixed[edge]:
             on_edge = k
-            fraction = ((px - x[k]) * (x[l] - x[k]) + (py - y[k]) * (y[l] - y[k])) / length**2
+            fraction = ((p - tail).conjugate() * (head - tail)).real / length**2
     if on_edge >= 0 and 0.0 < fraction < 1.0:
         split_edge(g, 3 * f + on_edge, fraction)
     else:
         weights /= weights.sum()
         split_face(g, f, weights[0], weights[1], weights[2])
-    new = g.counts[2] - 1
+    new = g.counts[VERTICES] - 1
     agenda.on_segment[new] = agenda.group[new] = -1
     agenda.narrow[new] = False
     look_around(g, agenda, step)
@@ -399,10 +409,10 @@ def vertex_near_edge(g: Gluing, h: int) -> tuple[int, float, float]:
     """Find a vertex opposite to an edge that nearly lies on it, its height and fraction along h; −1, ∞, ½ if none."""
     nearby, height, fraction, length, y = -1, np.inf, 0.5, g.length[g.edge[h]], h
     while True:
-        along, above = apex_position(g, y)
-        along = along / length if g.forward[y] == g.forward[h] else 1.0 - along / length
-        if above < min(height, NEARNESS * length * min(along, 1.0 - along)):
-            nearby, height, fraction = g.tail[preceding(y)], above, along
+        top = apex(g, y)
+        along = top.real / length if g.forward[y] == g.forward[h] else 1.0 - top.real / length
+        if top.imag < min(height, NEARNESS * length * min(along, 1.0 - along)):
+            nearby, height, fraction = g.tail[preceding(y)], top.imag, along
         y = g.sibling[y]
         if y == h:
             return nearby, height, fraction
@@ -414,9 +424,8 @@ def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
     nearest: float = np.inf
     length, y = g.length[g.edge[h]], h
     while True:
-        along, above = apex_position(g, y)
         share = fraction if g.forward[y] == g.forward[h] else 1.0 - fraction
-        nearest = min(nearest, np.hypot(along - share * length, above))
+        nearest = min(nearest, abs(apex(g, y) - share * length))
         y = g.sibling[y]
         if y == h:
             return nearest
@@ -430,7 +439,7 @@ def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool
     angle, a power of two from there (Ruppert 1995). A face with two sides on the segment is split instead.
     """
     e = g.edge[h]
-    segment, length, step = agenda.segment[e], g.length[e], g.counts[3]
+    segment, length, step = agenda.segment[e], g.length[e], g.counts[STEPS]
     if length < 1e-9 * agenda.segment_length[segment]:
         return True
     ring = sibling_count(g, h)
@@ -455,7 +464,7 @@ def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool
                 agenda.group[nearby], agenda.extent[nearby] = nearby, 0.0
             agenda.group[new] = agenda.group[nearby]
             agenda.extent[agenda.group[new]] += 1.01 * height
-        for k in range(g.counts[1] - 1 - ring, g.counts[1]):
+        for k in range(g.counts[EDGES] - 1 - ring, g.counts[EDGES]):
             agenda.segment[k] = segment
     agenda.narrow[new] = False
     look_around(g, agenda, step)
@@ -468,105 +477,91 @@ INSIDE, BLOCKED, LOST = 0, 1, 2
 
 
 @kernel
-def unfold(g: Gluing, h: int, side: int, tx: float, ty: float, hx: float, hy: float) -> tuple[float, float, int]:
-    """Unfold the face beyond halfedge h, from (tx, ty) to (hx, hy): its apex, and its side, 1 if counter-clockwise."""
+def unfold(g: Gluing, h: int, side: int, tail: complex, head: complex) -> tuple[complex, int]:
+    """Unfold the face beyond halfedge h, from tail to head: its apex, and its side, 1 if counter-clockwise."""
     t = g.sibling[h]
     if g.forward[t] == g.forward[h]:
         side = -side
     else:
-        tx, ty, hx, hy = hx, hy, tx, ty
-    x, y = apex_position(g, t)
-    length = g.length[g.edge[t]]
-    ux, uy = (hx - tx) / length, (hy - ty) / length
-    return tx + x * ux - side * y * uy, ty + x * uy + side * y * ux, side
+        tail, head = head, tail
+    top, unit = apex(g, t), (head - tail) / g.length[g.edge[t]]
+    x, y = top.real, side * top.imag
+    place = complex(tail.real + x * unit.real - y * unit.imag, tail.imag + x * unit.imag + y * unit.real)
+    return place, side
 
 
 @kernel
-def cross(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
-    """Twice the signed area of abc."""
-    return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-
-
-@kernel
-def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, float, float]:
+def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, complex]:
     """Walk from the barycentre of a face to its circumcentre: INSIDE a face, BLOCKED by a halfedge, or LOST if flat."""
-    x, y = np.zeros(3), np.zeros(3)
-    x[1] = g.length[g.edge[3 * f]]
-    x[2], y[2] = apex_position(g, 3 * f)
-    if not y[2] > 0.0:
-        return LOST, f, 0.0, 0.0
-    cx, cy = 0.5 * x[1], 0.5 * (x[2] * (x[2] - x[1]) / y[2] + y[2])
-    if not np.isfinite(cy):
-        return LOST, f, 0.0, 0.0
-    sx, sy = x.sum() / 3.0, y.sum() / 3.0
+    corners = corners_of(g, f)
+    base, x, y = corners[1].real, corners[2].real, corners[2].imag
+    if not y > 0.0:
+        return LOST, f, 0j
+    center = complex(0.5 * base, 0.5 * (x * (x - base) / y + y))
+    if not np.isfinite(center.imag):
+        return LOST, f, 0j
+    start = corners.sum() / 3.0
     side, entry = 1, -1
     for _ in range(100000):
         leaving, worst, outside = -1, 0.0, 0.0
-        area = cross(x[0], y[0], x[1], y[1], x[2], y[2])
+        area = cross(corners[1] - corners[0], corners[2] - corners[0])
         for k in range(3):
-            l = (k + 1) % 3
-            beyond = -cross(x[k], y[k], x[l], y[l], cx, cy) / area
-            left, right = cross(sx, sy, cx, cy, x[k], y[k]), cross(sx, sy, cx, cy, x[l], y[l])
+            tail, head = corners[k], corners[(k + 1) % 3]
+            beyond = -cross(head - tail, center - tail) / area
+            left, right = cross(center - start, tail - start), cross(center - start, head - start)
             outside = max(outside, beyond)
             if k != entry and beyond > worst and left * right <= 0.0:
                 leaving, worst = k, beyond
         if leaving < 0 and not outside < 1e-9:
-            return LOST, f, 0.0, 0.0
+            return LOST, f, 0j
         if leaving < 0:
             break
         h = 3 * f + leaving
         if g.fixed[g.edge[h]]:
-            return BLOCKED, h, 0.0, 0.0
-        l = (leaving + 1) % 3
-        t = g.sibling[h]
-        kt = t % 3
-        ax, ay, turned = unfold(g, h, side, x[leaving], y[leaving], x[l], y[l])
+            return BLOCKED, h, 0j
+        t, tail, head = g.sibling[h], corners[leaving], corners[(leaving + 1) % 3]
+        top, turned = unfold(g, h, side, tail, head)
         if turned == side:
-            x[leaving], y[leaving], x[l], y[l] = x[l], y[l], x[leaving], y[leaving]
-        tx, ty, hx, hy = x[leaving], y[leaving], x[l], y[l]
-        x[kt], y[kt], x[(kt + 1) % 3], y[(kt + 1) % 3], x[(kt + 2) % 3], y[(kt + 2) % 3] = tx, ty, hx, hy, ax, ay
-        f, side, entry = t // 3, turned, kt
-    base = g.length[g.edge[3 * f]]
-    ux, uy = (x[1] - x[0]) / base, (y[1] - y[0]) / base
-    px, py = (cx - x[0]) * ux + (cy - y[0]) * uy, side * ((cy - y[0]) * ux - (cx - x[0]) * uy)
-    return INSIDE, f, px, py
+            tail, head = head, tail
+        f, side, entry = t // 3, turned, t % 3
+        corners[entry], corners[(entry + 1) % 3], corners[(entry + 2) % 3] = tail, head, top
+    unit = (corners[1] - corners[0]) / g.length[g.edge[3 * f]]
+    place = (center - corners[0]) * unit.conjugate()
+    return INSIDE, f, complex(place.real, side * place.imag)
 
 
 @kernel
-def encroached(g: Gluing, f: int, px: float, py: float, ends: Floats, halfedges: Ints) -> int:
+def encroached(g: Gluing, agenda: Agenda, f: int, p: complex) -> int:
     """Find a segment that p, in the frame of face f, sees and that has p in its diametral circle; −1 if none."""
-    x, y = np.zeros(3), np.zeros(3)
-    x[1] = g.length[g.edge[3 * f]]
-    x[2], y[2] = apex_position(g, 3 * f)
-    count, visited = 0, 0
+    ends, halfedges = agenda.seen_sides, agenda.halfedges
+    corners = corners_of(g, f)
     for k in range(3):
-        l = (k + 1) % 3
-        halfedges[count] = 3 * f + k
-        ends[count, 0], ends[count, 1], ends[count, 2], ends[count, 3], ends[count, 4] = x[k], y[k], x[l], y[l], 1.0
-        count += 1
+        halfedges[k, 0], halfedges[k, 1] = 3 * f + k, 1
+        ends[k, 0], ends[k, 1] = corners[k], corners[(k + 1) % 3]
+    count, visited = 3, 0
     while count > 0:
         count -= 1
-        h: int = halfedges[count]
-        tx, ty, hx, hy, side = ends[count]
-        dot = (tx - px) * (hx - px) + (ty - py) * (hy - py)
+        h: int = halfedges[count, 0]
+        side: int = halfedges[count, 1]
+        tail, head = ends[count, 0], ends[count, 1]
+        dot = ((tail - p).conjugate() * (head - p)).real
         if g.fixed[g.edge[h]]:
             if dot < 0.0:
                 return h
             continue
         t = g.sibling[h]
         n, d = tangent_at(g, preceding(t))
-        in_circle = dot * 2.0 * np.sqrt(n * d) + (d - n) * abs(cross(px, py, tx, ty, hx, hy)) < 0.0
+        in_circle = dot * 2.0 * np.sqrt(n * d) + (d - n) * abs(cross(tail - p, head - p)) < 0.0
         visited += 1
         if not in_circle or count + 2 > len(ends) or visited > len(ends):
             continue
-        ax, ay, turned = unfold(g, h, side, tx, ty, hx, hy)
+        top, turned = unfold(g, h, side, tail, head)
         if turned == side:
-            tx, ty, hx, hy = hx, hy, tx, ty
-        halfedges[count], halfedges[count + 1] = following(t), preceding(t)
-        ends[count, 0], ends[count, 1], ends[count, 2], ends[count, 3], ends[count, 4] = hx, hy, ax, ay, turned
-        count += 1
-        ends[count, 0], ends[count, 1], ends[count, 2], ends[count, 3], ends[count, 4] = ax, ay, tx, ty, turned
-        count += 1
+            tail, head = head, tail
+        halfedges[count, 0], halfedges[count + 1, 0] = following(t), preceding(t)
+        halfedges[count, 1] = halfedges[count + 1, 1] = turned
+        ends[count, 0], ends[count, 1], ends[count + 1, 0], ends[count + 1, 1] = head, top, top, tail
+        count += 2
     return -1
 
 

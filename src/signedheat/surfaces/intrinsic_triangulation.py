@@ -24,7 +24,7 @@ from ..foreign import ForeignShape, converted
 from ..jobs import Progress, Stopwatch
 from ..memory import within_memory
 from ..mesh.curve_segments import CurveSegments, without_straight_nodes
-from ..mesh.gluing import flip_all, glue, lay_out
+from ..mesh.gluing import STEPS, flip_all, glue, lay_out
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import refuse_missing
 from ..mesh.triangles import gradients_along
@@ -123,8 +123,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         extra, corner = np.unique(cut.corner_vertices.ravel(), return_index=True)
         corner = corner[extra >= self.mesh.n_vertices]
         put = self.refinement.pull_back(corner // 3, np.eye(3)[corner % 3])
-        count = self.n_vertices - self.history.before.n_vertices
-        new = self.refinement.pull_back(*self.history.backward(np.full(count, -1), np.zeros((count, 3)))[:2])
+        new = self.refinement.pull_back(*self.history.inserted())
         return np.concatenate([faces, put[0], new[0]]), np.concatenate([weights, put[1], new[1]])
 
     @cached_property
@@ -455,7 +454,7 @@ def intrinsic_delaunay(
             limit = 20 * refinement.triangles.n_vertices + 10_000 if max_vertices is None else int(max_vertices)
             gluing, origin, close, complete = refine_all(gluing, np.radians(angle), float(coarsest), limit, inner)
             marked = np.append(marked, False)[origin]
-    n = int(gluing.counts[3])
+    n = int(gluing.counts[STEPS])
     triangles = lay_out(gluing)
     refuse_other_area(mesh, triangles)
     history = History(refinement.triangles, triangles, gluing.steps[:n].copy(), gluing.weights[:n].copy())
