@@ -130,7 +130,7 @@ def unsigned(mesh, curves) -> np.ndarray:
     """Exact distance of the vertices to curves."""
     surface = discretize(mesh)
     parts = [part for group in surface.segments(curves) for part in group]
-    return distance_to_segments(surface.triangles, [PlacedSegments.of(surface.triangles, parts)])[0]
+    return distance_to_segments(surface.triangles, PlacedSegments.of(surface.triangles, parts))[0]
 
 
 def nearest_side(mesh, curves) -> np.ndarray:

@@ -128,7 +128,7 @@ def to_curves(mesh: sh.TriangleMesh, curves: list[sh.Curve]) -> Array:
     """Exact unsigned distance along a surface to the segments of curves, by our own search."""
     surface = discretize(mesh)
     parts = [part for group in surface.segments(curves) for part in group]
-    return distance_to_segments(surface.triangles, [PlacedSegments.of(surface.triangles, parts)])[0]
+    return distance_to_segments(surface.triangles, PlacedSegments.of(surface.triangles, parts))[0]
 
 
 def to_segments(points: Array, lines: list[sh.Polyline]) -> tuple[Array, NDArray[np.int64], Array]:

@@ -42,17 +42,17 @@ def awful(seed: int) -> sh.TriangleMesh:
     return sh.TriangleMesh(points, mesh.faces)
 
 
-def placed(mesh: sh.TriangleMesh, kind: str) -> list[PlacedSegments]:
+def placed(mesh: sh.TriangleMesh, kind: str) -> PlacedSegments:
     triangles = discretize(mesh).triangles
     if kind == "zero line":
-        return [zero_line(triangles, wave(mesh))]
+        return zero_line(triangles, wave(mesh))
     sources = {
         "curves": lambda: mesh.level_set(wave(mesh), 0.0),
         "edges": lambda: [mesh.polyline(mesh.vertices[mesh.faces[7]])],
         "points": lambda: [sh.SurfacePoints([3, 40, 41], [[0.2, 0.5, 0.3], [1, 0, 0], [0.5, 0.5, 0]])],
     }
     parts = list(chain.from_iterable(discretize(mesh).segments(sources[kind]())))
-    return [PlacedSegments.of(triangles, parts)]
+    return PlacedSegments.of(triangles, parts)
 
 
 @pytest.mark.parametrize("kind", ["zero line", "curves", "edges", "points"])
@@ -69,7 +69,7 @@ def test_distances_are_those_in_the_triangles_given(mesh, kind):
 @pytest.mark.parametrize("kind", ["zero line", "curves", "edges"])
 def test_segments_as_a_curve_are_placed_alike(kind):
     mesh = awful(2)
-    triangles, (before,) = discretize(mesh).triangles, placed(mesh, kind)
+    triangles, before = discretize(mesh).triangles, placed(mesh, kind)
     after = PlacedSegments.of(triangles, [as_curve(triangles, before)])
     assert after.lengths.sum() == pytest.approx(before.lengths.sum(), rel=1e-12)
     assert sorted(zip(after.faces, after.along_edge, strict=True)) == sorted(
@@ -88,7 +88,7 @@ def test_lines_through_vertices_of_awful_triangles(seed):
     values = rng.integers(-1, 2, size=len(points)).astype(float)
     distance, _ = exact.distance_to_zero_line(triangles, values, 0.0)
     moved = exact.cleared(triangles, values, 1e-7 * triangles.lengths_of_edges.mean())
-    flipped = exact.PausedSearch.start(*in_delaunay_triangles(triangles, [zero_line(triangles, moved)]), 0.0)
+    flipped = exact.PausedSearch.start(*in_delaunay_triangles(triangles, zero_line(triangles, moved)), 0.0)
     bound = flipped.until(10**7, None).distance()[: len(points)]
     assert np.abs(distance - bound).max() < 1e-7 * distance.max()
 
@@ -98,7 +98,7 @@ def test_slivers_are_not_cut_short():
     mesh = zigzag(1000)
     triangles, heights = discretize(mesh).triangles, wave(mesh)
     limit = exact.window_limit(triangles)
-    given = exact.PausedSearch.start(triangles, [zero_line(triangles, heights)], 1e-4).until(limit, None)
+    given = exact.PausedSearch.start(triangles, zero_line(triangles, heights), 1e-4).until(limit, None)
     assert not given.has_ended
     distance, windows = exact.distance_to_zero_line(triangles, heights)
     assert windows < limit
@@ -116,4 +116,4 @@ def test_slivers_are_not_cut_short():
 def test_good_triangles_stay():
     mesh = sphere(3)
     triangles = discretize(mesh).triangles
-    assert in_delaunay_triangles(triangles, [zero_line(triangles, mesh.vertices[:, 2] + 0.01)]) is None
+    assert in_delaunay_triangles(triangles, zero_line(triangles, mesh.vertices[:, 2] + 0.01)) is None

@@ -77,7 +77,7 @@ def test_no_vertex_is_lost_between_merged_windows():
         rng = np.random.default_rng(seed)
         points = rng.integers(0, triangles.n_vertices, rng.integers(1, 9))
         source = PlacedSegments.of(triangles, [CurveSegments.of_points(points_at_vertices(triangles, points))])
-        exact, fast = (distance_to_segments(triangles, [source], tolerance)[0] for tolerance in (0.0, 1e-4))
+        exact, fast = (distance_to_segments(triangles, source, tolerance)[0] for tolerance in (0.0, 1e-4))
         assert np.abs(fast - exact).max() < 0.01 * edge
 
 

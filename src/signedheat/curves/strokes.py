@@ -12,7 +12,7 @@ from scipy import sparse
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..geodesics.geodesic_sources import PlacedSegments
+from ..geodesics.geodesic_sources import PlacedSegments, nearest_shares
 from ..linear import factorize
 from ..mesh.components import grouped, members_of
 from ..mesh.curve_segments import CurveSegments
@@ -389,8 +389,7 @@ def sides_seen(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> spar
     rows = np.flatnonzero((placed.sides != 0) & (np.abs(steps[:, 0]) > 0))
     start, step, faces = placed.positions[rows, :1], steps[rows], placed.faces[rows]
     corners = triangles.corner_positions[faces] - start
-    share = np.clip((corners * np.conj(step)).real / np.abs(step) ** 2, 0.0, 1.0)
-    gaps = np.abs(corners - share * step)
+    _, gaps = nearest_shares(corners, step)
     heights = (np.conj(step) * corners).imag / np.abs(step) * placed.sides[rows, None]
     size = triangles.edge_lengths[faces].max(axis=1, keepdims=True)
     sines = np.abs(heights) / np.maximum(np.maximum(gaps, np.abs(heights)), np.finfo(float).tiny)

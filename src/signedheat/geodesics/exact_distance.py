@@ -15,7 +15,7 @@ whose distance would be σ; kind `BEAM`: straight waves along the direction (p, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
@@ -29,7 +29,7 @@ from ..memory import refuse_beyond_memory
 from ..mesh.components import grouped
 from ..mesh.conforming_refinement import cut_along, flip_new_faces
 from ..mesh.intrinsic_mesh import IntrinsicMesh
-from .geodesic_sources import GeodesicSources, PlacedSegments, as_curve, through_vertices, zero_line
+from .geodesic_sources import GeodesicSources, PlacedSegments, as_curve, nearest_shares, through_vertices, zero_line
 from .heap_kernels import Queue, pop, push
 
 WINDOWS_PER_EDGE, FEW_WINDOWS, ON_SMALL = 100, 4_000_000, 1000
@@ -50,15 +50,15 @@ def distance_to_zero_line(
     Merging windows changes distances by less than `tolerance` of the edge; `window_limit` cuts the search short.
     """
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
-    return distance_to_segments(triangles, [zero_line(triangles, values)], tolerance, report)
+    return distance_to_segments(triangles, zero_line(triangles, values), tolerance, report)
 
 
 def distance_to_segments(
-    triangles: IntrinsicMesh, placed: Sequence[PlacedSegments], tolerance: float = 1e-4, report: Report | None = None
+    triangles: IntrinsicMesh, placed: PlacedSegments, tolerance: float = 1e-4, report: Report | None = None
 ) -> tuple[Floats, int]:
     """Return the distance of every vertex to segments and points as `distance_to_zero_line` does."""
     limit = window_limit(triangles)
-    placed = [through_vertices(triangles, segments) for segments in placed]
+    placed = through_vertices(triangles, placed)
     many = min(MANY_PER_EDGE * triangles.n_edges + MANY_WINDOWS, limit)
     search = PausedSearch.start(triangles, placed, tolerance).until(many, report)
     better = None if search.has_ended else in_delaunay_triangles(triangles, placed)
@@ -98,23 +98,29 @@ class PausedSearch:
     """A search on some triangles, in short calls of kernels between which it can be ended."""
 
     triangles: IntrinsicMesh
+    faces: Faces  # the same as plain arrays
     search: Search  # its state, which changes as it goes on
     tolerance: float  # see `distance_to_zero_line`
 
     @classmethod
-    def start(cls, triangles: IntrinsicMesh, placed: Sequence[PlacedSegments], tolerance: float) -> PausedSearch:
-        """Start with the windows that leave the sources."""
-        parts = [part.sources(triangles) for part in placed]
-        sources = GeodesicSources(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
-        pseudosources = is_pseudosource(triangles)
+    def start(cls, triangles: IntrinsicMesh, placed: PlacedSegments, tolerance: float) -> PausedSearch:
+        """Start with the waves that leave the sources."""
+        sources, pseudosources = placed.sources(triangles), is_pseudosource(triangles)
         pseudosources[sources.vertices] = True
-        faces, room = Faces.of(triangles), 1024
-        while True:
-            search = Search.start(triangles.n_faces, pseudosources, room)
-            start_search(faces, sources, search, ROUND + 2.0 * tolerance)
-            if not search.counts[WANTED]:
-                return cls(triangles, search, tolerance)
-            room *= 2
+        with np.errstate(all="ignore"):  # on faces of no size
+            waves = first_waves(triangles, sources)
+        beyond = triangles.edges.face_counts[triangles.edges.face_edges.ravel()[waves.halfedges]]
+        search = Search.start(triangles.n_faces, pseudosources, 1024 + int(beyond.sum()))
+        search.distance[sources.vertices] = 0.0
+        reach_corners(triangles, sources, search.distance)
+        started = cls(triangles, Faces.of(triangles), search, tolerance)
+        start_search(started.faces, waves, search, started.slack)
+        return started
+
+    @property
+    def slack(self) -> float:
+        """By how much a path must be longer than another, in lengths of an edge, to be dropped for it."""
+        return ROUND + 2.0 * self.tolerance
 
     @property
     def has_ended(self) -> bool:
@@ -128,13 +134,14 @@ class PausedSearch:
 
     def until(self, limit: int, report: Report | None) -> PausedSearch:
         """Go on to the end, or until this many windows have been made; return the same search."""
-        faces, search, slack = Faces.of(self.triangles), self.search, ROUND + 2.0 * self.tolerance
+        search = self.search
         while search.queue.size[0] > 0 and search.counts[MADE] < limit:
             if report is not None:
                 report()
             if search.counts[WANTED]:
                 search.larger().counts[WANTED] = 0
-            continue_search(faces, search, slack, self.tolerance, min(search.counts[MADE] + (1 << 16), limit))
+            most = min(search.counts[MADE] + (1 << 16), limit)
+            continue_search(self.faces, search, self.slack, self.tolerance, most)
         return self
 
     def distance(self) -> Floats:
@@ -168,17 +175,17 @@ FLIPPED = 0.05
 
 
 def in_delaunay_triangles(
-    triangles: IntrinsicMesh, placed: Sequence[PlacedSegments]
-) -> tuple[IntrinsicMesh, list[PlacedSegments]] | None:
+    triangles: IntrinsicMesh, placed: PlacedSegments
+) -> tuple[IntrinsicMesh, PlacedSegments] | None:
     """Return the surface in Delaunay triangles, with sources along edges; None if there is nothing to gain."""
     if not triangles.agree_on_lengths or share_to_flip(triangles) < FLIPPED:
         return None
-    parts = [as_curve(triangles, segments) for segments in placed]
-    if any(part is None for part in parts):
+    curve = as_curve(triangles, placed)
+    if curve is None:
         return None
-    finer, merged, _, _ = cut_along(triangles, [part for part in parts if part is not None])
+    finer, merged, _, _ = cut_along(triangles, [curve])
     flipped, merged = flip_new_faces(finer, merged, np.ones(finer.n_faces, dtype=bool))
-    return flipped, [PlacedSegments.of(flipped, merged.parts([False] * len(parts)))]
+    return flipped, PlacedSegments.of(flipped, merged.parts([False]))
 
 
 def share_to_flip(triangles: IntrinsicMesh) -> float:
@@ -311,7 +318,8 @@ def continue_search(faces: Faces, search: Search, slack: float, tolerance: float
     queue, counts = search.queue, search.counts
     while queue.size[0] > 0 and counts[MADE] < limit:
         most = _most_windows(faces, search.queued, search.following, queue.items[0])
-        if not has_room(counts, len(search.windows), most):
+        if counts[USED] + most > len(search.windows):
+            counts[WANTED] = most
             return
         item = pop(queue)
         if item < len(search.queued):
@@ -542,18 +550,6 @@ def straighten(w: Floats) -> None:
 
 
 @compiled
-def clip(s0: float, s1: float, at_start: float, slope: float) -> tuple[float, float]:
-    """Return the part of [s0, s1] where ``at_start + slope s ≤ 0``."""
-    if slope > 0.0:
-        s1 = min(s1, -at_start / slope)
-    elif slope < 0.0:
-        s0 = max(s0, -at_start / slope)
-    elif at_start > 0.0:
-        s1 = s0 - 1.0
-    return s0, s1
-
-
-@compiled
 def hit(x0: float, dx: float, dy: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Return the fraction of the way from a to b at which the ray from (x0, 0) along (dx, dy) meets their line."""
     ex, ey = bx - ax, by - ay
@@ -635,15 +631,6 @@ USED, FREE, MADE, WANTED = range(4)
 
 
 @compiled
-def has_room(counts: Ints, size: int, n: int) -> bool:
-    """Return whether n more windows fit into an array of this many rows; otherwise note how many were wanted."""
-    if counts[USED] + n <= size:
-        return True
-    counts[WANTED] = n
-    return False
-
-
-@compiled
 def take_row(counts: Ints, following: Ints) -> int:
     """Take a row for a window; there must be room."""
     row = counts[FREE]
@@ -676,7 +663,7 @@ def propagate_across(
     sigma: float,
     slack: float,
 ) -> None:
-    """Propagate a wave across fractions t0 to t1 of a side of a face to the faces beyond, if there is room.
+    """Propagate a wave across fractions t0 to t1 of a side of a face to the faces beyond.
 
     σ is the distance of the `point` that it comes from, or, of a beam along a `normal`, the distance at that point.
     """
@@ -690,8 +677,6 @@ def propagate_across(
         return
     begin, end = faces.first_halfedge[edge], faces.first_halfedge[edge + 1]
     distance, _, queue, queued, _, windows, following, counts = search
-    if not has_room(counts, len(windows), end - begin):
-        return
     w = windows[0]
     w[S0], w[S1], w[KIND] = t0 * length, t1 * length, kind
     unit = (b - a) / length
@@ -721,65 +706,77 @@ def propagate_across(
 
 
 @compiled
-def _reach_corners(faces: Faces, distance: Floats, face: int, start: complex, end: complex) -> None:
-    """Lower the distance of the corners of a face to that from a segment or a point in it."""
-    along = end - start
-    square = abs(along) ** 2
-    for k in range(3):
-        v, r = faces.vertices[face, k], faces.positions[face, k] - start
-        t = min(max((r * along.conjugate()).real / square, 0.0), 1.0) if square > 0.0 else 0.0
-        distance[v] = min(distance[v], abs(r - t * along))
-
-
-@compiled
-def _first_beam(faces: Faces, search: Search, face: int, start: complex, end: complex, slack: float) -> None:
-    """Send a parallel beam from a segment in a face, to the left of it, to the sides of the face that it meets."""
-    along = (end - start) / abs(end - start)
-    normal = 1j * along
-    for side in range(3):
-        a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
-        foot = ((a - start) * along.conjugate()).real
-        rate = ((b - a) * along.conjugate()).real
-        height = ((a - start) * normal.conjugate()).real
-        climb = ((b - a) * normal.conjugate()).real
-        if abs(height) + abs(climb) <= 1e-9 * abs(b - a):  # the segment lies on this side, and the beam leaves it
-            continue
-        t0, t1 = clip(0.0, 1.0, -foot, -rate)
-        t0, t1 = clip(t0, t1, foot - abs(end - start), rate)
-        t0, t1 = clip(t0, t1, -height, -climb)
-        if t1 > t0:
-            propagate_across(faces, search, face, side, BEAM, t0, t1, start, normal, 0.0, slack)
-
-
-@compiled
-def _first_fan(
-    faces: Faces, search: Search, face: int, point: complex, first: complex, second: complex, slack: float
-) -> None:
-    """Send circular waves from a point in a face, in directions of more than 90° from two given ones."""
-    for side in range(3):
-        a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
-        if ((point - a) * (1j * (b - a)).conjugate()).real <= 1e-9 * abs(b - a) ** 2:  # the point lies on this side
-            continue
-        t0, t1 = clip(0.0, 1.0, ((a - point) * first.conjugate()).real, ((b - a) * first.conjugate()).real)
-        t0, t1 = clip(t0, t1, ((a - point) * second.conjugate()).real, ((b - a) * second.conjugate()).real)
-        if t1 > t0:
-            propagate_across(faces, search, face, side, POINT, t0, t1, point, 0j, 0.0, slack)
-
-
-@compiled
-def start_search(faces: Faces, sources: GeodesicSources, search: Search, slack: float) -> None:
-    """Set distances at the corners of faces with sources, and make the first windows, as far as there is room."""
-    for v in sources.vertices:
-        search.distance[v] = 0.0
-    for i in range(len(sources.beam_faces)):
-        _reach_corners(faces, search.distance, sources.beam_faces[i], sources.beam_starts[i], sources.beam_stops[i])
-    for i in range(len(sources.fan_faces)):
-        _reach_corners(faces, search.distance, sources.fan_faces[i], sources.fan_points[i], sources.fan_points[i])
-    for i in range(len(sources.beam_faces)):
-        _first_beam(faces, search, sources.beam_faces[i], sources.beam_starts[i], sources.beam_stops[i], slack)
-    for i in range(len(sources.fan_faces)):
-        point, first, second = sources.fan_points[i], sources.fan_firsts[i], sources.fan_seconds[i]
-        _first_fan(faces, search, sources.fan_faces[i], point, first, second, slack)
+def start_search(faces: Faces, waves: Waves, search: Search, slack: float) -> None:
+    """Make the first windows, and queue the vertices around which paths from sources in their faces bend."""
+    for i in range(len(waves.halfedges)):
+        face, side = waves.halfedges[i] // 3, waves.halfedges[i] % 3
+        kind, t0, t1 = waves.kinds[i], waves.begins[i], waves.ends[i]
+        propagate_across(faces, search, face, side, kind, t0, t1, waves.points[i], waves.normals[i], 0.0, slack)
     for v in range(len(search.distance)):
         if search.pseudosources[v] and search.distance[v] < np.inf:
             push(search.queue, len(search.queued) + v, search.distance[v])
+
+
+class Waves(NamedTuple):
+    """The waves that leave sources, each through a part of one side of a face: see `propagate_across`."""
+
+    halfedges: Ints  # 3 f + k, for side k of face f
+    kinds: Floats
+    # fractions of the side
+    begins: Floats
+    ends: Floats
+    points: Complexes
+    normals: Complexes
+
+
+def reach_corners(triangles: IntrinsicMesh, sources: GeodesicSources, distance: Floats) -> None:
+    """Lower the distance of the corners of faces to that from the segments and points in them."""
+    faces = np.concatenate([sources.beam_faces, sources.fan_faces])
+    starts = np.concatenate([sources.beam_starts, sources.fan_points])[:, None]
+    steps = np.concatenate([sources.beam_stops, sources.fan_points])[:, None] - starts
+    _, gaps = nearest_shares(triangles.corner_positions[faces] - starts, steps)
+    np.minimum.at(distance, triangles.corner_vertices[faces], gaps)
+
+
+def first_waves(triangles: IntrinsicMesh, sources: GeodesicSources) -> Waves:
+    """Send parallel beams to the left of segments, and circular waves from points, to the sides that they meet.
+
+    A beam is between the ends of its segment and to the left of it; a fan is behind its two directions.
+    """
+    faces, starts = sources.beam_faces, sources.beam_starts[:, None]
+    lengths = np.abs(sources.beam_stops[:, None] - starts)
+    along = (sources.beam_stops[:, None] - starts) / lengths
+    tails, steps = triangles.corner_positions[faces] - starts, triangles.edge_vectors[faces]
+    foot, rate, height, climb = (dot(v, way) for way in (along, 1j * along) for v in (tails, steps))
+    apart = np.abs(height) + np.abs(climb) > 1e-9 * np.abs(steps)  # from segments on this side beams leave the face
+    beams = parts_within(apart, (-foot, -rate), (foot - lengths, rate), (-height, -climb))
+
+    points = sources.fan_points[:, None]
+    tails, steps = triangles.corner_positions[sources.fan_faces] - points, triangles.edge_vectors[sources.fan_faces]
+    apart = dot(-tails, 1j * steps) > 1e-9 * np.abs(steps) ** 2
+    ways = sources.fan_firsts[:, None], sources.fan_seconds[:, None]
+    fans = parts_within(apart, *((dot(tails, way), dot(steps, way)) for way in ways))
+
+    parts = []
+    for kind, owners, (rows, sides, begins, ends), points, normals in (
+        (BEAM, faces, beams, sources.beam_starts, 1j * along[:, 0]),
+        (POINT, sources.fan_faces, fans, sources.fan_points, np.zeros_like(sources.fan_points)),
+    ):
+        parts.append((3 * owners[rows] + sides, np.full(len(rows), kind), begins, ends, points[rows], normals[rows]))
+    return Waves(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def dot(a: Complexes, b: Complexes) -> Floats:
+    """Return scalar products of plane vectors."""
+    return (a * np.conj(b)).real
+
+
+def parts_within(chosen: Bools, *bounds: tuple[Floats, Floats]) -> tuple[Ints, Ints, Floats, Floats]:
+    """Return where on sides s = 0 … 1, (n, 3), ``a + b s ≤ 0`` for all bounds a and b: rows, sides, begins, ends."""
+    begins, ends = np.zeros(chosen.shape), np.ones(chosen.shape)
+    for at_tail, slope in bounds:
+        zero = -at_tail / np.where(slope != 0, slope, 1.0)
+        begins = np.where(slope < 0, np.maximum(begins, zero), begins)
+        ends = np.where(slope > 0, np.minimum(ends, zero), np.where((slope == 0) & (at_tail > 0), -1.0, ends))
+    rows, sides = np.nonzero(chosen & (ends > begins))
+    return rows, sides, begins[rows, sides], ends[rows, sides]

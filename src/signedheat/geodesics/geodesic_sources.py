@@ -106,10 +106,7 @@ class PlacedSegments:
         swapped = (along[:, 1] < along[:, 0]) == forward
         along[swapped], ends[swapped] = along[swapped, ::-1], ends[swapped, ::-1]
         positions = on_sides(triangles, faces, local_sides, along)
-        seen = vectors[owners]
-        seen = triangles.edge_directions[faces, local_sides] * np.where(
-            triangles.reflected[faces, local_sides], np.conj(seen), seen
-        )
+        seen = triangles.from_edge_frames(vectors[owners], faces, local_sides)
         sides = np.sign((np.conj(1j * triangles.edge_vectors[faces, local_sides]) * seen).real).astype(np.int64)
         return ends, faces, positions, np.ones(len(faces), dtype=bool), sides * oriented[rows][owners], rows[owners]
 
@@ -134,11 +131,10 @@ class PlacedSegments:
         inside, on_edge = np.flatnonzero(nodes.kinds == FACE), np.flatnonzero(nodes.kinds == EDGE)
         owners, halfedges = halfedges_of(triangles, nodes.elements[on_edge])
         faces, k, node = halfedges // 3, halfedges % 3, on_edge[owners]
-        turns, over = triangles.edge_directions[faces, k], triangles.reflected[faces, k]
         home = nodes.elements[inside]
         points = (nodes.barycentric[inside] * triangles.corner_positions[nodes.faces[inside]]).sum(axis=1)
         firsts, seconds = (
-            np.concatenate([d[inside], turns * np.where(over, np.conj(d[node]), d[node])]) for d in (first, second)
+            np.concatenate([d[inside], triangles.from_edge_frames(d[node], faces, k)]) for d in (first, second)
         )
         across = on_sides(triangles, faces, k, nodes.along[node][:, None])[:, 0]
         return np.concatenate([home, faces]), np.concatenate([points, across]), firsts, seconds
@@ -193,6 +189,13 @@ def zero_line(triangles: IntrinsicMesh, values: Floats, among: Bools | None = No
         np.ones(len(keep), dtype=np.int64),
         np.arange(len(keep)),
     )
+
+
+def nearest_shares(points: Complexes, steps: Complexes) -> tuple[Floats, Floats]:
+    """Return at which fractions of the way from the origin along steps the nearest places are, and how far away."""
+    squares = np.abs(steps) ** 2
+    shares = np.clip((points * np.conj(steps)).real / np.where(squares > 0, squares, 1.0), 0.0, 1.0)
+    return shares, np.abs(points - shares * steps)
 
 
 def halfedges_of(triangles: IntrinsicMesh, edges: Ints) -> tuple[Ints, Ints]:

@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import dijkstra
 from ..arrays import Complexes, Floats, Ints
 from ..compiled import compiled
 from ..errors import SourceError
+from ..mesh.gluing import cross, following, preceding
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import (
     LocatedPoints,
@@ -59,7 +60,7 @@ def geodesic_paths(
 ) -> tuple[LocatedPoints, Ints]:
     """Return the points at which locally shortest paths cross edges or pass vertices, and how many each path has."""
     starts, ends = Places.of(triangles, start), Places.of(triangles, end)
-    sides, fractions, counts = _shortest_lines(Faces.of(triangles), Routes.of(triangles.n_edges), starts, ends)
+    sides, fractions, counts = _shortest_lines(Faces.of(triangles), Routes.on(triangles), starts, ends)
     located = locate_points(triangles, sides // 3, barycentric_on_sides(sides % 3, fractions), name)
     blocked = np.flatnonzero(counts < 0)
     if not len(blocked):
@@ -101,12 +102,17 @@ class Routes(NamedTuple):
     leave: Ints
     enter: Ints
     queue: Queue  # of edges
+    middles: Complexes  # (3m,) midpoint of each halfedge, in the layout of its face
+    tolls: Floats  # (e,) factor that makes paths through each edge more expensive: evenly spread, by the golden ratio
 
     @classmethod
-    def of(cls, n_edges: int) -> Routes:
-        """Make work space for this many edges."""
-        sides = np.empty(n_edges, dtype=np.int64), np.empty(n_edges, dtype=np.int64)
-        return cls(np.full(n_edges, np.inf), *sides, Queue.empty(n_edges))
+    def on(cls, triangles: IntrinsicMesh) -> Routes:
+        """Make work space for a mesh."""
+        n, corners = triangles.n_edges, triangles.corner_positions
+        sides = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+        middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
+        tolls: Floats = 1.0 + TIE * ((np.arange(n) * 0.6180339887498949) % 1.0)
+        return cls(np.full(n, np.inf), *sides, Queue.empty(n), middles.ravel(), tolls)
 
 
 def path_through_vertices(
@@ -148,27 +154,15 @@ is then always found. Any number from 1e-12 to 1e-6 does."""
 
 
 @compiled
-def middle(faces: Faces, h: int) -> complex:
-    """Return the midpoint of a halfedge, in the layout of its face."""
-    return 0.5 * (faces.positions[h // 3, h % 3] + faces.positions[h // 3, (h % 3 + 1) % 3])
-
-
-@compiled
-def toll(e: int) -> float:
-    """Return the factor that makes paths through an edge more expensive: evenly spread, by the golden ratio."""
-    return 1.0 + TIE * ((e * 0.6180339887498949) % 1.0)
-
-
-@compiled
 def _find_sleeve(faces: Faces, routes: Routes, starts: Places, ends: Places, pair: int) -> tuple[Ints, Ints]:
     """Find halfedges by which faces are left and entered on the shortest path through midpoints (Dijkstra)."""
-    cost, leave, enter, queue = routes
+    cost, leave, enter, queue, middles, tolls = routes
     edge_of, touched = faces.edges.ravel(), [0]
     touched.pop()
     for s in range(starts.first[pair], starts.first[pair + 1]):
         for k in range(3):
             h, e = 3 * starts.faces[s] + k, edge_of[3 * starts.faces[s] + k]
-            d = abs(middle(faces, h) - starts.points[s]) * toll(e)
+            d = abs(middles[h] - starts.points[s]) * tolls[e]
             if d < cost[e]:
                 cost[e], leave[e], enter[e] = d, h, -1
                 touched.append(e)
@@ -183,14 +177,13 @@ def _find_sleeve(faces: Faces, routes: Routes, starts: Places, ends: Places, pai
             h = faces.halfedges[k]
             if h == leave[e]:
                 continue
-            entry = middle(faces, h)
+            entry = middles[h]
             for s in range(ends.first[pair], ends.first[pair + 1]):
                 if ends.faces[s] == h // 3 and d + abs(entry - ends.points[s]) < best:
                     best, last = d + abs(entry - ends.points[s]), h
-            for turn in range(1, 3):
-                out = h - h % 3 + (h + turn) % 3
+            for out in (following(h), preceding(h)):
                 to = edge_of[out]
-                longer = d + abs(middle(faces, out) - entry) * toll(to)
+                longer = d + abs(middles[out] - entry) * tolls[to]
                 if longer < cost[to]:
                     cost[to], leave[to], enter[to] = longer, out, h
                     touched.append(to)
@@ -237,29 +230,20 @@ def on_base(corners: Complexes, side: int, over: int, point: complex, a: complex
 
 
 @compiled
-def turns(a: complex, b: complex) -> float:
-    """Return the cross product of plane vectors, which is positive where b is counter-clockwise of a."""
-    return a.real * b.imag - a.imag * b.real
-
-
-@compiled
 def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tuple[list[int], list[int], float]:
     """Return the portals at which the shortest path in a sleeve bends, at which end (0: tail), and its length."""
     bends, ends = [0], [0]
     bends.pop()
     ends.pop()
-    rims, rim_portals = (
-        np.full(2, start),
-        np.full(2, -1),
-    )  # the right and left rim of the funnel, and the portals they come from
+    rims, rim_portals = np.full(2, start), np.full(2, -1)  # right and left, and the portals that they come from
     apex, total, i = start, 0.0, 0
     while i <= len(portals):
         for side in range(2):
             opposite, sign = 1 - side, 1.0 - 2.0 * side
             place = portals[i, side ^ over[i]] if i < len(portals) else end
-            if sign * turns(rims[side] - apex, place - apex) < 0:
+            if sign * cross(rims[side] - apex, place - apex) < 0:
                 continue
-            if apex == rims[side] or sign * turns(rims[opposite] - apex, place - apex) < 0:
+            if apex == rims[side] or sign * cross(rims[opposite] - apex, place - apex) < 0:
                 if i < len(portals):
                     rims[side], rim_portals[side] = place, i
                 continue
@@ -287,7 +271,8 @@ def other_way(
     goal, at_tail = entered[last] // 3, portals[first, 0] == point
     # walk around the vertex in all directions, breadth first: of each face reached, the two halfedges at the vertex, by
     # which it is entered and left; whether the vertex is the tail of the second; and the face before it
-    ways_in, ways_out, tail_there, before = [left[first]], [turned(left[first], at_tail)], [not at_tail], [-1]
+    way_out = preceding(left[first]) if at_tail else following(left[first])
+    ways_in, ways_out, tail_there, before = [left[first]], [way_out], [not at_tail], [-1]
     k = 0
     while k < len(ways_out):
         h = ways_out[k]
@@ -308,17 +293,11 @@ def other_way(
             same_way = faces.forward[h // 3, h % 3] == faces.forward[across // 3, across % 3]
             at_tail = tail_there[k] == same_way
             ways_in.append(across)
-            ways_out.append(turned(across, at_tail))
+            ways_out.append(preceding(across) if at_tail else following(across))
             tail_there.append(not at_tail)
             before.append(k)
         k += 1
     return left[:0], entered[:0]
-
-
-@compiled
-def turned(h: int, at_tail: bool) -> int:
-    """Return the other halfedge of the face at the tail of a halfedge, or at its head."""
-    return h - h % 3 + (h + 2) % 3 if at_tail else h - h % 3 + (h + 1) % 3
 
 
 @compiled
@@ -369,9 +348,9 @@ def _straighten(
             continue
         next_place = portals[bends[k], bend_ends[k]] if k < len(bends) else end
         along, span, away = next_place - place, portals[i, 1] - portals[i, 0], place - portals[i, 0]
-        across = turns(along, span)
+        across = cross(along, span)
         share = (
-            turns(along, away) / across if across != 0 else (np.conj(span) * away).real / max(abs(span) ** 2, 1e-300)
+            cross(along, away) / across if across != 0 else (np.conj(span) * away).real / max(abs(span) ** 2, 1e-300)
         )
         fractions[i] = min(max(share, 0.0), 1.0)
     return left, fractions

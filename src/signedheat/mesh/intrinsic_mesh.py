@@ -146,10 +146,13 @@ class IntrinsicMesh(Frozen):
         turned = np.conj(self.edge_directions[faces, sides]) * vectors
         return np.where(self.reflected[faces, sides], np.conj(turned), turned)
 
+    def from_edge_frames(self, vectors: Complexes, faces: Index, sides: Index = slice(None)) -> Complexes:
+        """Express vectors of edges, in the shape of the sides of faces, in the layouts of these faces."""
+        return self.edge_directions[faces, sides] * np.where(self.reflected[faces, sides], np.conj(vectors), vectors)
+
     def in_face_frames(self, vectors: Complexes, faces: Index = slice(None)) -> Complexes:
         """Return (k, 3) the vectors of an (e,) edge array in the layouts of faces."""
-        of_face = vectors[self.edges.face_edges[faces]]
-        return self.edge_directions[faces] * np.where(self.reflected[faces], np.conj(of_face), of_face)
+        return self.from_edge_frames(vectors[self.edges.face_edges[faces]], faces)
 
     def sums_in_faces(self, vectors: Complexes) -> Complexes:
         """Return (m, c) sums of an (e, c) edge array over the edges of each face, in its layout: 3 × Sec. 6."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Complexes, Floats, Frozen, Ints
+from ..arrays import Bools, Complexes, Floats, Frozen, Ints, mask_of
 from ..errors import SourceError
 from ..geodesics.exact_distance import cleared
 from ..geodesics.geodesic_sources import zero_line
@@ -183,18 +183,15 @@ def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[Ints, Flo
     """Return the face of every segment, the larger at an edge, its barycentric ends, and its normal in the layout."""
     faces = source.faces.copy()
     on_edge = np.flatnonzero(source.edges >= 0)
-    flat, used = triangles.edges.face_edges.ravel(), np.zeros(triangles.n_edges, dtype=bool)
-    used[source.edges[on_edge]] = True
-    chosen = np.flatnonzero(used[flat])
+    flat = triangles.edges.face_edges.ravel()
+    chosen = np.flatnonzero(mask_of(triangles.n_edges, source.edges[on_edge])[flat])
     order = chosen[np.lexsort([triangles.face_areas[chosen // 3], flat[chosen]])]
     fattest = np.empty(triangles.n_edges, dtype=np.int64)
     fattest[flat[order]] = order
     halfedge = fattest[source.edges[on_edge]]
     faces[on_edge] = halfedge // 3
     directions = source.vectors.copy()
-    seen = directions[on_edge]
-    reflected = triangles.reflected.ravel()[halfedge]
-    directions[on_edge] = triangles.edge_directions.ravel()[halfedge] * np.where(reflected, np.conj(seen), seen)
+    directions[on_edge] = triangles.from_edge_frames(directions[on_edge], halfedge // 3, halfedge % 3)
     starts = barycentric_in(triangles, faces, source.nodes[source.ends[:, 0]])
     return faces, starts, barycentric_in(triangles, faces, source.nodes[source.ends[:, 1]]), directions
 

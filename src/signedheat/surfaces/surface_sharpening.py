@@ -18,7 +18,7 @@ from ..discretization import SourceTerm, discretize
 from ..errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
 from ..foreign import as_list
 from ..geodesics.exact_distance import Report, cleared, distance_to_segments, distance_to_zero_line, window_limit
-from ..geodesics.geodesic_sources import PlacedSegments, zero_line
+from ..geodesics.geodesic_sources import PlacedSegments, nearest_shares, zero_line
 from ..jobs import Progress
 from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at
@@ -107,7 +107,7 @@ def nearest_zero(
         return Nearest(distance, sides, (note_on_searches(surface.triangles, windows),))
     # Unoriented curves run along edges of refined triangles, whose first vertices are those of the surface.
     near, windows = distance_to_segments(
-        source.triangles, [PlacedSegments.of(source.triangles, unsided)], tolerance, report
+        source.triangles, PlacedSegments.of(source.triangles, unsided), tolerance, report
     )
     note = note_on_searches(source.triangles, windows)
     near = near[: len(values)]
@@ -140,7 +140,7 @@ class CurvesThere:
     ) -> CurvesThere:
         """Measure to curves and points."""
         placed = PlacedSegments.of(triangles, parts)
-        distance, windows = distance_to_segments(triangles, [placed], tolerance, report)
+        distance, windows = distance_to_segments(triangles, placed, tolerance, report)
         return cls(placed, distance, curve_sides(triangles, placed), windows)
 
 
@@ -169,7 +169,7 @@ def nearest_curve(
     counts += more
     completed = float(missing.lengths.sum())
     if completed > 0:
-        to_missing, windows = distance_to_segments(triangles, [missing], tolerance, report)
+        to_missing, windows = distance_to_segments(triangles, missing, tolerance, report)
         distance = np.where(bounded, distance, np.minimum(distance, to_missing))
         counts.append(windows)
     there_length = sum(float(part.lengths.sum()) for part in parts)
@@ -201,7 +201,7 @@ def missing_parts(
     counts = []
     if len(there.sides.free_ends):
         ends = CurveSegments.of_points(there.placed.nodes[there.sides.free_ends])
-        to_ends, windows = distance_to_segments(triangles, [PlacedSegments.of(triangles, [ends])], ROUGHLY, report)
+        to_ends, windows = distance_to_segments(triangles, PlacedSegments.of(triangles, [ends]), ROUGHLY, report)
         counts.append(windows)
         beyond = to_ends <= there.distance * (1 + 1e-3)
         apart |= beyond[corners].all(axis=1)
@@ -210,7 +210,7 @@ def missing_parts(
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
     unsided = [part for part in parts if not part.oriented]
     if unsided:
-        near, windows = distance_to_segments(triangles, [PlacedSegments.of(triangles, unsided)], ROUGHLY, report)
+        near, windows = distance_to_segments(triangles, PlacedSegments.of(triangles, unsided), ROUGHLY, report)
         sided = [incident_faces(triangles, part.nodes)[1] for part in parts if part.oriented]
         values = without_false_zeros(
             triangles, values, near < FALSE_ZERO_WIDTH * spacing, corners[np.concatenate(sided)].ravel()
@@ -298,8 +298,7 @@ def nearest_sides(triangles: IntrinsicMesh, placed: PlacedSegments, ends: Ints) 
     start, step = placed.positions[rows, :1], np.diff(placed.positions[rows], axis=1)
     faces, sides = placed.faces[rows], placed.sides[rows]
     corner = triangles.corner_positions[faces] - start
-    share = np.clip((corner * np.conj(step)).real / np.abs(step) ** 2, 0.0, 1.0)
-    gap = np.abs(corner - share * step)
+    share, gap = nearest_shares(corner, step)
     height = (np.conj(step) * corner).imag / np.abs(step)
     height[np.abs(height) <= TIE * np.abs(step)] = 0.0
     is_end = mask_of(len(placed.nodes), ends)
