@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from ..compiled import compiled
 
 SIDE = 8
@@ -104,9 +104,15 @@ class BlockValues:
 
     def window(self, first: NDArray[np.integer], shape: tuple[int, int, int]) -> NDArray[np.float32]:
         """Return values in a box of nodes from `first` on; NaN where there are none."""
-        result = np.full(shape, np.nan, dtype=np.float32)
-        _gather(self.blocks.tables, self.values, np.asarray(first, dtype=np.int64), np.array(self.shape), result)
-        return result
+        low, high = first // SIDE, -(-(first + np.array(shape)) // SIDE)
+        counts = high - low
+        rows = self.blocks.rows(low + np.indices(counts).reshape(3, -1).T)
+        nodes = np.full((len(rows), SIDE, SIDE, SIDE), np.nan, dtype=np.float32)
+        nodes[rows >= 0] = self.values[rows[rows >= 0]]
+        by_axis = nodes.reshape(*counts, SIDE, SIDE, SIDE).transpose(0, 3, 1, 4, 2, 5).reshape(SIDE * counts)
+        for axis, end in enumerate(self.shape - SIDE * low):  # the last blocks reach beyond the grid
+            np.moveaxis(by_axis, axis, 0)[max(end, 0) :] = np.nan
+        return by_axis[tuple(slice(a, a + n) for a, n in zip(first - SIDE * low, shape, strict=True))]
 
 
 @compiled
@@ -142,21 +148,3 @@ def _interpolate(tables: Tables, values: NDArray[np.float32], points: Floats, li
                 total += part * values[row, (i + a) % SIDE, (j + b) % SIDE, (k + c) % SIDE]
         out[p] = total
     return out
-
-
-@compiled
-def _gather(tables: Tables, values: NDArray[np.float32], first: Ints, limit: Ints, out: NDArray[np.float32]) -> None:
-    """Copy the values of a box of nodes, from `first` on, into `out`, which keeps its own where there are none."""
-    for a in range(out.shape[0]):
-        for b in range(out.shape[1]):
-            i, j = first[0] + a, first[1] + b
-            if not (0 <= i < limit[0] and 0 <= j < limit[1]):
-                continue
-            row, held = np.int32(-1), np.int64(-1)
-            for c in range(out.shape[2]):
-                k = first[2] + c
-                if 0 <= k < limit[2]:
-                    if k // SIDE != held:
-                        row, held = row_of_node(tables, i, j, k), k // SIDE
-                    if row >= 0:
-                        out[a, b, c] = values[row, i % SIDE, j % SIDE, k % SIDE]

@@ -178,6 +178,22 @@ FLAT = 0.25
 Distances of balls and half spaces 13 to 17 nodes wide are best with .125 to .25, those of boxes with more."""
 
 
+class Crossings(NamedTuple):
+    """The zero set of the cubic interpolant near crossed edges: places on it, and how it lies and bends there."""
+
+    places: Floats  # (c, 4)
+    normals: Floats  # (c, 4) unit vectors
+    bends: Floats  # (c, 4, 4) symmetric shape operators
+
+    def heights(self, chosen: Ints, away: Floats) -> Floats:
+        """Return (n,) heights, over the tangent planes of some crossings (n,), of what is (n, 4) away from them."""
+        return np.einsum("ni,ni->n", away, self.normals[chosen])
+
+    def bend_along(self, chosen: Ints, across: Floats) -> Floats:
+        """Return (n,) curvatures of the zero set at some crossings (n,) along (n, 4), times their squared lengths."""
+        return np.einsum("ni,nij,nj->n", across, self.bends[chosen], across)
+
+
 class Contour(NamedTuple):
     """The zero set of an array."""
 
@@ -186,7 +202,7 @@ class Contour(NamedTuple):
     faces: Ints
     numbers: Ints  # (v,) the crossing at each vertex; −1 at vertices on no edge of the array
     zeros: Floats  # (k, 4) nodes that are zero, without a negative neighbour
-    curved: Floats  # (c, 18) crossings, normals and shape operators of the cubic interpolant: see `crossings_at`
+    curved: Crossings  # of edges with the zero set of the cubic interpolant
     # (c, 4) the crossings: where smooth on the zero set of the cubic interpolant, else of values linear along edges
     points: Floats
     smooth: Bools  # (c,) whether distance around a crossing is that to the interpolant's zero set
@@ -208,13 +224,13 @@ def zero_contour(values: Floats, steps: Floats) -> Contour:
     around = scipy.ndimage.generate_binary_structure(4, 1)
     zeros = np.argwhere((field == 0) & ~scipy.ndimage.binary_dilation(field < 0, around)) * steps
     if values.ndim == 4:
-        curved = crossings_at(field, crossed_edges(field), steps)
-        smooth, none = np.ones(len(curved), dtype=np.bool_), np.empty((0, 3))
+        curved = Crossings(*crossings_at(field, crossed_edges(field), steps))
+        smooth, none = np.ones(len(curved.places), dtype=np.bool_), np.empty((0, 3))
         ids = none.astype(np.int64)
-        return Contour(none, ids, ids[:, 0], zeros, curved, curved[:, :4].copy(), smooth, 0.0, reach)
+        return Contour(none, ids, ids[:, 0], zeros, curved, curved.places, smooth, 0.0, reach)
     vertices, faces, edges, first, numbers = _marched(values)
     vertices *= steps[1:]
-    curved = crossings_at(field, edges, steps)
+    curved = Crossings(*crossings_at(field, edges, steps))
     linear = np.pad(vertices[first], ((0, 0), (1, 0)))
     linear[:, :unused] = 0.0
     corners = numbers[faces]
@@ -222,7 +238,7 @@ def zero_contour(values: Floats, steps: Floats) -> Contour:
     uneven = _unevenness(curved, linear, pairs[(pairs >= 0).all(axis=1)])
     least = UNEVEN * float(steps[unused:].min())
     smooth = uneven <= least
-    points = np.where(smooth[:, None], curved[:, :4], linear)
+    points = np.where(smooth[:, None], curved.places, linear)
     return Contour(vertices, faces, numbers, zeros, curved, points, smooth, least, reach)
 
 
@@ -230,62 +246,58 @@ def distances_to(contour: Contour, places: Floats) -> Floats:
     """Return (n,) unsigned distances of (n, 4) places to the zero set."""
     distances = np.full(len(places), np.inf)
     if not len(contour.vertices) and len(contour.points):  # four axes
-        nearest = scipy.spatial.cKDTree(contour.points).query(places, workers=-1)[1]
-        distances = _around_crossings(contour, nearest, places)
+        crossings = scipy.spatial.cKDTree(contour.points)
+        (distances,) = in_chunks(lambda chunk: (_around_crossings(contour, crossings.query(chunk)[1], chunk),), places)
     elif len(contour.faces):
         features = FaceFeatures.of(contour.vertices, contour.faces)
         tree, corners = FaceTree.of(features), contour.numbers[contour.faces[features.ids]]
 
         def measured(chunk: Floats) -> tuple[Floats]:
             faces, squares = tree.nearest(np.ascontiguousarray(chunk[:, 1:]))
-            return (_around(contour, corners[faces], squares, chunk),)
+            return (_around(contour, corners[faces], np.sqrt(squares), chunk),)
 
-        distances = in_chunks(measured, places)[0]
+        (distances,) = in_chunks(measured, places)
     if len(contour.zeros):
         to_zeros = scipy.spatial.cKDTree(contour.zeros).query(places, workers=-1)[0]
         distances = np.minimum(distances, to_zeros)
     return distances
 
 
-@compiled
-def _around(contour: Contour, corners: Ints, squares: Floats, places: Floats) -> Floats:
-    """Return (n,) distances to triangles of (n, 3) corners, given squared; where smooth, those to the interpolant."""
-    result, away, room = np.empty(len(places)), np.empty(4), np.empty(4)
-    for i in range(len(places)):
-        distance, least, crossing = np.sqrt(squares[i]), np.inf, -1
-        for k in range(3):
-            corner = corners[i, k]
-            if corner >= 0:
-                square = 0.0
-                for d in range(4):
-                    square += (places[i, d] - contour.points[corner, d]) ** 2
-                if square < least:
-                    least, crossing = square, corner
-        if crossing >= 0 and contour.smooth[crossing]:
-            for d in range(4):
-                away[d] = places[i, d] - contour.curved[crossing, d]
-            curved = circle_distance(contour.curved[crossing], away, room, contour.reach)
-            distance = min(max(curved, distance - contour.uneven), distance + contour.uneven)
-        result[i] = distance
-    return result
+def _around(contour: Contour, corners: Ints, distances: Floats, places: Floats) -> Floats:
+    """Return distances, (n,) to triangles of (n, 3) corners; where smooth, to the interpolant at the nearest corner."""
+    squares = np.empty(corners.shape)
+    for k in range(3):
+        away = places - contour.points[corners[:, k]]
+        squares[:, k] = np.where(corners[:, k] >= 0, np.einsum("ni,ni->n", away, away), np.inf)
+    crossings = corners[np.arange(len(corners)), squares.argmin(axis=1)]
+    rows = np.flatnonzero((crossings >= 0) & contour.smooth[crossings])
+    curved = circle_distances(contour, crossings[rows], places[rows] - contour.curved.places[crossings[rows]])
+    low, high = distances[rows] - contour.uneven, distances[rows] + contour.uneven
+    distances[rows] = np.minimum(np.maximum(curved, low), high)
+    return distances
 
 
-@compiled
-def _around_crossings(contour: Contour, nearest: Ints, places: Floats) -> Floats:
+def _around_crossings(contour: Contour, crossings: Ints, places: Floats) -> Floats:
     """Return (n,) distances to the interpolant's zero set at the nearest crossings; if not smooth, to a flat piece."""
-    result, away, room = np.empty(len(places)), np.empty(4), np.empty(4)
-    for i in range(len(places)):
-        height, square = 0.0, 0.0
-        for d in range(4):
-            away[d] = places[i, d] - contour.curved[nearest[i], d]
-            height += away[d] * contour.curved[nearest[i], 4 + d]
-            square += away[d] ** 2
-        if contour.smooth[nearest[i]]:
-            result[i] = circle_distance(contour.curved[nearest[i]], away, room, contour.reach)
-        else:
-            beyond = max(0.0, np.sqrt(max(0.0, square - height**2)) - FLAT * contour.reach)
-            result[i] = np.sqrt(height**2 + beyond**2)
-    return result
+    away = places - contour.curved.places[crossings]
+    heights = contour.curved.heights(crossings, away)
+    across = np.sqrt(np.maximum((away**2).sum(axis=1) - heights**2, 0.0))
+    flat = np.hypot(heights, np.maximum(across - FLAT * contour.reach, 0.0))
+    return np.where(contour.smooth[crossings], circle_distances(contour, crossings, away), flat)
+
+
+def circle_distances(contour: Contour, crossings: Ints, away: Floats) -> Floats:
+    """Return (n,) distances, from (n, 4) away, to the circles that touch the zero set at crossings, in their planes."""
+    heights, squares = contour.curved.heights(crossings, away), np.einsum("ni,ni->n", away, away)
+    across = away - heights[:, None] * contour.curved.normals[crossings]
+    sides, distances = np.einsum("ni,ni->n", across, across), np.sqrt(squares)
+    aside = sides > 1e-12 * squares
+    bend = contour.curved.bend_along(crossings, across) / np.where(aside, sides, 1.0)
+    root = np.sqrt(np.maximum(1.0 + 2.0 * bend * heights + bend * bend * squares, 0.0))
+    circle = np.abs(2.0 * heights + bend * squares) / (1.0 + root)
+    before_center = 1.0 + bend * heights > 0.0  # beyond it the other side of the circle is nearer, which is no surface
+    nearer = np.minimum(distances, np.maximum(circle, distances - contour.reach))
+    return np.where(aside & before_center, nearer, distances)
 
 
 def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Ints]:
@@ -329,17 +341,13 @@ def _between_others(vertices: Floats, faces: Ints, chosen: Bools) -> None:
     vertices[counts > 0] = sums[counts > 0] / counts[counts > 0, None]
 
 
-def _unevenness(curved: Floats, linear: Floats, pairs: Ints) -> Floats:
+def _unevenness(curved: Crossings, linear: Floats, pairs: Ints) -> Floats:
     """Return (e,) how far each crossing moves, or how far those it is joined to lie off its paraboloid, if farther."""
-    uneven: Floats = np.linalg.norm(curved[:, :4] - linear, axis=1)
+    uneven: Floats = np.linalg.norm(curved.places - linear, axis=1)
     crossing, neighbor = np.concatenate([pairs, pairs[:, ::-1]]).T
-    away, height, at = curved[neighbor, :4] - curved[crossing, :4], np.zeros(len(crossing)), 8
-    for d in range(4):
-        height += away[:, d] * curved[crossing, 4 + d]
-        for f in range(d + 1):
-            height += (1.0 if f < d else 0.5) * away[:, d] * away[:, f] * curved[crossing, at]
-            at += 1
-    np.maximum.at(uneven, crossing, np.abs(height))
+    away = curved.places[neighbor] - curved.places[crossing]
+    heights = curved.heights(crossing, away) + 0.5 * curved.bend_along(crossing, away)
+    np.maximum.at(uneven, crossing, np.abs(heights))
     return uneven
 
 
@@ -404,9 +412,10 @@ def _cubic(field: Floats, place: Floats, weights: Floats, gradient: Floats) -> f
 
 
 @compiled
-def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> Floats:
-    """Return (e, 18) position, unit normal and symmetric shape operator of the zero set at crossed edges."""
-    result = np.zeros((len(edges), 18))
+def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the `Crossings` of crossed edges."""
+    n = len(edges)
+    places, normals, bends = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4, 4))
     weights = np.empty((2, 4, 4))
     slope, start, place, ahead, behind = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     bend = np.empty((4, 4))
@@ -447,8 +456,8 @@ def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> Floa
             slope[axis] = 1.0 if head_value > tail_value else -1.0
             length = 1.0
         for d in range(4):
-            result[e, d] = place[d] * steps[d]
-            result[e, 4 + d] = slope[d] / length
+            places[e, d] = place[d] * steps[d]
+            normals[e, d] = slope[d] / length
         # differences of the gradient one cell apart
         for d in range(4):
             for f in range(4):
@@ -464,37 +473,7 @@ def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> Floa
                 _cubic(field, behind, weights, slope)
                 for f in range(4):
                     bend[d, f] -= slope[f] / steps[f] / span
-        at = 8
         for d in range(4):
-            for f in range(d + 1):
-                result[e, at] = 0.5 * (bend[d, f] + bend[f, d])
-                at += 1
-    return result
-
-
-@compiled
-def circle_distance(crossing: Floats, away: Floats, across: Floats, reach: float) -> float:
-    """Return the distance to the circle that touches the zero set at a crossing, in the plane of its normal."""
-    s, square = 0.0, 0.0
-    for d in range(4):
-        s += away[d] * crossing[4 + d]
-        square += away[d] ** 2
-    side = 0.0
-    for d in range(4):
-        across[d] = away[d] - s * crossing[4 + d]
-        side += across[d] ** 2
-    distance = np.sqrt(square)
-    if side > 1e-12 * square:
-        bend, at = 0.0, 8
-        for d in range(4):
-            for f in range(d):
-                bend += 2.0 * across[d] * crossing[at] * across[f]
-                at += 1
-            bend += across[d] ** 2 * crossing[at]
-            at += 1
-        bend /= side
-        root = np.sqrt(max(0.0, 1.0 + 2.0 * bend * s + bend * bend * square))
-        if 1.0 + bend * s > 0.0:  # beyond its centre the other side of the circle is nearer, which is no surface
-            circle = abs(2.0 * s + bend * square) / (1.0 + root)
-            distance = min(distance, max(circle, distance - reach))
-    return float(distance)
+            for f in range(4):
+                bends[e, d, f] = 0.5 * (bend[d, f] + bend[f, d])
+    return places, normals, bends
