@@ -2,9 +2,6 @@
 
 A disc is flat: its plane is that of the faces below a node, its thickness their deviation from it. Far from a surface
 the boxes of many faces are as near as that of the nearest face, since boxes are askew to the surface; few discs are.
-
-A search may start from a candidate, a face that is near but not always the nearest. Over a surface without gaps it
-leads to the nearest: as long as the foot lies on the rim of a face, faces across that rim may be nearer.
 """
 
 from __future__ import annotations
@@ -19,7 +16,7 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.box_tree import LEAF, BoxTree, boxes_around, morton_codes
-from ..mesh.components import by_first_use, connected_components, grouped, sums_of
+from ..mesh.components import by_first_use, connected_components, sums_of
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import coincident_faces, same_positions, same_rows
@@ -56,12 +53,6 @@ class FaceFeatures(NamedTuple):
     # (e,) and (n,) whether the surface is closed and consistent there
     edge_regular: Bools
     vertex_regular: Bools
-    # (m, 3) the face across each edge, and its vertex opposite the edge; −1 where the edge is not regular
-    across: NDArray[np.int32]
-    apexes: NDArray[np.int32]
-    # (n + 1,) and (3 m,): where the corners at each vertex begin in the second, and these as 3 × face + corner
-    vertex_starts: Ints
-    vertex_corners: NDArray[np.int32]
     trusted: NDArray[np.float32]  # (m,) confidence in each face: 1 for given faces, less for completed ones
     ids: Ints  # (m,) which of the given triangles each is
 
@@ -87,7 +78,6 @@ class FaceFeatures(NamedTuple):
             table = edge_table(faces)
         places = vertices[faces]
         corners = np.ascontiguousarray(places.reshape(-1, 9))
-        starts, around = grouped(faces.ravel(), len(vertices))
         sides = np.roll(places, -1, axis=1) - places
         face_normals = unit(np.cross(sides[:, 0], sides[:, 1]))
         lengths = np.sqrt(np.einsum("mki,mki->mk", sides, sides))
@@ -97,20 +87,16 @@ class FaceFeatures(NamedTuple):
         thrice = np.repeat(face_normals, 3, axis=0)
         edge_normals = sums_of(thrice, table.face_edges.ravel(), len(table.vertices))
         vertex_normals = sums_of(angles[:, None] * thrice, faces.ravel(), len(vertices))
-
-        edge_regular, vertex_regular, mates = _regular(faces, table, edge_normals, len(vertices))
-        across = np.where(mates < 0, -1, mates // 3).reshape(-1, 3).astype(np.int32)
-        apexes = np.where(across < 0, -1, faces[across].sum(axis=2) - faces - np.roll(faces, -1, axis=1))
         positions = corners, triangle_rows(corners), vertices
         ids_of_faces = faces.astype(np.int32), table.face_edges.astype(np.int32)
         normals = face_normals, edge_normals, vertex_normals
-        regular, around_vertices = (edge_regular, vertex_regular), (starts, around.astype(np.int32))
-        beyond = across, apexes.astype(np.int32)
-        return cls(*positions, *ids_of_faces, *normals, *regular, *beyond, *around_vertices, trusted, ids)
+        return cls(
+            *positions, *ids_of_faces, *normals, *_regular(faces, table, edge_normals, len(vertices)), trusted, ids
+        )
 
 
-def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: int) -> tuple[Bools, Bools, Ints]:
-    """Return which edges and vertices are regular; and (3 m,) the other halfedge of each at a regular edge, or −1."""
+def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: int) -> tuple[Bools, Bools]:
+    """Return which edges and vertices are regular."""
     edges = (table.face_counts == 2) & (table.balance == 0) & ((edge_normals**2).sum(axis=1) > FOLD**2)
     mates = np.where(edges[table.face_edges].ravel(), table.mates, -1)
     mated = np.flatnonzero(mates >= 0)
@@ -121,7 +107,7 @@ def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: in
     vertices = np.ones(n_vertices, dtype=bool)
     vertices[corners[fans != fan[corners]]] = False  # at which several cones touch
     vertices[table.vertices[~edges]] = False
-    return edges, vertices, mates
+    return edges, vertices
 
 
 def _copies(faces: Ints, table: EdgeTable) -> Bools:
@@ -167,7 +153,7 @@ class FaceTree:
         """Find the nearest face of each of (n, 3) points, fastest where consecutive points are near each other."""
         nearer = self._brought_near(points)
         faces, _ = self.nearest(nearer)
-        result = search_from(self.features, nearer, faces[:, None])
+        result = feet_on(self.features, faces, nearer)
         return result if nearer is points else replace(result, distances=np.linalg.norm(points - result.places, axis=1))
 
     def _distances(self, points: Floats) -> Floats:
@@ -240,7 +226,7 @@ def _discs(corners: Floats, tree: BoxTree) -> Floats:
 class NearestFaces:
     """The nearest face of each of some points."""
 
-    faces: NDArray[np.int32]  # (n,) its id
+    faces: NDArray[np.integer]  # (n,) its id
     distances: Floats  # (n,) its distance
     places: Floats  # (n, 3) the nearest place
     features: NDArray[np.int8]  # (n,) the feature that this place lies on, in the code of `foot_on_triangle`
@@ -250,77 +236,29 @@ class NearestFaces:
     regular: Bools
 
 
-def search_from(features: FaceFeatures, points: Floats, candidates: NDArray[np.int32]) -> NearestFaces:
-    """Find the nearest of (n, c) candidate faces of each point, or one that it leads on to; −1 is no candidate."""
-    return NearestFaces(*_nearest_of_candidates(features, points, candidates))
+def feet_on(features: FaceFeatures, faces: NDArray[np.integer], points: Floats) -> NearestFaces:
+    """Find the nearest place of each of (n,) faces to its own one of (n, 3) points."""
+    return NearestFaces(faces, *_feet(features, faces, points))
 
 
 @compiled
-def _nearest_of_candidates(
-    features: FaceFeatures, points: Floats, candidates: NDArray[np.int32]
-) -> tuple[NDArray[np.int32], Floats, Floats, NDArray[np.int8], NDArray[np.float32], Bools]:
+def _feet(
+    features: FaceFeatures, faces: NDArray[np.int32], points: Floats
+) -> tuple[Floats, Floats, NDArray[np.int8], NDArray[np.float32], Bools]:
     n = len(points)
-    out_faces, out_distances, out_places = np.empty(n, dtype=np.int32), np.empty(n), np.empty((n, 3))
-    out_features, out_cosines = np.empty(n, dtype=np.int8), np.empty(n, dtype=np.float32)
-    out_regular = np.empty(n, dtype=np.bool_)
-    rows, places, faces, vertex_regular = features.rows, features.vertices, features.faces, features.vertex_regular
-    across, apexes = features.across, features.apexes
-    starts, around = features.vertex_starts, features.vertex_corners
-    for p in range(len(points)):
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        face, square, feature, fx, fy, fz = np.int64(-1), np.inf, 0, x, y, z
-        for c in range(candidates.shape[1]):
-            candidate = np.int64(candidates[p, c])
-            if candidate >= 0 and candidate != face and (c == 0 or candidate != candidates[p, c - 1]):
-                s, which, u, v, w = foot_on_triangle(rows, candidate, x, y, z)
-                if s < square:
-                    face, square, feature, fx, fy, fz = candidate, s, which, u, v, w
-        for _ in range(24):  # few are needed from a near candidate
-            if feature == 0:
-                break
-            candidate = np.int64(-1)
-            if feature <= 3:
-                vertex = np.int64(apexes[face, feature - 1])
-                if vertex >= 0:
-                    ax, ay, az = places[vertex, 0] - fx, places[vertex, 1] - fy, places[vertex, 2] - fz
-                    if (x - fx) * ax + (y - fy) * ay + (z - fz) * az > 0.0:
-                        candidate = np.int64(across[face, feature - 1])
-            else:
-                vertex = np.int64(faces[face, feature - 4])
-                vx, vy, vz = places[vertex, 0], places[vertex, 1], places[vertex, 2]
-                dx, dy, dz = x - vx, y - vy, z - vz
-                steepest = 0.0
-                # around a regular vertex every side is the first of a corner
-                turns = 1 if vertex_regular[vertex] else 2
-                for k in range(starts[vertex], starts[vertex + 1]):
-                    near = np.int64(around[k]) // 3
-                    corner = np.int64(around[k]) - 3 * near
-                    for _turn in range(turns):
-                        corner = corner + 1 if corner < 2 else 0
-                        end = np.int64(faces[near, corner])
-                        ex, ey, ez = places[end, 0] - vx, places[end, 1] - vy, places[end, 2] - vz
-                        gain = dx * ex + dy * ey + dz * ez
-                        if gain > 0.0:
-                            gain *= gain / (ex * ex + ey * ey + ez * ez)
-                            if gain > steepest:
-                                steepest, candidate = gain, near
-            if candidate < 0:
-                break
-            s, which, u, v, w = foot_on_triangle(rows, candidate, x, y, z)
-            if not s < square:
-                break
-            face, square, feature, fx, fy, fz = candidate, s, which, u, v, w
-        out_faces[p], out_distances[p], out_features[p] = face, np.sqrt(square), feature
-        out_places[p, 0], out_places[p, 1], out_places[p, 2] = fx, fy, fz
-        out_cosines[p], out_regular[p] = facing(features, face, feature, x - fx, y - fy, z - fz)
-    return out_faces, out_distances, out_places, out_features, out_cosines, out_regular
+    distances, places, kinds = np.empty(n), np.empty((n, 3)), np.empty(n, dtype=np.int8)
+    cosines, regular = np.empty(n, dtype=np.float32), np.empty(n, dtype=np.bool_)
+    for p in range(n):
+        face, x, y, z = np.int64(faces[p]), points[p, 0], points[p, 1], points[p, 2]
+        square, kinds[p], fx, fy, fz = foot_on_triangle(features.rows, face, x, y, z)
+        distances[p], places[p, 0], places[p, 1], places[p, 2] = np.sqrt(square), fx, fy, fz
+        cosines[p], regular[p] = _facing(features, face, kinds[p], x - fx, y - fy, z - fz)
+    return distances, places, kinds, cosines, regular
 
 
 @compiled
-def facing(features: FaceFeatures, face: int, feature: int, dx: float, dy: float, dz: float) -> tuple[float, bool]:
+def _facing(features: FaceFeatures, face: int, feature: int, dx: float, dy: float, dz: float) -> tuple[float, bool]:
     """Return the cosine between a feature's normal and the way from a face, and whether it decides the side."""
-    if face < 0:
-        return 0.0, False
     normals, row, regular = features.face_normals, np.int64(face), True
     if feature > 3:
         normals, row = features.vertex_normals, np.int64(features.faces[face, feature - 4])

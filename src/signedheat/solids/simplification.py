@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..compiled import compiled
 from ..errors import GeometryError, InexactWarning, warn_user
 from ..mesh.self_intersections import self_intersections
 from ..packages import lazy_module
-from ..search.face_tree import FaceFeatures, FaceTree
-from ..search.nearest_triangles import foot_on_triangle
+from ..search.face_tree import FaceFeatures, FaceTree, feet_on
 from ..surfaces.triangle_mesh import TriangleMesh
 
 manifold3d: Any = lazy_module("manifold3d", "simplified surfaces")
@@ -63,7 +60,6 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
     Distance to a triangle is convex, so corners of pieces tell; pieces near several are cut upright on its sides.
     """
     tree = FaceTree.of(FaceFeatures.of(other.vertices, other.faces))
-    rows = tree.features.rows
     pieces = mesh.vertices[mesh.faces]
     if tree.nearest(mesh.vertices)[1].max() > distance**2:
         return False
@@ -71,10 +67,11 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
         faces, squares = tree.nearest(pieces.mean(axis=1))
         if squares.max() > distance**2:
             return False
-        rest = _bounds(rows, pieces, faces) > distance**2
+        of_corners = feet_on(tree.features, np.repeat(faces, 3), pieces.reshape(-1, 3)).distances
+        rest = of_corners.reshape(-1, 3).max(axis=1) > distance
         if not rest.any():
             return True
-        pieces = _divided(pieces[rest], rows[faces[rest]], LEAST * distance)
+        pieces = _divided(pieces[rest], tree.features.rows[faces[rest]], LEAST * distance)
     return False
 
 
@@ -113,14 +110,3 @@ def _halved(pieces: Floats, sides: Floats) -> Floats:
     middle = 0.5 * (a + b)
     parts = [[a, middle, c], [middle, b, c]]
     return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 3)
-
-
-@compiled
-def _bounds(rows: Floats, pieces: Floats, faces: NDArray[np.int32]) -> Floats:
-    """(n,) squared distance of the farthest corner of each of (n, 3, 3) pieces from its own face."""
-    result = np.zeros(len(pieces))
-    for p in range(len(pieces)):
-        for c in range(3):
-            square = foot_on_triangle(rows, faces[p], pieces[p, c, 0], pieces[p, c, 1], pieces[p, c, 2])[0]
-            result[p] = max(result[p], square)
-    return result
