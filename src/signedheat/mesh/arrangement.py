@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from .box_tree import BoxTree
-from .components import grouped, members_of, sums_of
+from .components import grouped, members_of, numbered, sums_of
 from .edges import EdgeTable, edge_table
 from .planar_triangulation import triangulate_faces
 from .self_intersections import overlapping_faces
@@ -254,8 +254,8 @@ def _divided(
         order[np.searchsorted(keys[order], records.lines * n + end)] for end in (records.tails, records.heads)
     )
     low, high = np.minimum(tails, heads), np.maximum(tails, heads)
-    row = np.repeat(np.arange(len(low)), high - low)
-    place = np.arange(len(row)) - np.repeat(np.cumsum(high - low) - (high - low), high - low) + low[row]
+    row, place = numbered(high - low)
+    place += low[row]
     face, begins_at, ends_at = records.faces[row], whole[place], whole[place + 1]
 
     busy: Bools = np.asarray(counts[table.face_edges].any(axis=1))
@@ -292,7 +292,7 @@ def _divided(
     rims = np.bincount(np.searchsorted(chosen, owner), minlength=len(chosen))
     corners = np.flatnonzero(corner).reshape(-1, 3) - np.flatnonzero(begins)[:, None]
     corners = np.stack([corners[:, 1], corners[:, 2], rims], axis=1)
-    local = np.arange(len(members)) - np.repeat(member_starts[:-1], np.diff(member_starts))
+    _, local = numbered(np.diff(member_starts))
     keys = members_owner * n + members
     order = np.argsort(keys, kind="stable")
     corner_ends = [

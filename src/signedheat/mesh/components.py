@@ -61,11 +61,23 @@ def grouped(groups: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
     return starts, members
 
 
+def numbered(counts: Ints) -> tuple[Ints, Ints]:
+    """Return each of some groups as often as it has members, and the number of each member within its group."""
+    owners = np.repeat(np.arange(len(counts)), counts)
+    return owners, np.arange(len(owners)) - (np.cumsum(counts) - counts)[owners]
+
+
+def next_in_groups(starts: Ints) -> Ints:
+    """Return (k,) the place of the member after each in its group, cyclically, given (n + 1,) where groups begin."""
+    following, filled = np.arange(1, starts[-1] + 1), starts[1:] > starts[:-1]
+    following[starts[1:][filled] - 1] = starts[:-1][filled]
+    return following
+
+
 def members_of(starts: Ints, members: Ints, chosen: NDArray[np.integer]) -> tuple[Ints, Ints]:
     """Return all members of the chosen groups, as pairs: index into `chosen`, and member."""
-    begin, count = starts[chosen], starts[chosen + 1] - starts[chosen]
-    owners = np.repeat(np.arange(len(chosen)), count)
-    return owners, members[np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(owners))]
+    owners, number = numbered(starts[chosen + 1] - starts[chosen])
+    return owners, members[starts[chosen][owners] + number]
 
 
 def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -> Floats:

@@ -107,6 +107,22 @@ class EdgeTable(Frozen):
         ahead = np.bincount(self.face_edges.ravel(), self.forward.ravel(), len(self.vertices)).astype(np.int64)
         return read_only(2 * ahead - self.face_counts)
 
+    def unbalanced(self, groups: Ints, weights: Ints | int = 1) -> tuple[Ints, Ints, Ints]:
+        """Return groups of faces, (m,), edges that do not cancel within them, and the excess of faces along these.
+
+        Groups ascend, and so do the edges of each; faces count `weights` times, (m,), negative against edges.
+        """
+        n, edges, owners = len(self.vertices), self.face_edges.ravel(), np.repeat(groups, 3)
+        ways = (np.where(self.forward, 1, -1) * np.reshape(weights, (-1, 1))).ravel()
+        is_open, last = np.bincount(edges, ways, n) != 0, np.empty(n, dtype=np.int64)
+        last[edges] = owners
+        is_open[edges[owners != last[edges]]] = True  # of several groups; faces of one cancel
+        rows = np.flatnonzero(is_open[edges])
+        keys, which = np.unique(owners[rows] * n + edges[rows], return_inverse=True)
+        excess = np.bincount(which, ways[rows], len(keys)).astype(np.int64)
+        keys, excess = keys[excess != 0], excess[excess != 0]
+        return keys // max(n, 1), keys % max(n, 1), excess
+
     @cached_property
     def halfedges(self) -> tuple[Ints, Ints]:
         """(e + 1,) where the halfedges 3 f + k of each edge begin, and the halfedges: see `grouped`."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints, Number
 from ..compiled import compiled
+from .components import next_in_groups
 from .edges import EdgeTable
 from .intrinsic_mesh import IntrinsicMesh
 
@@ -335,10 +336,8 @@ def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
     edges, first = triangles.edges, triangles.first_halfedges
     edge, n_edges = edges.face_edges.ravel(), triangles.n_edges
     starts, order = edges.halfedges
-    used = starts[1:] > starts[:-1]
     sibling = np.empty_like(edge)
-    sibling[order] = np.roll(order, -1)
-    sibling[order[starts[1:][used] - 1]] = order[starts[:-1][used]]
+    sibling[order] = order[next_in_groups(starts)]
     start, front = np.zeros(n_edges, dtype=np.int64), np.zeros(len(edge), dtype=bool)
     start[edge[first]], front[first] = first, True
     sums = np.bincount(edge, weights=triangles.edge_lengths.ravel(), minlength=n_edges)

@@ -15,7 +15,7 @@ from scipy import sparse
 
 from ..arrays import Bools, Complexes, Floats, Frozen, Ints, mask_of
 from ..errors import GeometryError
-from .components import connected_components, element_components
+from .components import connected_components, element_components, next_in_groups
 from .edges import EdgeTable, edge_table
 from .triangles import Triangles
 
@@ -224,9 +224,7 @@ def face_pairs(triangles: IntrinsicMesh) -> FacePairs:
     edge = triangles.edges.face_edges.ravel()
     starts, order = triangles.edges.halfedges
     count = np.diff(starts)
-    following = np.arange(1, len(order) + 1)
-    following[starts[1:][count > 0] - 1] = starts[:-1][count > 0]
-    halfedges = np.stack([order, order[following]], axis=1)
+    halfedges = np.stack([order, order[next_in_groups(starts)]], axis=1)
     around = count[edge[order]]
     halfedges = halfedges[(around > 2) | ((around == 2) & (halfedges[:, 0] < halfedges[:, 1]))]
 

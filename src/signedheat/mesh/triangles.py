@@ -61,6 +61,14 @@ def divided_at(faces: Ints, rows: Ints, corners: Ints, points: Ints) -> Ints:
     return np.concatenate([np.delete(faces, rows, axis=0), halves])
 
 
+def halved(triangles: Floats, sides: Ints) -> Floats:
+    """Return (2 m, 3, 3) halves of triangles, cut from the middle of one side each: all first ones, then the second."""
+    turn = (sides[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(triangles, turn[:, :, None], axis=1).swapaxes(0, 1)
+    middle = 0.5 * (a + b)
+    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+
+
 def gradients_along(sides: Floats, rises: Floats) -> Floats:
     """Return (p, 3) gradients in the planes of sides (p, 2, 3) along which a function rises by (p, 2); else 0."""
     normals = np.cross(sides[:, 0], sides[:, 1])

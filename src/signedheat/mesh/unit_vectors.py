@@ -1,4 +1,4 @@
-"""Unit vectors, without underflow or overflow, and axes across vectors."""
+"""Unit vectors, without underflow or overflow; axes across vectors, and angles around them."""
 
 from __future__ import annotations
 
@@ -40,3 +40,9 @@ def axes_across(vectors: Floats) -> tuple[Floats, Floats]:
     """Return two (n, 3) unit vectors perpendicular to each vector and to each other, right-handed in this order."""
     first = unit(np.cross(vectors, np.eye(3)[np.abs(vectors).argmin(axis=1)]))
     return first, unit(np.cross(vectors, first))
+
+
+def angles_around(vectors: Floats, directions: Floats) -> Floats:
+    """Return (n,) angles of directions around vectors, right-handed; equal vectors have the same origin of angles."""
+    first, second = axes_across(vectors)
+    return np.arctan2((directions * second).sum(axis=1), (directions * first).sum(axis=1))

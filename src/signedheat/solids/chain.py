@@ -14,13 +14,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Frozen, Ints
-from ..mesh.components import connected_components, element_components
+from ..arrays import Bools, Floats, Frozen, Ints, mask_of
+from ..mesh.components import connected_components, element_components, next_in_groups
 from ..mesh.edges import EdgeTable, FaceOrientation, edge_table, orient_faces, pair_halfedges
 from ..mesh.triangles import area_vectors, face_areas
-from ..mesh.unit_vectors import axes_across, unit
+from ..mesh.unit_vectors import angles_around, unit
 from ..mesh.welding import ROUNDING, coincident_faces, joined_rims, same_positions
 from ..search.winding_tree import WindingTree
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -52,10 +51,8 @@ def inner_walls(chain: Chain) -> Bools:
     halfedges = np.lexsort((angles, table.face_edges.ravel()))
     forward, angles = forward[halfedges], angles[halfedges]
     edges, faces = table.face_edges.ravel()[halfedges], halfedges // 3
-    last = np.append(edges[1:] != edges[:-1], True)
-    first = np.append(True, last[:-1])
-    following = np.arange(1, len(edges) + 1)
-    following[last] = np.flatnonzero(first)
+    following = next_in_groups(np.append(0, np.cumsum(table.face_counts)))
+    last = following <= np.arange(len(edges))
 
     # complexes that have inner walls at all
     complexes = chain.complexes
@@ -101,9 +98,8 @@ def _angles(positions: Floats, tails: Ints, heads: Ints, forward: Bools, normals
     """Angles of faces around their edges, right-handed about the direction from the lower vertex to the higher."""
     along = unit(positions[heads] - positions[tails])
     into = np.cross(normals, along)
-    aside, across = axes_across(along * np.where(forward, 1.0, -1.0)[:, None])
-    x, y = (into * aside).sum(axis=1), (into * across).sum(axis=1)
-    return np.where((x != 0) | (y != 0), np.arctan2(y, x), np.nan)
+    angles = angles_around(along * np.where(forward, 1.0, -1.0)[:, None], into)
+    return np.where(into.any(axis=1), angles, np.nan)
 
 
 def _cavities(shells: Ints, inside: Bools, areas: Floats) -> Bools:
@@ -169,16 +165,9 @@ class Chain(Frozen):
         """(m,) component of each triangle; edges connect any number of triangles."""
         return element_components(self.edges.face_edges) if len(self.faces) else np.zeros(0, dtype=np.int64)
 
-    def unbalanced(self, weights: NDArray[np.integer], groups: Ints) -> Bools:
+    def unbalanced(self, weights: Ints, groups: Ints) -> Bools:
         """(g,) whether the directed edges of each group of triangles, counted with multiplicity, fail to cancel."""
-        n = len(self.edges.vertices)
-        keys = (groups[:, None] * n + self.edges.face_edges).ravel()
-        sides, inverse = np.unique(keys, return_inverse=True)
-        ways = (np.where(self.edges.forward, 1, -1) * weights[:, None]).ravel()
-        open_sides = np.bincount(inverse, ways, len(sides)) != 0
-        result = np.zeros(int(groups.max(initial=-1)) + 1, dtype=bool)
-        result[sides[open_sides] // n] = True
-        return result
+        return mask_of(int(groups.max(initial=-1)) + 1, self.edges.unbalanced(groups, weights)[0])
 
     def pieces(self, used: Bools) -> FaceOrientation:
         """Join triangles across edges that two used triangles share; most of the area of each piece stays as given."""
@@ -190,8 +179,7 @@ class Chain(Frozen):
     def pieces_as_given(self) -> FaceOrientation:
         """Join triangles across edges along which two of them run in opposite directions."""
         table = edge_table(np.where((self.multiplicities < 0)[:, None], self.faces[:, ::-1], self.faces))
-        joins = (table.face_counts == 2) & (table.balance == 0)
-        alone = len(table.vertices) + np.arange(self.faces.size).reshape(-1, 3)
-        parts = element_components(np.where(joins[table.face_edges], table.face_edges, alone))
+        opposite = table.forward.ravel()[table.pairs].sum(axis=1) == 1
+        parts = connected_components(len(self.faces), *table.pairs[opposite].T // 3)
         every = np.ones(int(parts.max(initial=-1)) + 1, dtype=bool)
         return FaceOrientation(parts, self.multiplicities < 0, every, every, 0)  # nothing is compared

@@ -19,7 +19,7 @@ from ..arrays import Bools, Floats, Frozen, Ints
 from ..compiled import compiled
 from ..mesh.box_tree import BoxTree
 from ..mesh.components import connected_components, element_components, sums_of
-from ..mesh.edges import edge_keys, edge_table
+from ..mesh.edges import EdgeTable, edge_keys, edge_table
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import unit
 from . import lids, walls
@@ -62,14 +62,6 @@ def width_of(lid: Lid) -> float:
     rim = lid.vertices[: lid.n_rim]
     length = float(side_lengths(rim).sum())
     return max(4.0 * float(face_areas(lid.vertices[lid.faces]).sum()) / length, NARROWEST * length)
-
-
-def smooth_patches(triangles: Floats, ids: Ints) -> Ints:
-    """(m,) component of each face; edges that are not sharp connect faces."""
-    table = edge_table(ids)
-    normals, (first, second) = unit(area_vectors(triangles)), table.pairs.T // 3
-    smooth = (normals[first] * normals[second]).sum(axis=1) > SHARP
-    return connected_components(len(ids), first[smooth], second[smooth])
 
 
 def samples_near(
@@ -209,7 +201,9 @@ def _least_bent(
             for i in range(n - span):
                 j = i + span
                 cost[i, j], split[i, j] = np.inf, i + 1
-                if span < n - 1 and _is_among(taken, ids[begin + i], ids[begin + j]):
+                key = (min(ids[begin + i], ids[begin + j]) << 32) | max(ids[begin + i], ids[begin + j])
+                place = np.searchsorted(taken, key)
+                if span < n - 1 and place < len(taken) and taken[place] == key:
                     continue
                 for k in range(i + 1, j):
                     if not cost[i, k] + cost[k, j] < cost[i, j]:
@@ -265,13 +259,6 @@ def _angle(a: Floats, b: Floats) -> float:
     if (a[0] == 0 and a[1] == 0 and a[2] == 0) or (b[0] == 0 and b[1] == 0 and b[2] == 0):
         return 0.0
     return float(np.arccos(min(max(a[0] * b[0] + a[1] * b[1] + a[2] * b[2], -1.0), 1.0)))
-
-
-@compiled
-def _is_among(taken: Ints, i: int, j: int) -> bool:
-    key = (min(i, j) << 32) | max(i, j)
-    place = np.searchsorted(taken, key)
-    return bool(place < len(taken) and taken[place] == key)
 
 
 NONE = np.empty((0, 2), dtype=np.int64)
@@ -330,6 +317,11 @@ class _Surface(Frozen):
         return self.vertices[self.faces]
 
     @cached_property
+    def edges(self) -> EdgeTable:
+        """Edges of the triangles."""
+        return edge_table(self.faces)
+
+    @cached_property
     def areas(self) -> Floats:
         """(m,) areas."""
         return face_areas(self.triangles)
@@ -342,12 +334,14 @@ class _Surface(Frozen):
     @cached_property
     def parts(self) -> Ints:
         """(m,) component of each face; shared edges connect faces."""
-        return element_components(edge_table(self.faces).face_edges)
+        return element_components(self.edges.face_edges)
 
     @cached_property
     def patches(self) -> Ints:
         """(m,) component of each face; edges that are not sharp connect faces."""
-        return smooth_patches(self.triangles, self.faces)
+        first, second = self.edges.pairs.T // 3
+        smooth = (self.normals[first] * self.normals[second]).sum(axis=1) > SHARP
+        return connected_components(len(self.faces), first[smooth], second[smooth])
 
     @cached_property
     def tree(self) -> BoxTree:
@@ -358,9 +352,7 @@ class _Surface(Frozen):
     def _sides(self) -> tuple[Ints, Ints]:
         """Sorted keys of directed sides, and the sides; among equal keys the one that `behind` prefers comes first."""
         keys = (self.faces * len(self.vertices) + np.roll(self.faces, -1, axis=1)).ravel()
-        table = edge_table(self.faces)
-        alone = len(table.vertices) + np.arange(self.faces.size).reshape(-1, 3)
-        pieces = element_components(np.where(table.face_counts[table.face_edges] == 2, table.face_edges, alone))
+        pieces = connected_components(len(self.faces), *self.edges.pairs.T // 3)
         closed = ~np.isin(pieces, open_edges(self.faces, pieces)[1])
         order = np.lexsort((-np.repeat(self.areas, 3), np.repeat(closed, 3), keys))
         return keys[order], order
@@ -389,7 +381,7 @@ def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
     normals = [surface.normals[surface.behind(loop)[0][places]] for loop, places in zip(chosen, corners, strict=True)]
     touching = np.zeros(len(surface.vertices), dtype=bool)
     touching[np.concatenate(rims)] = True
-    edges = edge_table(surface.faces).vertices
+    edges = surface.edges.vertices
     edges = edges[touching[edges].all(axis=1)]
     taken = np.sort(edge_keys(edges[:, 0], edges[:, 1]))
     for loop, places, lid in zip(

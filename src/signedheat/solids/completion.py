@@ -15,12 +15,13 @@ import scipy
 
 from ..arrays import Floats, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
-from ..diagnostics import Diagnostics, FacesRestored, Note, OrientedPoints
+from ..diagnostics import Diagnostics, FacesRestored, Note
 from ..errors import ConstraintError, SignedHeatError, SourceError
 from ..foreign import SurfaceShape
 from ..jobs import Progress, Stopwatch
 from ..kinds import ShapeLike
 from ..memory import refuse_beyond_memory, within_memory
+from ..mesh.components import numbered
 from ..mesh.triangles import face_areas
 from ..mesh.unit_vectors import axes_across
 from ..search.face_tree import FaceTree
@@ -35,7 +36,7 @@ from .heat_surfaces import Heat, heat_surface
 from .mesh_orientation import oriented_as, owners_of
 from .overlaps import Nesting
 from .point_orientation import mean_gap, orient_points
-from .rims import boundary, loops, open_edges
+from .rims import boundary, loops
 from .solid import Solid
 from .union import TriangleGroup, united
 
@@ -48,9 +49,8 @@ def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) ->
     rim, (tails, heads) = boundary(faces), boundary(patches).T
     starts, ways = vertices[rim[:, 0]], vertices[rim[:, 1]] - vertices[rim[:, 0]]
     counts = np.maximum(np.ceil(np.linalg.norm(ways, axis=1) / step), 1).astype(np.int64) - 1
-    edges = np.repeat(np.arange(len(rim)), counts)
-    first = np.cumsum(counts) - counts
-    shares = (np.arange(len(edges)) - first[edges] + 1) / (counts[edges] + 1)
+    edges, number = numbered(counts)
+    shares = (number + 1) / (counts[edges] + 1)
     points = starts[edges] + shares[:, None] * ways[edges]
     names = len(vertices) + np.arange(len(points))
     last = np.append(edges[1:] != edges[:-1], True)[: len(edges)]
@@ -206,14 +206,17 @@ def completed(
     stopwatch = Stopwatch(progress, STEPS)
     if isinstance(joined, PointCloud):
         with stopwatch("orient") as run:
-            cloud, notes = (joined, ()) if options.as_oriented else run(partial(oriented_points, joined))
+            cloud, notes = joined, list[Note]()
+            if not options.as_oriented:
+                cloud, note = run(partial(orient_points, joined))
+                notes = [note]
         with stopwatch("complete") as run:
             solid = run(partial(_from_points, cloud, method))
     else:
         with stopwatch("orient") as run:
             chain = run(lambda: Chain.of(joined.triangulation))
             decided = bounding(chain, options.nested, options.as_oriented)
-            notes = () if options.as_oriented else (oriented_as(joined, chain, decided).note,)
+            notes = [] if options.as_oriented else [oriented_as(joined, chain, decided).note]
         if not chain.areas.any():
             raise SourceError("all faces of the shape have zero area", element="shape")
         chain = replace(chain)  # without what deciding needed
@@ -234,12 +237,6 @@ def bytes_to_complete(shape: SurfaceShape, count: int) -> float:
     if mesh.n_vertices == 3 * mesh.n_faces and mesh.n_faces > 1:
         return BYTES_OF_HEAT + BYTES_IF_LOOSE * count
     return BYTES_PER_FACE * count
-
-
-def oriented_points(cloud: PointCloud) -> tuple[PointCloud, tuple[Note, ...]]:
-    """Orient the normals of points outwards, and note how many were fitted and turned."""
-    points = orient_points(cloud)
-    return points.cloud, (OrientedPoints(points.n_fitted, points.n_turned),)
 
 
 def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
@@ -300,7 +297,7 @@ def _completed_by_heat(
     patches = made[0][made[1]]
     cell = float(np.median(np.linalg.norm(patches[:, 1] - patches[:, 0], axis=1)))
     away = tree.distances(patches.mean(axis=1)) > SEAM * cell
-    if not len(open_edges(faces, np.zeros(len(faces), dtype=np.int64))[0]):
+    if not len(boundary(faces)):
         return [replace(given, closing=True)]
     places = np.concatenate([vertices, made[0]])
     others = made[1][away] + len(vertices)

@@ -24,9 +24,10 @@ from scipy import sparse
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..compiled import compiled
+from ..linear.conjugate_gradients import conjugate_gradients
 from ..mesh.box_tree import LEAF, BoxTree, morton_codes
-from ..mesh.components import sums_of
-from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.components import numbered, sums_of
+from ..mesh.triangles import area_vectors, face_areas, halved
 from ..mesh.unit_vectors import unit
 from ..parallel import in_chunks
 from ..search.winding_tree import WindingTree, mean_angle
@@ -168,11 +169,8 @@ def without_slender(pieces: Pieces) -> Pieces:
         slender = lengths.max(axis=1) ** 2 > SLENDER * face_areas(triangles)
         if not slender.any() or len(triangles) + slender.sum() > ELEMENTS:
             break
-        turn = (lengths[slender].argmax(axis=1)[:, None] + np.arange(3)) % 3
-        a, b, c = np.take_along_axis(triangles[slender], turn[:, :, None], axis=1).transpose(1, 0, 2)
-        middle = 0.5 * (a + b)
-        halves = [np.stack(corners, axis=1) for corners in ((a, middle, c), (middle, b, c))]
-        triangles = np.concatenate([triangles[~slender], *halves])
+        halves = halved(triangles[slender], lengths[slender].argmax(axis=1))
+        triangles = np.concatenate([triangles[~slender], halves])
         labels = np.concatenate([labels[~slender], labels[slender], labels[slender]])
     return Pieces(triangles, labels)
 
@@ -183,9 +181,8 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
     order = np.lexsort((morton_codes(pieces.triangles.mean(axis=1)), pieces.labels))
     shares = pieces.areas / max(pieces.areas.sum(), np.finfo(float).tiny)
     numbers = 1 + np.floor(0.5 * count * (shares + 1 / k)).astype(np.int64)
-    owners = np.repeat(np.arange(k), numbers)
-    before = np.cumsum(numbers) - numbers
-    share = (np.arange(len(owners)) - before[owners] + 0.5) / numbers[owners]
+    owners, number = numbered(numbers)
+    share = (number + 0.5) / numbers[owners]
     ends = np.cumsum(areas[order])
     lasts = np.cumsum(np.bincount(pieces.labels, minlength=k)) - 1
     begins = np.concatenate([[0.0], ends[lasts[:-1]]])
@@ -284,19 +281,9 @@ class Dipoles:
         def system(weights: Floats) -> Floats:
             return self._adjoint(shares * self._numbers(weights)) + smooth @ weights + held * weights
 
-        weights = np.zeros(len(held))
-        rest = self._adjoint((0.5 + self.within) * shares)
         inverse = 1.0 / np.maximum(smooth.diagonal() + held, np.finfo(float).tiny)
-        ahead = way = inverse * rest
-        steep = float(rest @ ahead)
-        for _ in range(STEPS):
-            image = system(way)
-            step = steep / max(float(way @ image), np.finfo(float).tiny)
-            weights, rest = weights + step * way, rest - step * image
-            ahead, before = inverse * rest, steep
-            steep = float(rest @ ahead)
-            way = ahead + steep / max(before, np.finfo(float).tiny) * way
-        return weights
+        wanted = self._adjoint((0.5 + self.within) * shares)
+        return conjugate_gradients(system, wanted, lambda rest: inverse * rest, tolerance=0.0, limit=STEPS)
 
     def levels(self, signs: Floats) -> Floats:
         """(n,) levels at the places, without the bodies ignored there."""

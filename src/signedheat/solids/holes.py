@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Bools, Floats, Ints
-from ..errors import GeometryError, SignedHeatError, SourceError
+from ..errors import GeometryError, SourceError
 from ..foreign import ForeignShape, converted
 from ..memory import within_memory
 from ..mesh.components import element_components
@@ -22,7 +22,7 @@ from ..validation import element_ids, positive_number
 from .bounding import Bounding, bounding
 from .chain import Chain
 from .closing import NONE, closed_by
-from .completion import Lids
+from .completion import Completion, Lids
 from .rims import boundary, loops
 from .spanning import side_lengths
 
@@ -123,8 +123,7 @@ def fill_holes(
     given = converted(mesh)
     if not isinstance(given, TriangleMesh | PolygonMesh):
         raise GeometryError(f"a {type(given).__name__} has no holes that can be closed by faces", remedy="pass a mesh")
-    if lids not in ("bent", "flat"):
-        raise SignedHeatError(f'lids must be "bent" or "flat", not {lids!r}', element="lids")
+    options = Completion(lids=lids)
     most = np.inf if largest is None else positive_number(largest, "largest")
     triangles = given.triangulation
     vertices, chain = triangles.vertices, Chain.of(triangles)
@@ -141,7 +140,7 @@ def fill_holes(
     chosen &= lengths <= most
     filled, left = ([loop for loop, yes in zip(around, chosen, strict=True) if yes == kind] for kind in (True, False))
     outlines = [np.stack([loop, np.roll(loop, -1)], axis=1) for loop in left]
-    points, added = closed_by(vertices, faces, bent=lids == "bent", outlines=np.concatenate([NONE, *outlines]))
+    points, added = closed_by(vertices, faces, bent=options.lids == "bent", outlines=np.concatenate([NONE, *outlines]))
     virtual = len(vertices) - given.n_vertices  # within polygons, which no lid touches
     added = _as_neighbours(faces, turned, added)
     added = np.where(added < given.n_vertices, added, added - virtual)

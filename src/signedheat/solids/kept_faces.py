@@ -15,11 +15,11 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError
 from ..mesh.arrangement import arranged, meeting_faces
-from ..mesh.components import by_first_use, connected_components, element_components, sums_of
+from ..mesh.components import by_first_use, connected_components, element_components, numbered, sums_of
 from ..mesh.edges import edge_table
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import divided_at, part_volumes
-from ..mesh.unit_vectors import axes_across
+from ..mesh.unit_vectors import angles_around
 from ..mesh.welding import coincident_faces, indexed
 from ..search.face_tree import FaceTree
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -123,9 +123,8 @@ def unjoined(places: Floats) -> str:
 def _along(edges: Floats, step: float) -> Floats:
     """(n, 3) points on edges, (m, 2, 3), as far apart as that at most."""
     pieces = np.maximum(np.ceil(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1) / step), 1).astype(np.int64)
-    row = np.repeat(np.arange(len(edges)), pieces + 1)
-    share = (np.arange(len(row)) - np.repeat(np.cumsum(pieces + 1) - pieces - 1, pieces + 1)) / pieces[row]
-    return edges[row, 0] + share[:, None] * (edges[row, 1] - edges[row, 0])
+    row, number = numbered(pieces + 1)
+    return edges[row, 0] + (number / pieces[row])[:, None] * (edges[row, 1] - edges[row, 0])
 
 
 def _far(surface: TriangleMesh, triangles: Floats, distance: float) -> Floats:
@@ -259,7 +258,6 @@ def _in_turn(points: Floats, faces: Ints, ends: Ints, halfedges: Ints) -> Ints:
     """Return (k,) halfedges in the order of their faces around edges, given the (k, 2) ends of these, edge by edge."""
     tails, heads = points[ends].swapaxes(0, 1)
     away = points[faces.ravel()[3 * (halfedges // 3) + (halfedges + 2) % 3]] - tails
-    first, second = axes_across(heads - tails)
-    angles = np.arctan2((away * second).sum(axis=1), (away * first).sum(axis=1))
+    angles = angles_around(heads - tails, away)
     edges = np.cumsum(np.append(0, (ends[1:] != ends[:-1]).any(axis=1)))
     return halfedges[np.lexsort((angles, edges[: len(ends)]))]

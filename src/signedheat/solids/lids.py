@@ -12,7 +12,7 @@ import scipy
 from scipy import sparse
 
 from ..arrays import Floats, Ints
-from ..mesh.components import sums_of
+from ..mesh.components import numbered, sums_of
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import unit
 from . import spanning
@@ -93,8 +93,8 @@ def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
     """Edges and shares of points along a loop: its vertices, and more, at most 1 / `PIECES` of its length apart."""
     lengths = side_lengths(loop)
     counts = np.maximum(np.ceil(lengths * PIECES / lengths.sum() - 1e-9), 1).astype(np.int64)
-    edges = np.repeat(np.arange(len(loop)), counts)
-    return edges, (np.arange(len(edges)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[edges]
+    edges, number = numbered(counts)
+    return edges, number / counts[edges]
 
 
 def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:

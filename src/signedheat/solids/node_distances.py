@@ -76,30 +76,16 @@ def _inside(windings: Windings, grid: Grid, first: Ints, values: Floats) -> Bool
     far = values > 0.5 * (1.0 + SLACK) * float(steps.max())
     groups, count = scipy.ndimage.label(far)
     if count:
-        farthest = _farthest(values, groups, count)
-        where = np.stack(np.unravel_index(farthest, values.shape), axis=1)
+        most = np.zeros(count + 1)
+        np.maximum.at(most, groups[far], values[far])
+        farthest = far & (values == most[groups])
+        where = np.argwhere(farthest)[np.unique(groups[farthest], return_index=True)[1]]
         group_is_inside = np.concatenate([[False], windings.inside(origin + where * steps)])
         inside = group_is_inside[groups]
     nodes = np.argwhere(~np.isnan(values) & ~far)
     if len(nodes):
         inside[tuple(nodes.T)] = windings.inside(origin + nodes * steps)
     return inside
-
-
-@compiled
-def _farthest(values: Floats, groups: NDArray[np.int32], count: int) -> Ints:
-    """(count,) flat index of the node with the greatest value in each group from 1 on."""
-    result = np.full(count, -1, dtype=np.int64)
-    most = np.zeros(count)
-    n0, n1, n2 = values.shape
-    for i in range(n0):
-        for j in range(n1):
-            for k in range(n2):
-                group = groups[i, j, k] - 1
-                if group >= 0 and values[i, j, k] > most[group]:
-                    most[group] = values[i, j, k]
-                    result[group] = (i * n1 + j) * n2 + k
-    return result
 
 
 @compiled

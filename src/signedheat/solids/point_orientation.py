@@ -2,34 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 
-from ..arrays import Floats, Ints, ShortRepr
+from ..arrays import Floats, Ints
+from ..diagnostics import OrientedPoints
 from ..errors import GeometryError
 from ..mesh.unit_vectors import unit
 from ..parallel import in_chunks
 from ..surfaces.point_cloud import PointCloud, outward_normals
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class PointOrientation(ShortRepr):
-    """What orienting a point cloud did."""
-
-    cloud: PointCloud  # the points, with outward unit normals
-    n_fitted: int  # normals that were fitted: all of them, or none
-    n_turned: int  # normals given that were turned round
-    n_neighbors: int  # neighbours from which planes were fitted
-    noisy: bool  # whether noise called for neighbourhoods larger than the smallest
-    sided: bool  # whether anything decided which side is out; for points in a plane, say, nothing does
-    # how far points confirm each other: 1 where all do. A low value is a warning; a high one is no proof, since thin
-    # sheets of noisy points can agree on a wrong side
-    coherence: float
-
-
-def orient_points(cloud: PointCloud) -> PointOrientation:
+def orient_points(cloud: PointCloud) -> tuple[PointCloud, OrientedPoints]:
     """Turn the normals of a point cloud outwards, fitted where there are none; given ones may be mostly inverted."""
     if cloud.points.shape[1] != 3:
         raise GeometryError(
@@ -45,7 +29,7 @@ def orient_points(cloud: PointCloud) -> PointOrientation:
             element="points",
         )
     given = None if cloud.normals is None else cloud.normals[ids]
-    outward, fits, decision = outward_normals(cloud.points[ids], given)
+    outward, _, decision = outward_normals(cloud.points[ids], given)
     if cloud.normals is None:
         normals = outward[owners.ravel()]
         fitted, turned = cloud.n_points, 0
@@ -53,8 +37,7 @@ def orient_points(cloud: PointCloud) -> PointOrientation:
         every = decision.signs[owners.ravel()]
         normals = cloud.normals * every[:, None]
         fitted, turned = 0, int((every < 0).sum())
-    oriented = PointCloud(cloud.points, normals, cloud.areas, cloud.n_neighbors)
-    return PointOrientation(oriented, fitted, turned, fits.n_neighbors, fits.noisy, decision.sided, decision.coherence)
+    return PointCloud(cloud.points, normals, cloud.areas, cloud.n_neighbors), OrientedPoints(fitted, turned)
 
 
 NEIGHBOURS = 30

@@ -15,10 +15,10 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.arrangement import TOUCHING, Arrangement
-from ..mesh.components import sums_of
+from ..mesh.components import next_in_groups, sums_of
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.triangles import area_vectors, face_areas
-from ..mesh.unit_vectors import axes_across, unit
+from ..mesh.unit_vectors import angles_around, unit
 from ..mesh.welding import coincident_faces
 from .winding import DEPTH, INSIDE, Windings
 
@@ -141,13 +141,11 @@ def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> 
     owners, ways, vertices = crowded // 3, _ways(table, crowded), table.vertices[edges]
     along = points[vertices[:, 1]] - points[vertices[:, 0]]
     lengths, along = np.linalg.norm(along, axis=1), unit(along)
-    first, second = axes_across(along)
     across = np.cross(normals[owners], ways[:, None] * along[around])
-    angles = np.arctan2((across * second[around]).sum(axis=1), (across * first[around]).sum(axis=1))
-    order, counts = np.lexsort((angles, around)), np.bincount(around, minlength=len(edges))
-    starts, place = np.cumsum(counts) - counts, np.arange(len(order))
-    last = place + 1 == (starts + counts)[around[order]]
-    following = order[np.where(last, starts[around[order]], place + 1)]
+    angles = angles_around(along[around], across)
+    order = np.lexsort((angles, around))
+    onward = next_in_groups(np.append(0, np.cumsum(table.face_counts[edges])))
+    last, following = onward <= np.arange(len(order)), order[onward]
     heights = face_areas(points[faces[owners]]) / np.maximum(lengths[around], 1e-300)
     apart = angles[following] - angles[order] + np.where(last, 2 * np.pi, 0.0)
     apart *= np.minimum(lengths[around[order]], np.minimum(heights[order], heights[following]))

@@ -12,7 +12,7 @@ from ..compiled import compiled
 from ..mesh.components import grouped, sums_of
 from ..mesh.edges import edge_table
 from ..mesh.triangles import area_vectors
-from ..mesh.unit_vectors import axes_across, unit
+from ..mesh.unit_vectors import angles_around, unit
 
 PLACES = 8
 """Number of places on an edge from which edges that run along it are searched for, nearer together than `ALONG`."""
@@ -30,25 +30,15 @@ STRAIGHT = 1e-5
 def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:
     """(k, 2) directed edges that the faces of each part lack, as often as they do, and (k,) these parts, ascending."""
     table = edge_table(faces)
-    n, edges_of_sides, owners = len(table.vertices), table.face_edges.ravel(), np.repeat(parts, 3)
-    lacking, last = table.balance != 0, np.empty(n, dtype=np.int64)
-    last[edges_of_sides] = owners
-    lacking[edges_of_sides[owners != last[edges_of_sides]]] = True  # of several parts; faces of one cancel
-    lacked = np.flatnonzero(lacking[edges_of_sides])
-    sides, owners_of_sides = np.unique(owners[lacked] * n + edges_of_sides[lacked], return_inverse=True)
-    excess = np.bincount(owners_of_sides, np.where(table.forward.ravel()[lacked], 1, -1), len(sides)).astype(np.int64)
-    edges = table.vertices[sides % n]
-    missing = np.where(excess[:, None] > 0, edges[:, ::-1], edges)
-    return np.repeat(missing, np.abs(excess), axis=0), np.repeat(sides // n, np.abs(excess))
+    owners, edges, excess = table.unbalanced(parts)
+    ends = table.vertices[edges]
+    missing = np.where(excess[:, None] > 0, ends[:, ::-1], ends)
+    return np.repeat(missing, np.abs(excess), axis=0), np.repeat(owners, np.abs(excess))
 
 
 def boundary(faces: Ints) -> Ints:
     """(k, 2) directed edges that faces lack, with multiplicity: together with them, all edges are balanced."""
-    table = edge_table(faces)
-    open_edges = np.flatnonzero(table.balance)
-    excess = table.balance[open_edges]
-    edges = table.vertices[open_edges]
-    return np.repeat(np.where(excess[:, None] > 0, edges[:, ::-1], edges), np.abs(excess), axis=0)
+    return open_edges(faces, np.zeros(len(faces), dtype=np.int64))[0]
 
 
 def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
@@ -67,8 +57,8 @@ def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
     around = np.flatnonzero(crossing[ends])
     if len(around):
         directions = vertices[np.concatenate([heads, tails])[around]] - vertices[ends[around]]
-        first, second = axes_across(_normals(vertices, faces[crossing[faces].any(axis=1)])[ends[around]])
-        angles[around] = np.arctan2((directions * second).sum(axis=1), (directions * first).sum(axis=1))
+        normals = _normals(vertices, faces[crossing[faces].any(axis=1)])[ends[around]]
+        angles[around] = angles_around(normals, directions)
     order = np.lexsort((angles, ends))
     names = np.concatenate([np.arange(n_edges), -1 - np.arange(n_edges)])[order]
     following = _across_gaps(grouped(ends, n)[0], names)

@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import GeometryError, InexactWarning, warn_user
 from ..mesh.self_intersections import self_intersections
+from ..mesh.triangles import halved
 from ..packages import lazy_module
 from ..search.face_tree import FaceFeatures, FaceTree, feet_on
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -88,7 +89,7 @@ def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
     row = np.arange(len(pieces))
     large = sides.max(axis=1) > LARGE * rows[:, [9, 12, 15]].max(axis=1)
     cut = ~large & (shorter[row, side] > least)
-    return np.concatenate([_cut(pieces[cut], beyond[row, side][cut]), _halved(pieces[~cut], sides[~cut])])
+    return np.concatenate([_cut(pieces[cut], beyond[row, side][cut]), halved(pieces[~cut], sides[~cut].argmax(axis=1))])
 
 
 def _cut(pieces: Floats, heights: Floats) -> Floats:
@@ -100,13 +101,4 @@ def _cut(pieces: Floats, heights: Floats) -> Floats:
     up, one, two = np.take_along_axis(heights, turn, axis=1).T[:, :, None]
     on_b, on_c = a + up / (up - one) * (b - a), a + up / (up - two) * (c - a)
     parts = [[a, on_b, on_c], [on_b, b, c], [on_b, c, on_c]]
-    return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 3)
-
-
-def _halved(pieces: Floats, sides: Floats) -> Floats:
-    """(2 n, 3, 3) halves of pieces, divided at the middle of their longest side."""
-    turn = (np.argmax(sides, axis=1)[:, None] + np.arange(3)) % 3
-    a, b, c = np.take_along_axis(pieces, turn[:, :, None], axis=1).swapaxes(0, 1)
-    middle = 0.5 * (a + b)
-    parts = [[a, middle, c], [middle, b, c]]
     return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 3)

@@ -24,7 +24,7 @@ from ..memory import refuse_beyond_memory
 from ..mesh.box_tree import LEAF
 from ..mesh.components import connected_components, sums_of
 from ..mesh.edges import edge_table
-from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.triangles import area_vectors, face_areas, halved
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import indexed
 from ..packages import lazy_module
@@ -346,11 +346,7 @@ def _cut(triangles: Floats, longest: float) -> tuple[Floats, Ints]:
         small = face_areas(triangles) <= 0.5 * longest * longest
         kept.append(triangles[small])
         whose.append(owners[small])
-        triangles, owners, first = triangles[~small], owners[~small], sides[~small].argmax(axis=1)
-        a, b, c = (triangles[np.arange(len(triangles)), (first + k) % 3] for k in range(3))
-        middle = 0.5 * (a + b)
-        triangles = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-        owners = np.tile(owners, 2)
+        triangles, owners = halved(triangles[~small], sides[~small].argmax(axis=1)), np.tile(owners[~small], 2)
     order = np.argsort(np.concatenate(whose), kind="stable")
     return np.concatenate(kept)[order], np.concatenate(whose)[order]
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from ..arrays import Floats, Ints
-from ..mesh.components import connected_components
+from ..mesh.components import connected_components, next_in_groups
 from ..mesh.unit_vectors import unit
 from .lids import cut_to_pieces
 from .rims import corners_of, meeting_edges
@@ -55,8 +55,7 @@ def seams(rims: list[Rim]) -> list[Ints]:
     counts = np.array([len(places) for places in corners])
     first = np.cumsum(counts) - counts
     owners, n = np.repeat(np.arange(len(rims)), counts), int(counts.sum())
-    following = np.arange(n) + 1
-    following[first + counts - 1] = first
+    following = next_in_groups(np.append(0, np.cumsum(counts)))
     starts = np.concatenate([rim.corners[places] for rim, places in zip(rims, corners, strict=True)])
     onward = np.concatenate([rim.onward[places] for rim, places in zip(rims, corners, strict=True)])
     parts = np.concatenate([rim.parts[places] for rim, places in zip(rims, corners, strict=True)])
