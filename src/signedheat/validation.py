@@ -20,8 +20,6 @@ LARGEST = 1e40
 """Largest coordinate. Squared volumes, the largest powers of lengths that are computed, then stay finite."""
 SMALLEST = 1e-40
 """Smallest extent of a shape."""
-SINGLE = 1e-16, 1e17
-"""Least step and greatest extent of grids on which squares of lengths are computed with single precision."""
 LEAST_STEP = 1e-13
 """Least spacing, relative to coordinates, so that nodes are more than a few digits apart."""
 _MOST = 2**63

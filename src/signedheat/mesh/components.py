@@ -23,8 +23,7 @@ def element_components(elements: Ints) -> Ints:
 
 def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
     """Renumber ids below n in order of first appearance; return the new numbers, and the old id of each."""
-    first = np.full(n, -1)
-    first[ids[::-1]] = np.arange(len(ids))[::-1]
+    first = first_members(ids, n)
     used = np.flatnonzero(first >= 0)
     order = used[np.argsort(first[used])]
     number = np.empty(n, dtype=np.int64)
@@ -59,6 +58,13 @@ def grouped(groups: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
     """Return (n + 1,) where the members of each of n groups begin, and the members in order."""
     starts, members = _grouped(read_only(np.ascontiguousarray(groups, dtype=np.int64)), n)
     return starts, members
+
+
+def first_members(groups: NDArray[np.integer], n: int) -> Ints:
+    """Return (n,) the first member of each of n groups, −1 where there is none."""
+    first = np.full(n, -1)
+    first[groups[::-1]] = np.arange(len(groups))[::-1]
+    return first
 
 
 def numbered(counts: Ints) -> tuple[Ints, Ints]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Frozen, Ints, read_only
 from ..compiled import compiled
-from .components import connected_components, grouped
+from .components import connected_components, first_members, grouped
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +67,7 @@ def orient_faces(pairs: HalfedgePairs, tails: Ints, owners: NDArray[np.integer],
     orientable, closed = np.ones((2, int(parts.max(initial=-1)) + 1), dtype=bool)
     orientable[parts[cover[:n] == cover[n:]]] = False
     closed[parts[owners[(pairs.edges >= 0) & (pairs.around != 2)]]] = False
-    leader = np.empty(len(orientable), dtype=np.int64)
-    leader[parts[::-1]] = np.arange(n)[::-1]
-    turned = cover[:n] != cover[leader[parts]]
+    turned = cover[:n] != cover[first_members(parts, len(orientable))[parts]]
     balance = np.bincount(parts, np.where(turned, -weights, weights), len(orientable))
     return FaceOrientation(
         parts, orientable[parts] & (turned != (balance < 0)[parts]), orientable, closed, int(disagree.sum())

@@ -46,6 +46,13 @@ def face_areas(triangles: Floats) -> Floats:
     return np.linalg.norm(area_vectors(triangles), axis=1)
 
 
+def corner_normals(triangles: Floats) -> Floats:
+    """Return (3 m, 3) unit normals of (m, 3, 3) triangles, times the angle at each corner, for sums around vertices."""
+    sides = unit(np.roll(triangles, -1, axis=1) - triangles)
+    angles = np.arccos(np.clip(-np.einsum("mki,mki->mk", sides, np.roll(sides, 1, axis=1)), -1.0, 1.0))
+    return angles.reshape(-1, 1) * np.repeat(unit(area_vectors(triangles)), 3, axis=0)
+
+
 def part_volumes(vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:
     """Return (m,) the connected part of each triangle, and the volume inside each part; negative for cavities."""
     parts = element_components(faces)

@@ -62,7 +62,7 @@ class WindingTree:
 
     @cached_property
     def _moments(self) -> Floats:
-        return moments_of(self.triangles, self.tree, OPENING)
+        return _moments(self.triangles, self.tree)
 
 
 def winding_sums(triangles: Floats, points: Floats) -> Floats:
@@ -81,7 +81,7 @@ def winding_sums(triangles: Floats, points: Floats) -> Floats:
 
 @compiled
 def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> Floats:
-    """Return (n,) winding numbers by solid angles in leaves, and far away by moments (`moments_of`)."""
+    """Return (n,) winding numbers by solid angles in leaves, and far away by moments (`_moments`)."""
     leaves = len(moments) // 2
     stack = np.empty(64, dtype=np.int64)
     result = np.zeros(len(points))
@@ -157,8 +157,8 @@ CUBES = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 0, 1), (0, 0, 2), (0, 1, 1), (1, 1
 """Terms of S: xxx, yyy, zzz, xxy, xxz, xyy, yyz, xzz, yzz, xyz."""
 
 
-def moments_of(triangles: Floats, tree: BoxTree, opening: float) -> Floats:
-    """Return (2 · leaves, 23) area vector, centre, (`opening` · radius)², and coefficients of M and S."""
+def _moments(triangles: Floats, tree: BoxTree) -> Floats:
+    """Return (2 · leaves, 23) area vector, centre, (`OPENING` · radius)², and coefficients of M and S."""
     leaves = len(tree.bounds) // 2
     grouped = tree.items.reshape(leaves, LEAF)
     blocks = [_of_leaves(triangles, grouped[start : start + CHUNK]) for start in range(0, leaves, CHUNK)]
@@ -173,7 +173,7 @@ def moments_of(triangles: Floats, tree: BoxTree, opening: float) -> Floats:
         with np.errstate(invalid="ignore"):  # of empty nodes
             box = np.linalg.norm(np.maximum(centres - low, high - centres), axis=0)
         radii = np.where(weights > 0, np.minimum(radii, box), 0.0)
-        moments[rows, :3], moments[rows, 3:6], moments[rows, 6] = vectors.T, centres.T, (opening * radii) ** 2
+        moments[rows, :3], moments[rows, 3:6], moments[rows, 6] = vectors.T, centres.T, (OPENING * radii) ** 2
         moments[rows, 7:13], moments[rows, 13:] = first.T, second.T
         if level == 1:
             return moments

@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from ..arrays import Bools, Floats, Frozen, Ints
-from ..mesh.components import connected_components, sums_of
+from ..mesh.components import connected_components, first_members, sums_of
 from ..mesh.triangles import area_vectors
 from ..mesh.unit_vectors import unit
 from ..search.winding_tree import WindingTree
@@ -257,9 +257,7 @@ def _counted(areas: Floats, groups: Ints, clusters: Ints) -> Floats:
 def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owners: Ints) -> Ints:
     """(p,) component of each piece; pieces are joined by shared edges or by rims that run along each other."""
     n = int(labels.max()) + 1
-    first = np.full(n, -1)
-    first[labels[::-1]] = faces[::-1]
-    hubs = np.unique(chain.complexes[first], return_inverse=True)[1]
+    hubs = np.unique(chain.complexes[faces[first_members(labels, n)]], return_inverse=True)[1]
     several = np.bincount(labels)[owners] > 1
     owners, (left, right) = owners[several], meeting_either_way(chain.positions[edges[several]])
     return connected_components(

@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..area_elements import sample_on_grid
+from ..area_elements import AreaSamples, sample_on_grid
 from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..constraints import Constraint, ZeroSet
@@ -23,7 +23,6 @@ from ..errors import OutsideError
 from ..grids.grid import Grid
 from ..grids.grid_discretization import GridSource
 from ..grids.marching import closed_surface
-from ..grids.node_sources import STRETCH, NodeSources
 from ..grids.stencil import solve_poisson
 from ..mesh.components import sums_of
 from ..method import diffuse, integrate, normalize
@@ -40,44 +39,37 @@ CLEARANCE = 10
 """Number of cells that the far field needs between the shape and the walls."""
 
 
-def winding_numbers(nodes: NodeSources, shape: tuple[int, ...], positions: Floats, vectors: Floats) -> Floats:
-    """Winding numbers around the nodes of a grid, of a shape with area vectors (s, d), smoothed over two cells."""
-    dimension = len(shape)
-    spacing = nodes.steps[4 - dimension :]
-    room = _room(nodes, dimension)
-    inner = tuple(slice(below, below + n) for (below, _), n in zip(room, shape, strict=True))
-    shape = tuple(n + below + above for n, (below, above) in zip(shape, room, strict=True))
-    positions = positions + [below for below, _ in room]
-    right = _sources(nodes, shape, [below for below, _ in room], spacing)
-    dipoles, strengths = blocks_of_dipoles(positions, vectors)
-    walls = [_wall(axis, end, shape) for axis in range(dimension) for end in (0, 1)]
+def winding_numbers(samples: AreaSamples) -> Floats:
+    """Winding numbers around the nodes of a grid in space, of a shape sampled there, smoothed over two cells."""
+    shape, spacing = np.array(samples.nodes.shape[1:]), samples.nodes.steps[1:]
+    nodes, vectors = samples.nodes.nonzero()
+    nodes = nodes[:, 1:]
+    # layers of nodes are added so that no vectors are near the walls
+    below, above = (np.maximum(0, CLEARANCE - room) for room in (nodes.min(axis=0), shape - 1 - nodes.max(axis=0)))
+    inner = tuple(slice(first, first + n) for first, n in zip(below, shape, strict=True))
+    size = tuple((shape + below + above).tolist())
+    right = _divergence(nodes + below, vectors, size, spacing)
+    dipoles, strengths = blocks_of_dipoles(samples.positions + below, samples.vectors)
+    walls = [_wall(axis, end, size) for axis in range(3) for end in (0, 1)]
     core = CORE * float(spacing.max())
     with ThreadPoolExecutor(n_threads()) as pool:
         jobs = [
-            pool.submit(_far_field, lattice.reshape(-1, dimension) * spacing, dipoles * spacing, strengths, axis, core)
+            pool.submit(_far_field, lattice.reshape(-1, 3) * spacing, dipoles * spacing, strengths, axis, core)
             for axis, _, lattice in walls
         ]
     fields = []
     for (axis, end, lattice), job in zip(walls, jobs, strict=True):
         w, flux = job.result()
-        flux = _refined(flux.reshape(lattice.shape[:-1]), shape, axis) / spacing[axis]
+        flux = _refined(flux.reshape(lattice.shape[:-1]), size, axis) / spacing[axis]
         layer = np.moveaxis(right, axis, 0)[-1 if end else 0]
         layer += flux if end else -flux
-        fields.append(_refined(w.reshape(lattice.shape[:-1]), shape, axis))
+        fields.append(_refined(w.reshape(lattice.shape[:-1]), size, axis))
     result = solve_poisson(right, spacing, overwrite=True)
     excess = [
         result.take(-1 if end else 0, axis=axis) - field for (axis, end, _), field in zip(walls, fields, strict=True)
     ]
     result -= np.median(np.concatenate([part.ravel() for part in excess]))
     return result[inner]
-
-
-def _room(nodes: NodeSources, dimension: int) -> list[tuple[int, int]]:
-    """Layers of nodes to add before and behind along each axis, so that no vectors are near the walls."""
-    occupied = nodes.nonzero()[0][:, 4 - dimension :]
-    before, behind = occupied.min(axis=0), np.array(nodes.shape[4 - dimension :]) - 1 - occupied.max(axis=0)
-    rooms = np.maximum(0, CLEARANCE - np.stack([before, behind], axis=1))
-    return [(int(below), int(above)) for below, above in rooms]
 
 
 def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Floats]:
@@ -96,46 +88,22 @@ def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Float
     return sums_of(weights[:, None] * positions, owners, n) / total[:, None], sums_of(vectors, owners, n)
 
 
-def _sources(nodes: NodeSources, shape: tuple[int, ...], below: list[int], spacing: Floats) -> Floats:
-    """∇·(n δ) on a grid with added layers of nodes; there are no vectors at its walls."""
-    dimension = len(shape)
-    right = np.zeros((1,) * (4 - dimension) + shape)
-    first, scales = np.zeros(4, dtype=np.int64), np.zeros(4)
-    first[4 - dimension :] = below
+def _divergence(nodes: Ints, vectors: NDArray[np.float32], shape: tuple[int, ...], spacing: Floats) -> Floats:
+    """∇·(n δ) on a grid, by central differences of vectors at (k, 3) nodes, none of which is at the walls."""
+    right = np.zeros(shape)
     volume = float(np.prod(spacing))
-    scales[4 - dimension :] = -0.5 / spacing * volume ** ((dimension - 1) / dimension) / volume
-    _add_divergence(np.argwhere(nodes.places >= 0), nodes.places, nodes.sums, first, scales, right)
-    return right.reshape(shape)
-
-
-@compiled
-def _add_divergence(
-    stretches: Ints, places: NDArray[np.int32], sums: NDArray[np.float32], first: Ints, scales: Floats, right: Floats
-) -> None:
-    """Add differences of the vectors of some stretches between the nodes before and behind."""
-    skipped = 0
-    while scales[skipped] == 0.0:
-        skipped += 1
-    for s in range(len(stretches)):
-        a, b, c, d = stretches[s]
-        i, j, k = a + first[0], b + first[1], c + first[2]
-        for m in range(STRETCH):
-            n = STRETCH * d + m + first[3]
-            for axis in range(skipped, 4):
-                flow = scales[axis] * sums[places[a, b, c, d], m, axis - skipped]
-                if flow != 0.0:
-                    right[i + (axis == 0), j + (axis == 1), k + (axis == 2), n + (axis == 3)] += flow
-                    right[i - (axis == 0), j - (axis == 1), k - (axis == 2), n - (axis == 3)] -= flow
+    flows = (-0.5 / spacing * volume ** (2 / 3) / volume) * vectors[:, :3].astype(np.float64)
+    for axis, flow in enumerate(flows.T):
+        step = np.arange(3) == axis
+        right[tuple((nodes + step).T)] += flow
+        right[tuple((nodes - step).T)] -= flow
+    return right
 
 
 def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, Floats]:
     """Lattice of places, in cells, 8 cells apart, on a wall half a cell beyond the last nodes of the box."""
-    lines = [
-        np.array([shape[d] - 0.5 if end else -0.5])
-        if d == axis
-        else np.linspace(-0.5, shape[d] - 0.5, max(2, 1 + -(-shape[d] // 8)))
-        for d in range(len(shape))
-    ]
+    lines = [np.linspace(-0.5, n - 0.5, max(2, 1 + -(-n // 8))) for n in shape]
+    lines[axis] = lines[axis][[-1 if end else 0]]
     lattice = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
     return axis, end, lattice.squeeze(axis=axis)
 
@@ -153,21 +121,19 @@ def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
 @compiled
 def _far_field(places: Floats, dipoles: Floats, strengths: Floats, axis: int, core: float) -> tuple[Floats, Floats]:
     """Winding number at places, and its derivative along an axis."""
-    dimension = places.shape[1]
-    sphere = 2.0 * np.pi if dimension == 2 else 4.0 * np.pi
     value, slope = np.zeros(len(places)), np.zeros(len(places))
     for i in range(len(places)):
         for j in range(len(dipoles)):
             square, product = 0.0, 0.0
-            for d in range(dimension):
+            for d in range(3):
                 away = dipoles[j, d] - places[i, d]
                 square += away * away
                 product += away * strengths[j, d]
             square = max(square, core * core)
-            power = square * np.sqrt(square) if dimension == 3 else square
-            value[i] += product / (sphere * power)
+            sphere = 4.0 * np.pi * square * np.sqrt(square)
+            value[i] += product / sphere
             away = dipoles[j, axis] - places[i, axis]
-            slope[i] += (dimension * product * away / square - strengths[j, axis]) / (sphere * power)
+            slope[i] += (3 * product * away / square - strengths[j, axis]) / sphere
     return value, slope
 
 
@@ -198,7 +164,7 @@ def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0
     nodes = int(np.clip((1 + 2 * ROOM) * side / cell, *NODES)) if cell > 0 else NODES[1]
     grid = Grid.around(bounds, nodes, ROOM * side)
     samples = sample_on_grid([shape], grid)
-    winding = winding_numbers(samples.nodes, grid.shape, samples.positions, samples.vectors)
+    winding = winding_numbers(samples)
     areas = np.linalg.norm(samples.vectors, axis=1)
     level = float(np.average(scipy.ndimage.map_coordinates(winding, samples.positions.T, order=1), weights=areas))
     if level < FRAGMENTS:

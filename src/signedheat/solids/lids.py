@@ -165,29 +165,28 @@ def film(pattern: Film) -> Film:
     if n == len(vertices):
         return pattern
     edges, sides = np.unique(_sides(faces, len(plane)), return_inverse=True)
-    ends = np.stack(np.divmod(edges, len(plane)))
     shape, size = np.c_[plane, np.zeros(len(plane))], np.ptp(vertices[:n], axis=0).max()
     for _ in range(1 + ROUNDS):
         weights = np.bincount(sides.ravel(), _cotangents(shape, faces).ravel())
-        shape = _membrane(vertices, n, ends, np.maximum(weights, 1e-6))
+        matrix = _laplacian(*np.divmod(edges, len(plane)), np.maximum(weights, 1e-6), len(plane))
+        shape = _extended(matrix, vertices[:n])
         if np.abs(shape - vertices).max() <= PLANE * size:
             break
         vertices = shape
     return Film(vertices, faces, n, plane, pattern.places)
 
 
-def _membrane(vertices: Floats, n: int, ends: Ints, weights: Floats) -> Floats:
-    """Solve for vertices of which all but the first n are weighted means of their neighbours."""
-    heads, tails = np.concatenate([ends, ends[::-1]], axis=1)
-    both = np.concatenate([weights, weights])
-    inner, fixed = (heads >= n) & (tails >= n), (heads >= n) & (tails < n)
-    size = len(vertices) - n
-    rows = np.concatenate([np.arange(size), heads[inner] - n])
-    columns = np.concatenate([np.arange(size), tails[inner] - n])
-    entries = np.concatenate([np.bincount(heads, both, len(vertices))[n:], -both[inner]])
-    sums = sums_of(both[fixed, None] * vertices[tails[fixed]], heads[fixed] - n, size)
-    matrix = sparse.csc_array((entries, (rows, columns)), shape=(size, size))
-    return np.concatenate([vertices[:n], sparse.linalg.splu(matrix).solve(sums)])
+def _laplacian(tails: Ints, heads: Ints, weights: Floats, n: int) -> sparse.csr_array:
+    """(n, n) Laplacian of a graph, given the weights of its edges, which add up."""
+    entries = np.concatenate([-weights, -weights, weights, weights])
+    places = np.concatenate([tails, heads, tails, heads]), np.concatenate([heads, tails, tails, heads])
+    return sparse.coo_array((entries, places), shape=(n, n)).tocsr()
+
+
+def _extended(matrix: sparse.csr_array, values: Floats) -> Floats:
+    """Extend values at the rim, which comes first, harmonically over a lid with this Laplacian."""
+    n = len(values)
+    return np.concatenate([values, sparse.linalg.splu(matrix[n:, n:].tocsc()).solve(-(matrix[n:, :n] @ values))])
 
 
 def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: float) -> Film | None:
@@ -206,7 +205,7 @@ def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: f
     if n == len(lid.vertices):
         return lid
     rim = lid.vertices[:n]
-    rest, load = _harmonic(lid, held * curvatures), _load(rim, normals)
+    rest, load = _extended(stiffness(lid), held * curvatures), _load(rim, normals)
     lengths = side_lengths(rim)
     springs = (1.0 / np.maximum(held, 1e-9) - 1.0) * 0.25 * width * 0.5 * (lengths + np.roll(lengths, 1))
     size = float(np.linalg.norm(np.ptp(rim, axis=0)))
@@ -245,13 +244,6 @@ def _load(rim: Floats, normals: Floats) -> Floats:
     return load
 
 
-def _harmonic(lid: Lid, values: Floats) -> Floats:
-    """Extend values at the rim, one or several per point, harmonically over the lid."""
-    n, matrix = lid.n_rim, stiffness(lid)
-    inner = sparse.linalg.splu(matrix[n:, n:].tocsc()).solve(-(matrix[n:, :n] @ values))
-    return np.concatenate([values, inner])
-
-
 def _sides(faces: Ints, n: int) -> Ints:
     """(m, 3) edge opposite each corner of the triangles."""
     tails, heads = np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)
@@ -268,11 +260,8 @@ def _cotangents(vertices: Floats, faces: Ints) -> Floats:
 
 def stiffness(lid: Lid) -> sparse.csr_array:
     """(n, n) the positive semidefinite cotangent Laplacian; corners of flat triangles are bounded."""
-    weights, n = _cotangents(lid.vertices, lid.faces).ravel(), len(lid.vertices)
-    i, j = np.roll(lid.faces, -1, axis=1).ravel(), np.roll(lid.faces, -2, axis=1).ravel()
-    entries = np.concatenate([-weights, -weights, weights, weights])
-    places = np.concatenate([i, j, i, j]), np.concatenate([j, i, i, j])
-    return sparse.coo_array((entries, places), shape=(n, n)).tocsr()
+    tails, heads = np.roll(lid.faces, -1, axis=1).ravel(), np.roll(lid.faces, -2, axis=1).ravel()
+    return _laplacian(tails, heads, _cotangents(lid.vertices, lid.faces).ravel(), len(lid.vertices))
 
 
 def vertex_normals(lid: Lid) -> Floats:

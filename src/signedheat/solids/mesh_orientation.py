@@ -16,6 +16,7 @@ from ..errors import GeometryError
 from ..foreign import ForeignShape, converted
 from ..kinds import SurfaceDomain
 from ..memory import within_memory
+from ..mesh.components import first_members
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.surface_curves import CurveOrPoints
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -161,8 +162,7 @@ def oriented_as(shape: Mesh, chain: Chain, decided: Bounding) -> Orientation:
         """(n,) faces of which most of the area is in a mask of triangles."""
         return np.bincount(owners, np.where(mask, areas, -areas), n) > 0
 
-    first = np.full(n, -1)
-    first[owners[::-1]] = np.arange(len(owners))[::-1]
+    first = first_members(owners, n)
     turned, whole = most(decided.to_turn(chain)), most(as_given)
     # of copies one that need not turn stays; all do of what is whole as it was given
     group = np.where(proper[first] & ~whole, chain.numbers[first], len(chain.faces) + np.arange(n))

@@ -148,7 +148,9 @@ def bodies_around(
         homes[away] = homes[own][scipy.spatial.cKDTree(places[own]).query(places[away], workers=-1)[1]]
     normals = np.concatenate([system.normals, np.zeros(rims.middles.shape)])
     sizes = np.concatenate([system.areas, rims.lengths])
-    parts = parts_of(directed[np.argsort(numbers, kind="stable")], np.sort(numbers), count, closed)
+    order = np.argsort(numbers, kind="stable")
+    parts = np.split(directed[order], np.searchsorted(numbers[order], np.arange(count)))[1:]
+    parts += [closed] * (len(closed) > 0)  # one more body
     rows, others, numbers_there = _windings(places, normals, sizes, parts)
     homes_there = homes[rows]
     weights = np.where(own, sizes, 0.0)
@@ -174,12 +176,6 @@ def bodies_around(
     everything = WindingTree.of(np.concatenate(parts[:count]))
     around = everything.levels(system.places, system.normals, system.areas)
     return around - np.bincount(rows[subtracted], numbers_there[subtracted], n)
-
-
-def parts_of(triangles: Floats, numbers: Ints, count: int, closed: Floats) -> list[Floats]:
-    """Split triangles into bodies, by ascending body numbers; closed triangles, if any, are one more body."""
-    parts = np.split(triangles, np.searchsorted(numbers, np.arange(count + 1)))[1:]
-    return [*parts[:count], closed] if len(closed) else parts[:count]
 
 
 def _windings(places: Floats, normals: Floats, sizes: Floats, parts: list[Floats]) -> tuple[Ints, Ints, Floats]:

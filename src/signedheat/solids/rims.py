@@ -11,7 +11,7 @@ from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..mesh.components import grouped, sums_of
 from ..mesh.edges import edge_table
-from ..mesh.triangles import area_vectors
+from ..mesh.triangles import corner_normals
 from ..mesh.unit_vectors import angles_around, unit
 
 PLACES = 8
@@ -57,8 +57,9 @@ def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
     around = np.flatnonzero(crossing[ends])
     if len(around):
         directions = vertices[np.concatenate([heads, tails])[around]] - vertices[ends[around]]
-        normals = _normals(vertices, faces[crossing[faces].any(axis=1)])[ends[around]]
-        angles[around] = angles_around(normals, directions)
+        beside = faces[crossing[faces].any(axis=1)]
+        normals = sums_of(corner_normals(vertices[beside]), beside.ravel(), n)
+        angles[around] = angles_around(unit(normals)[ends[around]], directions)
     order = np.lexsort((angles, ends))
     names = np.concatenate([np.arange(n_edges), -1 - np.arange(n_edges)])[order]
     following = _across_gaps(grouped(ends, n)[0], names)
@@ -67,15 +68,6 @@ def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
     farthest = np.argsort(-np.linalg.norm(middles - centre, axis=1), kind="stable")
     walks, stops = _simple_loops(np.ascontiguousarray(tails), following, farthest, n)
     return np.split(tails[walks], stops[:-1])
-
-
-def _normals(vertices: Floats, faces: Ints) -> Floats:
-    """(n, 3) unit normals at vertices, as angle-weighted means over faces."""
-    corners = vertices[faces]
-    ahead, back = unit(np.roll(corners, -1, axis=1) - corners), unit(np.roll(corners, 1, axis=1) - corners)
-    angles = np.arccos(np.clip((ahead * back).sum(axis=2), -1.0, 1.0))
-    normals = angles[..., None] * unit(area_vectors(corners))[:, None]
-    return unit(sums_of(normals.reshape(-1, 3), faces.ravel(), len(vertices)))
 
 
 @compiled

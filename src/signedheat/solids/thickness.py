@@ -21,10 +21,10 @@ from ..compiled import compiled
 from ..errors import SourceError
 from ..kinds import ShapeLike
 from ..memory import refuse_beyond_memory
-from ..mesh.box_tree import LEAF
+from ..mesh.box_tree import LEAF, BoxTree
 from ..mesh.components import connected_components, sums_of
 from ..mesh.edges import edge_table
-from ..mesh.triangles import area_vectors, face_areas, halved
+from ..mesh.triangles import area_vectors, corner_normals, face_areas, halved
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import indexed
 from ..packages import lazy_module
@@ -292,7 +292,8 @@ def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) 
     extent = float(np.linalg.norm(upper - lower))
     least = COINCIDENT * float(np.abs(tree.tree.bounds[1]).max())
 
-    ways = _ways(facing, tree.tree.items)
+    # least and greatest components of the normals of all faces below each node
+    ways = BoxTree.in_order(facing, facing, tree.tree.items[: len(facing)]).bounds
 
     def measured(rays: Floats) -> tuple[Floats, Ints]:
         """At places, with their normals."""
@@ -305,18 +306,6 @@ def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) 
     return np.where(diameters < extent, diameters, np.nan), touched
 
 
-def _ways(normals: Floats, items: Ints) -> Floats:
-    """(2 · leaves, 6) least and greatest components of the normals of all faces below each node of a tree."""
-    own = normals[items].reshape(-1, LEAF, 3)
-    within = np.where((items >= 0).reshape(-1, LEAF, 1), own, 0.0)
-    levels = [np.concatenate([within.min(axis=1), within.max(axis=1)], axis=1)]
-    while len(levels[-1]) > 1:
-        left, right = levels[-1].reshape(-1, 2, 6).swapaxes(0, 1)
-        lower, upper = np.minimum(left[:, :3], right[:, :3]), np.maximum(left[:, 3:], right[:, 3:])
-        levels.append(np.concatenate([lower, upper], axis=1))
-    return np.concatenate([np.zeros((1, 6)), *levels[::-1]])
-
-
 def _normals_at(triangles: Floats, faces: Ints, places: Floats) -> Floats:
     """(n, 3) unit normals at places, mixed of means at corners: others would tilt balls, and make them small."""
     ids = indexed(triangles)[1]
@@ -325,10 +314,7 @@ def _normals_at(triangles: Floats, faces: Ints, places: Floats) -> Floats:
     following = np.roll(np.arange(ids.size).reshape(-1, 3), -1, axis=1).ravel()
     first, second = pairs.T
     fans = connected_components(ids.size, np.append(first, following[first]), np.append(following[second], second))
-    sides = unit(np.roll(triangles, -1, axis=1) - triangles)
-    angles = np.arccos(np.clip(-np.einsum("mki,mki->mk", sides, np.roll(sides, 1, axis=1)), -1.0, 1.0))
-    weighted = angles.reshape(-1, 1) * np.repeat(flat, 3, axis=0)
-    corners = unit(sums_of(weighted, fans, ids.size))[fans].reshape(-1, 3, 3)
+    corners = unit(sums_of(corner_normals(triangles), fans, ids.size))[fans].reshape(-1, 3, 3)
     return unit(np.einsum("nk,nki->ni", weights_in(triangles[faces], places), corners[faces]))
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints
 from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
 from ..mesh.arrangement import Arrangement, arranged, meeting_faces
+from ..mesh.components import first_members
 from ..mesh.triangles import face_areas
 from ..mesh.welding import same_positions
 from .regions import cut_and_sided
@@ -72,9 +73,7 @@ def united(
 def _cut(whole: TriangleGroup, closing: Bools, touching: float) -> Arrangement:
     """Faces divided where they meet: those that close by each other, all others by these."""
     ids = whole.ids
-    first = np.full(int(ids.max()) + 1, -1)
-    first[ids.ravel()[::-1]] = np.arange(ids.size)[::-1]
-    points = whole.triangles.reshape(-1, 3)[first]
+    points = whole.triangles.reshape(-1, 3)[first_members(ids.ravel(), int(ids.max()) + 1)]
     faces = same_positions(points)[ids]
     pairs = meeting_faces(points, faces, touching)
     both = closing[pairs].all(axis=1)
