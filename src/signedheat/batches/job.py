@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -330,11 +331,9 @@ class Watertight:
             shape = read(path)
         scale = 1.0 if self.units is None else scale_to(path, self.units)
         solid = complete(shape if scale == 1 else transform(shape, np.diag([scale, scale, scale, 1.0])))
-        names = ("thickness", "contoured", "tolerance", "resolution", "spacing")
-        options = {name: getattr(self, name) for name in names}
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", InexactWarning)
-            surface, way = closed_surface(solid, **options)
+            surface, way = self._closed_surface(solid)
         with warnings.catch_warnings(record=True) as losses:
             warnings.simplefilter("always", InexactWarning)
             save(surface, f"{stem}{self.surfaces}")
@@ -350,41 +349,31 @@ class Watertight:
         units = unit_of(path) if self.units is None else self.units.rpartition(":")[2]
         return {"way": way, **figures, **faults, "units": units, "notes": notes}
 
+    def _closed_surface(self, solid: Solid) -> tuple[TriangleMesh, str]:
+        """Make a closed surface of a solid, and say how."""
+        whole = partial(solid.surface, resolution=self.resolution, spacing=self.spacing)
+        contour = partial(whole, tolerance=self.tolerance)
+        if self.thickness is not None:
+            return contour(0.5 * self.thickness), f"thickened to {self.thickness:g}"
+        areas = face_areas(solid.triangles)
+        if areas[solid.bounding].sum() < BOUNDS * areas.sum():
+            raise SourceError("the shape is a sheet, which bounds nothing", remedy="give it a thickness")
+        if self.contoured:
+            return contour(), "contoured"
+        cell = float(Grid.around(solid.bounds, self.resolution, None, self.spacing).spacing.max())
+        try:
+            kept, places = given_surface(solid, whole, cell)
+            made = kept if self.tolerance is None else simplified(kept, self.tolerance)
+            return made, f"faces kept but {unjoined(places)}" if len(places) else "faces kept"
+        except GeometryError as error:
+            reason = str(error).partition(":")[0]
+            return contour(), f"contoured, since {reason}"
+
 
 BOUNDS = 1e-3
 """A shape is a sheet if a smaller share of its area is on the boundary of its solid."""
 PARTS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [1 / 3, 1 / 3, 1 / 3]])
 """Barycentric coordinates at which distances of a triangle are measured: corners, middles of sides, and centre."""
-
-
-def closed_surface(
-    solid: Solid,
-    thickness: float | None = None,
-    contoured: bool = False,
-    tolerance: float | None = None,
-    resolution: int = 256,
-    spacing: float | None = None,
-) -> tuple[TriangleMesh, str]:
-    """Make a closed surface of a solid, and say how; the options are those of `signedheat.batches.Watertight`."""
-
-    def contour(level: float) -> TriangleMesh:
-        return solid.surface(level, tolerance=tolerance, resolution=resolution, spacing=spacing)
-
-    if thickness is not None:
-        return contour(0.5 * thickness), f"thickened to {thickness:g}"
-    areas = face_areas(solid.triangles)
-    if areas[solid.bounding].sum() < BOUNDS * areas.sum():
-        raise SourceError("the shape is a sheet, which bounds nothing", remedy="give it a thickness")
-    if contoured:
-        return contour(0.0), "contoured"
-    cell = float(Grid.around(solid.bounds, resolution, None, spacing).spacing.max())
-    try:
-        kept, places = given_surface(solid, lambda: solid.surface(resolution=resolution, spacing=spacing), cell)
-        made = kept if tolerance is None else simplified(kept, tolerance)
-        return made, f"faces kept but {unjoined(places)}" if len(places) else "faces kept"
-    except GeometryError as error:
-        reason = str(error).partition(":")[0]
-        return contour(0.0), f"contoured, since {reason}"
 
 
 def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[str, object]:

@@ -72,10 +72,11 @@ def report(file: str, arguments: Namespace) -> Summary:
         measured = widths(outwards)
         summary["thickness"] = {**asdict(measured), "spacing": measured.spacing}
         rows |= _width_rows(measured)
-    extra: dict[str, object] = {"memory_bytes": {str(n): _memory(shape, n) for n in arguments.resolution}}
-    extra["least_spacing"] = _least_spacing(shape)
-    summary |= extra
-    text = _table(rows | extra)
+    summary["memory_bytes"] = sizes = {str(n): _memory(shape, n) for n in arguments.resolution}
+    summary["least_spacing"] = least = _least_spacing(shape)
+    rows |= {f"memory at {n}": "–" if size is None else f"{size / 1e9:.2f} GB" for n, size in sizes.items()}
+    rows["spacing that fits"] = "–" if least is None else f"{least:.3g}"
+    text = _table(rows)
     if arguments.curves:
         if isinstance(shape, sh.TetMesh):
             raise SourceError(
@@ -313,13 +314,6 @@ def _memory(shape: Any, resolution: int) -> int | None:
 def _table(summary: dict[str, Any]) -> str:
     rows = []
     for key, value in summary.items():
-        if key == "least_spacing":
-            rows.append(("spacing that fits", "–" if value is None else f"{value:.3g}"))
-            continue
-        if key == "memory_bytes":
-            for resolution, size in value.items():
-                rows.append((f"memory at {resolution}", "–" if size is None else f"{size / 1e9:.2f} GB"))
-            continue
         if isinstance(value, (list, tuple)):
             value = " ".join(f"{entry:g}" for entry in value)
         elif isinstance(value, bool):

@@ -6,7 +6,7 @@ import codecs
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -233,7 +233,10 @@ class _BinaryReader:
 
     def _all_alike(self, element: _Element, lists: dict[str, tuple[str, str]]) -> dict[str, Any] | None:
         """Return the table if all lists have the length of the first, which is quick; otherwise None."""
-        lengths = self._first_lengths(element)
+        lengths = dict.fromkeys(lists, 0)
+        if element.count:
+            start, first = self.at, self._row_by_row(replace(element, count=1))
+            self.at, lengths = start, {name: int(first[name][1][0]) for name in lists}
         entries: list[Any] = []
         for number, (name, kind) in enumerate(element.properties.items()):
             if isinstance(kind, str):
@@ -255,23 +258,6 @@ class _BinaryReader:
             else rows[column]
             for name, column in columns.items()
         }
-
-    def _first_lengths(self, element: _Element) -> dict[str, int]:
-        lengths: dict[str, int] = {}
-        position = self.at
-        for name, kind in element.properties.items():
-            if isinstance(kind, str):
-                position += int(kind[1])
-                continue
-            size = int(kind[0][1])
-            enough = element.count > 0 and position + size <= len(self.body)
-            length = int(self._numbers(kind[0], position)[0]) if enough else 0
-            lengths[name] = length if 0 <= length <= len(self.body) else 0
-            position += size + lengths[name] * int(kind[1][1])
-        return lengths
-
-    def _numbers(self, code: str, position: int, count: int = 1) -> NDArray[Any]:
-        return np.frombuffer(self.body, self.order + code, count, position)
 
     def _row_by_row(self, element: _Element) -> dict[str, Any]:
         columns: dict[str, list[Any]] = {name: [] for name in element.properties}
@@ -296,7 +282,7 @@ class _BinaryReader:
         if length < 0 or self.at + size > len(self.body):
             raise _truncated(element)
         self.at += size
-        return self._numbers(code, self.at - size, length)
+        return np.frombuffer(self.body, self.order + code, length, self.at - size)
 
 
 def _text_reader(body: bytes) -> Any:
