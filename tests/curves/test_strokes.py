@@ -221,6 +221,7 @@ def test_what_is_a_guess_is_announced_and_nothing_else(damage, seed, guessed):
     assert (strokes.wrong_share(drawing, values) > 0.06) == guessed
 
 
+@pytest.mark.filterwarnings("ignore:.*is a guess")
 @pytest.mark.parametrize(("damage", "seed"), [("overlapping", 20000), ("scribbles", 20000), ("twice_turned", 20000)])
 def test_what_is_turned_and_left_out_does_not_depend_on_the_triangles_of_the_method(damage, seed):
     """Copies of strokes within the width of triangles are left out or not as these happen to lie."""

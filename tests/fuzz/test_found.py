@@ -102,6 +102,8 @@ FOUND = [
     ("same solid renumbered", 20261127, 2),
     # boxes from one end of what can be written to the other
     ("arguments", 7004, 197), ("arguments", 7008, 1101),
+    # shapes taken as they are oriented, none of whose faces has an area
+    ("commands", 9112, 263),
 ]  # fmt: skip
 
 

@@ -44,11 +44,11 @@ ROUNDS = 20
 SINGLY = 16
 """Number of strokes, the longest first, that are turned or left out one by one where they explain nothing; limited for
 speed. Halved and doubled, none of 46 drawings changes."""
-HALF, TURNED = 0.49, 0.34
-"""Turning loops, this share of each or more, is a guess if they make up more than that share of the length. Of 778
-drawings (`benchmarks/strokes.py`, seeds 20000 to 20077) 5 are wrong in silence and 16 right with a warning; at .45 of
-each 5 and 18, at two thirds 5 and 12, but then two halves of a circle that contradict each other are no guess if a dot
-decides between them; at .25 of the length 4 and 23, at .4 6 and 11."""
+HALF, TURNED = 0.45, 0.34
+"""Turning loops, this share of each or more, is a guess if they make up more than that share of the length. Of 600
+drawings of which parts are turned (`benchmarks/strokes.py`, seeds 20000 to 20200) 6 are wrong in silence and 29 right
+with a warning; at .49 of each 7 and 25, at .4 4 and 37, at .37 4 and 48; at .25 of the length 3 and 43, at .3 5 and
+31. Above a half, two halves of a circle that contradict each other would be no guess if a dot decides between them."""
 WORTH = 0.5
 """The inside is a guess if it depends on a stroke worth less than this, relative to its length. At .4 6 and 15 of these
 drawings, halved 8 and 15, at .6 5 and 22."""

@@ -17,8 +17,8 @@ def connected_components(n: int, tails: NDArray[np.integer], heads: NDArray[np.i
 def element_components(elements: Ints) -> Ints:
     """Return (m,) components, by first appearance, of elements that share vertices, or edges if they name these."""
     links = np.repeat(elements[:, 0], elements.shape[1] - 1), elements[:, 1:].ravel()
-    labels = connected_components(int(elements.max()) + 1, *links)[elements[:, 0]]
-    return by_first_use(labels, int(labels.max()) + 1)[0]
+    labels = connected_components(int(elements.max(initial=-1)) + 1, *links)[elements[:, 0]]
+    return by_first_use(labels, int(labels.max(initial=-1)) + 1)[0]
 
 
 def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
