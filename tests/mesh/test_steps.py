@@ -24,8 +24,7 @@ def test_halfedges_of_a_common_edge_are_paired():
 
 
 def test_of_two_faces_that_disagree_the_lighter_one_turns():
-    tails, heads, owners = np.array([0, 1, 2, 2, 3, 1]), np.array([1, 2, 0, 3, 1, 2]), np.array([0, 0, 0, 1, 1, 1])
-    orientation = orient_faces(pair_halfedges(tails, heads, 4), tails, owners, np.array([1.0, 2.0]))
+    orientation = orient_faces(np.array([[0, 1, 2], [2, 3, 1]]), np.array([1.0, 2.0]), 4)
     assert orientation.turned.tolist() == [True, False]
     assert orientation.orientable.tolist() == [True] and orientation.disagreeing == 1
 

@@ -65,7 +65,7 @@ class RepairedMesh:
         corners = once.places[given.faces]
         kept, targets = np.unique(copied_faces(corners, n), return_inverse=True)
         faces, areas = corners[kept], given.face_areas[kept]
-        turned = orient_faces(_pairs(faces, n), faces.ravel(), np.repeat(np.arange(len(kept)), 3), areas).turned
+        turned = orient_faces(faces, areas, n).turned
         copies = given.n_faces - len(kept)
         if not (copies or turned.any()):
             return None
@@ -126,15 +126,12 @@ def _halfedges(mesh: TriangleMesh | PolygonMesh) -> tuple[Ints, Ints]:
 def copied_faces(faces: Ints, n_vertices: int) -> Ints:
     """(m,) first face on the vertices of each, where an edge has more faces than two; elsewhere the face itself."""
     first = np.arange(len(faces))
-    crowded = np.flatnonzero((_pairs(faces, n_vertices).around > 2).reshape(-1, 3).any(axis=1))
+    pairs = pair_halfedges(faces.ravel(), np.roll(faces, -1, axis=1).ravel(), n_vertices)
+    crowded = np.flatnonzero((pairs.around > 2).reshape(-1, 3).any(axis=1))
     if len(crowded):
         copies, _ = coincident_faces(faces[crowded].ravel(), np.arange(0, 3 * len(crowded) + 1, 3))
         first[crowded] = np.where(copies < 0, crowded, crowded[copies])
     return first
-
-
-def _pairs(faces: Ints, n_vertices: int) -> Any:
-    return pair_halfedges(faces.ravel(), np.roll(faces, -1, axis=1).ravel(), n_vertices)
 
 
 APART = 0.1

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Frozen, Ints, read_only
+from ..arrays import Bools, Floats, Frozen, Ints, mask_of, read_only
 from ..compiled import compiled
 from .components import connected_components, first_members, grouped
 
@@ -35,9 +35,7 @@ class FaceOrientation:
 
     parts: Ints  # (n_faces,) part of each face; parts are numbered by first appearance
     turned: Bools  # (n_faces,) whether each face must be turned; False in parts that cannot be oriented
-    # (n_parts,) whether all neighbours of the part can agree; whether each of its edges has two faces
-    orientable: Bools
-    closed: Bools
+    orientable: Bools  # (n_parts,) whether all neighbours of the part can agree
     disagreeing: int  # number of edges whose two faces run along them the same way
 
 
@@ -55,8 +53,12 @@ def pair_halfedges(tails: Ints, heads: Ints, n_vertices: int, used: Bools | None
     return HalfedgePairs(edges, *table)
 
 
-def orient_faces(pairs: HalfedgePairs, tails: Ints, owners: NDArray[np.integer], weights: Floats) -> FaceOrientation:
-    """Make faces agree with their neighbours across edges of two faces; in each part the majority by weight stays."""
+def orient_faces(faces: Ints, weights: Floats, n_vertices: int, used: Bools | None = None) -> FaceOrientation:
+    """Make triangles agree across edges of two that are used; in each part the majority by weight stays."""
+    tails, owners = faces.ravel(), np.repeat(np.arange(len(faces)), 3)
+    pairs = pair_halfedges(
+        tails, np.roll(faces, -1, axis=1).ravel(), n_vertices, None if used is None else used[owners]
+    )
     two = pairs.counts == 2
     first, second = pairs.first[two], pairs.second[two]
     (f, g), n, disagree = (owners[first], owners[second]), len(weights), tails[first] == tails[second]
@@ -64,14 +66,11 @@ def orient_faces(pairs: HalfedgePairs, tails: Ints, owners: NDArray[np.integer],
     # each face is there twice, as it is and, n numbers farther on, turned over: faces that agree are connected
     ways = np.concatenate([f, f + n]), np.concatenate([np.where(disagree, g + n, g), np.where(disagree, g, g + n)])
     cover = connected_components(2 * n, *ways)
-    orientable, closed = np.ones((2, int(parts.max(initial=-1)) + 1), dtype=bool)
-    orientable[parts[cover[:n] == cover[n:]]] = False
-    closed[parts[owners[(pairs.edges >= 0) & (pairs.around != 2)]]] = False
+    orientable = ~mask_of(int(parts.max(initial=-1)) + 1, parts[cover[:n] == cover[n:]])
     turned = cover[:n] != cover[first_members(parts, len(orientable))[parts]]
     balance = np.bincount(parts, np.where(turned, -weights, weights), len(orientable))
-    return FaceOrientation(
-        parts, orientable[parts] & (turned != (balance < 0)[parts]), orientable, closed, int(disagree.sum())
-    )
+    turned = orientable[parts] & (turned != (balance < 0)[parts])
+    return FaceOrientation(parts, turned, orientable, int(disagree.sum()))
 
 
 def may_coincide(pairs: HalfedgePairs, tails: Ints, following: NDArray[np.integer]) -> bool:

@@ -226,7 +226,7 @@ def _discs(corners: Floats, tree: BoxTree) -> Floats:
 class NearestFaces:
     """The nearest face of each of some points."""
 
-    faces: NDArray[np.integer]  # (n,) its id
+    faces: NDArray[np.int32]  # (n,) its id
     distances: Floats  # (n,) its distance
     places: Floats  # (n, 3) the nearest place
     features: NDArray[np.int8]  # (n,) the feature that this place lies on, in the code of `foot_on_triangle`
@@ -236,7 +236,7 @@ class NearestFaces:
     regular: Bools
 
 
-def feet_on(features: FaceFeatures, faces: NDArray[np.integer], points: Floats) -> NearestFaces:
+def feet_on(features: FaceFeatures, faces: NDArray[np.int32], points: Floats) -> NearestFaces:
     """Find the nearest place of each of (n,) faces to its own one of (n, 3) points."""
     return NearestFaces(faces, *_feet(features, faces, points))
 

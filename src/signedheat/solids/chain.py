@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Frozen, Ints, mask_of
 from ..mesh.components import connected_components, element_components, next_in_groups
-from ..mesh.edges import EdgeTable, FaceOrientation, edge_table, orient_faces, pair_halfedges
+from ..mesh.edges import EdgeTable, FaceOrientation, edge_table, orient_faces
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import angles_around, unit
 from ..mesh.welding import ROUNDING, coincident_faces, joined_rims, same_positions
@@ -171,10 +171,7 @@ class Chain(Frozen):
 
     def pieces(self, used: Bools) -> FaceOrientation:
         """Join triangles across edges that two used triangles share; most of the area of each piece stays as given."""
-        tails, heads = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
-        owners = np.repeat(np.arange(len(self.faces)), 3)
-        pairs = pair_halfedges(tails, heads, len(self.positions), used[owners])
-        return orient_faces(pairs, tails, owners, self.areas * np.sign(self.multiplicities))
+        return orient_faces(self.faces, self.areas * np.sign(self.multiplicities), len(self.positions), used)
 
     def pieces_as_given(self) -> FaceOrientation:
         """Join triangles across edges along which two of them run in opposite directions."""
@@ -182,4 +179,4 @@ class Chain(Frozen):
         opposite = table.forward.ravel()[table.pairs].sum(axis=1) == 1
         parts = connected_components(len(self.faces), *table.pairs[opposite].T // 3)
         every = np.ones(int(parts.max(initial=-1)) + 1, dtype=bool)
-        return FaceOrientation(parts, self.multiplicities < 0, every, every, 0)  # nothing is compared
+        return FaceOrientation(parts, self.multiplicities < 0, every, 0)  # nothing is compared
