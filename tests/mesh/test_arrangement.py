@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from signedheat import samples
 from signedheat.mesh.arrangement import arranged
+from signedheat.mesh.components import connected_components
 from signedheat.mesh.edges import edge_table
 from signedheat.mesh.planar_triangulation import triangulate_faces
 from signedheat.mesh.self_intersections import self_intersections
@@ -106,7 +107,7 @@ def test_segments_become_edges():
         inner = points[n:, 0].argsort() + n  # a path from left to right does not cross itself
         segments = np.stack([inner[:-1], inner[1:]], axis=1)
         places = np.array([[1 + len(sides[0]), 2 + len(sides[0]) + len(sides[1]), n]])
-        made, _, cells = triangulate_faces(
+        made, _, across = triangulate_faces(
             points,
             np.array([0, len(points)]),
             np.arange(len(points)),
@@ -121,7 +122,8 @@ def test_segments_become_edges():
         assert areas.sum() == pytest.approx(12)
         edges = {tuple(sorted(edge)) for edge in np.sort(edge_table(made).vertices, axis=1).tolist()}
         assert {tuple(sorted(segment)) for segment in segments.tolist()} <= edges
-        assert (cells == 0).all()
+        rows, sides = np.nonzero(across >= 0)
+        assert not connected_components(len(made), rows, across[rows, sides]).any()  # one cell, around the path
 
 
 def test_bodies_that_touch_have_edges_and_vertices_of_their_own():

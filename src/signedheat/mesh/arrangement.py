@@ -14,11 +14,11 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from .box_tree import BoxTree
-from .components import grouped, members_of, numbered, sums_of
+from .components import connected_components, grouped, members_of, numbered, sums_of
 from .edges import EdgeTable, edge_table
 from .planar_triangulation import triangulate_faces
 from .self_intersections import overlapping_faces
-from .triangles import face_areas
+from .triangles import face_areas, heights
 from .welding import distinct_rows, welded
 
 TOUCHING = 1e-8
@@ -96,7 +96,7 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, touching: f
     busy = np.unique(faces[pairs.ravel()])
     faces = _welded(points, busy, slack)[faces]
     proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
-    proper = proper[_heights(points[faces[proper]]) > slack]
+    proper = proper[heights(points[faces[proper]]) > slack]
     number = np.full(int(faces.size), -1)
     number[proper] = np.arange(len(proper))
     faces, pairs = faces[proper], number[pairs]
@@ -134,12 +134,6 @@ class Lines(NamedTuple):
         on = Incidence.of((self.on.owners, rename[self.on.points]))
         on = on.select((on.points[:, None] != ends[on.owners]).all(axis=1))
         return self._replace(ends=ends, on=on, within=Incidence.of((self.within.owners, rename[self.within.points])))
-
-
-def _heights(corners: Floats) -> Floats:
-    """Return (m,) heights of triangles above their longest sides."""
-    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
-    return 2.0 * face_areas(corners) / np.maximum(sides, 1e-300)
 
 
 def _welded(points: Floats, chosen: Ints, slack: float) -> Ints:
@@ -298,7 +292,7 @@ def _divided(
     corner_ends = [
         local[order[np.searchsorted(keys[order], segment_faces * n + end)]] for end in (segment_tails, segments.points)
     ]
-    pieces, owners, cells = triangulate_faces(
+    pieces, owners, across = triangulate_faces(
         points,
         member_starts,
         members,
@@ -306,6 +300,8 @@ def _divided(
         np.searchsorted(segment_faces, np.append(chosen, len(faces))),
         np.stack(corner_ends, axis=1),
     )
+    rows, sides = np.nonzero(across >= 0)
+    cells = connected_components(len(pieces), rows, across[rows, sides])
     kept = np.flatnonzero(~busy)
     all_faces = np.concatenate([faces[kept], pieces])
     all_origins = np.concatenate([kept, chosen[owners]])

@@ -38,14 +38,18 @@ def triangulate_faces(
 
     From ``starts[f]`` on, `members` are the points of a face, those on its rim first and in order; `corners`, (m, 3),
     are the places of the second and third corner and the number on the rim; `segments`, (t, 2), join places. Returns
-    triangles (k, 3), the face of each, ascending, and its cell, which has no segment within.
+    triangles (k, 3), the face of each, ascending, and (k, 3) the one across each edge, −1 across segments and rims.
     """
     m = len(corners)
     total = np.int64(0)
     for f in range(m):
         total += max(2 * (starts[f + 1] - starts[f]) - corners[f, 2] - 2, 0)
-    triangles, owners, cells = np.empty((total, 3), np.int64), np.empty(total, np.int64), np.full(total, -1, np.int64)
-    filled, n_cells = 0, 0
+    triangles, owners, across = (
+        np.empty((total, 3), np.int64),
+        np.empty(total, np.int64),
+        np.empty((total, 3), np.int64),
+    )
+    filled = 0
     for f in range(m):
         begin, n, rim = starts[f], starts[f + 1] - starts[f], corners[f, 2]
         x = _flattened(points, members[begin : begin + n], corners[f])
@@ -60,35 +64,13 @@ def triangulate_faces(
         for s in range(segment_starts[f], segment_starts[f + 1]):
             _connect(mesh, segments[s, 0], segments[s, 1])
         _improve(mesh)
-        n_cells = _number_cells(adj, fixed, cells[filled : filled + last], n_cells)
         for t in range(last):
             for k in range(3):
-                triangles[filled, k] = members[begin + tri[t, k]]
-            owners[filled] = f
-            filled += 1
-    return triangles[:filled], owners[:filled], cells[:filled]
-
-
-@compiled
-def _number_cells(adj: Ints, fixed: Bools, cells: Ints, n_cells: int) -> int:
-    """Give triangles that are connected across free edges the same number; return the next number."""
-    stack = np.empty(len(cells), np.int64)
-    for seed in range(len(cells)):
-        if cells[seed] >= 0:
-            continue
-        cells[seed] = n_cells
-        stack[0], depth = seed, 1
-        while depth > 0:
-            depth -= 1
-            t = stack[depth]
-            for k in range(3):
-                s = adj[t, k]
-                if s >= 0 and not fixed[t, k] and cells[s] < 0:
-                    cells[s] = n_cells
-                    stack[depth] = s
-                    depth += 1
-        n_cells += 1
-    return n_cells
+                triangles[filled + t, k] = members[begin + tri[t, k]]
+                across[filled + t, k] = filled + adj[t, k] if adj[t, k] >= 0 and not fixed[t, k] else -1
+            owners[filled + t] = f
+        filled += last
+    return triangles[:filled], owners[:filled], across[:filled]
 
 
 @compiled

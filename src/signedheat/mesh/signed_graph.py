@@ -53,7 +53,7 @@ def signs_of(links: Links, n_nodes: int) -> Floats:
     result = np.ones(int(levels[-1][1].max()) + 1 if levels else n_nodes)
     for weights, groups, within in reversed(levels):
         result = result[groups] * within
-        turn_where_better(weights.indptr, weights.indices, weights.data, result, _ROUNDS)
+        turn_where_better(weights.indptr, weights.indices, weights.data, result)
     return result
 
 
@@ -136,11 +136,9 @@ def _contraction(weights: sparse.csr_matrix) -> tuple[Ints, Floats]:
 
 
 @compiled
-def turn_where_better(
-    starts: NDArray[np.int32], neighbors: NDArray[np.int32], weights: Floats, signs: Floats, rounds: int
-) -> None:
+def turn_where_better(starts: NDArray[np.int32], neighbors: NDArray[np.int32], weights: Floats, signs: Floats) -> None:
     """Turn signs that disagree with their neighbours, one after the other, until none does."""
-    for _ in range(rounds):
+    for _ in range(_ROUNDS):
         turned = False
         for node in range(len(signs)):
             agreement = 0.0

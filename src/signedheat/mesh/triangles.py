@@ -46,6 +46,12 @@ def face_areas(triangles: Floats) -> Floats:
     return np.linalg.norm(area_vectors(triangles), axis=1)
 
 
+def heights(triangles: Floats) -> Floats:
+    """Return (m,) heights of (m, 3, 3) triangles above their longest sides."""
+    longest = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2).max(axis=1)
+    return 2.0 * face_areas(triangles) / np.maximum(longest, 1e-300)
+
+
 def corner_normals(triangles: Floats) -> Floats:
     """Return (3 m, 3) unit normals of (m, 3, 3) triangles, times the angle at each corner, for sums around vertices."""
     sides = unit(np.roll(triangles, -1, axis=1) - triangles)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..mesh.box_tree import LEAF, BoxTree
+from ..mesh.triangles import area_vectors
 from ..parallel import CHUNK, in_chunks
 
 DEPTH = 1e-5
@@ -54,15 +55,18 @@ class WindingTree:
 
     def behind(self, faces: NDArray[np.integer], places: Floats) -> Floats:
         """Return (n,) winding numbers just behind places (n, 3) in faces (n,), away from their rims."""
-        corners = self.triangles[faces]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        areas = np.linalg.norm(normals, axis=1)
-        depth = DEPTH * np.sqrt(areas) / np.where(areas > 0, areas, 1.0)
-        return self.numbers(places - depth[:, None] * normals)
+        return self.numbers(places - steps_off(self.triangles[faces], DEPTH))
 
     @cached_property
     def _moments(self) -> Floats:
         return _moments(self.triangles, self.tree)
+
+
+def steps_off(triangles: Floats, depth: float) -> Floats:
+    """Return (m, 3) steps along the normals of triangles, as long as `depth` times the root of twice their areas."""
+    normals = 2.0 * area_vectors(triangles)
+    areas = np.linalg.norm(normals, axis=1)
+    return (depth * np.sqrt(areas) / np.where(areas > 0, areas, 1.0))[:, None] * normals
 
 
 def winding_sums(triangles: Floats, points: Floats) -> Floats:

@@ -19,8 +19,8 @@ from ..mesh.unit_vectors import unit
 from ..search.winding_tree import WindingTree
 from .chain import Chain, inner_walls
 from .gauss import Dipoles, Matrix, Pieces, means, sampled, system_of, without_slender
-from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, levels_of_pieces, levels_within
-from .rims import meeting_either_way, open_edges
+from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, directed, levels_of_pieces, levels_within
+from .rims import meeting_edges, open_edges
 
 COHERENT = 0.7
 """Least coherence of the levels of loose pieces that are the remains of a body. Bodies have .81 to 1, however little is
@@ -86,7 +86,7 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     rest = np.flatnonzero((open_pieces & orientable)[pieces] & ~inner)
     if len(rest):
         names, labels = np.unique(pieces[rest], return_inverse=True)
-        triangles = np.where((counts[rest] < 0)[:, None, None], chain.triangles[rest, ::-1], chain.triangles[rest])
+        triangles = directed(chain.triangles[rest], np.sign(counts[rest]))
         edges, owners = open_edges(chain.faces[rest], labels)
         groups = connected_pieces(chain, rest, labels, edges, owners)
         ends = chain.positions[edges]
@@ -94,7 +94,7 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
         around = np.zeros((0, 3, 3))
         if closed.any() and not as_oriented:
             facing = _nested(chain, pieces, counts * closed[pieces], closed, flips, nested)[0]
-            around = _directed(chain, counts * (closed * facing)[pieces])
+            around = directed(chain.triangles, counts * (closed * facing)[pieces])
         given = sums_of(np.sign(counts[rest] * chain.multiplicities[rest]) * chain.areas[rest], labels, len(names))
         signs, bounds[names], loose[names], levels[names] = open_bounding(
             Pieces(triangles, labels), groups, rims, given, around, nested, as_oriented
@@ -164,7 +164,7 @@ def _nested(
     faces, places = sampled(Pieces(triangles, labels), PROBES * len(names))
     probes, own = owners[faces], np.abs(counts[counted[faces]])
     normals = unit(area_vectors(triangles[faces]))
-    tree = WindingTree.of(_directed(chain, counts * outward[pieces]))
+    tree = WindingTree.of(directed(chain.triangles, counts * outward[pieces]))
     around = tree.levels(places, normals, chain.areas[counted[faces]]) - 0.5 * own
     depth = np.full(n, np.inf)
     np.minimum.at(depth, probes, np.round(around))
@@ -176,7 +176,7 @@ def _nested(
     clear = np.abs(given) >= HINT * np.bincount(pieces, chain.areas, n)
     way = np.where(given >= 0, 1.0, -1.0)
     rows, outermost = np.flatnonzero(inner[probes]), np.zeros(n)
-    roots = WindingTree.of(_directed(chain, counts * (way * (depth <= 0))[pieces]))
+    roots = WindingTree.of(directed(chain.triangles, counts * (way * (depth <= 0))[pieces]))
     np.add.at(outermost, probes[rows], roots.numbers(places[rows]))
     by_depth = np.where(depth % 2 == 0, 1.0, -1.0)
     facing = np.where(clear, outward * way * np.where(outermost >= 0, 1.0, -1.0), by_depth)
@@ -259,24 +259,17 @@ def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owner
     n = int(labels.max()) + 1
     hubs = np.unique(chain.complexes[faces[first_members(labels, n)]], return_inverse=True)[1]
     several = np.bincount(labels)[owners] > 1
-    owners, (left, right) = owners[several], meeting_either_way(chain.positions[edges[several]])
+    owners, (left, right, _) = owners[several], meeting_edges(chain.positions[edges[several]])
     return connected_components(
         n + int(hubs.max()) + 1,
         *(np.concatenate(ends) for ends in ((np.arange(n), owners[left]), (n + hubs, owners[right]))),
     )[:n]
 
 
-def _directed(chain: Chain, counts: Floats | Ints) -> Floats:
-    """(k, 3, 3) triangles of a chain, repeated by their counts, and reversed where counts are negative."""
-    copies = np.repeat(np.arange(len(counts)), np.abs(counts).astype(np.int64))
-    triangles = chain.triangles[copies]
-    return np.where((counts[copies] < 0)[:, None, None], triangles[:, ::-1], triangles)
-
-
 def _along(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | Ints) -> Bools:
     """(p,) whether pieces are in loose clusters along closed pieces, as noisy copies are: half inside, half outside."""
     chosen = np.flatnonzero(clusters[pieces] >= 0)
-    around = WindingTree.of(_directed(chain, counts)).numbers(chain.triangles[chosen].mean(axis=1))
+    around = WindingTree.of(directed(chain.triangles, counts)).numbers(chain.triangles[chosen].mean(axis=1))
     owners = clusters[pieces[chosen]]
     inside = means(around, owners, chain.areas[chosen], int(owners.max()) + 1)
     return (clusters >= 0) & (np.abs(inside - np.round(inside)) > ALONG)[clusters]

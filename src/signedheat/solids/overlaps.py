@@ -34,6 +34,12 @@ FEW = 16
 one."""
 
 
+def directed(triangles: Floats, counts: Floats | Ints) -> Floats:
+    """(k, 3, 3) triangles, repeated by their counts, and reversed where these are negative."""
+    copies = np.repeat(np.arange(len(counts)), np.abs(counts).astype(np.int64))
+    return np.where((counts[copies] < 0)[:, None, None], triangles[copies, ::-1], triangles[copies])
+
+
 def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) -> Floats:
     """(n,) levels at the centres of some triangles, each due to its own group, with counts as multiplicities."""
     names, labels = np.unique(groups, return_inverse=True)
@@ -46,9 +52,7 @@ def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) ->
     for group in np.unique(labels[faces][wanted > FEW]):
         chosen = np.flatnonzero(labels[faces] == group)
         members = order[starts[group] : starts[group + 1]]
-        copies = np.repeat(members, np.abs(counts[members]))
-        directed = np.where((counts[copies] < 0)[:, None, None], triangles[copies, ::-1], triangles[copies])
-        tree, some = WindingTree.of(directed), triangles[faces[chosen]]
+        tree, some = WindingTree.of(directed(triangles[members], counts[members])), triangles[faces[chosen]]
         levels[chosen] = tree.levels(some.mean(axis=1), unit(area_vectors(some)), face_areas(some))
     return levels
 
@@ -133,13 +137,13 @@ def bodies_around(
 
     It sees its own body, the one in which this is a cavity, and cavities in it; `nested` decides which bodies are.
     """
-    directed = np.where((signs < 0)[pieces.labels, None, None], pieces.triangles[:, ::-1], pieces.triangles)
-    bodies = Bodies.of(pieces, directed, groups, alone, signs * given)
+    triangles = directed(pieces.triangles, signs[pieces.labels])
+    bodies = Bodies.of(pieces, triangles, groups, alone, signs * given)
     count, n = len(bodies.levels), len(system.places)
     if count < 2 and not (count and len(closed)):
         return np.zeros(n)
     numbers = bodies.numbers[pieces.labels]
-    directed = np.where((bodies.levels < 0)[numbers, None, None], directed[:, ::-1], directed)
+    triangles = directed(triangles, np.sign(bodies.levels)[numbers])
     places = np.concatenate([system.places, rims.middles])
     homes = bodies.numbers[np.concatenate([system.owners, rims.owners])]
     own = homes >= 0
@@ -149,7 +153,7 @@ def bodies_around(
     normals = np.concatenate([system.normals, np.zeros(rims.middles.shape)])
     sizes = np.concatenate([system.areas, rims.lengths])
     order = np.argsort(numbers, kind="stable")
-    parts = np.split(directed[order], np.searchsorted(numbers[order], np.arange(count)))[1:]
+    parts = np.split(triangles[order], np.searchsorted(numbers[order], np.arange(count)))[1:]
     parts += [closed] * (len(closed) > 0)  # one more body
     rows, others, numbers_there = _windings(places, normals, sizes, parts)
     homes_there = homes[rows]

@@ -17,7 +17,7 @@ from ..compiled import compiled
 from ..mesh.arrangement import TOUCHING, Arrangement
 from ..mesh.components import next_in_groups, sums_of
 from ..mesh.edges import EdgeTable, edge_table
-from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.triangles import area_vectors, face_areas, heights
 from ..mesh.unit_vectors import angles_around, unit
 from ..mesh.welding import coincident_faces
 from .winding import DEPTH, INSIDE, Windings
@@ -112,11 +112,11 @@ def _windings(
     levels, labels, contradictions = _levels(times, sides, facing_sides)
     levels, labels = levels.reshape(-1, 2), labels[::2]
     # the widest faces of each part
-    order = np.lexsort((-_widths(points, faces), labels))
+    order = np.lexsort((-heights(points[faces]), labels))
     starts = np.searchsorted(labels[order], np.arange(int(labels.max(initial=-1)) + 1))
     chosen = order[np.arange(n) - starts[labels[order]] < SAMPLES]
     corners = points[faces[chosen]]
-    away = np.minimum(np.maximum(DEPTH * np.sqrt(face_areas(corners)), step), 0.1 * _widths(points, faces[chosen]))
+    away = np.minimum(np.maximum(DEPTH * np.sqrt(face_areas(corners)), step), 0.05 * heights(corners))
     away, centres = away[:, None] * normals[chosen], corners.mean(axis=1)
     sampled = windings.numbers_once(np.concatenate([centres - away, centres + away]))
     offsets, owners = sampled - levels[chosen].T.ravel(), np.tile(labels[chosen], 2)
@@ -208,17 +208,7 @@ def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints, int]:
 
 def widest(pieces: Arrangement) -> Floats:
     """(p, 3) middle of the widest face of each piece."""
-    order = np.lexsort((-_widths(pieces.points, pieces.faces), pieces.cells))
+    order = np.lexsort((-heights(pieces.points[pieces.faces]), pieces.cells))
     first = order[np.searchsorted(pieces.cells[order], np.arange(int(pieces.cells.max()) + 1))]
     middles: Floats = pieces.points[pieces.faces[first]].mean(axis=1)[pieces.cells]
     return middles
-
-
-def _widths(points: Floats, faces: Ints) -> Floats:
-    """(m,) widths of triangles: area over longest side."""
-    a, b, c = (points[corners] for corners in faces.T)
-    b, c, longest = b - a, c - a, np.linalg.norm(c - b, axis=1)
-    for side in (b, c):
-        longest = np.maximum(longest, np.linalg.norm(side, axis=1))
-    widths: Floats = 0.5 * np.linalg.norm(np.cross(b, c), axis=1) / np.maximum(longest, 1e-300)
-    return widths

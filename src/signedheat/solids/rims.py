@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import scipy
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.components import grouped, sums_of
 from ..mesh.edges import edge_table
@@ -122,23 +122,8 @@ def corners_of(points: Floats) -> Ints:
     return np.flatnonzero(np.linalg.norm(ahead - np.roll(ahead, 1, axis=0), axis=1) > STRAIGHT)
 
 
-def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
-    """Pairs of edges, without common ends, that run along each other in opposite directions, as patches do."""
-    first, second, cosines = _edges_beside(ends)
-    meeting = (cosines < OPPOSITE) & (ends[first] != ends[second, ::-1]).any(axis=(1, 2))
-    return first[meeting], second[meeting]
-
-
-def meeting_either_way(ends: Floats) -> tuple[Ints, Ints]:
-    """Pairs of edges that meet if one of them is turned or none: which way they run is not known yet."""
-    first, second, cosines = _edges_beside(ends)
-    other = np.where((cosines < 0)[:, None, None], ends[second, ::-1], ends[second])
-    meeting = (np.abs(cosines) > -OPPOSITE) & (ends[first] != other).any(axis=(1, 2))
-    return first[meeting], second[meeting]
-
-
-def _edges_beside(ends: Floats) -> tuple[Ints, Ints, Floats]:
-    """Pairs of edges that lie along each other, and the cosine between the two."""
+def meeting_edges(ends: Floats) -> tuple[Ints, Ints, Bools]:
+    """Pairs of edges without common ends that run along each other, as patches do, and whether in opposite ways."""
     along = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(along, axis=1)
     ways = along / np.maximum(lengths, 1e-300)[:, None]
@@ -156,4 +141,7 @@ def _edges_beside(ends: Floats) -> tuple[Ints, Ints, Floats]:
     pairs, shared = np.unique(owners[beside // len(ends)] * len(ends) + beside % len(ends), return_counts=True)
     pairs = np.stack([pairs // len(ends), pairs % len(ends)], axis=1)[shared >= SHARED]
     first, second = np.unique(np.sort(pairs, axis=1), axis=0).T
-    return first, second, (ways[first] * ways[second]).sum(axis=1)
+    cosines = (ways[first] * ways[second]).sum(axis=1)
+    alike = np.where((cosines < 0)[:, None, None], ends[second, ::-1], ends[second])
+    meeting = (np.abs(cosines) > -OPPOSITE) & (ends[first] != alike).any(axis=(1, 2))
+    return first[meeting], second[meeting], cosines[meeting] < 0

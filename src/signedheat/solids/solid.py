@@ -198,12 +198,18 @@ class Solid(Displayed, Represented, Frozen):
         >>> complete(samples.sphere(3)).distance([[0.0, 0.0, 0.5], [0.0, 0.0, 2.0]]).round(2)
         array([-0.5,  1. ])
         """
-        measure = self._distances if flag(signed, "signed") else self._lengths
+        is_signed = flag(signed, "signed")
+
+        def measured(chunk: Floats) -> tuple[Floats]:
+            nearest = self.tree.search(chunk)
+            inside = is_signed and self._inside(chunk, nearest)
+            return (np.where(inside, -nearest.distances, nearest.distances),)
+
         places, shape = query_points(points, 3)
         result = np.empty(len(places))
         for begin in range(0, len(places), MANY):
             order = begin + order_in_space(places[begin : begin + MANY])
-            (result[order],) = in_chunks(measure, places[order])
+            (result[order],) = in_chunks(measured, places[order])
         return shaped(result, shape)
 
     @within_memory
@@ -259,10 +265,7 @@ class Solid(Displayed, Represented, Frozen):
         order = order_in_space(places)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
-        results = (
-            [part[back] for part in in_chunks(self._closest, places[order])] if len(places) else self._closest(places)
-        )
-        return Closest(*(shaped(values, shape) for values in results))
+        return Closest(*(shaped(values[back], shape) for values in in_chunks(self._closest, places[order])))
 
     @within_memory
     def field(
@@ -594,13 +597,6 @@ class Solid(Displayed, Represented, Frozen):
         array([ True])
         """
         files.save_solid(self, path)
-
-    def _lengths(self, points: Floats) -> tuple[Floats]:
-        return (self.tree.search(points).distances,)
-
-    def _distances(self, points: Floats) -> tuple[Floats]:
-        nearest = self.tree.search(points)
-        return (np.where(self._inside(points, nearest), -nearest.distances, nearest.distances),)
 
     def _inside(self, points: Floats, found: NearestFaces) -> Bools:
         """(n,) whether points are inside: by the normal at the nearest place, or the winding number if in doubt."""

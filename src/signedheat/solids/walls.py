@@ -60,13 +60,13 @@ def seams(rims: list[Rim]) -> list[Ints]:
     onward = np.concatenate([rim.onward[places] for rim, places in zip(rims, corners, strict=True)])
     parts = np.concatenate([rim.parts[places] for rim, places in zip(rims, corners, strict=True)])
     ends = np.stack([starts, starts[following]], axis=1)
-    first_sides, second_sides = meeting_edges(ends)
+    first_sides, second_sides, opposite = meeting_edges(ends)
     middles = ends.mean(axis=1)
     across = middles[second_sides] - middles[first_sides]
     gap = (parts[first_sides] != parts[second_sides]) | (
         ((across * onward[first_sides]).sum(axis=1) >= 0) & ((across * onward[second_sides]).sum(axis=1) <= 0)
     )
-    first_sides, second_sides = first_sides[gap], second_sides[gap]
+    first_sides, second_sides = first_sides[gap & opposite], second_sides[gap & opposite]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     strips, used = [], np.zeros(n, dtype=bool)
     for pairs in _stretches(

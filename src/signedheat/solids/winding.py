@@ -10,9 +10,8 @@ import numpy as np
 from ..arrays import Bools, Floats, Frozen
 from ..errors import GeometryError
 from ..mesh.edges import edge_table
-from ..mesh.triangles import area_vectors
 from ..mesh.welding import same_positions
-from ..search.winding_tree import WindingTree, winding_sums
+from ..search.winding_tree import WindingTree, steps_off, winding_sums
 
 INSIDE = 0.5
 """Winding number above which a point is inside; exact winding numbers are integers."""
@@ -58,10 +57,7 @@ class Windings(Frozen):
 
     def sides(self, triangles: Floats) -> tuple[Bools, Bools]:
         """(n,) whether places just behind (n, 3, 3) triangles are inside; and the same just in front of them."""
-        vectors = 2.0 * area_vectors(triangles)
-        areas = np.linalg.norm(vectors, axis=1)
-        step = DEPTH * vectors * (np.sqrt(areas) / np.where(areas > 0, areas, 1.0))[:, None]
-        centres = triangles.mean(axis=1)
+        step, centres = steps_off(triangles, DEPTH), triangles.mean(axis=1)
         return self.inside(centres - step), self.inside(centres + step)
 
 
