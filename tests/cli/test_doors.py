@@ -192,7 +192,11 @@ def test_curves_lie_on_the_surface_of_a_solid(tmp_path, capsys):
 def test_options_of_completion_are_refused_of_solids(tmp_path, capsys):
     """They had no effect on what is complete, without a word."""
     sh.complete(samples.sphere(1)).save(tmp_path / "solid.npz")
-    for command in ("volume", "thickness"):
-        output = str(tmp_path / "made.npz")
-        assert main([command, str(tmp_path / "solid.npz"), "-o", output, "--resolution", "9", "--lids", "flat"]) == 1
-        assert "--lids is for shapes that are completed" in capsys.readouterr().err
+    shape, output = str(tmp_path / "solid.npz"), str(tmp_path / "made.npz")
+    for command, name, value in (
+        ("volume", "--lids", "flat"),
+        ("thickness", "--lids", "flat"),
+        ("volume", "--diffusion", "2"),
+    ):
+        assert main([command, shape, "-o", output, "--resolution", "9", name, value]) == 1
+        assert f"{name} is for shapes that are completed" in capsys.readouterr().err

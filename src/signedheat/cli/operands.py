@@ -30,7 +30,7 @@ from ..memory import refuse_beyond_memory
 from ..solids.completion import Completion, completed
 from ..solids.heat_surfaces import Heat
 from ..tets.tet_discretization import memory_estimate
-from .options import IMAGES, REPAIR, is_given, is_planar, is_quiet
+from .options import IMAGES, METHOD, REPAIR, is_given, is_planar, is_quiet
 from .terminal import ProgressBar, say
 
 TET_RESOLUTION = 32
@@ -73,7 +73,7 @@ def read_shape(arguments: Namespace, path: str) -> Any:
 
 def refuse_completing(arguments: Namespace) -> None:
     """Refuse options that have no effect on a solid."""
-    for option in REPAIR.options:
+    for option in (*REPAIR.options, *(() if arguments.plain else METHOD.options)):
         if is_given(arguments, option.names[-1]):
             raise SourceError(
                 f"{option.names[-1]} is for shapes that are completed, and a solid is complete",

@@ -268,9 +268,9 @@ def curves_text(rows: Sequence[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def _shortened(items: Sequence[Any], most: int = 6) -> str:
+def _shortened(items: Sequence[Any]) -> str:
     """Write the first few items of a list."""
-    return ", ".join(map(str, items[:most])) + (", …" if len(items) > most else "")
+    return ", ".join(map(str, items[:6])) + (", …" if len(items) > 6 else "")
 
 
 def _count(number: int, name: str) -> str:

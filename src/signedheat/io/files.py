@@ -164,13 +164,13 @@ def companion_contents(path: PathLike, name: str) -> bytes:
     return contents(named)
 
 
-def ensure_fits(size: int, path: PathLike, remedy: str = "check that it is not damaged, or free some memory") -> None:
+def ensure_fits(size: int, path: PathLike) -> None:
     """Raise `MemoryLimitError` if less than `size` bytes of memory are free, before they are allocated."""
     free = available_memory()
     if free is not None and size > free:
         raise MemoryLimitError(
             f"reading it takes about {size / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are free",
-            remedy=remedy,
+            remedy="check that it is not damaged, or free some memory",
             path=path,
         )
 
