@@ -111,7 +111,8 @@ class Routes(NamedTuple):
         n, corners = triangles.n_edges, triangles.corner_positions
         sides = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
         middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
-        tolls: Floats = 1.0 + TIE * ((np.arange(n) * 0.6180339887498949) % 1.0)
+        spread = np.arange(n) * 0.6180339887498949
+        tolls = 1.0 + TIE * (spread - np.floor(spread))
         return cls(np.full(n, np.inf), *sides, Queue.empty(n), middles.ravel(), tolls)
 
 
