@@ -7,6 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import signedheat as sh
 from shapes import strokes
@@ -14,7 +15,7 @@ from shapes.surfaces import disk
 from signedheat.curves.curve_completion import completion
 from signedheat.curves.curve_distance import CurvesTaken
 from signedheat.curves.stroke_directions import CurvePieces
-from signedheat.curves.strokes import CutGraph
+from signedheat.curves.strokes import CutGraph, widened
 from signedheat.discretization import discretize
 from signedheat.samples import sphere, torus, with_flipped_faces
 
@@ -231,3 +232,14 @@ def test_what_is_turned_and_left_out_does_not_depend_on_the_triangles_of_the_met
     taken = [field.diagnostics.note(CurvesTaken) for field in fields]
     assert taken[0].turned or taken[0].left_out
     assert all((note.turned, note.left_out) == (taken[0].turned, taken[0].left_out) for note in taken)
+
+
+def test_of_two_edges_between_the_same_vertices_the_shorter_counts():
+    """Two voxels that touch along an edge have it twice; both lengths together were taken for that of one."""
+    volume = np.zeros((2, 2, 1), dtype=bool)
+    volume[0, 0] = volume[1, 1] = True
+    triangles = discretize(sh.DigitalSurface(volume, radius=0)).triangles
+    ends, counts = np.unique(np.sort(triangles.edges.vertices, axis=1), axis=0, return_counts=True)
+    (tail, head), length = ends[counts == 2][0], triangles.lengths_of_edges.max()
+    seen = sparse.csr_matrix(([3.0], ([0], [tail])), shape=(1, triangles.n_vertices))
+    assert widened(triangles, seen, 1.01 * length)[0, head] != 0

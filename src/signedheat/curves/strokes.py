@@ -12,6 +12,7 @@ from scipy import sparse
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
+from ..geodesics.exact_distance import shortest_arcs
 from ..geodesics.geodesic_sources import PlacedSegments, nearest_shares
 from ..linear import factorize
 from ..mesh.components import grouped, members_of
@@ -329,7 +330,10 @@ class Strokes:
         """Return the sides of least energy for strokes with these directions, 0 if one is left out: a minimum cut."""
         key = signs.tobytes()
         if key not in self._found:
-            self._found[key] = self._least(signs)
+            sides, boundary = self._cut(signs, -1.0)
+            explained = signs * (self.means @ sides)
+            energy = boundary - REWARD * float(self.lengths @ explained)
+            self._found[key] = Inside(signs, sides, explained, energy)
         return self._found[key]
 
     def either_way(self, inside: Inside) -> float:
@@ -343,29 +347,17 @@ class Strokes:
             return 0.0
         return float(self.areas[reached & (largest != inside.sides)].sum())
 
-    def _least(self, signs: Floats) -> Inside:
-        sides, boundary = self._cut(signs, -1.0)
-        explained = signs * (self.means @ sides)
-        return Inside(signs, sides, explained, boundary - REWARD * float(self.lengths @ explained))
-
     def _cut(self, signs: Floats, larger: float) -> tuple[Floats, float]:
         """Return the sides of least energy, of several the largest inside (1) or the smallest (−1), and the cost."""
-        falling, rising = self._uncovered(signs)
+        along = self.crossed.multiply(signs[:, None]).tocsr()
+        covered = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
+        falling, rising = (np.where(mask, 0.0, self.costs) for mask in covered)
         pull = self.means.T @ (REWARD * self.lengths * signs)
         pull += larger * TIE * self.lengths.sum() / self.areas.sum() * self.areas
         sides = self.graph.cut(falling, rising, pull)
-        return sides, float(self._boundary(sides, falling, rising).sum())
-
-    def _uncovered(self, signs: Floats) -> list[Floats]:
-        """(e,) cost of each edge between sides that fall from its first vertex to its second, and that rise."""
-        along = self.crossed.multiply(signs[:, None]).tocsr()
-        free = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
-        return [np.where(mask, 0.0, self.costs) for mask in free]
-
-    def _boundary(self, sides: Floats, falling: Floats, rising: Floats) -> Floats:
-        """(e,) cost of each edge between these sides."""
         first, second = sides[self.surface.triangles.edges.vertices].T
-        return np.where(first > second, falling, np.where(first < second, rising, 0.0))
+        boundary = np.where(first > second, falling, np.where(first < second, rising, 0.0))
+        return sides, float(boundary.sum())
 
 
 def fluxes_across(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> sparse.csr_matrix:
@@ -409,10 +401,8 @@ def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, width: float) -> 
     """(k, n) sparse ±1 at vertices on either side of each stroke: corners of crossed faces, and more up to a width."""
     n = triangles.n_vertices
     tails, heads = triangles.edges.vertices.T
-    lengths = np.tile(triangles.lengths_of_edges, 2)
-    neighbors = sparse.csr_matrix(
-        (lengths, (np.concatenate([tails, heads]), np.concatenate([heads, tails]))), shape=(n, n)
-    )
+    both_ways = np.concatenate([tails, heads]), np.concatenate([heads, tails])
+    neighbors = shortest_arcs(*both_ways, np.tile(triangles.lengths_of_edges, 2), n)
     pairs = sparse.coo_matrix(seen)
     known = np.sort(pairs.row.astype(np.int64) * n + pairs.col)
     off = pairs.data != 2

@@ -110,7 +110,7 @@ class PausedSearch:
         with np.errstate(all="ignore"):  # on faces of no size
             waves = first_waves(triangles, sources)
         beyond = triangles.edges.face_counts[triangles.edges.face_edges.ravel()[waves.halfedges]]
-        search = Search.start(triangles.n_faces, pseudosources, 1024 + int(beyond.sum()))
+        search = Search.start(triangles, pseudosources, 1024 + int(beyond.sum()))
         search.distance[sources.vertices] = 0.0
         reach_corners(triangles, sources, search.distance)
         started = cls(triangles, Faces.of(triangles), search, tolerance)
@@ -159,15 +159,19 @@ class PausedSearch:
 def distances_along_edges(triangles: IntrinsicMesh, vertices: Ints, offsets: Floats) -> Floats:
     """Return (n,) distances along edges from vertices (k,) with distances of their own; inf if unconnected."""
     n = triangles.n_vertices
-    tails, heads = triangles.edges.vertices.T
-    rows, columns = np.concatenate([tails, np.full(len(vertices), n)]), np.concatenate([heads, vertices])
-    lengths = np.concatenate([triangles.lengths_of_edges, offsets]) + 1e-300  # SciPy drops edges of length 0
-    order = np.lexsort([lengths, columns, rows])
-    rows, columns, lengths = rows[order], columns[order], lengths[order]
-    first = np.ones(len(rows), dtype=bool)  # the shortest of the edges that join two vertices
-    first[1:] = (np.diff(rows) != 0) | (np.diff(columns) != 0)
-    graph = csr_matrix((lengths[first], (rows[first], columns[first])), shape=(n + 1, n + 1))
+    tails, heads = np.concatenate([triangles.edges.vertices, np.stack([np.full(len(vertices), n), vertices], axis=1)]).T
+    graph = shortest_arcs(tails, heads, np.concatenate([triangles.lengths_of_edges, offsets]), n + 1)
     return dijkstra(graph, directed=False, indices=n)[:n]
+
+
+def shortest_arcs(tails: Ints, heads: Ints, lengths: Floats, n: int) -> csr_matrix:
+    """Return the lengths of arcs between n nodes, (n, n): of those between the same two nodes the shortest counts."""
+    order = np.lexsort([lengths, heads, tails])
+    tails, heads, lengths = tails[order], heads[order], lengths[order]
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = (np.diff(tails) != 0) | (np.diff(heads) != 0)
+    entries = lengths[first] + 1e-300, (tails[first], heads[first])  # SciPy drops arcs of length 0
+    return csr_matrix(entries, shape=(n, n))
 
 
 FLIPPED = 0.05
@@ -215,21 +219,24 @@ def _collect(
     search: Search, halfedge: int, at_tail: float, at_head: float, length: float, slack: float, tolerance: float
 ) -> tuple[Floats, int]:
     """Return the windows queued for a halfedge, in order, without what is behind others, and merged if possible."""
-    _, _, _, queued, settled, windows, following, counts = search
-    count, row = 0, queued[halfedge]
-    while row >= 0:
-        count += 1
-        row = following[row]
-    row, before = settled[halfedge], 0
-    while row >= 0:
-        before += 1
-        row = following[row]
+    queued, settled, windows, following, counts = (
+        search.queued,
+        search.settled,
+        search.windows,
+        search.following,
+        search.counts,
+    )
+    count, before = list_length(following, queued[halfedge]), list_length(following, settled[halfedge])
     counts[MADE] += count * (count + before) // MANY**2  # each is compared with all others
     chosen = np.empty((count, 6))
     count, row = 0, queued[halfedge]
     while row >= 0:
         w = windows[row]
-        if not outrun(w, at_tail, at_head, length, slack) and _left(windows, following, settled[halfedge], w, length):
+        is_left, other = not outrun(w, at_tail, at_head, length, slack), settled[halfedge]
+        while is_left and other >= 0:
+            trim_by(windows[other], w, ROUND * length)
+            is_left, other = w[S1] - w[S0] > 1e-12 * length, following[other]
+        if is_left:
             k = count
             while k > 0 and chosen[k - 1, S0] > w[S0]:
                 put(chosen[k - 1], chosen, k)
@@ -256,20 +263,9 @@ def _collect(
 
 
 @compiled
-def _left(windows: Floats, following: Ints, row: int, w: Floats, length: float) -> bool:
-    """Trim a window against those of a list; return whether anything is left."""
-    while row >= 0:
-        trim_by(windows[row], w, ROUND * length)
-        if not w[S1] - w[S0] > 1e-12 * length:
-            return False
-        row = following[row]
-    return True
-
-
-@compiled
 def _settle(search: Search, halfedge: int, chosen: Floats, count: int) -> None:
     """Add windows to those that have crossed a halfedge, in place of those that they outdo."""
-    _, _, _, _, settled, windows, following, counts = search
+    settled, windows, following, counts = search.settled, search.windows, search.following, search.counts
     row, before = settled[halfedge], -1
     while row >= 0:
         after, outdone = following[row], False
@@ -292,24 +288,13 @@ def _settle(search: Search, halfedge: int, chosen: Floats, count: int) -> None:
 
 
 @compiled
-def _most_windows(faces: Faces, queued: Ints, following: Ints, item: int) -> int:
-    """Return the largest number of windows that one item of the queue can make."""
-    most, n_halfedges = 0, len(queued)
-    if item >= n_halfedges:
-        v = item - n_halfedges
-        for k in range(faces.first_corner[v], faces.first_corner[v + 1]):
-            edge = faces.edges[faces.corners[k] // 3, (faces.corners[k] % 3 + 1) % 3]
-            most += faces.first_halfedge[edge + 1] - faces.first_halfedge[edge]
-        return most
-    row, face = queued[item], item // 3
+def list_length(following: Ints, row: int) -> int:
+    """Return the number of windows of a list."""
+    count = 0
     while row >= 0:
-        most += 1
+        count += 1
         row = following[row]
-    beyond = 1
-    for side in range(3):
-        edge = faces.edges[face, side]
-        beyond += faces.first_halfedge[edge + 1] - faces.first_halfedge[edge]
-    return most * beyond
+    return count
 
 
 @compiled
@@ -317,12 +302,15 @@ def continue_search(faces: Faces, search: Search, slack: float, tolerance: float
     """Propagate in order of distance until nothing is queued, room is wanted, or `limit` windows have been made."""
     queue, counts = search.queue, search.counts
     while queue.size[0] > 0 and counts[MADE] < limit:
-        most = _most_windows(faces, search.queued, search.following, queue.items[0])
+        item = queue.items[0]
+        is_halfedge, most = item < len(search.queued), search.most[item]
+        if is_halfedge:
+            most *= list_length(search.following, search.queued[item])
         if counts[USED] + most > len(search.windows):
             counts[WANTED] = most
             return
-        item = pop(queue)
-        if item < len(search.queued):
+        pop(queue)
+        if is_halfedge:
             _cross_face(faces, search, item, slack, tolerance)
         else:
             _bend_around(faces, search, item - len(search.queued), slack)
@@ -602,15 +590,19 @@ class Search(NamedTuple):
     windows: Floats
     following: Ints
     counts: Ints
+    most: Ints  # windows that each item of the queue can make: each window of a halfedge, or a vertex
 
     @classmethod
-    def start(cls, n_faces: int, pseudosources: Bools, room: int) -> Search:
+    def start(cls, triangles: IntrinsicMesh, pseudosources: Bools, room: int) -> Search:
         """Start with nothing known, and room for this many windows."""
-        n = len(pseudosources)
-        lists = np.full(3 * n_faces, -1), np.full(3 * n_faces, -1)
+        n, m = triangles.n_vertices, triangles.n_faces
+        queue, lists = Queue.empty(3 * m + n), (np.full(3 * m, -1), np.full(3 * m, -1))
         windows, following = np.empty((room, 6)), np.empty(room, dtype=np.int64)
         counts = np.array([1, -1, 0, 0])
-        return cls(np.full(n, np.inf), pseudosources, Queue.empty(3 * n_faces + n), *lists, windows, following, counts)
+        across = triangles.edges.face_counts[triangles.edges.face_edges]  # side k + 1 is opposite to corner k
+        of_vertices = np.bincount(triangles.corner_vertices.ravel(), np.roll(across, -1, axis=1).ravel(), n)
+        most = np.concatenate([np.repeat(1 + across.sum(axis=1), 3), of_vertices.astype(np.int64)])
+        return cls(np.full(n, np.inf), pseudosources, queue, *lists, windows, following, counts, most)
 
     def larger(self) -> Search:
         """Enlarge this search to at least the room that was wanted, in place: a copy would need twice the memory."""
@@ -676,7 +668,13 @@ def propagate_across(
     if not t1 - t0 > 1e-12:  # NaN, on faces of no size, ends here too
         return
     begin, end = faces.first_halfedge[edge], faces.first_halfedge[edge + 1]
-    distance, _, queue, queued, _, windows, following, counts = search
+    queue, queued, windows, following, counts = (
+        search.queue,
+        search.queued,
+        search.windows,
+        search.following,
+        search.counts,
+    )
     w = windows[0]
     w[S0], w[S1], w[KIND] = t0 * length, t1 * length, kind
     unit = (b - a) / length
@@ -688,7 +686,7 @@ def propagate_across(
         turned = (point - a) * unit.conjugate()
         w[P], w[Q], w[SIGMA] = turned.real, -kind * abs(turned.imag), sigma
     tail, head = faces.edge_vertices[edge]
-    if outrun(w, distance[tail], distance[head], length, slack * length):
+    if outrun(w, search.distance[tail], search.distance[head], length, slack * length):
         return
     near = min(arrival(w, w[S0], 0.0), arrival(w, w[S1], 0.0))
     if not near < np.inf:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..arrays import Complexes, Floats, Ints
@@ -27,7 +26,7 @@ from ..mesh.surface_points import (
     points_at_vertices,
     shared_faces,
 )
-from .exact_distance import Faces
+from .exact_distance import Faces, shortest_arcs
 from .heap_kernels import Queue, pop, push
 
 
@@ -128,7 +127,7 @@ def path_through_vertices(
         arcs.append(np.stack([np.full(len(corners), node), corners], axis=1))
         lengths.append(np.abs(triangles.corner_positions[faces] - points[:, None]).ravel())
     tails, heads = np.concatenate(arcs).T
-    graph = csr_matrix((np.concatenate(lengths) + 1e-300, (tails, heads)), shape=(n + 2, n + 2))
+    graph = shortest_arcs(tails, heads, np.concatenate(lengths), n + 2)
     before = dijkstra(graph, directed=False, indices=n, return_predecessors=True)[1]
     path = [n + 1]
     while path[-1] != n and before[path[-1]] >= 0:
