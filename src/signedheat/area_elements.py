@@ -20,7 +20,7 @@ from .arrays import Floats, Ints
 from .errors import CancellingNormalsError, SourceError
 from .foreign import what_to_pass
 from .grids.grid import Grid
-from .grids.node_sources import NodeSources, Simplices, merge_in_cells
+from .grids.node_sources import NodeSources, merge_in_cells
 from .grids.polyline import Polyline
 from .grids.stencil import padded_shape
 from .mesh.components import element_components
@@ -163,11 +163,9 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid) -> AreaSamples:
                 f"source {owner} lives in {elements.corners.shape[2]} dimensions, and the grid in {grid.dimension}",
                 element=f"source {owner}",
             )
-        order = np.argsort(elements.components, kind="stable")
-        corners = (elements.corners - grid.origin) / grid.spacing
-        arrays = np.ascontiguousarray(corners), np.ascontiguousarray(elements.vectors), elements.weights
-        simplices = Simplices(*arrays, elements.components)
-        samples, nodes = merge_in_cells(simplices, order, np.array(grid.shape), SIZE, nodes, scale)
+        corners = np.ascontiguousarray((elements.corners - grid.origin) / grid.spacing)
+        simplices = corners, np.ascontiguousarray(elements.vectors), elements.weights, elements.components
+        samples, nodes = merge_in_cells(simplices, np.array(grid.shape), SIZE, nodes, scale)
         positions, vectors, weights, components = samples
         total += float(elements.weights.sum())
         inside += float(weights.sum())

@@ -116,16 +116,9 @@ class BlockValues:
 
 
 @compiled
-def row_of_node(tables: Tables, i: int, j: int, k: int) -> np.int32:
-    """Return the block that holds a node of the grid; −1 if there is none."""
-    cubes, rows = tables
-    cube = cubes[i // (SIDE * CUBE), j // (SIDE * CUBE), k // (SIDE * CUBE)]
-    return rows[cube, i // SIDE % CUBE, j // SIDE % CUBE, k // SIDE % CUBE] if cube >= 0 else np.int32(-1)
-
-
-@compiled
 def _interpolate(tables: Tables, values: NDArray[np.float32], points: Floats, limit: Floats) -> Floats:
     """Interpolate linearly at points in cells; NaN beyond the last node, `limit`, and where a node has no block."""
+    cubes, rows = tables
     out = np.empty(len(points))
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
@@ -141,7 +134,9 @@ def _interpolate(tables: Tables, values: NDArray[np.float32], points: Floats, li
             a, b, c = corner >> 2 & 1, corner >> 1 & 1, corner & 1
             part = (f if a else 1.0 - f) * (g if b else 1.0 - g) * (h if c else 1.0 - h)
             if part > 0.0:
-                row = row_of_node(tables, i + a, j + b, k + c)
+                u, v, w = (i + a) // SIDE, (j + b) // SIDE, (k + c) // SIDE
+                cube = cubes[u // CUBE, v // CUBE, w // CUBE]
+                row = rows[cube, u % CUBE, v % CUBE, w % CUBE] if cube >= 0 else np.int32(-1)
                 if row < 0:
                     total = np.nan
                     break

@@ -34,7 +34,7 @@ from ..compiled import compiled
 from ..memory import untouched_zeros
 from ..parallel import n_threads
 from .node_sources import STRETCH, NodeSources
-from .stencil import FEW_NODES, by_slabs
+from .stencil import FEW_NODES, by_slabs, slab
 
 BAND = 14.0
 """Half width, in √t, of the band around the source in which a level is swept."""
@@ -199,13 +199,6 @@ TINY = np.float32(1e-34)
 
 
 @compiled
-def _size(vector: NDArray[np.float32]) -> np.float32:
-    """Return the largest of four components, by which vectors are divided before they are squared; or 0 if unknown."""
-    largest = max(max(abs(vector[0]), abs(vector[1])), max(abs(vector[2]), abs(vector[3])))
-    return largest if largest >= TINY else np.float32(0)
-
-
-@compiled
 def _carry(
     vectors: NDArray[np.float32],
     inside: Bools,
@@ -225,8 +218,8 @@ def _carry(
                         continue
                     for m in range(STRETCH * s, min(STRETCH * (s + 1), n3)):
                         line, d = vectors[i, j, k, m], m // factors[3]
-                        size = _size(line)
-                        if (m % 2 and factors[3] == 2) or size == 0:
+                        size = max(max(abs(line[0]), abs(line[1])), max(abs(line[2]), abs(line[3])))
+                        if (m % 2 and factors[3] == 2) or size < TINY:
                             continue
                         scale = size ** (power - np.float32(1))
                         for q in range(4):
@@ -271,48 +264,36 @@ def _interpolate(
                             into[2 * m + 1] = np.float32(0.5) * (row[m] + row[m + 1])
 
 
-@compiled
 def unit_vectors(
     vectors: NDArray[np.float32], inside: Bools, out: NDArray[np.float32], axis: int, start: int, stop: int
 ) -> None:
     """Scale the vectors to length one; where they have underflowed, `out` keeps the values of a coarser level."""
-    dimension, n0, n1, n2, n = out.shape
-    stretches = inside.shape[3]
-    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
-        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
-            for k in range(n2):
-                line = vectors[i, j, k]
-                for s in range(stretches):
-                    if not inside[i, j, k, s]:
-                        continue
-                    for m in range(STRETCH * s, min(STRETCH * (s + 1), n)):
-                        square, size = np.float32(0), _size(line[m])
-                        if size == 0:
-                            continue
-                        factor = np.float32(1) / size
-                        for d in range(dimension):
-                            square += (factor * line[m, d]) ** 2
-                        factor /= np.sqrt(square)
-                        for d in range(dimension):
-                            out[d, i, j, k, m] = factor * line[m, d]
+    window = slab(axis, start, stop)
+    components = np.moveaxis(vectors[window], -1, 0)
+    sizes = np.abs(components[0])
+    for component in components[1:]:
+        np.maximum(sizes, np.abs(component), out=sizes)
+    known = _nodes_of(inside[window], sizes.shape[3]) & (sizes >= TINY)
+    factors = np.float32(1) / np.where(known, sizes, np.float32(1))  # by which they are divided before they are squared
+    squares = sum((factors * component) ** 2 for component in components[: len(out)])
+    factors /= np.sqrt(np.where(known, squares, np.float32(1)))
+    for component, into in zip(components, out, strict=False):
+        np.copyto(into[window], factors * component, where=known)
 
 
-@compiled
 def quotients(
     vectors: NDArray[np.float32], inside: Bools, out: NDArray[np.float32], axis: int, start: int, stop: int
 ) -> None:
     """Divide the second component by the first; `out` keeps its values where the first has underflowed."""
-    _, n0, n1, n2, n = out.shape
-    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
-        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
-            for k in range(n2):
-                line = vectors[i, j, k]
-                for s in range(inside.shape[3]):
-                    if not inside[i, j, k, s]:
-                        continue
-                    for m in range(STRETCH * s, min(STRETCH * (s + 1), n)):
-                        if line[m, 0] > TINY:
-                            out[0, i, j, k, m] = line[m, 1] / line[m, 0]
+    window = slab(axis, start, stop)
+    first, second = vectors[window][..., 0], vectors[window][..., 1]
+    known = _nodes_of(inside[window], first.shape[3]) & (first > TINY)
+    np.divide(second, first, out=out[0][window], where=known)
+
+
+def _nodes_of(stretches: Bools, n: int) -> Bools:
+    """Return the values of stretches of lines at each of the n nodes of these."""
+    return np.repeat(stretches, STRETCH, axis=3)[..., :n]
 
 
 def diffuse_by_sweeps(

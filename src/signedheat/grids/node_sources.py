@@ -71,26 +71,20 @@ class NodeSources(NamedTuple):
         return nodes, vectors[rows, offsets]
 
 
-class Simplices(NamedTuple):
-    """Area elements on a grid."""
-
-    corners: Floats  # (m, c, d) positions, in cells
-    vectors: Floats  # (m, d)
-    weights: Floats  # (m,)
-    components: Ints  # (m,)
-
-
 def merge_in_cells(
-    simplices: Simplices, order: Ints, shape: Ints, size: float, sources: NodeSources, scale: float
+    simplices: tuple[Floats, Floats, Floats, Ints], shape: Ints, size: float, sources: NodeSources, scale: float
 ) -> tuple[tuple[Floats, Floats, Floats, Ints], NodeSources]:
     """Merge simplices to one sample for each cell, of a grid of `shape` nodes, and component; add vectors to nodes.
 
-    `order` lists simplices by component; parts are at most `size` cells long. Returns positions, vectors, weights and
-    components of the samples; and the sources, with multilinear shares of all vectors over `scale`.
+    Simplices are corners (m, c, d) in cells, vectors, weights and components; parts are at most `size` cells long.
+    Returns positions, vectors, weights and components of the samples; and the sources, with multilinear shares of all
+    vectors over `scale`.
     """
+    corners, vectors, weights, components = simplices
+    order = np.argsort(components, kind="stable")
     slots = untouched_zeros((int(np.prod(shape - 1)),), np.int32)
-    dimension = simplices.corners.shape[2]
-    sums, labels, nodes = _merge(simplices, order, shape, size, slots, sources, scale)
+    dimension = corners.shape[2]
+    sums, labels, nodes = _merge(corners, vectors, weights, components, order, shape, size, slots, sources, scale)
     kept = sums[:, -1] > 0
     sums, labels = sums[kept], labels[kept]
     weight = sums[:, -1]
@@ -113,7 +107,10 @@ def _with_room(sums: NDArray[np.float32], used: int, more: int) -> NDArray[np.fl
 
 @compiled
 def _merge(
-    simplices: Simplices,
+    corners: Floats,
+    vectors: Floats,
+    weights: Floats,
+    components: Ints,
     order: Ints,
     shape: Ints,
     size: float,
@@ -122,7 +119,6 @@ def _merge(
     scale: float,
 ) -> tuple[Floats, Ints, NDArray[np.float32]]:
     """Sum weight · position, vector and weight for each component and cell; copies by entry compile fastest."""
-    corners, vectors, weights, components = simplices
     nodes, places = sources.sums, sources.places.reshape(-1, sources.places.shape[3])
     n_corners, dimension = corners.shape[1], corners.shape[2]
     deepest = 256
