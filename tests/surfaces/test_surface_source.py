@@ -140,9 +140,9 @@ def test_given_normals_that_are_the_implied_ones_change_nothing():
     step = np.diff(positions(mesh, curve), axis=0)
     left = np.stack([-step[:, 1], step[:, 0], step[:, 2]], axis=1)
     given = sh.Curve(curve.faces, curve.barycentric, normals=left)
-    triangles, at = laid_out(mesh), mesh.vertices
+    triangles = laid_out(mesh)
     a = surface_source(triangles, [curve], 1.0, 1.0).vectors
-    b = surface_source(triangles, [given], 1.0, 1.0, at).vectors
+    b = surface_source(triangles, segments_of_each([given], triangles, mesh.vertices), 1.0, 1.0).vectors
     assert abs(a - b).max() < 1e-14
 
 

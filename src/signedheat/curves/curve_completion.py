@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 import scipy
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, mask_of
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..discretization import discretize
 from ..errors import SourceError
@@ -176,8 +176,7 @@ def beyond_the_rim(triangles: IntrinsicMesh, values: Floats) -> None:
     zero, ends = np.abs(values) <= least, triangles.edges.vertices
     rim = ends[triangles.edges.face_counts == 1]
     row = connected_components(len(values), *rim[zero[rim].all(axis=1)].T)
-    in_row = np.zeros(len(values), dtype=bool)
-    in_row[rim[zero[rim]]] = True
+    in_row = mask_of(len(values), rim[zero[rim]])
 
     def neighbor_signs(edges: Ints) -> Floats:
         """Sum of the signs at the other ends of edges from each row."""

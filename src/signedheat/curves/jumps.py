@@ -17,7 +17,7 @@ import numpy as np
 from scipy import sparse
 from threadpoolctl import threadpool_limits
 
-from ..arrays import Bools, Complexes, Floats, Ints
+from ..arrays import Bools, Complexes, Floats, Ints, mask_of
 from ..linear import factorize
 from ..linear.splitting import split_rounds
 from ..mesh.components import connected_components
@@ -26,6 +26,8 @@ from ..mesh.polylines import assemble_polylines
 from ..surfaces.cotan import cotan_matrix, divergence
 from .piecewise_field import PiecewiseField
 
+GAP, MOST_ROUNDS = 2e-3, 3000
+"""Gap at which minimisation ends, and the largest number of its rounds."""
 LOOSE = 0.15
 """Below this gap it is checked whether constants leave a cut: if not, the remaining jumps are smaller than
 triangles."""
@@ -90,8 +92,6 @@ class JumpSolution:
 
 def minimize(
     problem: JumpProblem,
-    tolerance: float = 2e-3,
-    max_rounds: int = 3000,
     progress: Callable[[float], None] | None = None,
     enough: Callable[[Floats], bool] | None = None,
 ) -> JumpSolution:
@@ -122,7 +122,7 @@ def minimize(
             return factor.solve(transposed @ (spring * target))
 
         steps, rounds = split_rounds(proximal, solve, problem.differences, step, step), 0
-        while least - bound > max(tolerance * least, negligible) and rounds < max_rounds:
+        while least - bound > max(GAP * least, negligible) and rounds < MOST_ROUNDS:
             constants, difference, z, before, scaled = next(islice(steps, _LOOK - 1, None))
             rounds += _LOOK
             value = problem.objective(constants)
@@ -137,7 +137,7 @@ def minimize(
                 threshold *= _GROWTH
                 scaled *= _GROWTH  # so that the unscaled multipliers stay the same
             if progress is not None:
-                progress(rounds / max_rounds)
+                progress(rounds / MOST_ROUNDS)
     moved = regions_moved(problem, best)
     return JumpSolution(moved, problem.objective(moved), bound, rounds)
 
@@ -210,16 +210,13 @@ def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: Floats) -> Bo
     ends = triangles.edges.vertices[pairs.edges[high]]
     n = triangles.n_vertices
     line = connected_components(n, *ends.T)[ends[:, 0]]
-    far = np.zeros(n, dtype=bool)
-    far[line[height[high] > FAR * typical]] = True
+    far = mask_of(n, line[height[high] > FAR * typical])
     high, line = high[far[line]], line[far[line]]
     highest = np.zeros(n)
     np.maximum.at(highest, line, height[high])
     least = np.minimum(TWIG * typical, 0.5 * highest[line])
     ends = triangles.edges.vertices[pairs.edges[high]]
-    result = np.zeros(len(height), dtype=bool)
-    result[high[without_twigs(ends, height[high] > least)]] = True
-    return result
+    return mask_of(len(height), high[without_twigs(ends, height[high] > least)])
 
 
 def without_twigs(edges: Ints, high: Bools) -> Bools:
@@ -232,8 +229,7 @@ def without_twigs(edges: Ints, high: Bools) -> Bools:
     [False, True, True, True]
     """
     once, numbers = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
-    keeps = np.zeros(len(once), dtype=bool)
-    keeps[numbers.ravel()[high]] = True
+    keeps = mask_of(len(once), numbers.ravel()[high])
     left = np.arange(len(once))
     while True:
         chains = assemble_polylines(once[left, 0], once[left, 1], directed=False)

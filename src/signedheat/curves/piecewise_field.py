@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Frozen, Ints
+from ..arrays import Bools, Floats, Frozen, Ints, mask_of
 from ..diagnostics import Diagnostics
 from ..errors import GeometryError
 from ..exchange import Displayed
@@ -310,8 +310,7 @@ class IntrinsicPiecewiseField(PiecewiseField):
             triangles.corner_vertices[face[at_vertices]] == node[at_vertices, None]
         ).argmax(axis=1)
         places = where[node[on] - n]
-        on_cut = np.zeros(triangles.n_edges, dtype=bool)
-        on_cut[self.pairs.edges[self.is_cut]] = True
+        on_cut = mask_of(triangles.n_edges, self.pairs.edges[self.is_cut])
         values, keys = np.empty(len(node)), np.zeros((len(node), 2), dtype=np.int64)
         values[at_vertices], keys[at_vertices, 1] = at_corners.ravel()[corner], owner[corner]
         values[on] = (at_corners[face[on]] * barycentric_in(triangles, face[on], places)).sum(axis=1)

@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 import scipy
 
-from ..arrays import Bools, Floats, Frozen, Ints, ShortRepr
+from ..arrays import Bools, Floats, Frozen, Ints, ShortRepr, mask_of
 from ..errors import UnsupportedTypeError
 from ..foreign import ForeignShape, as_list, converted
 from ..kinds import SurfaceDomain
@@ -110,9 +110,7 @@ class Decision:
 
     def turned(self, n: int) -> Bools:
         """(n,) which of all curves given are turned."""
-        result = np.zeros(n, dtype=bool)
-        result[self.pieces.curves(self.best.signs < 0)] = True
-        return result
+        return mask_of(n, self.pieces.curves(self.best.signs < 0))
 
     @property
     def loose(self) -> Bools:
@@ -165,9 +163,8 @@ class Decision:
             return float(areas[by_lines | by_heat].sum()) if by_lines.any() else 0.0
 
         share = np.array([depending(rival) for rival in without]) / areas.sum()
-        found = np.zeros(len(best.signs), dtype=bool)
-        found[chosen[(worth < WORTH * strokes.lengths[chosen]) & (share > OTHERWISE)]] = True
-        return self.pieces.curves(found)
+        little = chosen[(worth < WORTH * strokes.lengths[chosen]) & (share > OTHERWISE)]
+        return self.pieces.curves(mask_of(len(best.signs), little))
 
 
 def order_in_space(places: Sequence[Floats]) -> Ints:
@@ -199,8 +196,8 @@ def is_piece(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
     if part.ends[0, 0] == part.ends[-1, 1]:
         return False
     edges = triangles.edges
-    at_boundary = np.zeros(triangles.n_vertices, dtype=bool)
-    at_boundary[edges.vertices[edges.face_counts != 2]] = True  # across three faces no direction goes on to the others
+    # across three faces no direction goes on to the others
+    at_boundary = mask_of(triangles.n_vertices, edges.vertices[edges.face_counts != 2])
     ends = interpolation_at(triangles, part.nodes[part.ends[[0, -1], [0, 1]]])
     return not all(at_boundary[ends[end].indices].all() for end in (0, 1))
 

@@ -282,6 +282,11 @@ class Surfels:
     axes: Ints  # (m,) axis to which the surfel is orthogonal
     signs: Ints  # (m,) 1 where the outward normal points along the positive axis, −1 where along the negative one
 
+    @property
+    def outward(self) -> Ints:
+        """(m, 3) normals, which are steps to the voxels outside."""
+        return np.eye(3, dtype=np.int64)[self.axes] * self.signs[:, None]
+
 
 def boundary_surfels(volume: Bools) -> Surfels:
     """Surfels of a volume, in order of their voxels; everything beyond the array is outside."""
@@ -317,8 +322,7 @@ def count_surfels(volume: Bools) -> int:
 
 def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: float) -> Floats:
     """(m, 3) unit normals: the negative gradient of the volume after a blur of standard deviation radius/2."""
-    own = np.zeros((len(surfels.axes), 3))
-    own[np.arange(len(own)), surfels.axes] = surfels.signs
+    own = surfels.outward.astype(np.float64)
     if radius == 0:
         return own
     extent = spacing * volume.shape
@@ -326,7 +330,7 @@ def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: 
     padded = np.pad(volume, 1).astype(np.float32)
     reach = [min(int(4 * w + 0.5), n) for w, n in zip(width, padded.shape, strict=True)]  # beyond, there is nothing
     inside = tuple((surfels.voxels + 1).T)
-    outside = tuple((surfels.voxels + own.astype(np.int64) + 1).T)
+    outside = tuple((surfels.voxels + surfels.outward + 1).T)
     gradient = np.empty_like(own)
     for axis in range(3):
         order = [int(a == axis) for a in range(3)]
@@ -343,9 +347,7 @@ def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:
     """Replace each edge along which two voxels touch by two, each of surfels that face the same voxel outside."""
     triangles = np.flatnonzero(edges.face_counts[edges.face_edges[:, 0]] > 2)
     surfel = triangles // 4
-    step = np.zeros((len(surfel), 3), dtype=np.int64)
-    step[np.arange(len(surfel)), surfels.axes[surfel]] = surfels.signs[surfel]
-    outside = surfels.voxels[surfel] + step
+    outside = (surfels.voxels + surfels.outward)[surfel]
     key = np.column_stack([edges.face_edges[triangles, 0], outside])
     _, first, pair = np.unique(key, axis=0, return_index=True, return_inverse=True)
     kept = np.isin(first, np.unique(edges.face_edges[triangles, 0], return_index=True)[1])

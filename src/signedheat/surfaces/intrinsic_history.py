@@ -270,15 +270,6 @@ def squared_length(g: Gluing, f: int, v: Floats) -> tuple[float, float]:
 
 
 @kernel
-def keep_on_edges(w: Floats, v: Floats) -> None:
-    """Put a line on the edge from which only rounding separates it: else it may cross to the other side midway."""
-    largest = max(abs(v[0]), abs(v[1]), abs(v[2]))
-    for k in range(3):
-        if w[k] < ALONG and abs(v[k]) < ALONG * largest:
-            w[k] = v[k] = 0.0
-
-
-@kernel
 def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, sign: float, out: Lines, n: int) -> int:
     """Trace a geodesic from a point along its first vector, times ±1, over its length; carry the other vectors.
 
@@ -290,7 +281,10 @@ def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, s
     square, rounding = squared_length(g, f, v[0])
     longest = 4.0 * (abs(square) + ROUNDING * rounding)
     for _ in range(1000000):
-        keep_on_edges(w, v[0])
+        largest = max(abs(v[0, 0]), abs(v[0, 1]), abs(v[0, 2]))
+        for k in range(3):  # a line that only rounding separates from an edge may cross to its other side midway
+            if w[k] < ALONG and abs(v[0, k]) < ALONG * largest:
+                w[k] = v[0, k] = 0.0
         step, leaving = left, -1
         for k in range(3):
             slope = sign * v[0, k]

@@ -255,7 +255,9 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     segment = place if outcome == BLOCKED else encroached(g, agenda, place, center)
     if segment >= 0:
         return close or coincide(g, agenda, segment) or split_segment(g, agenda, segment, f, goal)
-    if too_near(g, h, place, center):
+    n, d = tangent_at(g, preceding(h))
+    radius = 0.25 * g.length[g.edge[h]] * (n + d) / np.sqrt(n * d)
+    if not np.abs(corners_of(g, place) - center).min() > 0.5 * radius:  # too near a corner, which only rounding can do
         return True
     if not has_room(g, agenda, 2):
         return False
@@ -269,14 +271,6 @@ def corners_of(g: Gluing, f: int) -> Complexes:
     corners = np.zeros(3, np.complex128)
     corners[1], corners[2] = g.length[g.edge[3 * f]], apex(g, 3 * f)
     return corners
-
-
-@kernel
-def too_near(g: Gluing, h: int, f: int, p: complex) -> bool:
-    """Whether p, the circumcentre for shortest side h, is too near a corner of face f, which only rounding can do."""
-    n, d = tangent_at(g, preceding(h))
-    radius = 0.25 * g.length[g.edge[h]] * (n + d) / np.sqrt(n * d)
-    return not np.abs(corners_of(g, f) - p).min() > 0.5 * radius
 
 
 @kernel

@@ -14,7 +14,7 @@ which both sides end.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -179,6 +179,12 @@ class TangentPlanes:
 
         return in_chunks(places, np.column_stack([here, there]))[0]
 
+    def unfolded_sides(self, triangles: Ints) -> Iterator[tuple[Floats, Floats]]:
+        """Yield, for each corner, the ways (m, 2) to the next one and to the one after, in the plane of the corner."""
+        for k in range(3):
+            corners, right, left = (triangles[:, (k + shift) % 3] for shift in range(3))
+            yield self.unfolded(corners, right), self.unfolded(corners, left)
+
 
 def turned_alike(offsets: Floats, normal: Floats, others: Floats, flat: Floats) -> tuple[Floats, Bools]:
     """Turn mistaken normals (…, 3) back; return also which points lie on the other side of a plate.
@@ -261,14 +267,10 @@ def well_shaped_triangles(points: Floats, triangles: Ints, reach: Floats) -> tup
 def nonoverlapping_triangles(planes: TangentPlanes, triangles: Ints) -> Ints:
     """Accept triangles, in order, unless they overlap an earlier one: in the tangent plane of a common corner."""
     starts, widths = np.empty(triangles.shape), np.empty(triangles.shape)
-    for k in range(3):
-        corners, right, left = (triangles[:, (k + shift) % 3] for shift in range(3))
-        angle = []
-        for others in (right, left):
-            step = planes.unfolded(corners, others)
-            angle.append(np.arctan2(step[:, 1], step[:, 0]))
-        turn = np.mod(angle[1] - angle[0] + np.pi, 2 * np.pi) - np.pi
-        starts[:, k], widths[:, k] = np.where(turn < 0, angle[1], angle[0]), np.abs(turn)
+    for k, sides in enumerate(planes.unfolded_sides(triangles)):
+        right, left = (np.arctan2(side[:, 1], side[:, 0]) for side in sides)
+        turn = np.mod(left - right + np.pi, 2 * np.pi) - np.pi
+        starts[:, k], widths[:, k] = np.where(turn < 0, left, right), np.abs(turn)
     return triangles[accept_apart(triangles, starts, widths, len(planes.points))]
 
 
@@ -301,10 +303,8 @@ def facing(planes: TangentPlanes, normals: Floats, faces: Ints) -> Ints:
     """Turn faces to be counter-clockwise, in the planes of their corners, as seen from where the normals point."""
     up = np.sign((np.cross(planes.axes[:, 0], planes.axes[:, 1]) * normals).sum(axis=1))
     area = np.zeros(len(faces))
-    for k in range(3):
-        corners, right, left = (faces[:, (k + shift) % 3] for shift in range(3))
-        a, b = (planes.unfolded(corners, others) for others in (right, left))
-        area += up[corners] * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    for k, (a, b) in enumerate(planes.unfolded_sides(faces)):
+        area += up[faces[:, k]] * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     return np.where((area < 0)[:, None], faces[:, [0, 2, 1]], faces)
 
 

@@ -125,25 +125,6 @@ def nearest_zero(
     return Nearest(np.minimum(near, distance), sides, (both,))
 
 
-@dataclass(frozen=True, eq=False)
-class CurvesThere:
-    """The curves on the triangles of a surface, and exact distance to them."""
-
-    placed: PlacedSegments  # all of them
-    distance: Floats  # (n,) of every vertex to them
-    sides: CurveSides  # those of the oriented ones
-    windows: int  # a measure of the work
-
-    @classmethod
-    def on(
-        cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments], tolerance: float, report: Report | None
-    ) -> CurvesThere:
-        """Measure to curves and points."""
-        placed = PlacedSegments.of(triangles, parts)
-        distance, windows = distance_to_segments(triangles, placed, tolerance, report)
-        return cls(placed, distance, curve_sides(triangles, placed), windows)
-
-
 def nearest_curve(
     triangles: IntrinsicMesh,
     values: Floats,
@@ -156,16 +137,18 @@ def nearest_curve(
 
     Curves decide sides in regions that they bound, and next to them; far from them the zero set of φ counts.
     """
-    present = CurvesThere.on(triangles, parts, tolerance, report)
-    distance, counts = present.distance, [present.windows]
+    placed = PlacedSegments.of(triangles, parts)
+    distance, windows = distance_to_segments(triangles, placed, tolerance, report)
+    counts = [windows]
     if not any(part.oriented for part in parts):
         return Nearest(distance, np.ones(len(values), dtype=np.int64), (note_on_searches(triangles, *counts),))
-    sides, bounded = present.sides, present.sides.regions != 0
+    sides = curve_sides(triangles, placed)
+    bounded = sides.regions != 0
     is_near = sides.reach <= distance * (1 + 1e-9)
     side = np.where(bounded, sides.regions, np.where(is_near, sides.nearby, 0))
     turned = (side != 0) & (np.sign(values) != side) & ~np.isnan(values)
     values = np.where(turned, np.copysign(distance, side), values)
-    missing, more = missing_parts(triangles, values, parts, present, spacing, report)
+    missing, more = missing_parts(triangles, values, parts, placed, distance, sides, spacing, report)
     counts += more
     completed = float(missing.lengths.sum())
     if completed > 0:
@@ -190,23 +173,25 @@ def missing_parts(
     triangles: IntrinsicMesh,
     values: Floats,
     parts: Sequence[CurveSegments],
-    there: CurvesThere,
+    placed: PlacedSegments,
+    distance: Floats,
+    sides: CurveSides,
     spacing: float,
     report: Report | None,
 ) -> tuple[PlacedSegments, list[int]]:
     """Find the parts of the zero set of φ that complete the curves, and the number of windows of each search."""
     size = np.sqrt(2 * triangles.face_areas)
     corners = triangles.corner_vertices
-    apart = there.distance[corners].mean(axis=1) > size
+    apart = distance[corners].mean(axis=1) > size
     counts = []
-    if len(there.sides.free_ends):
-        ends = CurveSegments.of_points(there.placed.nodes[there.sides.free_ends])
+    if len(sides.free_ends):
+        ends = CurveSegments.of_points(placed.nodes[sides.free_ends])
         to_ends, windows = distance_to_segments(triangles, PlacedSegments.of(triangles, [ends]), ROUGHLY, report)
         counts.append(windows)
-        beyond = to_ends <= there.distance * (1 + 1e-3)
+        beyond = to_ends <= distance * (1 + 1e-3)
         apart |= beyond[corners].all(axis=1)
-    apart[there.placed.faces] = False
-    apart &= (there.sides.regions[corners] == 0).any(axis=1)
+    apart[placed.faces] = False
+    apart &= (sides.regions[corners] == 0).any(axis=1)
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
     unsided = [part for part in parts if not part.oriented]
     if unsided:

@@ -64,15 +64,13 @@ def lie_along(triangles: IntrinsicMesh, points: LocatedPoints, edges: Bools) -> 
     )
 
 
-def surface_source(
-    triangles: IntrinsicMesh, sources: Sequence[Any], diffusion: float, spacing: float, positions: Floats | None = None
-) -> SurfaceSource:
+def surface_source(triangles: IntrinsicMesh, sources: Sequence[Any], diffusion: float, spacing: float) -> SurfaceSource:
     """Lower sources to an intrinsic mesh, whose faces they refer to; ``t = diffusion · spacing²``.
 
     A sequence among them counts as one; an isolated point weighs as a curve of length `spacing`. Unoriented curves must
-    run along edges (`refine_to_conform`); those with normals need `positions`, (n_vertices, 3).
+    run along edges (`refine_to_conform`).
     """
-    groups = segments_of_each(sources, triangles, positions)
+    groups = segments_of_each(sources, triangles)
     parts = [part for group in groups for part in group]
     if not parts or not all(groups):
         raise SourceError("no source was given", remedy="pass at least one curve or point, and no empty lists")
