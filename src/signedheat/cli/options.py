@@ -227,28 +227,21 @@ def ending(word: str) -> str:
     return word.removeprefix(".")
 
 
-def positive(word: str) -> float:
-    """Return a positive number."""
-    value = finite(word)
-    if value <= 0:
-        raise argparse.ArgumentTypeError(f"{word} is not positive")
-    return value
+def bounded(fault: str, is_within: Callable[[float], bool]) -> Callable[[str], float]:
+    """Return a parser of finite numbers within bounds; of others it tells the fault."""
+
+    def parse(word: str) -> float:
+        value = finite(word)
+        if not is_within(value):
+            raise argparse.ArgumentTypeError(f"{word} is {fault}")
+        return value
+
+    return parse
 
 
-def not_negative(word: str) -> float:
-    """Return a nonnegative number."""
-    value = finite(word)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"{word} is negative")
-    return value
-
-
-def fraction(word: str) -> float:
-    """Return a number from 0 to 1."""
-    value = not_negative(word)
-    if value > 1:
-        raise argparse.ArgumentTypeError(f"{word} is more than 1")
-    return value
+positive = bounded("not positive", lambda value: value > 0)
+not_negative = bounded("negative", lambda value: value >= 0)
+fraction = bounded("less than 0 or more than 1", lambda value: 0 <= value <= 1)
 
 
 def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
