@@ -13,6 +13,7 @@ from scipy import sparse
 from .arrays import Bools, Floats, mask_of
 from .diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
 from .errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
+from .geodesics.exact_distance import shortest_arcs
 from .grids.grid_discretization import GridDiscretization, GridSource
 from .grids.grid_field import GridField
 from .mesh.components import connected_components
@@ -126,9 +127,8 @@ def small_loops(source: SurfaceSource) -> int:
     inside = np.concatenate([part.edges < 0 for part in parts])
     sides = np.where(inside, np.sqrt(4 / 3**0.5 * triangles.face_areas[faces]), 0.0)  # edges see what runs along them
     length, weighted = np.bincount(label, lengths), np.bincount(label, lengths * sides)
-    is_open = np.zeros(len(length), dtype=bool)
     odd = np.bincount(ends.ravel(), minlength=len(nodes)) % 2 == 1
-    is_open[label[odd[ends].any(axis=1)]] = True
+    is_open = mask_of(len(length), label[odd[ends].any(axis=1)])
     return int(((length > 0) & ~is_open & (length**2 < SMALL_LOOP * weighted)).sum())
 
 
@@ -146,16 +146,10 @@ def spread(points: Floats, values: Floats, used: Bools) -> Floats:
     graph = sparse.csr_matrix(graph.minimum(graph.T))  # joined from both sides
     finite = np.flatnonzero(~lacking[ids])
     start = np.abs(values[ids[finite]])
-    tail, head = finite, np.full(len(finite), len(ids))
-    coo = graph.tocoo()
-    whole = sparse.csr_matrix(
-        (
-            np.concatenate([coo.data, start + 1e-300, start + 1e-300]),
-            (np.concatenate([coo.row, tail, head]), np.concatenate([coo.col, head, tail])),
-        ),
-        shape=(len(ids) + 1,) * 2,
-    )
-    away, before = sparse.csgraph.dijkstra(whole, indices=len(ids), return_predecessors=True)
+    pairs, source = graph.tocoo(), np.full(len(finite), len(ids))
+    tails, heads = np.concatenate([pairs.row, source]), np.concatenate([pairs.col, finite])
+    whole = shortest_arcs(tails, heads, np.concatenate([pairs.data, start]), len(ids) + 1)
+    away, before = sparse.csgraph.dijkstra(whole, directed=False, indices=len(ids), return_predecessors=True)
     result: Floats = values.copy()
     sign = np.where(values[ids] < 0, -1.0, 1.0)
     for k in np.argsort(away, kind="stable").tolist():

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError, OutsideError
+from ..mesh.components import places_among
 from ..packages import lazy_module
 from .blocks import SIDE, BlockValues
 
@@ -213,7 +214,8 @@ def contour_parts(values: BlockValues, spacing: Floats, level: float, refine: Re
         numbers = np.full(len(points), -1, dtype=np.int64)
         for step in np.ndindex(3, 3, 3):
             if seam := seams.get(tuple((window + step - 1).tolist())):
-                numbers[shared] = np.maximum(numbers[shared], _looked_up(seam, keys[shared]))
+                known = np.append(seam[1], -1)[places_among(seam[0], keys[shared])]
+                numbers[shared] = np.maximum(numbers[shared], known)
         new = numbers < 0
         numbers[new] = count + np.arange(int(new.sum()))
         count += int(new.sum())
@@ -226,12 +228,3 @@ def contour_parts(values: BlockValues, spacing: Floats, level: float, refine: Re
         raise OutsideError(
             f"the values of the band do not take level {level:g}", remedy="choose another level or a wider band"
         )
-
-
-def _looked_up(seam: _Seam, keys: Ints) -> Ints:
-    """Return (k,) the number of the vertex with each key, −1 where there is none."""
-    held, numbers = seam
-    if not len(held):
-        return np.full(len(keys), -1, dtype=np.int64)
-    positions = np.minimum(np.searchsorted(held, keys), len(held) - 1)
-    return np.where(held[positions] == keys, numbers[positions], -1)

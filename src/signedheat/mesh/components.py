@@ -67,6 +67,14 @@ def first_members(groups: NDArray[np.integer], n: int) -> Ints:
     return first
 
 
+def places_among(ordered: NDArray[np.integer], keys: NDArray[np.integer]) -> Ints:
+    """Return (k,) the place of each key among ordered ones, −1 where it is none of them."""
+    if not len(ordered):
+        return np.full(len(keys), -1)
+    places = np.minimum(np.searchsorted(ordered, keys), len(ordered) - 1)
+    return np.where(ordered[places] == keys, places, -1)
+
+
 def numbered(counts: Ints) -> tuple[Ints, Ints]:
     """Return each of some groups as often as it has members, and the number of each member within its group."""
     owners = np.repeat(np.arange(len(counts)), counts)

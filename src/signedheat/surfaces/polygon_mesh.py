@@ -20,7 +20,7 @@ from scipy import sparse
 from ..arrays import Bools, Floats, Ints, mask_of
 from ..errors import GeometryError
 from ..exchange import Elements, Exchangeable
-from ..mesh.components import sums_of
+from ..mesh.components import next_in_groups, sums_of
 from ..mesh.triangles import area_vectors, cut_into_ears
 from ..validation import array_of, coordinates, frozen, used_bounds, whole_numbers
 from .surface import Surface, check_mask
@@ -126,9 +126,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
     @cached_property
     def next_corners(self) -> Ints:
         """Vertex that follows each entry of `corners` around its polygon."""
-        following = np.roll(self.corners, -1)
-        following[self.offsets[1:] - 1] = self.corners[self.offsets[:-1]]
-        return following
+        return self.corners[next_in_groups(self.offsets)]
 
     @cached_property
     def polygon_centroids(self) -> Floats:
@@ -186,8 +184,7 @@ def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> Virtua
     corners, polygons = corners[differs], np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))[differs]
     counts = np.bincount(polygons, minlength=len(offsets) - 1)
     begin = np.cumsum(counts) - counts
-    following = np.arange(1, len(corners) + 1)
-    following[(begin + counts - 1)[counts > 0]] = begin[counts > 0]
+    following = next_in_groups(np.append(begin, len(corners)))
 
     in_fan = counts[polygons] > 3
     fans, fan_of = np.unique(polygons[in_fan], return_inverse=True)

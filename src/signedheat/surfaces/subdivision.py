@@ -14,6 +14,7 @@ from scipy.sparse import csr_matrix
 from ..arrays import Floats, Ints
 from ..errors import GeometryError
 from ..memory import within_memory
+from ..mesh.components import first_members
 from ..mesh.surface_points import EDGE, VERTEX, LocatedPoints, locate_points
 from .intrinsic_history import misplaced_lines
 from .intrinsic_triangulation import IntrinsicTriangulation
@@ -56,9 +57,7 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
         )
     triangles, n = triangulation.triangles, triangulation.n_vertices
     polygons, _, where = subdivided(triangulation)
-    used = triangles.corner_vertices.ravel()
-    corner_of = np.full(n, -1)
-    corner_of[used] = np.arange(len(used))
+    corner_of = first_members(triangles.corner_vertices.ravel(), n)
     own = corner_of >= 0
     weights = np.concatenate([np.eye(3)[corner_of % 3] * own[:, None], where.barycentric])
     faces = np.concatenate([corner_of // 3, where.faces])

@@ -25,6 +25,7 @@ from ..foreign import converted
 from ..grids.grid import room_around
 from ..kinds import Shape, ShapeLike
 from ..memory import refuse_beyond_memory, within_memory
+from ..mesh.components import places_among
 from ..surfaces.point_cloud import PointCloud
 from ..validation import finite_number, refuse_extreme
 from .tet_mesh import TetMesh
@@ -170,7 +171,8 @@ def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
     leaves = np.sort((corners * 32 + np.log2(sizes).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
 
     def is_leaf(corner: Ints, size: Ints) -> Bools:
-        return _contains(leaves, (corner * 32 + np.log2(size).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
+        keys = (corner * 32 + np.log2(size).astype(np.int64)[:, None] * [0, 0, 1]) @ stride
+        return places_among(leaves, keys) >= 0
 
     octants = np.array(list(itertools.product((0, 1), repeat=3)))
     taken = np.unique((corners[:, None] + octants * sizes[:, None, None]).reshape(-1, 3) @ stride)
@@ -194,7 +196,7 @@ def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
         for k in range(4):
             start, end = face[:, k], face[:, (k + 1) % 4]
             middle = (start + end) // 2
-            split = _contains(taken, middle @ stride)
+            split = places_among(taken, middle @ stride) >= 0
             whole = ~split
             for ends, which in (((start, end), whole), ((start, middle), split), ((middle, end), split)):
                 parts = (center[chosen], opposite[chosen], *ends)
@@ -206,11 +208,6 @@ def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
     turned = np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) < 0
     tets[turned] = tets[turned][:, [0, 1, 3, 2]]
     return points, tets
-
-
-def _contains(sorted_keys: Ints, keys: Ints) -> Bools:
-    """Return whether each key is among sorted ones."""
-    return sorted_keys[np.minimum(np.searchsorted(sorted_keys, keys), len(sorted_keys) - 1)] == keys
 
 
 def _box_around(shape: Any, resolution: int, padding: float | None) -> tuple[Floats, Floats, float]:
