@@ -38,10 +38,10 @@ from .simplification import simplified
 from .tiles import Scheduler, band_field, dense_field
 from .winding import Windings
 
-booleans: Any = lazy_module("signedheat.solids.booleans", "solids")
 files: Any = lazy_module("signedheat.io.shape_files", "files")
 morphology: Any = lazy_module("signedheat.morphology", "solids")
 sampling: Any = lazy_module("signedheat.solids.sampling", "solids")
+unions: Any = lazy_module("signedheat.solids.union", "solids")
 
 if TYPE_CHECKING:
     import pyvista
@@ -511,7 +511,7 @@ class Solid(Displayed, Represented, Frozen):
         """Union: points in either of the two."""
         if isinstance(other, GridField):
             return self.field_on(other) | other
-        return booleans.union(self, other) if isinstance(other, Solid) else NotImplemented
+        return unions.union(self, other) if isinstance(other, Solid) else NotImplemented
 
     @overload
     def __and__(self, other: Solid) -> Solid: ...
@@ -521,7 +521,7 @@ class Solid(Displayed, Represented, Frozen):
         """Intersection: points in both."""
         if isinstance(other, GridField):
             return self.field_on(other) & other
-        return booleans.intersection(self, other) if isinstance(other, Solid) else NotImplemented
+        return unions.intersection(self, other) if isinstance(other, Solid) else NotImplemented
 
     @overload
     def __sub__(self, other: Solid) -> Solid: ...
@@ -531,7 +531,7 @@ class Solid(Displayed, Represented, Frozen):
         """Difference: points in this and not in the other."""
         if isinstance(other, GridField):
             return self.field_on(other) - other
-        return booleans.difference(self, other) if isinstance(other, Solid) else NotImplemented
+        return unions.difference(self, other) if isinstance(other, Solid) else NotImplemented
 
     def field_on(self, field: GridField[Literal[3]]) -> GridField[Literal[3]]:
         """Compute the distance at the nodes of a field, in a band or everywhere.
