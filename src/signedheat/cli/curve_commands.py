@@ -20,6 +20,7 @@ from .options import (
     Summary,
     command,
     format_option,
+    is_given,
     is_quiet,
     option,
     output,
@@ -73,8 +74,10 @@ def about_curves(written: str) -> tuple[Option, ...]:
 
 
 def check_curves(arguments: Namespace) -> None:
-    """Reject turning none of the curves that are taken as they are anyway."""
+    """Reject turning none of the curves that are taken as they are anyway, and isolines next to standard output."""
     refuse_together(arguments, "--as-oriented", PLAIN)
+    if arguments.output == "-" and is_given(arguments, "--contours"):
+        arguments.parser.error("--contours writes a file next to the output: name a file instead of standard output")
 
 
 @command(

@@ -455,7 +455,6 @@ EXCLUDED = {
     "--origin": ("--resolution", "--padding"),
     "--scheduler": ("--workers",),
     "--tets": ("--spacing", "--origin", "--shape", "--band", "--label"),
-    "--contours": ("--output -",),
     "--every-piece": PLAIN,
 }
 """Options that contradict others, or others with a value that begins so."""
