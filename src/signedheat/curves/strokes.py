@@ -47,12 +47,6 @@ class CutGraph:
 
         Of several such signs, those with the fewest positive. An edge whose first node is positive and whose second is
         negative costs `falling`, (e,), the reverse `rising`.
-
-        Examples
-        --------
-        >>> chain = CutGraph.of(np.array([[0, 1], [1, 2], [2, 3]]), 4)
-        >>> chain.cut(np.array([1.0, 0.2, 1.0]), np.ones(3), np.array([3.0, 0, 0, -3.0]))
-        array([ 1.,  1., -1., -1.])
         """
         total = 2 * max(float(pull[pull > 0].sum()), -float(pull[pull < 0].sum()))
         if total == 0:

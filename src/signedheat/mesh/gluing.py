@@ -18,8 +18,6 @@ from .components import next_in_groups
 from .edges import EdgeTable
 from .intrinsic_mesh import IntrinsicMesh
 
-kernel = compiled(error_model="numpy")  # without exceptions, compilation takes half the time
-
 FLIP, TURN, SPLIT_FACE, SPLIT_EDGE = 0, 1, 2, 3
 """Kinds of steps in a history."""
 FACES, EDGES, VERTICES, STEPS, STACKED = range(5)
@@ -50,19 +48,19 @@ class Gluing(NamedTuple):
     unit: float  # unit of length
 
 
-@kernel
+@compiled
 def following(h: int) -> int:
     """Return the next halfedge around the face."""
     return h + 1 if h % 3 < 2 else h - 2
 
 
-@kernel
+@compiled
 def preceding(h: int) -> int:
     """Return the previous halfedge around the face."""
     return h - 1 if h % 3 else h + 2
 
 
-@kernel
+@compiled
 def half_tangent(a: float, b: float, c: float) -> tuple[float, float]:
     """Return numerator and denominator of tan²(α/2), α opposite side a (Kahan); their product is 16 area²."""
     if b < c:
@@ -73,14 +71,14 @@ def half_tangent(a: float, b: float, c: float) -> tuple[float, float]:
     return numerator, denominator
 
 
-@kernel
+@compiled
 def tangent_at(g: Gluing, h: int) -> tuple[float, float]:
     """Return the `half_tangent` of the corner at the tail of a halfedge."""
     n = following(h)
     return half_tangent(g.length[g.edge[n]], g.length[g.edge[h]], g.length[g.edge[preceding(h)]])
 
 
-@kernel
+@compiled
 def move(g: Gluing, old: tuple[int, ...], new: tuple[int, ...]) -> None:
     """Renumber halfedges old[k] to new[k], a permutation of them, all at once; tails stay where they are."""
     successors, predecessors, edges, flags = g.scratch[0], g.scratch[1], g.scratch[2], g.scratch[3]
@@ -106,7 +104,7 @@ def move(g: Gluing, old: tuple[int, ...], new: tuple[int, ...]) -> None:
             g.sibling[predecessors[k]] = h
 
 
-@kernel
+@compiled
 def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float, b: float, c: float, d: float) -> None:
     """Write one step into the history."""
     n = g.counts[STEPS]
@@ -115,7 +113,7 @@ def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float,
     g.counts[STEPS] = n + 1
 
 
-@kernel
+@compiled
 def faces_around(steps: Ints, n: int, around: Ints, start: Ints) -> None:
     """Write the faces that step n of a history has or makes, and the corner of each that its first point is at."""
     kind = steps[n, 0]
@@ -129,7 +127,7 @@ def faces_around(steps: Ints, n: int, around: Ints, start: Ints) -> None:
         around[1], start[1] = steps[n, 2] // 3, steps[n, 2] % 3
 
 
-@kernel
+@compiled
 def turn_over(g: Gluing, face: int) -> None:
     """Reverse a face: corners (0, 1, 2) become (0, 2, 1)."""
     h = 3 * face
@@ -140,7 +138,7 @@ def turn_over(g: Gluing, face: int) -> None:
     record(g, TURN, face, -1, -1, 0.0, 0.0, 0.0, 0.0)
 
 
-@kernel
+@compiled
 def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
     """Unfold the two faces at an edge into one plane: ``h: i → j`` with apex a, its twin with apex b.
 
@@ -167,7 +165,7 @@ def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
     return area_jab, area_iab, 0.25 * np.sqrt(n2 * d2), 0.25 * np.sqrt(n1 * d1), length
 
 
-@kernel
+@compiled
 def flip(g: Gluing, h: int) -> bool:
     """Flip an interior edge of a strictly convex quadrilateral: h and its twin are then ``b → a``, ``a → b``."""
     t = g.sibling[h]
@@ -189,7 +187,7 @@ def flip(g: Gluing, h: int) -> bool:
     return True
 
 
-@kernel
+@compiled
 def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
     """Flip stacked edges until all that are not fixed are Delaunay; return False if the history is full before."""
     while g.counts[STACKED] > 0:
@@ -213,7 +211,7 @@ def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
     return True
 
 
-@kernel
+@compiled
 def look_at(g: Gluing, stack: Ints, stacked: Bools, e: int) -> None:
     """Push an edge on the stack of edges to be checked."""
     if not stacked[e]:
@@ -222,7 +220,7 @@ def look_at(g: Gluing, stack: Ints, stacked: Bools, e: int) -> None:
         g.counts[STACKED] += 1
 
 
-@kernel
+@compiled
 def new_edge(g: Gluing, length: float, fixed: bool) -> int:
     """Add an edge; return its id."""
     e: int = g.counts[EDGES]
@@ -231,7 +229,7 @@ def new_edge(g: Gluing, length: float, fixed: bool) -> int:
     return e
 
 
-@kernel
+@compiled
 def apex(g: Gluing, h: int) -> complex:
     """Return the face's third corner, above the halfedge, which runs along the positive real axis from the origin."""
     base, right, left = g.length[g.edge[h]], g.length[g.edge[following(h)]], g.length[g.edge[preceding(h)]]
@@ -239,13 +237,13 @@ def apex(g: Gluing, h: int) -> complex:
     return complex(0.5 * (base + (left - right) * (left + right) / base), 0.5 * np.sqrt(n * d) / base)
 
 
-@kernel
+@compiled
 def cross(a: complex, b: complex) -> float:
     """Return the cross product of plane vectors, which is positive where b is counter-clockwise of a."""
     return a.real * b.imag - a.imag * b.real
 
 
-@kernel
+@compiled
 def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
     """Insert a vertex x at (u, v, w) into a face (a, b, c), which becomes (a, b, x), (b, c, x), (c, a, x); return x."""
     h = 3 * f
@@ -271,7 +269,7 @@ def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
     return x
 
 
-@kernel
+@compiled
 def split_edge(g: Gluing, h: int, fraction: float) -> int:
     """Insert a vertex on an edge, `fraction` of the way along halfedge h, and split all its faces; return the vertex.
 
@@ -313,7 +311,7 @@ def split_edge(g: Gluing, h: int, fraction: float) -> int:
     return x
 
 
-@kernel
+@compiled
 def sibling_count(g: Gluing, h: int) -> int:
     """Return the number of halfedges of an edge."""
     count, y = 1, g.sibling[h]
@@ -323,7 +321,7 @@ def sibling_count(g: Gluing, h: int) -> int:
     return count
 
 
-@kernel
+@compiled
 def pair(g: Gluing, h: int, tail: int, t: int, head: int, e: int) -> None:
     """Glue two halfedges into a new edge."""
     g.tail[h], g.edge[h], g.forward[h], g.front[h], g.sibling[h] = tail, e, True, True, t

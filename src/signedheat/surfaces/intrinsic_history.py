@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Frozen, Ints
+from ..compiled import compiled
 from ..mesh.gluing import (
     FLIP,
     SPLIT_EDGE,
@@ -27,7 +28,6 @@ from ..mesh.gluing import (
     faces_around,
     following,
     glue,
-    kernel,
 )
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 
@@ -194,7 +194,7 @@ ROUNDING = 1e-10
 """Rounding error of squared lengths, relative to the size of their terms."""
 
 
-@kernel
+@compiled
 def linked_steps(steps: Ints, n_faces: int, forward: bool) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Link the steps that change each face: see `Links`."""
     first = np.full(n_faces, -1, np.int32)
@@ -212,7 +212,7 @@ def linked_steps(steps: Ints, n_faces: int, forward: bool) -> tuple[NDArray[np.i
     return first, following_step
 
 
-@kernel
+@compiled
 def transfer(steps: Ints, weights: Floats, links: Links, begin: NDArray[np.int32], faces: Ints, rows: Floats) -> None:
     """Carry points and vectors (p, 1 + k, 3) through the steps that change their faces, from `begin` on, in place."""
     around, start = np.empty(3, np.int64), np.zeros(3, np.int64)
@@ -229,7 +229,7 @@ def transfer(steps: Ints, weights: Floats, links: Links, begin: NDArray[np.int32
             n = links.next_of_face[n, place]
 
 
-@kernel
+@compiled
 def exchange(
     kind: int, c: Floats, forward: bool, corners: Ints, start: int, new_corners: Ints, new_start: Ints, rows: Floats
 ) -> int:
@@ -258,7 +258,7 @@ def exchange(
     return place
 
 
-@kernel
+@compiled
 def squared_length(g: Gluing, f: int, v: Floats) -> tuple[float, float]:
     """Squared length of a vector in a face, and the sum of the sizes of its terms."""
     square, size = 0.0, 0.0
@@ -269,7 +269,7 @@ def squared_length(g: Gluing, f: int, v: Floats) -> tuple[float, float]:
     return square, size
 
 
-@kernel
+@compiled
 def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, sign: float, out: Lines, n: int) -> int:
     """Trace a geodesic from a point along its first vector, times ±1, over its length; carry the other vectors.
 
@@ -338,7 +338,7 @@ def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, s
     return n
 
 
-@kernel
+@compiled
 def trace_both_ways(g: Gluing, faces: Ints, barycentric: Floats, vectors: Floats, out: Lines) -> int:
     """Trace half of the first vector both ways from every point p; rows of the backward half have owner −1 − p."""
     n = 0

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import Bools, Complexes, Floats, Ints
+from ..compiled import compiled
 from ..mesh.gluing import (
     EDGES,
     FACES,
@@ -25,7 +26,6 @@ from ..mesh.gluing import (
     faces_around,
     flip_until_delaunay,
     following,
-    kernel,
     lay_out,
     look_at,
     preceding,
@@ -167,7 +167,7 @@ class Goal(NamedTuple):
     max_vertices: int
 
 
-@kernel
+@compiled
 def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
     """Insert vertices until every face meets the goal, where possible; pause after `patience` of them."""
     pause = g.counts[VERTICES] + patience
@@ -193,7 +193,7 @@ def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
     return GROW
 
 
-@kernel
+@compiled
 def is_bad(g: Gluing, f: int, goal: Goal) -> tuple[bool, int]:
     """Whether a face is too thin (its smallest angle is opposite to its shortest side) or too large; and that side."""
     h = 3 * f
@@ -204,7 +204,7 @@ def is_bad(g: Gluing, f: int, goal: Goal) -> tuple[bool, int]:
     return n < goal.angle * d or g.length[g.edge[h]] * (n + d) > 4.0 * goal.radius * np.sqrt(n * d), h
 
 
-@kernel
+@compiled
 def list_face(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> None:
     """Put a face on the lists, if it is bad."""
     bad, h = is_bad(g, f, goal)
@@ -218,14 +218,14 @@ def list_face(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> None:
     agenda.listed[f] = True
 
 
-@kernel
+@compiled
 def list_all(g: Gluing, agenda: Agenda, goal: Goal) -> None:
     """Put every bad face on the lists."""
     for f in range(g.counts[FACES]):
         list_face(g, agenda, f, goal)
 
 
-@kernel
+@compiled
 def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
     """Return the bad face of (nearly) the largest circumradius, or −1."""
     for place in range(N_BINS - 1, -1, -1):
@@ -239,7 +239,7 @@ def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
     return -1
 
 
-@kernel
+@compiled
 def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     """Insert a vertex at the circumcentre of bad face f, or on a segment in the way; return False without room for it.
 
@@ -265,7 +265,7 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     return True
 
 
-@kernel
+@compiled
 def corners_of(g: Gluing, f: int) -> Complexes:
     """(3,) the corners of a face in its frame: its first halfedge runs along the positive real axis from the origin."""
     corners = np.zeros(3, np.complex128)
@@ -273,7 +273,7 @@ def corners_of(g: Gluing, f: int) -> Complexes:
     return corners
 
 
-@kernel
+@compiled
 def coincide(g: Gluing, agenda: Agenda, h: int) -> bool:
     """Whether the two ends of a halfedge nearly coincide."""
     group: int = agenda.group[g.tail[h]]
@@ -282,7 +282,7 @@ def coincide(g: Gluing, agenda: Agenda, h: int) -> bool:
     return group >= 0 and group == other and is_short
 
 
-@kernel
+@compiled
 def is_cap(g: Gluing, agenda: Agenda, f: int) -> bool:
     """Whether an angle of the face exceeds 150°, opposite to a side whose ends do not nearly coincide."""
     for h in range(3 * f, 3 * f + 3):
@@ -292,7 +292,7 @@ def is_cap(g: Gluing, agenda: Agenda, f: int) -> bool:
     return False
 
 
-@kernel
+@compiled
 def is_hopeless(g: Gluing, agenda: Agenda, h: int) -> bool:
     """Whether the small angle opposite to h cannot be avoided: it is given by the surface or by its segments."""
     corner = preceding(h)
@@ -309,7 +309,7 @@ def is_hopeless(g: Gluing, agenda: Agenda, h: int) -> bool:
     return False
 
 
-@kernel
+@compiled
 def sector(g: Gluing, corner: int) -> float:
     """Angle around the tail of a halfedge between two segments, or the total angle; counted up to π."""
     n, d = tangent_at(g, corner)
@@ -327,7 +327,7 @@ def sector(g: Gluing, corner: int) -> float:
     return total
 
 
-@kernel
+@compiled
 def narrow_vertices(g: Gluing) -> Bools:
     """(n,) vertices at which two segments meet at less than 60°, or with a total angle of less than 60°."""
     narrow = np.zeros(g.counts[VERTICES], dtype=np.bool_)
@@ -337,14 +337,14 @@ def narrow_vertices(g: Gluing) -> Bools:
     return narrow
 
 
-@kernel
+@compiled
 def has_room(g: Gluing, agenda: Agenda, ring: int) -> bool:
     """Whether splitting an edge with so many faces fits into the arrays (splitting a face needs less)."""
     fits: bool = 3 * (g.counts[FACES] + ring + 2) <= len(g.tail) and g.counts[EDGES] + ring + 4 <= len(g.length)
     return fits and g.counts[VERTICES] + 1 <= len(agenda.on_segment) and g.counts[STEPS] + ring + 2 <= len(g.steps)
 
 
-@kernel
+@compiled
 def look_around(g: Gluing, agenda: Agenda, step: int) -> None:
     """Push onto the stack the edges of all faces that steps of the history, from number `step` on, have changed."""
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
@@ -356,7 +356,7 @@ def look_around(g: Gluing, agenda: Agenda, step: int) -> None:
                     look_at(g, agenda.stack, agenda.stacked, g.edge[3 * f + k])
 
 
-@kernel
+@compiled
 def insert(g: Gluing, agenda: Agenda, f: int, p: complex) -> None:
     """Insert a vertex at p (in the frame of face f), or on the edge of the face that p nearly lies on."""
     step = g.counts[STEPS]
@@ -386,7 +386,7 @@ def insert(g: Gluing, agenda: Agenda, f: int, p: complex) -> None:
     look_around(g, agenda, step)
 
 
-@kernel
+@compiled
 def folded_face(g: Gluing, h: int) -> int:
     """Find a face two of whose sides are the edge of halfedge h, which `split_edge` cannot split; −1 if none is."""
     y = h
@@ -398,7 +398,7 @@ def folded_face(g: Gluing, h: int) -> int:
             return -1
 
 
-@kernel
+@compiled
 def vertex_near_edge(g: Gluing, h: int) -> tuple[int, float, float]:
     """Find a vertex opposite to an edge that nearly lies on it, its height and fraction along h; −1, ∞, ½ if none."""
     nearby, height, fraction, length, y = -1, np.inf, 0.5, g.length[g.edge[h]], h
@@ -412,7 +412,7 @@ def vertex_near_edge(g: Gluing, h: int) -> tuple[int, float, float]:
             return nearby, height, fraction
 
 
-@kernel
+@compiled
 def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
     """Distance of the nearest vertex opposite to an edge from the point at `fraction` along h."""
     nearest: float = np.inf
@@ -425,7 +425,7 @@ def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
             return nearest
 
 
-@kernel
+@compiled
 def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool:
     """Split a segment that keeps face f from being removed; return False if the arrays have no room for it.
 
@@ -470,7 +470,7 @@ INSIDE, BLOCKED, LOST = 0, 1, 2
 """Outcomes of `find_circumcenter`."""
 
 
-@kernel
+@compiled
 def unfold(g: Gluing, h: int, side: int, tail: complex, head: complex) -> tuple[complex, int]:
     """Unfold the face beyond halfedge h, from tail to head: its apex, and its side, 1 if counter-clockwise."""
     t = g.sibling[h]
@@ -484,7 +484,7 @@ def unfold(g: Gluing, h: int, side: int, tail: complex, head: complex) -> tuple[
     return place, side
 
 
-@kernel
+@compiled
 def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, complex]:
     """Walk from the barycentre of a face to its circumcentre: INSIDE a face, BLOCKED by a halfedge, or LOST if flat."""
     corners = corners_of(g, f)
@@ -524,7 +524,7 @@ def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, complex]:
     return INSIDE, f, complex(place.real, side * place.imag)
 
 
-@kernel
+@compiled
 def encroached(g: Gluing, agenda: Agenda, f: int, p: complex) -> int:
     """Find a segment that p, in the frame of face f, sees and that has p in its diametral circle; −1 if none."""
     ends, halfedges = agenda.seen_sides, agenda.halfedges
@@ -563,7 +563,7 @@ NEARNESS = 0.01
 """Vertices nearly coincide where the size of their group is less than this fraction of the distance to any other."""
 
 
-@kernel
+@compiled
 def root(parent: Ints, a: int) -> int:
     """Find the representative of the group of a vertex (union–find with path halving)."""
     while parent[a] != a:
@@ -572,7 +572,7 @@ def root(parent: Ints, a: int) -> int:
     return a
 
 
-@kernel
+@compiled
 def coinciding(tail: Ints, head: Ints, length: Floats, order: Ints, n_vertices: int) -> tuple[Ints, Floats]:
     """Group vertices that nearly coincide; return the first vertex of the group of each, or −1, and there its extent.
 
