@@ -48,7 +48,8 @@ def face_areas(triangles: Floats) -> Floats:
 
 def heights(triangles: Floats) -> Floats:
     """Return (m,) heights of (m, 3, 3) triangles above their longest sides."""
-    longest = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2).max(axis=1)
+    a, b, c = triangles.transpose(1, 0, 2)
+    longest = np.max([np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c)], axis=0)
     return 2.0 * face_areas(triangles) / np.maximum(longest, 1e-300)
 
 

@@ -173,7 +173,7 @@ def film(pattern: Film) -> Film:
         if np.abs(shape - vertices).max() <= PLANE * size:
             break
         vertices = shape
-    return Film(vertices, faces, n, plane, pattern.places)
+    return replace(pattern, vertices=vertices)
 
 
 def _laplacian(tails: Ints, heads: Ints, weights: Floats, n: int) -> sparse.csr_array:
