@@ -93,19 +93,6 @@ def merge_in_cells(
 
 
 @compiled
-def _with_room(sums: NDArray[np.float32], used: int, more: int) -> NDArray[np.float32]:
-    """Return `sums`, or a longer copy with room for `more` rows beyond the `used` ones."""
-    if used + more <= sums.shape[0]:
-        return sums
-    grown = np.zeros((2 * sums.shape[0] + more, STRETCH, 4), dtype=np.float32)
-    for row in range(used):
-        for m in range(STRETCH):
-            for q in range(4):
-                grown[row, m, q] = sums[row, m, q]
-    return grown
-
-
-@compiled
 def _merge(
     corners: Floats,
     vectors: Floats,
@@ -118,15 +105,13 @@ def _merge(
     sources: NodeSources,
     scale: float,
 ) -> tuple[Floats, Ints, NDArray[np.float32]]:
-    """Sum weight · position, vector and weight for each component and cell; copies by entry compile fastest."""
+    """Sum weight · position, vector and weight for each component and cell."""
     nodes, places = sources.sums, sources.places.reshape(-1, sources.places.shape[3])
     n_corners, dimension = corners.shape[1], corners.shape[2]
     deepest = 256
     stack = np.empty((deepest, n_corners, dimension))
     shares = np.empty(deepest)  # of the whole simplex
-    capacity = 1024
-    sums = np.zeros((capacity, 2 * dimension + 1))
-    labels = np.empty(capacity, dtype=np.int64)
+    sums, labels = np.zeros((1024, 2 * dimension + 1)), np.zeros(1024, dtype=np.int64)
     count, used = 0, nodes.shape[0]
     first = 0  # slots of the current component start here
     current = np.int64(-1)
@@ -193,14 +178,9 @@ def _merge(
                 continue
             slot = slots[cell] - 1
             if slot < first:
-                if count == capacity:
-                    capacity *= 2
-                    grown, more = np.zeros((capacity, 2 * dimension + 1)), np.empty(capacity, dtype=np.int64)
-                    for k in range(count):
-                        more[k] = labels[k]
-                        for d in range(2 * dimension + 1):
-                            grown[k, d] = sums[k, d]
-                    sums, labels = grown, more
+                if count == len(sums):
+                    sums = np.concatenate((sums, np.zeros_like(sums)))
+                    labels = np.concatenate((labels, np.zeros_like(labels)))
                 slot = count
                 labels[slot] = current
                 count += 1
@@ -208,7 +188,8 @@ def _merge(
             share = shares[top]
             weight = weights[face] * share
             if used + (1 << dimension) > nodes.shape[0]:
-                nodes = _with_room(nodes, used, 1 << dimension)
+                more = np.zeros((len(nodes) + (1 << dimension), STRETCH, 4), dtype=np.float32)
+                nodes = np.concatenate((nodes, more))
             lines[0], parts[0] = 0, share / scale
             for d in range(dimension - 1):
                 below = min(max(np.int64(centre[d]), 0), shape[d] - 2)
