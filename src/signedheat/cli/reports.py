@@ -16,6 +16,7 @@ from ..errors import SourceError, printable
 from ..geodesics.shortest_paths import gaps
 from ..grids.grid_discretization import fitting_spacing, memory_estimate
 from ..inspection import CloudReport, SurfaceReport, TetReport, inspect
+from ..io import read
 from ..io.files import extension
 from ..io.mesh_files import read_obj_elements
 from ..io.scenes import unit_of
@@ -50,7 +51,7 @@ def report(file: str, arguments: Namespace) -> Summary:
         return summary, _table(summary)
     if is_planar(file):
         return lines_report(file)
-    held = sh.read(file)
+    held = read(file)
     shape = sh.as_shape(held)
     counts = inspect(shape)
     solid = held if isinstance(held, sh.Solid) else None
