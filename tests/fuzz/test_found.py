@@ -99,7 +99,7 @@ FOUND = [
     ("arguments", 100, 6), ("arguments", 100, 88), ("arguments", 100, 152), ("arguments", 100, 211),
     ("arguments", 206, 22), ("arguments", 108, 89), ("arguments", 102, 126), ("arguments", 103, 15),
     # samples of faces at places that depended on which corner came first
-    ("same solid renumbered", 20261127, 2),
+    ("same solid renumbered", 20261127, 2), ("same solid renumbered", 9601, 81),
     # boxes from one end of what can be written to the other
     ("arguments", 7004, 197), ("arguments", 7008, 1101),
     # shapes taken as they are oriented, none of whose faces has an area

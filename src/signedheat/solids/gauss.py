@@ -195,9 +195,12 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
     u, v = (1 / 3 + run * 0.7548776662466927) % 1.0, (1 / 3 + run * 0.5698402909980532) % 1.0
     fold = u + v > 1
     u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
-    corners = pieces.triangles[faces]  # whichever comes first: in order of the lengths of the sides across
+    # whichever comes first: in order of the lengths of the sides across, or of their places if these are equal
+    corners = pieces.triangles[faces]
     across = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1), axis=2)
-    a, b, c = np.take_along_axis(corners, np.argsort(across, axis=1)[..., None], axis=1).transpose(1, 0, 2)
+    across = np.round(across / np.maximum(across.max(axis=1, keepdims=True), np.finfo(float).tiny), 9)
+    x, y, z = corners.transpose(2, 0, 1)
+    a, b, c = np.take_along_axis(corners, np.lexsort((z, y, x, across), axis=1)[..., None], axis=1).transpose(1, 0, 2)
     return faces, a + u[:, None] * (b - a) + v[:, None] * (c - a)
 
 
