@@ -98,6 +98,8 @@ FOUND = [
     # arguments that are quoted, compared or counted
     ("arguments", 100, 6), ("arguments", 100, 88), ("arguments", 100, 152), ("arguments", 100, 211),
     ("arguments", 206, 22), ("arguments", 108, 89), ("arguments", 102, 126), ("arguments", 103, 15),
+    # lids whose plates went to and fro
+    ("same solid moved", 9952, 89),
     # samples of faces at places that depended on which corner came first
     ("same solid renumbered", 20261127, 2), ("same solid renumbered", 9601, 81),
     # boxes from one end of what can be written to the other

@@ -197,7 +197,8 @@ def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: f
     the edge e of the rim in the plane with the normal n: where the surface goes on smoothly, ∂x/∂g = g there. Springs
     hold the lid to it: s is 0 where it is clamped, and s_v = (1 / h_v − 1) ¼ W Σ_e ½ |e| where it is held by h_v, which
     is half as stiff as a disc of width W for h = ½. Spheres and cylinders go on as they are. Each round takes m, L and
-    n from the last. Normals, curvatures and held are those of `continuation`.
+    n from the last, and goes half as far as those before once moves grow, so that it comes to rest. Normals, curvatures
+    and held are those of `continuation`.
 
     None where it moves farther than its rim is wide, as on very ragged rims.
     """
@@ -209,7 +210,7 @@ def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: f
     lengths = side_lengths(rim)
     springs = (1.0 / np.maximum(held, 1e-9) - 1.0) * 0.25 * width * 0.5 * (lengths + np.roll(lengths, 1))
     size = float(np.linalg.norm(np.ptp(rim, axis=0)))
-    moves = [size]
+    moves, share = [size], 1.0
     for _ in range(MOVES):
         up = vertex_normals(lid)
         matrix = stiffness(lid)
@@ -224,8 +225,10 @@ def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: f
         vertices = lid.vertices.copy()
         vertices[n:] = sparse.linalg.splu(normal).solve(-(inner.T @ (weights[:, None] * given)))
         rises = ((vertices - lid.vertices) * up).sum(axis=1)  # what slides along the surface does not change it
-        lid = replace(lid, vertices=lid.vertices + rises[:, None] * up)
         moves.append(float(np.abs(rises).max()))
+        if moves[-1] > moves[-2]:  # the rounds go to and fro
+            share *= 0.5
+        lid = replace(lid, vertices=lid.vertices + share * rises[:, None] * up)
         if not moves[-1] <= size:
             return None
         slowed = moves[-1] / moves[-2]
