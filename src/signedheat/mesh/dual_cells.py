@@ -14,13 +14,16 @@ Around a crossed edge from a to b lie four vertices, one in each cell. All trian
 four tetrahedra of the edge and two neighbouring vertices meet no triangle of another edge, since the tetrahedra of
 different edges do not overlap (Ju & Udeshi 2006, Sec. 4). On a regular grid the line between vertices of neighbouring
 cells always passes through the face between them, so that no vertices on faces are needed. Where neither diagonal stays
-within the tetrahedra, the four vertices are joined to the place where the edge is crossed.
+within the tetrahedra, the four vertices are joined to the place where the edge is crossed. What may meet others are
+therefore triangles whose vertices have left their cells or have one in common with another piece, and those of flipped
+edges.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,8 +60,17 @@ class DualCells:
     quads: Ints  # (e, 4) the pieces around each crossed edge, counter-clockwise as seen from its end
 
 
-def cells_around(crossings: Crossings, shape: tuple[int, ...]) -> tuple[Ints, Ints, Ints, Ints]:
-    """Find cells around crossed edges: first nodes (c, 3), edges (c, 12); cells and sides at each edge (e, 4)."""
+class CrossedCells(NamedTuple):
+    """Cells around crossed edges."""
+
+    places: Ints  # (c, 3) first node of each
+    edges: Ints  # (c, 12) number of each crossed edge; −1 where an edge is not crossed
+    rows: Ints  # (e, 4) the cells around each crossed edge, counter-clockwise as seen from its end
+    sides: Ints  # (e, 4) which of their edges it is
+
+
+def crossed_cells(crossings: Crossings, shape: tuple[int, ...]) -> CrossedCells:
+    """Find the cells of a grid around crossed edges."""
     axes, crossed_edges = crossings.axes, np.arange(len(crossings.axes))[:, None]
     around = np.repeat(crossings.nodes[:, None], 4, axis=1)
     around[crossed_edges, np.arange(4), AFTER[axes, 1][:, None]] -= AROUND[:, 0]
@@ -69,12 +81,14 @@ def cells_around(crossings: Crossings, shape: tuple[int, ...]) -> tuple[Ints, In
     sides = 4 * axes[:, None] + 2 * AROUND[:, 0] + AROUND[:, 1]
     edges = np.full((len(cells), 12), -1, dtype=np.int64)
     edges[rows, sides] = crossed_edges
-    return np.stack(np.unravel_index(cells, shape), axis=1).astype(np.int64), edges, rows, sides
+    return CrossedCells(np.stack(np.unravel_index(cells, shape), axis=1).astype(np.int64), edges, rows, sides)
 
 
-def dual_cells(crossings: Crossings, shape: tuple[int, ...], inside: Callable[[Floats], Bools]) -> DualCells:
+def dual_cells(
+    crossings: Crossings, around: CrossedCells, shape: tuple[int, ...], inside: Callable[[Floats], Bools]
+) -> DualCells:
     """Find the pieces of a level set in the cells of a grid; `inside` is asked about the middles of faces, in cells."""
-    places, edges, rows, sides = cells_around(crossings, shape)
+    places, edges, rows, sides = around
     ways = np.zeros((len(places), 6), dtype=np.bool_)
     pieces = _pieces(edges, ways)
     crossed = _crossed_faces(edges)
@@ -92,8 +106,8 @@ def dual_cells(crossings: Crossings, shape: tuple[int, ...], inside: Callable[[F
         while True:
             ways[cells[order], faces[order]] = way[:, None]
             pieces = _pieces(edges, ways)
-            around = pieces[cells[:, None], _face_edges(faces)]
-            double = np.flatnonzero((around == around[:, :1]).all(axis=1)[order].all(axis=1))
+            linked = pieces[cells[:, None], _face_edges(faces)]
+            double = np.flatnonzero((linked == linked[:, :1]).all(axis=1)[order].all(axis=1))
             if not len(double):
                 break
             # one face of a cell at a time: each divides the pieces of both cells, two together may join them again
@@ -184,12 +198,16 @@ def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) 
     """
     count = choices.shape[1]
     chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(cells.quads), dtype=bool)
+    crowded = (np.bincount(cells.owners) > 1)[cells.owners]
     for _ in range(8):  # two rounds are enough for nearly all shapes
         vertices = choices[np.minimum(chosen, 2), np.arange(count)]
-        points, faces, centres = dual_triangles(cells, crossings, vertices, fanned)
-        held = np.concatenate([chosen > 0, np.zeros(len(centres), dtype=bool)])
-        faces = flipped_along_creases(points, faces, held)
-        meeting = np.unique(faces[self_intersections(points, faces)])
+        points, straight, centres = dual_triangles(cells, crossings, vertices, fanned)
+        beside = np.zeros(len(centres), dtype=bool)
+        faces = flipped_along_creases(points, straight, np.concatenate([chosen > 0, beside]))
+        # all others stay within the tetrahedra of their edges
+        out = np.concatenate([crowded | (np.floor(vertices) != cells.places[cells.owners]).any(axis=1), beside])
+        asked = (faces != straight).any(axis=1) | out[faces].any(axis=1)
+        meeting = np.unique(faces[self_intersections(points, faces, asked)])
         if not len(meeting):
             break
         meeting = np.union1d(meeting[meeting < count], cells.quads[centres[meeting[meeting >= count] - count]])

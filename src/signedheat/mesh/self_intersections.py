@@ -41,15 +41,18 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float,
         return np.zeros((0, 2), dtype=np.int64)
     centred = np.ascontiguousarray(vertices - vertices.mean(axis=0), dtype=np.float64)
     hubs = _hubs(faces, len(vertices))
-    order = _order(centred[faces], centred, hubs)
-    if asked is not None:  # those come first, since each face looks for what follows it
-        order = order[np.argsort(~asked[order], kind="stable")]
+    if asked is None:
+        order = _order(centred[faces], centred, hubs)
+    else:  # all look among those asked, which come first
+        order = np.flatnonzero(asked)
+        order = np.append(order[_order(centred[faces[order]], centred, hubs[order])], np.flatnonzero(~asked))
     ids, hubs = np.ascontiguousarray(faces[order], dtype=np.int64), hubs[order]
     corners = centred[ids]
     flat = corners.reshape(-1, 9)
     fans = np.flatnonzero(hubs >= 0)
     places = np.arange(len(ids))
-    tree = BoxTree.over(corners, places, hubs)
+    from_leaf = np.where(places < count, places // LEAF, 0)
+    tree = BoxTree.over(corners[:count], places[:count], hubs[:count])
     arcs = _arcs(centred, ids[fans], hubs[fans]) if len(fans) else corners[:0]
     around = BoxTree.around(arcs) if len(fans) else tree
 
@@ -57,10 +60,10 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float,
         return np.stack([first, second], axis=1)[_overlapping(flat, ids, first, second, slack, depth)]
 
     def of_tree(start: int) -> Ints:
-        batch = slice(start, min(start + CHUNK, count))
-        starts, near = tree.meeting(corners[batch], slack, hubs[batch], places[batch] // LEAF)
+        batch = slice(start, start + CHUNK)
+        starts, near = tree.meeting(corners[batch], slack, hubs[batch], from_leaf[batch])
         owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-        chosen = (near > owners) & ((hubs[owners] < 0) | (hubs[owners] != hubs[near]))
+        chosen = ((near > owners) | (owners >= count)) & ((hubs[owners] < 0) | (hubs[owners] != hubs[near]))
         return overlapping(owners[chosen], near[chosen])
 
     def of_fans(start: int) -> Ints:
@@ -70,7 +73,7 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float,
         return overlapping(fans[owners[chosen]], fans[near[chosen]])
 
     with ThreadPoolExecutor(n_threads()) as pool:
-        parts = list(pool.map(of_tree, range(0, count, CHUNK)))
+        parts = list(pool.map(of_tree, range(0, len(ids), CHUNK)))
         pairs = np.concatenate(parts + list(pool.map(of_fans, range(0, int((fans < count).sum()), CHUNK))))
     pairs = np.sort(order[pairs], axis=1)
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]

@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 import scipy
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, mask_of
 from ..errors import InexactWarning, MemoryLimitError, OutsideError, warn_user
 from ..field_levels import NodeValues, on_level
 from ..grids.blocks import SIDE, Blocks, BlockValues
@@ -28,7 +28,7 @@ from ..grids.marching import CLEARANCE
 from ..jobs import Progress
 from ..memory import available_memory, libraries
 from ..mesh.components import element_components, sums_of
-from ..mesh.dual_cells import Crossings, DualCells, cells_around, dual_cells, open_cells, separate_triangles
+from ..mesh.dual_cells import Crossings, DualCells, crossed_cells, dual_cells, open_cells, separate_triangles
 from ..mesh.edges import edge_table
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import MOST, area_vectors, divided_at
@@ -155,13 +155,15 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats
     for begin in range(0, count, MANY):
         stop = min(begin + MANY, count)
         batch = slice(*np.searchsorted(pieces, [begin, stop]))
+        used, crossed = np.unique(edges[batch], return_inverse=True)  # each is in four cells
         parts = _vertices(
             offset,
             grid,
             cells.places[cells.owners[begin:stop]],
             alone[begin:stop],
             pieces[batch] - begin,
-            points[edges[batch]],
+            crossed,
+            points[used],
         )
         for whole, part in zip((vertices, middles, wider), parts, strict=True):
             whole[begin:stop] = (part - grid.origin) / grid.spacing
@@ -185,20 +187,25 @@ def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
 
 
 def _vertices(
-    offset: ImplicitSurface, grid: Grid, places: Ints, alone: Bools, owners: Ints, points: Floats
+    offset: ImplicitSurface, grid: Grid, places: Ints, alone: Bools, owners: Ints, crossed: Ints, points: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Vertices of pieces in their cells, their middles, and candidates up to `BEYOND` outside, or NaN."""
+    """Vertices of pieces in their cells, their middles, and candidates up to `BEYOND` outside, or NaN.
+
+    The `owners`, (k,), are the pieces in which (k,) edges are `crossed`, at (e, 3) points.
+    """
     count = len(places)
     step = float(grid.spacing.max())
     corners = grid.origin + places * grid.spacing
     room = CLEARANCE * grid.spacing
     lower, upper = corners + room, corners + grid.spacing - room
-    middles = np.clip(sums_of(points, owners, count) / np.bincount(owners, minlength=count)[:, None], lower, upper)
+    middles = np.clip(
+        sums_of(points[crossed], owners, count) / np.bincount(owners, minlength=count)[:, None], lower, upper
+    )
     lower, upper = lower - middles, upper - middles
-    on, normals = offset.planes(points)
+    on, normals = (part[crossed] for part in offset.planes(points))
     quadrics = Quadrics.of(owners, on - middles[owners], normals, count)
     minima, ranks = minimizers(quadrics, lower, upper)
-    off = offset.distance(middles + minima)
+    off, gradients = offset.slopes(middles + minima)
     wider = np.full((count, 3), np.nan)
     creased = np.flatnonzero((ranks > 1) & alone)
     if len(creased):
@@ -214,9 +221,9 @@ def _vertices(
         wanted = (error < ON * step) & ((higher > ranks[creased]) | (higher == 3) | (np.abs(off[creased]) > ON * step))
         wider[creased[wanted]] = middles[creased[wanted]] + farther[wanted]
     for _ in range(2):
-        off, gradients = offset.slopes(middles + minima)
-        onto = np.clip(minima - off[:, None] * gradients, lower, upper)
-        minima = np.where((np.abs(off) > ON * step)[:, None], onto, minima)
+        far = np.flatnonzero(np.abs(off) > ON * step)
+        minima[far] = np.clip(minima[far] - off[far, None] * gradients[far], lower[far], upper[far])
+        off[far], gradients[far] = offset.slopes(middles[far] + minima[far])
     return middles + minima, middles, wider
 
 
@@ -227,11 +234,13 @@ def divided_along_creases(
     new = np.ones(len(faces), dtype=bool)
     for _ in range(DIVISIONS if len(faces) <= MOST else 0):
         edges, points = _creases_off(offset, spacing, vertices, faces, new)
+        if not len(edges):
+            break
+        away, _ = scipy.spatial.cKDTree(points).query(vertices, distance_upper_bound=NEAR * float(spacing.max()))
         while len(edges):
             divided, made = _divided(vertices, faces, edges, points)
-            away, _ = scipy.spatial.cKDTree(points).query(divided, distance_upper_bound=NEAR * float(spacing.max()))
             new = np.any(made >= len(vertices), axis=1)
-            near = np.flatnonzero(np.isfinite(away)[made].any(axis=1))
+            near = np.flatnonzero(np.append(np.isfinite(away), np.ones(len(points), dtype=bool))[made].any(axis=1))
             meeting = made[near][self_intersections(divided, made[near], new[near])]
             if not len(meeting):
                 break
@@ -249,9 +258,11 @@ def _creases_off(
 ) -> tuple[Ints, Floats]:
     """Return (k, 2) halfedges of bent edges off the level, one in a `new` face (m,), and (k, 3) points on it."""
     step = float(spacing.max())
-    normals, edges = unit(area_vectors(vertices[faces])), edge_table(faces).pairs
-    edges = edges[new[edges // 3].any(axis=1)]
-    edges = edges[normals[edges // 3].prod(axis=1).sum(axis=1) < np.cos(BENT)]
+    near = np.flatnonzero(mask_of(len(vertices), faces[new])[faces].any(axis=1))
+    normals, edges = unit(area_vectors(vertices[faces[near]])), edge_table(faces[near]).pairs
+    bent = normals[edges // 3].prod(axis=1).sum(axis=1) < np.cos(BENT)
+    edges = edges[bent & new[near[edges // 3]].any(axis=1)]
+    edges = 3 * near[edges // 3] + edges % 3
     tails, heads = faces.ravel()[edges[:, 0]], faces.ravel()[edges[:, 1]]
     middles = 0.5 * (vertices[tails] + vertices[heads])
     off = np.abs(offset.distance(middles))
@@ -396,14 +407,17 @@ def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCe
             merged[both.rows(part.blocks.places)] = part.values
         done = BlockValues(both, merged)
         crossings = crossed_edges(done)
-        cells, edges, _, _ = cells_around(crossings, grid.shape)
-        around = cells[open_cells(edges)][:, None] + np.array(list(np.ndindex(2, 2, 2)))
+        cells = crossed_cells(crossings, grid.shape)
+        around = cells.places[open_cells(cells.edges)][:, None] + np.array(list(np.ndindex(2, 2, 2)))
         places = np.unique(around.reshape(-1, 3) // SIDE, axis=0)
         places = places[both.rows(places) < 0]
         if not len(places):
             break
-    pieces = dual_cells(crossings, grid.shape, lambda nodes: offset.distance(grid.origin + nodes * grid.spacing) < 0)
-    return done, crossings, pieces
+
+    def inside(nodes: Floats) -> Bools:
+        return offset.distance(grid.origin + nodes * grid.spacing) < 0
+
+    return done, crossings, dual_cells(crossings, cells, grid.shape, inside)
 
 
 def blocks_at(offset: Offset, grid: Grid) -> Ints:

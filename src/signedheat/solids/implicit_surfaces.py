@@ -16,7 +16,7 @@ from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_discretization import refuse_large_grid
 from ..grids.marching import CAP, closed_surface
 from ..memory import within_memory
-from ..mesh.dual_cells import dual_cells
+from ..mesh.dual_cells import crossed_cells, dual_cells
 from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import array_of, finite_number, flag, positive_steps, refuse_beside, whole_number
@@ -219,7 +219,8 @@ def contour(
         )
         return TriangleMesh(vertices, faces)
     crossings = joined_crossings(crossings_in(values, np.zeros(3, dtype=np.int64)))
-    pieces = dual_cells(crossings, grid.shape, lambda at: surface.distance(grid.origin + at * grid.spacing) < 0)
+    around = crossed_cells(crossings, grid.shape)
+    pieces = dual_cells(crossings, around, grid.shape, lambda at: surface.distance(grid.origin + at * grid.spacing) < 0)
     return TriangleMesh(*traced(surface, grid, values, crossings, pieces, lambda fraction, step: None))
 
 

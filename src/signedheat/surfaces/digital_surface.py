@@ -26,7 +26,7 @@ from ..errors import GeometryError
 from ..exchange import Displayed
 from ..linear.conjugate_gradients import conjugate_gradients
 from ..mesh.components import sums_of
-from ..mesh.dual_cells import Crossings, DualCells, dual_cells, separate_triangles
+from ..mesh.dual_cells import Crossings, DualCells, crossed_cells, dual_cells, separate_triangles
 from ..mesh.edges import EdgeTable
 from ..validation import array_of, finite_number, frozen, numbers, positive_steps, refuse_extreme, refuse_lost_spacing
 from .polygon_mesh import PolygonMesh
@@ -196,7 +196,8 @@ def surface_net(volume: Bools) -> tuple[Floats, Ints]:
     nodes = [np.argwhere(np.diff(padded, axis=axis)) for axis in range(3)]
     first, along = np.concatenate(nodes), np.repeat(np.arange(3), [len(part) for part in nodes])
     crossings = Crossings(first, along, padded[tuple(first.T)], np.full(len(first), 0.5))
-    cells = dual_cells(crossings, padded.shape, lambda places: np.ones(len(places), dtype=bool))
+    around = crossed_cells(crossings, padded.shape)
+    cells = dual_cells(crossings, around, padded.shape, lambda places: np.ones(len(places), dtype=bool))
     middles, room = _rooms(cells, crossings)
     relaxed = _relaxed(cells.quads, middles, room)
     rows = np.arange(len(first))
