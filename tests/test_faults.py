@@ -155,6 +155,7 @@ def signalled():
 def waiting(path):
     ctypes.CFUNCTYPE(None)(signalled)()
     time.sleep(20)
+    print("waited", file=sys.stderr)
 reports.read = waiting
 sys.exit(main(["info", "ball.stl"]))
 """

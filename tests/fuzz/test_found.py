@@ -18,7 +18,8 @@ FOUND = [
     ("surface distance", 100, 191), ("surface use", 102, 2), ("surface use", 105, 68), ("surface piecewise", 103, 156),
     ("surface piecewise", 104, 236),
     # faces without area
-    ("surface use", 102, 212), ("surface use", 101, 223), ("surface piecewise", 102, 218), ("surface use", 100, 168),
+    ("surface use", 102, 212), ("surface piecewise", 102, 218), ("surface use", 100, 168),
+    pytest.param("surface use", 101, 223, marks=pytest.mark.slow),
     # numbers whose squares or quotients leave the range
     ("surface use", 100, 21), ("surface piecewise", 106, 119), ("arguments", 109, 172),
     # weights of soft constraints

@@ -194,7 +194,15 @@ class Signals:
         if self.caught is None or not isinstance(lost.exc_value, Stopped):
             return self._hook(lost)
         self._last = -APART
-        threading.Timer(SHORTLY, signal.raise_signal, [self.caught]).start()
+        threading.Timer(SHORTLY, _send, [self.caught]).start()
+
+
+def _send(number: int) -> None:
+    """Send a signal to the main thread, which then no longer waits, where the system can."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:
+        signal.raise_signal(number)
 
 
 INPUTS = ("shape", "mesh", "field", "file")
