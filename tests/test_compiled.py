@@ -55,6 +55,25 @@ def test_a_number_written_in_a_kernel_needs_no_compilation_of_its_own():
     assert len(half.dispatcher.signatures) == 1
 
 
+def test_kernels_are_compiled_once():
+    """Whether arrays are read-only, and how they lie in memory, makes no second compilation."""
+    code = """
+import warnings
+from signedheat import compiled
+from signedheat.cli.kernel_runs import JOBS
+warnings.simplefilter("ignore")
+for job in JOBS.values():
+    job()
+for kernel in compiled.made:
+    print(kernel.__name__, len(kernel.dispatcher.overloads))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    counts = {name: int(count) for name, count in map(str.split, done.stdout.splitlines())}
+    assert counts.pop("_substitute") <= 2  # of real and of complex numbers
+    assert set(counts.values()) == {1}, counts
+    assert len(counts) > 40
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signal to one process")
 def test_ctrl_c_within_a_kernel_is_a_keyboard_interrupt():
     """Numba makes a SystemError of it; that of another process, so that this one is not stopped by a slip."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Floats, Ints, mask_of
+from .arrays import Floats, Ints, mask_of, read_only
 from .foreign import Shape
 from .mesh.components import connected_components
 from .mesh.edges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
@@ -128,7 +128,7 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
         first, _ = coincident_faces(corners, offsets)
         duplicates = int(((first >= 0) & (first != np.arange(len(sides)))).sum())
     lonely = pairs.around == 1
-    areas, degenerate = areas_of_polygons(mesh.vertices, corners, offsets)
+    areas, degenerate = areas_of_polygons(mesh.vertices, read_only(corners), read_only(offsets))
     lower, upper = used_bounds(mesh.vertices, corners)
     two = pairs.counts == 2
     return SurfaceReport(

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from ..arrays import Bools, Complexes, Floats, Ints
+from ..arrays import Bools, Complexes, Floats, Ints, read_only
 from ..compiled import compiled
 from ..memory import refuse_beyond_memory
 from ..mesh.components import grouped
@@ -570,9 +570,10 @@ class Faces(NamedTuple):
         """Collect the arrays of an intrinsic mesh."""
         table, (first_halfedge, halfedges) = triangles.edges, triangles.edges.halfedges
         first_corner, corners = grouped(triangles.corner_vertices.ravel(), triangles.n_vertices)
-        corners_and_edges = triangles.corner_vertices, triangles.corner_positions, table.face_edges, table.forward
-        lists = halfedges, first_halfedge, corners, first_corner
-        return cls(*corners_and_edges, table.vertices, triangles.lengths_of_edges, *lists)
+        corners_and_edges = triangles.corner_positions, table.face_edges, table.forward
+        corner_vertices, ends = (np.ascontiguousarray(ids) for ids in (triangles.corner_vertices, table.vertices))
+        lists = triangles.lengths_of_edges, halfedges, first_halfedge, corners, first_corner
+        return cls(read_only(corner_vertices), *corners_and_edges, ends, *lists)
 
 
 class Search(NamedTuple):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, read_only
 from ..compiled import compiled
 from ..memory import untouched_zeros
 from .stencil import interpolation_stencil
@@ -84,7 +84,8 @@ def merge_in_cells(
     order = np.argsort(components, kind="stable")
     slots = untouched_zeros((int(np.prod(shape - 1)),), np.int32)
     dimension = corners.shape[2]
-    sums, labels, nodes = _merge(corners, vectors, weights, components, order, shape, size, slots, sources, scale)
+    simplices = corners, vectors, read_only(weights), components
+    sums, labels, nodes = _merge(*simplices, order, shape, size, slots, sources, scale)
     kept = sums[:, -1] > 0
     sums, labels = sums[kept], labels[kept]
     weight = sums[:, -1]

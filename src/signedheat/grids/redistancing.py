@@ -354,9 +354,8 @@ def _unevenness(curved: Crossings, linear: Floats, pairs: Ints) -> Floats:
 def crossed_edges(field: Floats) -> NDArray[np.int32]:
     """Return (e, 5) node and axis of each edge whose ends have different signs; zero counts as positive."""
     nodes_by_axis = [np.argwhere(np.diff(field < 0, axis=axis)) for axis in range(4)]
-    return np.concatenate([np.insert(nodes, 4, axis, axis=1) for axis, nodes in enumerate(nodes_by_axis)]).astype(
-        np.int32
-    )
+    edges = np.concatenate([np.insert(nodes, 4, axis, axis=1) for axis, nodes in enumerate(nodes_by_axis)])
+    return np.ascontiguousarray(edges, dtype=np.int32)
 
 
 @compiled

@@ -104,7 +104,7 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, touching: f
     table = edge_table(faces)
     on_open = _on_open_edges(points, table, slack)
 
-    meetings, places = _meet(points, faces, table.vertices, table.face_edges, pairs, slack)
+    meetings, places = _meet(np.ascontiguousarray(points), faces, table.vertices, table.face_edges, pairs, slack)
     kinds, owners, others = meetings.T
     points, ids = _with_new(points, meetings, places, kinds >= EDGES, others)
     on_edge, edges, pierced, in_face = kinds == ON_EDGE, kinds == EDGES, kinds == EDGE_AND_FACE, kinds == IN_FACE

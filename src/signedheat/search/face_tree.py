@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, read_only
 from ..compiled import compiled
 from ..mesh.box_tree import LEAF, BoxTree, boxes_around, morton_codes
 from ..mesh.components import by_first_use, connected_components, sums_of
@@ -238,7 +238,7 @@ class NearestFaces:
 
 def feet_on(features: FaceFeatures, faces: NDArray[np.int32], points: Floats) -> NearestFaces:
     """Find the nearest place of each of (n,) faces to its own one of (n, 3) points."""
-    return NearestFaces(faces, *_feet(features, faces, points))
+    return NearestFaces(faces, *_feet(features, faces, read_only(points)))
 
 
 @compiled

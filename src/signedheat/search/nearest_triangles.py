@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, read_only
 from ..compiled import compiled
 from ..mesh.box_tree import LEAF, BoxTree
 from ..parallel import in_chunks
@@ -155,7 +155,7 @@ def barycentric_on_triangles(rows: Floats, faces: NDArray[np.int32], points: Flo
     """Return (n, 3) barycentric coordinates of the place of a triangle that is nearest to each point."""
     weights = np.zeros((len(points), 3))
     for k in range(len(points)):
-        f = faces[k]
+        f = np.int64(faces[k])
         _, feature, _, _, _ = foot_on_triangle(rows, f, points[k, 0], points[k, 1], points[k, 2])
         x, y, z = points[k, 0] - rows[f, 0], points[k, 1] - rows[f, 1], points[k, 2] - rows[f, 2]
         p = x * rows[f, 3] + y * rows[f, 4] + z * rows[f, 5]
@@ -181,7 +181,7 @@ def barycentric_on_triangles(rows: Floats, faces: NDArray[np.int32], points: Flo
 def weights_in(triangles: Floats, places: Floats) -> Floats:
     """Return (n, 3) barycentric coordinates of (n, 3) places, each in one of (n, 3, 3) triangles."""
     rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
-    return barycentric_on_triangles(rows, np.arange(len(rows), dtype=np.int32), places)
+    return barycentric_on_triangles(rows, np.arange(len(rows), dtype=np.int32), read_only(places))
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +203,7 @@ class TriangleTree:
 
     def nearest(self, points: Floats) -> tuple[Ints, Floats]:
         """Return the triangle nearest to each of (k, 3) points, and barycentric coordinates of its nearest place."""
-        points = np.ascontiguousarray(points)
+        points = read_only(np.ascontiguousarray(points))
         faces, _ = nearest_faces(self.rows, self.tree, self._no_discs, points, TOGETHER * max(len(points), 1))
         return faces.astype(np.int64), barycentric_on_triangles(self.rows, faces, points)
 
@@ -212,7 +212,7 @@ def nearest_faces(
     rows: Floats, tree: BoxTree, discs: Floats, points: Floats, run: int
 ) -> tuple[NDArray[np.int32], Floats]:
     """Return (n,) the nearest face of each of (n, 3) points, and the squares of their distances: see `_descend`."""
-    return _descend(rows, tree, discs, points, run, np.empty(min(max(len(points), 1), TOGETHER)))
+    return _descend(rows, tree, discs, read_only(points), run, np.empty(min(max(len(points), 1), TOGETHER)))
 
 
 @compiled

@@ -217,7 +217,7 @@ def transfer(steps: Ints, weights: Floats, links: Links, begin: NDArray[np.int32
     """Carry points and vectors (p, 1 + k, 3) through the steps that change their faces, from `begin` on, in place."""
     around, start = np.empty(3, np.int64), np.zeros(3, np.int64)
     for p in range(len(faces)):
-        n = begin[p]
+        n = np.int64(begin[p])
         while n >= 0:
             faces_around(steps, n, around, start)
             kind, side = steps[n, 0], 0
@@ -226,7 +226,7 @@ def transfer(steps: Ints, weights: Floats, links: Links, begin: NDArray[np.int32
             old, new = (BEFORE[kind], AFTER[kind]) if links.forward else (AFTER[kind], BEFORE[kind])
             place = exchange(kind, weights[n], links.forward, old[side], start[side], new, start, rows[p])
             faces[p] = around[place]
-            n = links.next_of_face[n, place]
+            n = np.int64(links.next_of_face[n, place])
 
 
 @compiled

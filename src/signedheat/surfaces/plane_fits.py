@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, read_only
 from ..compiled import compiled
 from ..mesh.unit_vectors import axes_across
 from ..parallel import in_chunks
@@ -139,7 +139,8 @@ def planes_near(
         distances, neighbors = tree.query(tree.data[ids], k=n_neighbors + 1)
         neighbors[:, 0] = ids  # the point itself
         fitted = axes, centers, deviations = np.zeros((len(ids), 3)), points[ids], np.zeros(len(ids))
-        robust_planes(points, neighbors, distances, np.array(heights), on_surface, STARTS if on_surface else 1, *fitted)
+        starts = STARTS if on_surface else 1
+        robust_planes(read_only(points), neighbors, distances, np.array(heights), on_surface, starts, *fitted)
         return axes, centers, distances[:, -1], deviations
 
     axes, centers, reaches, deviations = in_chunks(fit, chosen)
