@@ -570,10 +570,10 @@ class Faces(NamedTuple):
         """Collect the arrays of an intrinsic mesh."""
         table, (first_halfedge, halfedges) = triangles.edges, triangles.edges.halfedges
         first_corner, corners = grouped(triangles.corner_vertices.ravel(), triangles.n_vertices)
-        corners_and_edges = triangles.corner_positions, table.face_edges, table.forward
         corner_vertices, ends = (np.ascontiguousarray(ids) for ids in (triangles.corner_vertices, table.vertices))
-        lists = triangles.lengths_of_edges, halfedges, first_halfedge, corners, first_corner
-        return cls(read_only(corner_vertices), *corners_and_edges, ends, *lists)
+        corners_and_edges = read_only(corner_vertices), triangles.corner_positions, table.face_edges, table.forward
+        lists = halfedges, first_halfedge, corners, first_corner
+        return cls(*corners_and_edges, ends, triangles.lengths_of_edges, *lists)
 
 
 class Search(NamedTuple):
