@@ -83,8 +83,8 @@ def test_the_limit_of_a_job_counts_whose_files_are_given_back(tmp_path, monkeypa
     (group / names[1]).write_text("4000\n")
     (group / "17" / names[0]).write_text("max\n")
     (group / "memory.stat").write_text(f"anon 900\n{cached}inactive_file 2000\n{cached}active_file 1000\n")
-    monkeypatch.setattr(memory, "GROUPS", tmp_path / "own")
-    monkeypatch.setattr(memory, "ROOT", tmp_path)
+    monkeypatch.setattr(memory, "CGROUPS", tmp_path / "own")
+    monkeypatch.setattr(memory, "CGROUP_ROOT", tmp_path)
     assert available_memory() == 5000 - 4000 + 3000
 
 
@@ -203,7 +203,7 @@ def test_piecewise_fields_that_do_not_fit_name_a_number_of_triangles_that_does(m
         with refused(sh.errors.MemoryLimitError) as caught:
             sh.piecewise_distance(surface, half)
         fitting = int(caught.value.remedy.split()[3].replace(",", ""))
-        room = (free - memory.libraries()) / memory.ROOM
+        room = (free - memory.libraries()) / memory.REMEDY_MARGIN
         assert piecewise_estimate(fitting) <= room < piecewise_estimate(fitting + 1)
 
 

@@ -87,7 +87,7 @@ def test_sharpening_stops_when_asked_to(monkeypatch):
 def test_what_listens_and_is_no_scheduler_is_told(greeting, monkeypatch):
     """Dask itself waits for ever, or takes what it hears for the size of a message."""
     pytest.importorskip("distributed")
-    monkeypatch.setattr(parallel, "PATIENCE", 0.2)
+    monkeypatch.setattr(parallel, "CLUSTER_SECONDS", 0.2)
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def answer():

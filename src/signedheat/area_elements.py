@@ -32,11 +32,9 @@ from .surfaces.polygon_mesh import PolygonMesh
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
 
-NEIGHBOURS = 8
+AREA_NEIGHBORS = 8
 """Neighbours from which the area of an oriented point is estimated."""
-SIZE = 1.0
-"""Longest edge, in cells, of the simplices into which the elements of shapes are bisected."""
-ROUNDING = 1e-9
+NET_AREA_ROUNDING = 1e-9
 """Where normals cancel up to less than this fraction of the area, what is left is rounding error."""
 
 
@@ -134,7 +132,7 @@ def point_areas(points: Floats) -> Floats:
     """(n,) area, or volume in d − 1, of the disk up to the k-th neighbour over k; coinciding points share one."""
     places, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     dimension = points.shape[1] - 1
-    k = min(NEIGHBOURS, len(places) - 1)
+    k = min(AREA_NEIGHBORS, len(places) - 1)
     if dimension == 0 or k == 0:
         return np.ones(len(points)) / counts[which.ravel()]
     reach = scipy.spatial.cKDTree(places).query(places, k=[k + 1], workers=-1)[0][:, 0]
@@ -149,7 +147,7 @@ def components_of(vertices: Floats, faces: Ints) -> Ints:
 
 
 def sample_on_grid(shapes: Sequence[Any], grid: Grid) -> AreaSamples:
-    """Bisect the elements of shapes until no edge is longer than `SIZE` cells; merge them per cell and component."""
+    """Bisect the elements of shapes until no edge is longer than a cell; merge them per cell and component."""
     steps = np.zeros(4)
     steps[4 - grid.dimension :] = grid.spacing
     nodes = NodeSources.empty(padded_shape(grid.shape), steps)
@@ -165,7 +163,7 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid) -> AreaSamples:
             )
         corners = np.ascontiguousarray((elements.corners - grid.origin) / grid.spacing)
         simplices = corners, np.ascontiguousarray(elements.vectors), elements.weights, elements.components
-        samples, nodes = merge_in_cells(simplices, np.array(grid.shape), SIZE, nodes, scale)
+        samples, nodes = merge_in_cells(simplices, np.array(grid.shape), 1.0, nodes, scale)
         positions, vectors, weights, components = samples
         total += float(elements.weights.sum())
         inside += float(weights.sum())
@@ -187,7 +185,7 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid) -> AreaSamples:
             remedy="choose a smaller spacing, or scale the shape",
         )
     left = float(np.linalg.norm(vectors, axis=1).sum() / weights.sum())
-    if left < ROUNDING:
+    if left < NET_AREA_ROUNDING:
         raise CancellingNormalsError(
             "the normals of the source cancel each other everywhere, so that nothing separates inside from outside",
             remedy="remove or turn one of its coinciding sides",

@@ -25,7 +25,7 @@ def mask_of(n: int, ids: NDArray[np.integer] | list[int]) -> Bools:
 
 
 Number = TypeVar("Number", bound=np.generic)
-MOST = 6
+MOST_WRITTEN_OUT = 6
 """Arrays and sequences of up to this many numbers are written out."""
 
 
@@ -67,7 +67,7 @@ class ShortRepr:
 def short(value: object) -> str:
     """Write a value as a short text: four digits of numbers, the size of arrays."""
     if isinstance(value, np.ndarray):
-        if value.ndim == 1 and value.size <= MOST and value.dtype.kind in "biuf":
+        if value.ndim == 1 and value.size <= MOST_WRITTEN_OUT and value.dtype.kind in "biuf":
             return f"[{', '.join(short(entry) for entry in value.tolist())}]"
         what = {"b": "booleans", "f": "numbers", "i": "numbers", "u": "numbers"}.get(value.dtype.kind, "entries")
         return f"{' × '.join(map(str, value.shape))} {what}"
@@ -76,7 +76,7 @@ def short(value: object) -> str:
     if isinstance(value, dict):
         return f"{{{', '.join(f'{name}: {short(entry)}' for name, entry in value.items())}}}"
     if type(value) in (tuple, list) and isinstance(value, tuple | list):
-        if len(value) > MOST:
+        if len(value) > MOST_WRITTEN_OUT:
             return f"{len(value)} entries"
         inner = ", ".join(short(entry) for entry in value)
         return f"({inner})" if isinstance(value, tuple) else f"[{inner}]"

@@ -24,14 +24,13 @@ from typing import Any, Generic, ParamSpec, TypeVar, overload
 import numpy as np
 
 from .errors import SignedHeatError
-from .jobs import Announcement
+from .jobs import MOST_THREADS, Announcement
 from .packages import lazy_module
 
 numba: Any = lazy_module("numba", "compiled kernels")
 extending: Any = lazy_module("numba.extending", "compiled kernels")
 
 logger: logging.Logger = logging.getLogger("signedheat")
-MOST_THREADS = 1024
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """Division by zero raises nothing; and since C does not call kernels, no wrapper for it is compiled."""
 WORD = re.compile(r"\w+")

@@ -11,7 +11,7 @@ import numpy as np
 from .arrays import Floats, ShortRepr
 from .discretization import Integration, Levels, SourceTerm
 from .errors import ConstraintError
-from .validation import LARGEST, numbers, positive_number
+from .validation import LARGEST_COORDINATE, numbers, positive_number
 
 
 @runtime_checkable
@@ -134,8 +134,10 @@ class LevelValues(ShortRepr, Constraint):
 
     def __post_init__(self) -> None:
         values = np.atleast_1d(numbers(self.values, "values", ConstraintError))
-        if values.ndim != 1 or not (np.abs(values) <= LARGEST).all():
-            raise ConstraintError(f"level values must be numbers up to {LARGEST:g}, not {values}", element="values")
+        if values.ndim != 1 or not (np.abs(values) <= LARGEST_COORDINATE).all():
+            raise ConstraintError(
+                f"level values must be numbers up to {LARGEST_COORDINATE:g}, not {values}", element="values"
+            )
         object.__setattr__(self, "values", tuple(values.tolist()))
 
     def integrate(self, integration: Integration, divergence: Floats, source: SourceTerm) -> Floats:

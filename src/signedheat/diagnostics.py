@@ -10,7 +10,7 @@ import numpy as np
 
 from .arrays import Frozen, Ints, ShortRepr
 
-SMALL = 0.005
+SMALL_SHARE = 0.005
 """Fraction of the surface below which its completion, or parts that bound nothing, are not important."""
 
 
@@ -223,7 +223,7 @@ class CompletedArea(Note):
     completed_area: float  # in squared units of length
     completed_share: float  # over the area of the whole surface
     where: list[list[list[float]]]  # (k, 2, d) lower and upper corners of boxes around it
-    limits: ClassVar[Mapping[str, float]] = {"completed_share": SMALL}
+    limits: ClassVar[Mapping[str, float]] = {"completed_share": SMALL_SHARE}
 
     def __str__(self) -> str:
         text = f"{self.completed_share:.1%} of the surface is completed"
@@ -238,7 +238,7 @@ class BoundsNothing(Note):
     """Fraction of the area that bounds nothing: both of its sides are outside, and distance to it is positive."""
 
     open_area: float
-    limits: ClassVar[Mapping[str, float]] = {"open_area": SMALL}
+    limits: ClassVar[Mapping[str, float]] = {"open_area": SMALL_SHARE}
     text: ClassVar[str] = "{0.open_area:.1%} of the area bounds nothing: distance to it is positive on both sides"
 
 

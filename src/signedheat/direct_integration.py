@@ -19,17 +19,15 @@ from .errors import ConstraintError
 from .linear import Factor, PardisoFactor, factorize, upper_triangle, whole
 from .linear.conjugate_gradients import conjugate_gradients
 
-MAX_ROUNDS, MAX_INNER = 12, 30
-"""Largest number of rounds with which exact constraints are imposed, and of conjugate gradients within one."""
-MOST_GROWTH = 10.0
+CONTRADICTORY_GROWTH = 10.0
 """Growth of φ in one round above which rows contradict each other."""
-SOFTEST, STIFFEST = 1e-10, 1e10
+SOFTEST_SPRING, STIFFEST_SPRING = 1e-10, 1e10
 """Strengths of springs, relative to C, below and above which their strength makes no difference beyond rounding."""
-BATCH = 32
+COLUMNS_AT_ONCE = 32
 """Right-hand sides solved at a time."""
-PIN = 1e6
+PIN_STIFFNESS = 1e6
 """Stiffness of the springs at vertices on the source, relative to the largest diagonal entry of C."""
-ANCHOR = 10.0
+LEAST_STIFFNESS = 10.0
 """Least stiffness of all springs together that hold φ, relative to the same."""
 
 
@@ -82,8 +80,8 @@ class DirectIntegration(Frozen):
         loads = sparse.csr_matrix(entries, shape=(len(group), len(free)))
         _, pull = self._interpolate(rows, divergence[:, None], values[:, None])
         capacitance = np.empty((len(free), len(free)))
-        for begin in range(0, len(free), BATCH):
-            batch = slice(begin, begin + BATCH)
+        for begin in range(0, len(free), COLUMNS_AT_ONCE):
+            batch = slice(begin, begin + COLUMNS_AT_ONCE)
             lifted = loads[:, batch].toarray()
             _, multipliers = self._interpolate(rows, np.zeros((len(divergence), lifted.shape[1])), lifted)
             capacitance[:, batch] = loads.T @ multipliers
@@ -94,9 +92,9 @@ class DirectIntegration(Frozen):
     def penalize(self, divergence: Floats, source: SourceTerm, strength: float) -> Floats:
         """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the line or area elements, up to λ = ∞."""
         rows, stiffest = source.interpolation, float(self.stiffness.diagonal().max())
-        if strength * float(source.weights.sum()) < SOFTEST * stiffest:
+        if strength * float(source.weights.sum()) < SOFTEST_SPRING * stiffest:
             return self.solve(divergence, source)
-        strength = min(strength, STIFFEST * stiffest / float(source.weights.max()))
+        strength = min(strength, STIFFEST_SPRING * stiffest / float(source.weights.max()))
         return self._reached(self._pulled_factor(rows, strength * source.weights).solve(divergence), rows)
 
     def anchored(self, source: SourceTerm) -> Factor:
@@ -122,12 +120,12 @@ class DirectIntegration(Frozen):
 
         values, multipliers = np.zeros_like(forces), np.zeros_like(levels)
         gap, worst, slow = levels, np.inf, False
-        for _ in range(MAX_ROUNDS):
+        for _ in range(12):
             displacements = gap
             if slow:  # roughly: what remains is left to the next round
-                displacements = conjugate_gradients(lambda d: rows @ pull(d), gap, tolerance=1e-3, limit=MAX_INNER)
+                displacements = conjugate_gradients(lambda d: rows @ pull(d), gap, tolerance=1e-3, limit=30)
             step = factor.solve(forces - stiffness @ values - rows.T @ multipliers) + pull(displacements)
-            if worst < np.inf and np.abs(step).max() > MOST_GROWTH * np.abs(values).max():
+            if worst < np.inf and np.abs(step).max() > CONTRADICTORY_GROWTH * np.abs(values).max():
                 break
             values += step
             multipliers -= spring * (displacements - rows @ step)
@@ -232,16 +230,16 @@ class SpringIntegration(DirectIntegration):
             members = sparse.csr_matrix(entries, shape=(len(springs), len(others)))
             forces = sparse.csr_matrix(members.T @ sparse.diags_array(springs))
             balance = np.empty((len(others), len(others)))
-            for begin in range(0, len(others), BATCH):
-                lifted = members[:, begin : begin + BATCH].toarray()
-                balance[:, begin : begin + BATCH] = forces @ (lifted - rows @ factor.solve(pull @ lifted))
+            for begin in range(0, len(others), COLUMNS_AT_ONCE):
+                lifted = members[:, begin : begin + COLUMNS_AT_ONCE].toarray()
+                balance[:, begin : begin + COLUMNS_AT_ONCE] = forces @ (lifted - rows @ factor.solve(pull @ lifted))
             constants = np.linalg.lstsq(balance, forces @ (rows @ fitted - values), rcond=None)[0]
             fitted = fitted + factor.solve(pull @ (members @ constants))
         return self._centered(fitted, source)
 
     def anchored(self, source: SourceTerm) -> Factor:
         """Factor of C with φ held at zero along the source, however small a part of it lies in the domain."""
-        springs, least = self.springs(source), ANCHOR * float(self.stiffness.diagonal().max())
+        springs, least = self.springs(source), LEAST_STIFFNESS * float(self.stiffness.diagonal().max())
         return self._pulled_factor(source.interpolation, springs * max(1.0, least / float(springs.sum())))
 
     def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, Floats]:
@@ -251,7 +249,7 @@ class SpringIntegration(DirectIntegration):
     def springs(self, source: SourceTerm) -> Floats:
         """(s,) stiffness of the springs: stiff for samples at vertices, soft for those inside cells."""
         at_vertex = np.diff(source.interpolation.indptr) == 1
-        return np.where(at_vertex, PIN * self.stiffness.diagonal().max(), self.strength * source.weights)
+        return np.where(at_vertex, PIN_STIFFNESS * self.stiffness.diagonal().max(), self.strength * source.weights)
 
     def corrected(self, levels: Floats, solve: Callable[[Floats], Floats], source: SourceTerm) -> tuple[Floats, Floats]:
         """Return the levels that the linear interpolant of φ is given, and φ."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .arrays import Floats, Ints
 from .errors import UnsupportedTypeError
-from .exchange import TAKEN
+from .exchange import ACCEPTED_SHAPES
 
 
 class SourceTerm(Protocol):
@@ -128,4 +128,4 @@ class Levels:
 @singledispatch
 def discretize(domain: Any) -> Discretization:
     """Lower a domain to its discretisation; every kind of domain registers a function of its own."""
-    raise UnsupportedTypeError(f"{type(domain).__name__} is not a domain", remedy=f"use a Grid, or {TAKEN}")
+    raise UnsupportedTypeError(f"{type(domain).__name__} is not a domain", remedy=f"use a Grid, or {ACCEPTED_SHAPES}")

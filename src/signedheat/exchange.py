@@ -21,7 +21,7 @@ from .mesh.tet_shapes import face_table, signed_volumes
 from .packages import lazy_module
 from .validation import array_of, coordinates, element_ids
 
-TAKEN = "a shape of signedheat, trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces)"
+ACCEPTED_SHAPES = "a shape of signedheat, trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces)"
 """What functions accept as a shape, for messages."""
 
 if TYPE_CHECKING:
@@ -40,21 +40,21 @@ windows: Any = lazy_module("signedheat.view.windows", "windows")
 Kind = TypeVar("Kind", bound="Exchangeable[Any]")
 Trimesh = TypeVar("Trimesh")
 """The type of trimesh that corresponds to a kind of shape."""
-NAME = "signed_distance"
+VALUES_NAME = "signed_distance"
 """Name of the values of a field in objects of PyVista and in files."""
-_SIDES = {"triangle": 3, "quad": 4}
+CELL_SIDES = {"triangle": 3, "quad": 4}
 """Number of sides of faces, by the type of cell of meshio; other polygons are ``polygon``."""
 _VTK_FACES = (5, 7, 9)
 """Types of cells of VTK that are faces: triangles, polygons and quadrilaterals; `_VTK_TETRA` is that of tets."""
 _VTK_TETRA = 10
-FLAT = ("vertex", "line", "triangle", "quad", "polygon")
+FLAT_CELLS = ("vertex", "line", "triangle", "quad", "polygon")
 """Beginnings of the names that meshio gives to cells without a volume; beside tets these are left out."""
 
 
 def with_values(thing: Any, values: NDArray[np.floating]) -> Any:
     """Give an object of PyVista the values of a field at its points."""
-    thing.point_data[NAME] = np.array(values)
-    thing.set_active_scalars(NAME)
+    thing.point_data[VALUES_NAME] = np.array(values)
+    thing.set_active_scalars(VALUES_NAME)
     return thing
 
 
@@ -372,7 +372,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         cells = []
         for first, last in zip(change, [*change[1:], len(counts)], strict=True):
             sides = int(counts[first])
-            name = next((name for name, n in _SIDES.items() if n == sides), "polygon")
+            name = next((name for name, n in CELL_SIDES.items() if n == sides), "polygon")
             cells.append((name, corners[starts[first] : starts[first] + sides * (last - first)].reshape(-1, sides)))
         return meshio.Mesh(points, cells)
 
@@ -484,7 +484,7 @@ def from_meshio(thing: Any, as_points: bool = False) -> Elements:
     """From a `meshio.Mesh`: its polygons, else its tets; `as_points`, a mesh of other cells alone is a cloud."""
     if not hasattr(thing, "cells") or not hasattr(thing, "points"):
         raise _no_shape(thing, "a Mesh", "read it with meshio.read")
-    blocks = [block.data for block in thing.cells if block.type in _SIDES or block.type.startswith("polygon")]
+    blocks = [block.data for block in thing.cells if block.type in CELL_SIDES or block.type.startswith("polygon")]
     if not blocks and any(block.type == "tetra" for block in thing.cells):
         return Elements(thing.points, tets=tets_of_meshio(thing))
     others = [block.type for block in thing.cells if block.type != "vertex"]
@@ -500,7 +500,7 @@ def from_meshio(thing: Any, as_points: bool = False) -> Elements:
 def tets_of_meshio(mesh: Any) -> Ints:
     """(t, 4) the tets of a `meshio.Mesh`; no other part of a volume may be left out."""
     kinds = sorted({block.type for block in mesh.cells})
-    if "tetra" not in kinds or not all(kind == "tetra" or kind.startswith(FLAT) for kind in kinds):
+    if "tetra" not in kinds or not all(kind == "tetra" or kind.startswith(FLAT_CELLS) for kind in kinds):
         held = ", ".join(kinds) or "no cells"
         raise GeometryError(f"it holds {held}, not tets alone", remedy="convert it to linear tetrahedra first")
     blocks = [block.data for block in mesh.cells if block.type == "tetra"]

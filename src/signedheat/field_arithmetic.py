@@ -21,7 +21,7 @@ files: Any = lazy_module("signedheat.io.field_files", "files")
 Change = Callable[[NDArray[Any]], NDArray[Any]]
 Rule = Callable[[Floats, Floats], Floats]
 Number = float | np.number[Any]
-NUMBERS = (int, float, np.number)
+NUMBER_TYPES = (int, float, np.number)
 
 
 class HasValues(Protocol):
@@ -80,23 +80,23 @@ class Arithmetic:
         return self._scaled(-1.0)
 
     def __mul__(self: AnyField, factor: Number) -> AnyField:
-        return self._scaled(float(factor)) if isinstance(factor, NUMBERS) else NotImplemented
+        return self._scaled(float(factor)) if isinstance(factor, NUMBER_TYPES) else NotImplemented
 
     def __truediv__(self: AnyField, divisor: Number) -> AnyField:
-        if not isinstance(divisor, NUMBERS):
+        if not isinstance(divisor, NUMBER_TYPES):
             return NotImplemented
         return self._scaled(1.0 / float(divisor)) if divisor else self._mapped(lambda phi: phi / divisor)
 
     def __add__(self: AnyField, summand: Number) -> AnyField:
-        if not isinstance(summand, NUMBERS):
+        if not isinstance(summand, NUMBER_TYPES):
             return NotImplemented
         return self._mapped(lambda phi: phi + summand) if summand else self._scaled(1.0)
 
     def __sub__(self: AnyField, level: Number) -> AnyField:
-        return Arithmetic.__add__(self, -float(level)) if isinstance(level, NUMBERS) else NotImplemented
+        return Arithmetic.__add__(self, -float(level)) if isinstance(level, NUMBER_TYPES) else NotImplemented
 
     def __rsub__(self: AnyField, level: Number) -> AnyField:
-        return self._mapped(lambda phi: level - phi) if isinstance(level, NUMBERS) else NotImplemented
+        return self._mapped(lambda phi: level - phi) if isinstance(level, NUMBER_TYPES) else NotImplemented
 
     def _scaled(self: AnyField, factor: float) -> AnyField:
         return self._mapped(lambda phi: phi * factor)
@@ -135,7 +135,7 @@ class Combinable(Arithmetic):
 
     def __sub__(self: Solid, other: Solid | Number) -> Solid:
         """Difference: inside where this is and the other is not. Of a number, it is taken from the values."""
-        if isinstance(other, NUMBERS):
+        if isinstance(other, NUMBER_TYPES):
             return Arithmetic.__sub__(self, other)
         exact = _of_solids(self, other, operator.sub)
         if exact is not None:

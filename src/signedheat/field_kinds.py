@@ -31,7 +31,7 @@ Field = GridField | VertexField | TetField
 AnyField = TypeVar("AnyField", GridField, VertexField, TetField, Field)
 SMALL_LOOP = 3.5
 """Length of a loop, in sides of the triangles that it crosses, below which a quarter or more of its heat cancels."""
-NEAREST = 8
+JOINED_NEIGHBORS = 8
 """Number of nearest points to which a point is joined: on a surface about six lie around a point."""
 
 
@@ -136,10 +136,10 @@ def spread(points: Floats, values: Floats, used: Bools) -> Floats:
     """(n,) signed distances, continued by the way between neighbours among the `used` (n,) where they are NaN."""
     lacking = np.isnan(values) & used
     ids = np.flatnonzero(used)
-    if not lacking.any() or len(ids) <= NEAREST:
+    if not lacking.any() or len(ids) <= JOINED_NEIGHBORS:
         return values
-    far, near = scipy.spatial.cKDTree(points[ids]).query(points[ids], k=NEAREST + 1)
-    rows = np.repeat(np.arange(len(ids)), NEAREST)
+    far, near = scipy.spatial.cKDTree(points[ids]).query(points[ids], k=JOINED_NEIGHBORS + 1)
+    rows = np.repeat(np.arange(len(ids)), JOINED_NEIGHBORS)
     graph = sparse.csr_matrix(
         (np.maximum(far[:, 1:].ravel(), 1e-300), (rows, near[:, 1:].ravel())), shape=(len(ids),) * 2
     )

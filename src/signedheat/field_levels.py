@@ -12,10 +12,8 @@ from .errors import OutsideError
 from .grids.grid import Grid
 from .grids.marching import CLEARANCE
 
-CLOSE = 1e-3
+LEVEL_ACCURACY = 1e-3
 """Distance from a level, in cells, at which a point is close enough."""
-ROUNDS = 10
-"""Upper bound of the number of iterations; few points need more than 4."""
 
 
 class NodeValues(Protocol):
@@ -55,10 +53,10 @@ def on_level(
     crossed = (low < 0) != (high < 0)
     movable, low, high = movable[crossed], low[crossed], high[crossed]
     moved = np.array(points, dtype=np.float64)
-    base, axis, far = base[movable], axis[movable], CLOSE * float(grid.spacing.min())
+    base, axis, far = base[movable], axis[movable], LEVEL_ACCURACY * float(grid.spacing.min())
     start, stop, last = np.zeros(len(base)), np.ones(len(base)), np.zeros(len(base), dtype=np.int8)
     active = np.arange(len(base))
-    for _ in range(ROUNDS):
+    for _ in range(10):  # few points need more than 4
         if not len(active):
             break
         share = low[active] / (low[active] - high[active])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import SourceError, UnsupportedTypeError
-from .exchange import ELEMENTS_OF, TAKEN, Elements
+from .exchange import ACCEPTED_SHAPES, ELEMENTS_OF, Elements
 from .surfaces.digital_surface import DigitalSurface
 from .surfaces.point_cloud import PointCloud
 from .surfaces.polygon_mesh import PolygonMesh
@@ -90,8 +90,8 @@ def what_to_pass(thing: object) -> str:
     if isinstance(thing, DigitalSurface):
         return "pass its smooth_surface, or its squares"
     if isinstance(thing, np.ndarray) and thing.ndim == 2:
-        return f"for points alone pass sh.PointCloud(points), otherwise {TAKEN}"
-    return f"pass {TAKEN}"
+        return f"for points alone pass sh.PointCloud(points), otherwise {ACCEPTED_SHAPES}"
+    return f"pass {ACCEPTED_SHAPES}"
 
 
 def package_of(thing: object) -> str | None:

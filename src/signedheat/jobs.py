@@ -19,6 +19,8 @@ Result = TypeVar("Result")
 
 logger: logging.Logger = logging.getLogger("signedheat")
 
+MOST_THREADS = 1024
+"""Largest number of threads, or of processes, that is accepted."""
 CLEAR_LINE = "\r\x1b[2K"
 """Clears a progress bar from a terminal."""
 
@@ -79,9 +81,7 @@ def within(progress: Progress | None, start: float, stop: float) -> Progress | N
     return lambda fraction, step: whole(start + fraction * (stop - start), step)
 
 
-INTERVAL = 0.1
-"""Seconds between progress reports."""
-RUN = (
+ENTRY_PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from importlib import import_module; "
     "module, name = sys.argv[2].split(':'); getattr(import_module(module), name)(*sys.argv[3:])"
 )
@@ -89,7 +89,7 @@ RUN = (
 
 
 def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:
-    """Run a job on its own thread, call `report` every `INTERVAL` seconds until it ends, and return its result.
+    """Run a job on its own thread, call `report` every tenth of a second until it ends, and return its result.
 
     An exception from `report` is raised at once; the job then runs on in the background and its result is dropped.
     """
@@ -106,7 +106,7 @@ def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -
     Thread(target=run, daemon=True).start()
     while True:
         try:
-            return future.result(INTERVAL)
+            return future.result(0.1)
         except FutureTimeout:
             if future.done():  # the timeout is the job's own
                 raise
@@ -130,4 +130,4 @@ def command_for(entry: str, *arguments: str) -> list[str]:
     It can import what this one can, and nothing from the current folder, which ``python -c`` would search first.
     """
     path = [os.path.abspath(folder) for folder in sys.path if folder]
-    return [sys.executable, "-I", "-c", RUN, json.dumps(path), entry, *arguments]
+    return [sys.executable, "-I", "-c", ENTRY_PROGRAM, json.dumps(path), entry, *arguments]

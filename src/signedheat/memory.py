@@ -19,26 +19,26 @@ from .errors import MemoryLimitError
 P = ParamSpec("P")
 T = TypeVar("T")
 
-GROUPS = Path("/proc/self/cgroup")
+CGROUPS = Path("/proc/self/cgroup")
 """Lists the control groups of this process, a line ``id:controllers:path`` each."""
-ROOT = Path("/sys/fs/cgroup")
+CGROUP_ROOT = Path("/sys/fs/cgroup")
 """Folder of the groups of version 2, with those of version 1 in ``memory``."""
-FILES = {"": ("memory.max", "memory.current"), "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes")}
+CGROUP_FILES = {"": ("memory.max", "memory.current"), "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes")}
 """Files with the limit and the usage of a group, by the controllers in its line: versions 2 and 1."""
-UNLOADED, IMPORTED, LOADED = 45_000_000, 24_000_000, 7_000_000
+BYTES_UNLOADED, BYTES_IMPORTED, BYTES_LOADED = 45_000_000, 24_000_000, 7_000_000
 """Bytes that libraries will still allocate: before Numba is imported, after that, and after the first kernel. Cached
 files of libraries, 75 to 140 MB, are not counted, since the system can free them."""
-MAPPED = {"VmSize": 685_000_000, "VmData": 165_000_000}
+BYTES_MAPPED = {"VmSize": 685_000_000, "VmData": 165_000_000}
 """Bytes that libraries map but hardly touch; they count towards limits on address space and data."""
-ROOM = 1.1
+REMEDY_MARGIN = 1.1
 """Safety factor of the size that a remedy names, since free memory changes between calls."""
 
 
 def libraries() -> int:
     """Bytes that libraries will still allocate, mostly for the compiler that the first kernel loads."""
     if made:
-        return LOADED
-    return IMPORTED if "numba" in sys.modules else UNLOADED
+        return BYTES_LOADED
+    return BYTES_IMPORTED if "numba" in sys.modules else BYTES_UNLOADED
 
 
 def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float], remedy: Callable[[int], str]) -> None:
@@ -49,7 +49,7 @@ def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float]
         return
     raise MemoryLimitError(
         f"{what} needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free",
-        remedy=remedy(fitting_count(count, estimate, (available - libraries()) / ROOM)),
+        remedy=remedy(fitting_count(count, estimate, (available - libraries()) / REMEDY_MARGIN)),
     )
 
 
@@ -113,11 +113,11 @@ def _free() -> int | None:
 
 def _containers() -> list[int]:
     """Memory that each control group around this process leaves, up to the root."""
-    lines = [line.split(":", 2) for line in _text(GROUPS).splitlines() if line.count(":") > 1]
+    lines = [line.split(":", 2) for line in _text(CGROUPS).splitlines() if line.count(":") > 1]
     own = {controllers: path for _, controllers, path in lines}
     left = []
-    for controllers, names in FILES.items():
-        root = ROOT / controllers
+    for controllers, names in CGROUP_FILES.items():
+        root = CGROUP_ROOT / controllers
         group = root / own.get(controllers, "/").lstrip("/")
         for place in (group, *(parent for parent in group.parents if parent.is_relative_to(root))):
             limit, used = (_text(place / name).strip() for name in names)
@@ -141,9 +141,9 @@ def _own_limits() -> list[int]:
     held = _fields("/proc/self/status")
     kinds = {"VmSize": resource.RLIMIT_AS, "VmData": resource.RLIMIT_DATA}
     limits = {name: resource.getrlimit(kind)[0] for name, kind in kinds.items() if name in held}
-    share = libraries() / UNLOADED
+    share = libraries() / BYTES_UNLOADED
     return [
-        limit - 1024 * held[name] - int(share * MAPPED[name])
+        limit - 1024 * held[name] - int(share * BYTES_MAPPED[name])
         for name, limit in limits.items()
         if limit != resource.RLIM_INFINITY
     ]

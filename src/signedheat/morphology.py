@@ -58,12 +58,12 @@ __all__ = [
     "smooth_union", "thicken",
 ]  # fmt: skip
 
-ROOM_FOR_OFFSETS = 0.15
+OFFSET_PADDING = 0.15
 """Padding of a shape in addition to its offsets, relative to its longest side."""
-LIMITS = {"round": 1.0, "mitre": 2.0, "sharp": 10.0}
+MITRE_LIMITS = {"round": 1.0, "mitre": 2.0, "sharp": 10.0}
 """Largest length of mitres, relative to the distance. With 2, edges and corners of boxes stay whole, and edges between
 faces less than 60° apart are cut off; with 10, those of less than 12°."""
-SIDES = 64
+DRAIN_SIDES = 64
 """Number of sides of a drain hole."""
 
 Boundary: TypeAlias = TriangleMesh | list[Polyline] | list[Curve]
@@ -273,8 +273,8 @@ def offset(
     >>> grown.bounds[:, 2].round(2).tolist()
     [-1.1, 1.3]
     """
-    if corners not in LIMITS:
-        raise SignedHeatError(f"corners are {', '.join(LIMITS)}, not {corners!r}", element="corners")
+    if corners not in MITRE_LIMITS:
+        raise SignedHeatError(f"corners are {', '.join(MITRE_LIMITS)}, not {corners!r}", element="corners")
     solid = complete(shape)
     reach: float | Reach
     if callable(distance):
@@ -287,10 +287,10 @@ def offset(
         reach = largest = finite_number(distance, "the distance")
     sides = np.array([[-1.0], [1.0]])
     grid = Grid.around(solid.bounds + sides * max(largest, 0.0), resolution, None, spacing)
-    if LIMITS[corners] > 1:
-        bounds = solid.bounds + sides * LIMITS[corners] * max(largest, 0.0)
+    if MITRE_LIMITS[corners] > 1:
+        bounds = solid.bounds + sides * MITRE_LIMITS[corners] * max(largest, 0.0)
         grid = Grid.around(bounds, padding=2 * float(grid.spacing.max()), spacing=grid.spacing)
-    return sharp_surface(Offset(solid, reach, LIMITS[corners]), grid, progress)
+    return sharp_surface(Offset(solid, reach, MITRE_LIMITS[corners]), grid, progress)
 
 
 def offset_of(field: Any, distance: float) -> Any:
@@ -543,13 +543,20 @@ def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
     bottom = cavity[cavity[:, 2] <= low + 0.5 * lift]
     room = complete(wall, as_oriented=True).distance(np.column_stack([bottom[:, :2], np.full(len(bottom), low + lift)]))
     x, y = bottom[np.argmax(np.round(room / cell, 6)), :2]  # the first of equally wide places
-    angles = 2 * np.pi * np.arange(SIDES) / SIDES
+    angles = 2 * np.pi * np.arange(DRAIN_SIDES) / DRAIN_SIDES
     rim = np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles)])
     ends = wall.bounds[0, 2] - diameter, low + lift
-    vertices = np.concatenate([*(np.column_stack([rim, np.full(SIDES, z)]) for z in ends), [[x, y, z] for z in ends]])
-    a, b = np.arange(SIDES), np.roll(np.arange(SIDES), -1)
-    below, above = np.full(SIDES, 2 * SIDES), np.full(SIDES, 2 * SIDES + 1)
-    sides = (a, b, below), (b + SIDES, a + SIDES, above), (b, a, b + SIDES), (a, a + SIDES, b + SIDES)  # facing inwards
+    vertices = np.concatenate(
+        [*(np.column_stack([rim, np.full(DRAIN_SIDES, z)]) for z in ends), [[x, y, z] for z in ends]]
+    )
+    a, b = np.arange(DRAIN_SIDES), np.roll(np.arange(DRAIN_SIDES), -1)
+    below, above = np.full(DRAIN_SIDES, 2 * DRAIN_SIDES), np.full(DRAIN_SIDES, 2 * DRAIN_SIDES + 1)
+    sides = (
+        (a, b, below),
+        (b + DRAIN_SIDES, a + DRAIN_SIDES, above),
+        (b, a, b + DRAIN_SIDES),
+        (a, a + DRAIN_SIDES, b + DRAIN_SIDES),
+    )  # facing inwards
     faces = np.concatenate([np.stack(each, axis=1) for each in sides])
     both = concatenated([(wall.vertices, wall.faces), (vertices, faces)])
     solid = complete(TriangleMesh(*both), as_oriented=True)
@@ -586,7 +593,7 @@ def _given_or_room(domain: Domain | None, shape: Sources, reach: float, resoluti
         raise SourceError("a Curve lies on a surface", remedy="pass that surface as the domain")
     bounds = bounds_around(shapes)
     nodes = RESOLUTION if resolution is None else resolution
-    return Grid.around(bounds, nodes, room_around(bounds, reach, ROOM_FOR_OFFSETS))
+    return Grid.around(bounds, nodes, room_around(bounds, reach, OFFSET_PADDING))
 
 
 def _grid(domain: object) -> Grid[Literal[3]]:

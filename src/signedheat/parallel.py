@@ -17,11 +17,11 @@ from .packages import lazy_module
 
 distributed: Any = lazy_module("distributed", "Dask clusters")
 
-CHUNK = 1 << 13
+ROWS_PER_TASK = 1 << 13
 """Rows per task of a thread."""
-PATIENCE = 30.0
+CLUSTER_SECONDS = 30.0
 """Seconds to wait for a cluster to answer."""
-GREETING = 1 << 20
+MOST_GREETING = 1 << 20
 """Upper bound of the bytes in the first message of a Dask scheduler."""
 
 
@@ -39,9 +39,9 @@ def in_chunks(
 
     The result does not depend on the number of threads. Each thread needs additional memory for one chunk.
     """
-    if len(rows) <= CHUNK:
+    if len(rows) <= ROWS_PER_TASK:
         return function(rows)
-    first = function(rows[:CHUNK])
+    first = function(rows[:ROWS_PER_TASK])
     results = tuple(np.empty((len(rows), *part.shape[1:]), dtype=part.dtype) for part in first)
 
     def fill(start: int, parts: tuple[NDArray[Any], ...]) -> None:
@@ -50,8 +50,8 @@ def in_chunks(
 
     fill(0, first)
     with ThreadPoolExecutor(n_threads()) as pool:
-        starts = range(CHUNK, len(rows), CHUNK)
-        for job in [pool.submit(lambda k: fill(k, function(rows[k : k + CHUNK])), start) for start in starts]:
+        starts = range(ROWS_PER_TASK, len(rows), ROWS_PER_TASK)
+        for job in [pool.submit(lambda k: fill(k, function(rows[k : k + ROWS_PER_TASK])), start) for start in starts]:
             job.result()
     return results
 
@@ -62,7 +62,7 @@ def connected(address: str) -> Any:
     try:
         if comm.parse_address(address)[0] == "tcp":
             _hear_greeting(*comm.get_address_host_port(address))
-        return run_limited(lambda: distributed.Client(address, timeout=PATIENCE), 2 * PATIENCE)
+        return run_limited(lambda: distributed.Client(address, timeout=CLUSTER_SECONDS), 2 * CLUSTER_SECONDS)
     except Exception as error:  # Dask raises exceptions of many types
         reason = " ".join(str(error).split()) or type(error).__name__
         raise SignedHeatError(
@@ -74,10 +74,10 @@ def connected(address: str) -> Any:
 
 def _hear_greeting(host: str, port: int) -> None:
     """Refuse a listener that is not a scheduler, for which Dask would wait or allocate too much."""
-    with socket.create_connection((host, port), PATIENCE) as connection:
+    with socket.create_connection((host, port), CLUSTER_SECONDS) as connection:
         try:
             heard = connection.recv(8, socket.MSG_WAITALL)
         except TimeoutError:
             heard = b""
-    if len(heard) < 8 or int.from_bytes(heard, "little") > GREETING:
+    if len(heard) < 8 or int.from_bytes(heard, "little") > MOST_GREETING:
         raise ConnectionError("the listener there is not a scheduler")

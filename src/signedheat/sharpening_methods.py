@@ -38,9 +38,9 @@ from .surfaces.vertex_field import VertexField
 from .tets.tet_field import TetField
 from .validation import finite_number, positive_number
 
-WORSE = 0.1
+ADDED_SLOPE_ERROR = 0.1
 """Mean deviation of slopes from 1, each counted as 1 at most, that sharpening may add; .08 on triangles."""
-TO_CURVES = 1e-5
+CURVE_TOLERANCE = 1e-5
 """Tolerance of distance to curves. At a tenth of that of `Geodesic`, distance depends on the order of faces by less
 than 1e-6 of its range."""
 
@@ -355,9 +355,9 @@ def sharpened(
     if source is None:
         run = partial(method.sharpened, discretization, elements, values, field.source, progress)
     else:
-        run = partial(distance_to_nearest, discretization, values, field.source, source, TO_CURVES, progress)
+        run = partial(distance_to_nearest, discretization, values, field.source, source, CURVE_TOLERANCE, progress)
     new, diagnostics = timed(run, field.diagnostics, progress)
-    worse = elements.bounded_slope_error(new) > 1.5 * elements.bounded_slope_error(values) + WORSE
+    worse = elements.bounded_slope_error(new) > 1.5 * elements.bounded_slope_error(values) + ADDED_SLOPE_ERROR
     errors = SlopeErrors(elements.slope_error(values), elements.slope_error(new), worse)
     if worse:
         warn_user(f"sharpening made the field worse: {errors}", InexactWarning)

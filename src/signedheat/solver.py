@@ -32,7 +32,7 @@ from .tets.tet_field import TetField
 from .tets.tet_mesh import TetMesh
 from .validation import positive_number
 
-_BATCH = 16  # sources diffused at a time
+SOURCES_AT_ONCE = 16  # sources diffused at a time
 
 AnyDomain = TypeVar("AnyDomain", bound=Domain | ForeignShape, covariant=True)
 
@@ -264,8 +264,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             ) from None
         report = within(self.progress, 0.4, 1.0)  # before, the domain is discretised
         fields: list[Field] = []
-        for begin in range(0, len(listed), _BATCH):
-            batch = (self._prepared(each, constraint) for each in listed[begin : begin + _BATCH])
+        for begin in range(0, len(listed), SOURCES_AT_ONCE):
+            batch = (self._prepared(each, constraint) for each in listed[begin : begin + SOURCES_AT_ONCE])
             for (discretization, _, imposed), run in groupby(
                 batch, lambda each: (each.discretization, each.times, each.constraint)
             ):

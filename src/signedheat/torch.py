@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 torch: Any = lazy_module("torch", "tensors")
 
-SAME = 1e-5
+UNMOVED = 1e-5
 """Difference between vertices and those of the solid, over the greatest coordinate: what single precision rounds off,
 and no step of an optimiser."""
 
@@ -84,7 +84,7 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
             )
         vertices = torch.as_tensor(vertices)
         now, then = vertices.detach().cpu().double().numpy(), solid.source.vertices
-        if now.shape != then.shape or not np.abs(now - then).max() <= SAME * np.abs(then).max():
+        if now.shape != then.shape or not np.abs(now - then).max() <= UNMOVED * np.abs(then).max():
             raise SourceError(
                 "the vertices differ from those of the completed mesh",
                 remedy="complete the mesh again after each step",

@@ -20,7 +20,7 @@ from .surfaces.polygon_mesh import PolygonMesh
 from .surfaces.surface_curves import Curve, SurfacePoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
-from .validation import LARGEST, SMALLEST, numbers
+from .validation import LARGEST_COORDINATE, SMALLEST_EXTENT, numbers
 
 
 def transform(
@@ -58,12 +58,13 @@ def transform(
     whole = numbers(matrix, "matrix")
     if whole.shape == (4, 4) and np.array_equal(whole[3], [0, 0, 0, 1]):
         whole = whole[:3]
-    if whole.shape != (3, 4) or not (np.abs(whole) <= LARGEST).all():
+    if whole.shape != (3, 4) or not (np.abs(whole) <= LARGEST_COORDINATE).all():
         raise GeometryError(
-            f"a transform is a matrix of 4 × 4 numbers up to {LARGEST:g} with the last row 0 0 0 1, or of 3 × 4",
+            f"a transform is a matrix of 4 × 4 numbers up to {LARGEST_COORDINATE:g} with the last row 0 0 0 1, "
+            "or of 3 × 4",
             element=f"matrix of shape {whole.shape}",
         )
-    linear = whole[:, :3] / max(float(np.abs(whole[:, :3]).max()), SMALLEST)
+    linear = whole[:, :3] / max(float(np.abs(whole[:, :3]).max()), SMALLEST_EXTENT)
     if abs(np.linalg.det(linear)) <= 1e-12 * np.linalg.norm(linear) ** 3:
         raise GeometryError("the transform flattens the shape", remedy="check the matrix", element="matrix")
     stays = transformed.dispatch(type(shape)) is not transformed.dispatch(object)

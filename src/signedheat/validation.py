@@ -16,13 +16,13 @@ from .memory import within_memory
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
-LARGEST = 1e40
+LARGEST_COORDINATE = 1e40
 """Largest coordinate. Squared volumes, the largest powers of lengths that are computed, then stay finite."""
-SMALLEST = 1e-40
+SMALLEST_EXTENT = 1e-40
 """Smallest extent of a shape."""
-LEAST_STEP = 1e-13
+LEAST_SPACING = 1e-13
 """Least spacing, relative to coordinates, so that nodes are more than a few digits apart."""
-_MOST = 2**63
+INT64_END = 2**63
 
 
 def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
@@ -61,8 +61,8 @@ def whole_numbers(values: object, name: str, error: type[SignedHeatError] = Geom
     """`values` as a new int64 array of any shape; whatever holds anything but integers is refused."""
     array = array_of(values, name, error)
     if array.dtype.kind == "O" and array.size and all(isinstance(value, Integral) for value in array.ravel()):
-        array = array.astype(np.int64) if all(abs(int(value)) < _MOST for value in array.ravel()) else array
-    if array.dtype.kind not in "iu" or (array.size and array.dtype == np.uint64 and array.max() >= _MOST):
+        array = array.astype(np.int64) if all(abs(int(value)) < INT64_END for value in array.ravel()) else array
+    if array.dtype.kind not in "iu" or (array.size and array.dtype == np.uint64 and array.max() >= INT64_END):
         raise error(f"{name} must be integers of at most 63 bits, not {_described(array)}", element=name)
     return array.astype(np.int64)
 
@@ -111,20 +111,20 @@ def coordinates(
 
 
 def refuse_extreme(lower: Floats, upper: Floats, name: str, error: type[SignedHeatError] = GeometryError) -> None:
-    """Refuse a box that reaches beyond `LARGEST`, or is smaller than `SMALLEST` but no point."""
+    """Refuse a box that reaches beyond `LARGEST_COORDINATE`, or is smaller than `SMALLEST_EXTENT` but no point."""
     with np.errstate(over="ignore"):  # from one end of what can be written to the other
         farthest, extent = float(max(-lower.min(), upper.max())), float((upper - lower).max())
-    if farthest > LARGEST or 0 < extent < SMALLEST:
-        what = f"reach as far as {farthest:.3g}" if farthest > LARGEST else f"extend over {extent:.3g} only"
+    if farthest > LARGEST_COORDINATE or 0 < extent < SMALLEST_EXTENT:
+        what = f"reach as far as {farthest:.3g}" if farthest > LARGEST_COORDINATE else f"extend over {extent:.3g} only"
         raise error(
-            f"{name} {what}, and lengths from {SMALLEST:g} to {LARGEST:g} can be computed with",
+            f"{name} {what}, and lengths from {SMALLEST_EXTENT:g} to {LARGEST_COORDINATE:g} can be computed with",
             remedy="scale and move the shape, for instance to a size of 1 around the origin",
             element=name,
         )
 
 
 def query_points(values: object, columns: int) -> tuple[Floats, tuple[int, ...]]:
-    """`values`, of shape (..., columns), as (n, columns) finite positions within `LARGEST`, and the leading shape."""
+    """`values`, of shape (..., columns), as (n, columns) positions up to `LARGEST_COORDINATE`; the leading shape."""
     points = contiguous(values, "points")
     if points.shape[-1:] != (columns,):
         raise GeometryError(
@@ -135,10 +135,10 @@ def query_points(values: object, columns: int) -> tuple[Floats, tuple[int, ...]]
     if not np.isfinite(points).all():
         raise GeometryError("points must be finite", remedy="leave out NaN and infinity", element="points")
     farthest = float(np.abs(points).max(initial=0.0))
-    if farthest > LARGEST:
+    if farthest > LARGEST_COORDINATE:
         raise GeometryError(
             f"points reach as far as {farthest:.3g}: the squares of such lengths overflow",
-            remedy=f"evaluate at points up to {LARGEST:g}",
+            remedy=f"evaluate at points up to {LARGEST_COORDINATE:g}",
             element="points",
         )
     return points.reshape(-1, columns), points.shape[:-1]
@@ -151,7 +151,7 @@ def shaped(values: NDArray[Scalar], shape: tuple[int, ...]) -> NDArray[Scalar]:
 
 def refuse_lost_spacing(steps: Floats, first: Floats, last: Floats) -> None:
     """Refuse a lattice whose nodes are few digits apart."""
-    if (steps < LEAST_STEP * np.maximum(np.abs(first), np.abs(last))).any():
+    if (steps < LEAST_SPACING * np.maximum(np.abs(first), np.abs(last))).any():
         raise GeometryError(
             f"the spacing {steps.tolist()} is lost in the rounding of coordinates from {first.tolist()} on",
             remedy="move the shape to the origin, or choose a larger spacing",

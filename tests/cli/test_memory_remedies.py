@@ -73,7 +73,7 @@ def test_surfaces_of_as_many_triangles_as_are_told_fit(folder, command, monkeypa
     assert main([command, "ball.ply", "curve.csv", "-o", output]) == 0, capsys.readouterr().err
 
 
-@pytest.mark.parametrize("ending", [*files.TAKEN, ".obj", ".glb"])
+@pytest.mark.parametrize("ending", [*files.BYTES_PER_FILE_BYTE, ".obj", ".glb"])
 def test_files_that_would_not_fit_while_they_are_read_are_refused(tmp_path, ending, monkeypatch):
     """By their size, or by what they announce."""
     path = tmp_path / f"ball{ending}"
@@ -82,8 +82,8 @@ def test_files_that_would_not_fit_while_they_are_read_are_refused(tmp_path, endi
         ball.to_trimesh().export(path)
     else:
         (samples.oriented_points(ball, 5000) if ending == ".xyz" else ball).save(path)
-    size, taken = path.stat().st_size, files.TAKEN.get(ending, 40)
-    monkeypatch.setattr(memory, "_free", lambda: (taken - 1) * size if ending in files.TAKEN else 900_000)
+    size, taken = path.stat().st_size, files.BYTES_PER_FILE_BYTE.get(ending, 40)
+    monkeypatch.setattr(memory, "_free", lambda: (taken - 1) * size if ending in files.BYTES_PER_FILE_BYTE else 900_000)
     with pytest.raises(sh.errors.MemoryLimitError) as caught:
         sh.read(path)
     assert caught.value.path == str(path) and caught.value.remedy
@@ -92,10 +92,10 @@ def test_files_that_would_not_fit_while_they_are_read_are_refused(tmp_path, endi
 
 
 def test_surfaces_of_too_many_faces_to_do_anything_with_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(shapes, "MANY", 1000)
+    monkeypatch.setattr(shapes, "CHECKED_FACES", 1000)
     monkeypatch.setattr(memory, "_free", lambda: memory.libraries() + 1_000_000)
     samples.sphere(5).save(tmp_path / "ball.ply")
-    monkeypatch.setattr(files, "TAKEN", {})
+    monkeypatch.setattr(files, "BYTES_PER_FILE_BYTE", {})
     with pytest.raises(sh.errors.MemoryLimitError) as caught:
         sh.read(tmp_path / "ball.ply")
     most = int(re.search(r"at most ([0-9,]+) faces", caught.value.remedy).group(1).replace(",", ""))

@@ -18,7 +18,7 @@ def test_displays_that_do_not_answer_give_a_picture(tmp_path, monkeypatch, capsy
     """VTK draws nowhere there, with two warnings and success."""
     samples.sphere(1).save(tmp_path / "ball.ply")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(view, "PATIENCE", 0.3)
+    monkeypatch.setattr(view, "DISPLAY_SECONDS", 0.3)
     with socket.socket() as server:
         if display == "silent":
             for number in range(70, 170):  # an X server of this number listens at that port

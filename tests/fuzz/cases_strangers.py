@@ -23,7 +23,7 @@ from fuzz.mutations import damaged
 from signedheat import samples
 from signedheat.arrays import fingerprint
 from signedheat.io.numpy_files import write_npz
-from signedheat.io.solid_arrays import NEEDED, SOURCE
+from signedheat.io.solid_arrays import SOLID_ARRAYS, SOURCE_ARRAYS
 
 NUMBERS: list[Any] = [0, -1, 1, 2, 3, 4, 7, 255, 65535, 2**31, -(2**31), 2**32, 2**53, 10**30]
 NUMBERS += [0.5, -0.0, 1e-320, 1e300, 1e400, None, "1", [], {}, True]
@@ -137,7 +137,9 @@ def numbers(random: np.random.Generator, folder: Path) -> Loaded:
     arrays = dict(solid())
     changed = [one_changed(random, arrays) for _ in range(int(random.choice([1, 1, 2])))]
     if "key" in arrays and random.random() < 0.7:
-        held = [np.asarray(arrays[name]) for name in (*NEEDED, *SOURCE) if name in arrays and name != "key"]
+        held = [
+            np.asarray(arrays[name]) for name in (*SOLID_ARRAYS, *SOURCE_ARRAYS) if name in arrays and name != "key"
+        ]
         arrays["key"] = np.frombuffer(fingerprint(*held), dtype=np.uint8)
     write_npz(folder / "solid.npz", **arrays)
     return Loaded(folder / "solid.npz", "; ".join(changed))

@@ -187,7 +187,7 @@ def test_where_pardiso_would_pay_it_is_named_once(monkeypatch):
 
     matrix = sparse.eye(5, format="csr") * 2.0
     monkeypatch.setattr(Announcement, "are_wanted", True)
-    monkeypatch.setattr(linear, "LARGE", 5)
+    monkeypatch.setattr(linear, "MKL_UNKNOWNS", 5)
     monkeypatch.setattr(linear, "HAS_MKL", True)
     monkeypatch.setattr(linear, "available_backends", lambda: ["superlu"])
     monkeypatch.setattr(linear, "advise", Announcement("pip install mkl"))

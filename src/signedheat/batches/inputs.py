@@ -12,7 +12,7 @@ from ..errors import FileFormatError
 from ..io.files import extension
 from ..io.shape_files import READERS
 
-MAGIC = frozenset("*?[")
+WILDCARDS = frozenset("*?[")
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,9 @@ def _files(path: Path, results: Path | None) -> tuple[list[Path], Path]:
         if avoided is not None:
             shapes = [file for file in shapes if not Path(os.path.realpath(file)).is_relative_to(avoided)]
         return shapes, path
-    if path.exists() or not MAGIC & set(str(path)):
+    if path.exists() or not WILDCARDS & set(str(path)):
         return [path], path.parent  # the worker reports a file that cannot be read
-    fixed = next(k for k, part in enumerate(path.parts) if MAGIC & set(part))
+    fixed = next(k for k, part in enumerate(path.parts) if WILDCARDS & set(part))
     root, pattern = Path(*path.parts[:fixed]), path.parts[fixed:]
     if pattern[-1] == "**":
         pattern = (*pattern, "*")

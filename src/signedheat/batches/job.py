@@ -356,7 +356,7 @@ class Watertight:
         if self.thickness is not None:
             return contour(0.5 * self.thickness), f"thickened to {self.thickness:g}"
         areas = face_areas(solid.triangles)
-        if areas[solid.bounding].sum() < BOUNDS * areas.sum():
+        if areas[solid.bounding].sum() < SHEET_BOUNDARY * areas.sum():
             raise SourceError("the shape is a sheet, which bounds nothing", remedy="give it a thickness")
         if self.contoured:
             return contour(), "contoured"
@@ -370,7 +370,7 @@ class Watertight:
             return contour(), f"contoured, since {reason}"
 
 
-BOUNDS = 1e-3
+SHEET_BOUNDARY = 1e-3
 """A shape is a sheet if a smaller share of its area is on the boundary of its solid."""
 PARTS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [1 / 3, 1 / 3, 1 / 3]])
 """Barycentric coordinates at which distances of a triangle are measured: corners, middles of sides, and centre."""

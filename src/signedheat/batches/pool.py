@@ -29,10 +29,9 @@ from signal import SIG_IGN, SIGINT, Signals, signal
 from types import FunctionType
 from typing import Any
 
-from ..compiled import MOST_THREADS
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, printable
 from ..io.files import move_into_place, replaceable, writing
-from ..jobs import Progress, command_for, logger
+from ..jobs import MOST_THREADS, Progress, command_for, logger
 from ..packages import require
 from ..parallel import connected, n_threads
 from ..validation import positive_number, whole_number
@@ -44,9 +43,9 @@ Function = Callable[[Path, Path], Mapping[str, object]]
 """Takes a file and the common beginning of the names of its results; returns figures that JSON can hold."""
 Done = tuple[Outcome, bool]
 """The outcome of a shape, and whether memory ran out, so that it may succeed once other processes have ended."""
-DEATHS = (EOFError, OSError, pickle.UnpicklingError)
+PROCESS_DEATHS = (EOFError, OSError, pickle.UnpicklingError)
 """Exceptions when reading from or writing to a process that has died."""
-THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+THREAD_VARIABLES = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """Environment variables that set the number of threads of a process."""
 
 
@@ -141,7 +140,7 @@ class Worker:
             process.stdin.write(message)  # type: ignore[union-attr]
             process.stdin.flush()  # type: ignore[union-attr]
             done: Done | str = pickle.load(process.stdout)  # type: ignore[arg-type]
-        except DEATHS:
+        except PROCESS_DEATHS:
             seconds, last = time.perf_counter() - begin, self.close()
             shutil.rmtree(task.scratch, ignore_errors=True)
             if timer is not None and time_limit is not None and seconds >= time_limit:
@@ -162,7 +161,7 @@ class Worker:
             if self.is_closed:
                 raise EOFError
             pickle.load(process.stdout)  # type: ignore[arg-type]
-        except DEATHS:
+        except PROCESS_DEATHS:
             if self.is_closed or tries == 1:
                 raise
             self.close()
@@ -200,7 +199,7 @@ class Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
-            env={**os.environ, **dict.fromkeys(THREADS, str(self.threads))},
+            env={**os.environ, **dict.fromkeys(THREAD_VARIABLES, str(self.threads))},
         )
 
 

@@ -25,7 +25,7 @@ from .options import (
 )
 from .terminal import Signals, open_standard_streams, say, standard_files, write_out
 
-FAILED, BUG = 1, 70
+EXIT_FAILED, EXIT_BUG = 1, 70
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -43,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             if os.environ.get("SIGNEDHEAT_TRACEBACK"):
                 raise
             say(f"signedheat: {_one_line(error)}")
-            return FAILED if _is_expected(error) else BUG
+            return EXIT_FAILED if _is_expected(error) else EXIT_BUG
 
 
 def _run(argv: Sequence[str] | None) -> int:
@@ -71,7 +71,7 @@ def _run(argv: Sequence[str] | None) -> int:
         write_out(standard.named(json.dumps(summary)))
     elif text and not (arguments.quiet or standard.takes_output):
         write_out(standard.named(text))
-    return FAILED if summary.get("failed") else 0  # some of many inputs failed
+    return EXIT_FAILED if summary.get("failed") else 0  # some of many inputs failed
 
 
 def _say_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:

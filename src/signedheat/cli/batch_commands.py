@@ -13,16 +13,16 @@ from typing import Any
 import signedheat as sh
 
 from ..errors import SignedHeatError, SourceError, printable
+from ..jobs import MOST_THREADS
 from .late_imports import files, inputs, pool, shape_files
 from .late_imports import operands as shapes
 from .options import (
+    COMPLETION_STEPS,
+    GRID_AROUND,
     LABEL,
     METHOD,
-    MOST_WORKERS,
-    ROOM,
     SAMPLING,
     SCHEDULER,
-    STEPS,
     UNITS_OPTION,
     Summary,
     command,
@@ -39,7 +39,7 @@ from .options import (
 from .terminal import ProgressBar, say, write_out
 
 SURFACE_FILES = ("stl", "obj", "ply", "off", "vtp")
-MANY = (
+MANY_SHAPES = (
     option(
         "inputs",
         metavar="FILE",
@@ -51,7 +51,7 @@ MANY = (
     option("--time-limit", type=positive, metavar="S", help="seconds after which a shape is abandoned"),
 )
 """Options of commands on many shapes."""
-WANTED = group(
+WANTED_RESULTS = group(
     "results for each shape, at least one of",
     option("--volume", nargs="?", const="npz", choices=("npz", "vti", "nrrd", "npy", "vdb"), help="the field (npz)"),
     option("--offset", type=finite, nargs="+", default=[], metavar="D", help="closed surfaces at distances"),
@@ -60,7 +60,7 @@ WANTED = group(
 )
 RUNNING = group(
     "running",
-    option("--threads", type=whole_number(1, MOST_WORKERS), default=1, metavar="N", help="threads of each process (1)"),
+    option("--threads", type=whole_number(1, MOST_THREADS), default=1, metavar="N", help="threads of each process (1)"),
     SCHEDULER,
 )
 
@@ -72,7 +72,7 @@ def check_batch(arguments: Namespace) -> None:
     except SignedHeatError as problem:
         arguments.parser.error(str(problem))
     if not (arguments.volume or arguments.offset or arguments.sample):
-        for option in (*ROOM.options, *STEPS.options, *METHOD.options):
+        for option in (*GRID_AROUND.options, *COMPLETION_STEPS.options, *METHOD.options):
             if is_given(arguments, option.names[-1]):
                 arguments.parser.error(f"{option.names[-1]} goes with --volume, --offset or --sample")
 
@@ -83,7 +83,7 @@ def check_batch(arguments: Namespace) -> None:
     "Fields, offsets, samples and reports of many shapes, each in a separate process, with a manifest of the outcomes. "
     "A batch that is started again skips the shapes that are done.",
     output("results, and manifest.jsonl", "FOLDER"),
-    *(*MANY, WANTED, RUNNING, SAMPLING, ROOM, STEPS, METHOD),
+    *(*MANY_SHAPES, WANTED_RESULTS, RUNNING, SAMPLING, GRID_AROUND, COMPLETION_STEPS, METHOD),
     check=check_batch,
     usage="FILE [FILE ...] -o FOLDER [--volume] [--offset D ...] [--sample] [--info] [options]",
 )
@@ -135,7 +135,7 @@ def check_watertight(arguments: Namespace) -> None:
     "elsewhere the surface is contoured with its edges and corners. Sheets are refused unless they are given a "
     "thickness.",
     output("a file for one shape; or a folder for the files of many, and manifest.jsonl"),
-    *(*MANY, LABEL, UNITS_OPTION),
+    *(*MANY_SHAPES, LABEL, UNITS_OPTION),
     option("--thickness", type=positive, metavar="D", help="thickness of solids around sheets"),
     option("--contour", action="store_true", help="contour everything, with even triangles instead of few"),
     option("--tolerance", type=positive, metavar="D", help="use fewer triangles, within this distance (manifold3d)"),

@@ -14,8 +14,8 @@ from .late_imports import diagnostics, numpy
 from .late_imports import operands as shapes
 from .late_imports import surface_discretization as discretization
 from .options import (
-    PLAIN,
     UP,
+    WITHOUT_COMPLETION,
     Option,
     Summary,
     command,
@@ -75,7 +75,7 @@ def about_curves(written: str) -> tuple[Option, ...]:
 
 def check_curves(arguments: Namespace) -> None:
     """Reject turning none of the curves that are taken as they are anyway, and isolines next to standard output."""
-    refuse_together(arguments, "--as-oriented", PLAIN)
+    refuse_together(arguments, "--as-oriented", WITHOUT_COMPLETION)
     if arguments.output == "-" and is_given(arguments, "--contours"):
         arguments.parser.error("--contours writes a file next to the output: name a file instead of standard output")
 

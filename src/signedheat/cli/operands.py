@@ -33,10 +33,9 @@ from ..tets.tet_discretization import memory_estimate
 from .options import IMAGES, METHOD, REPAIR, is_given, is_planar, is_quiet
 from .terminal import ProgressBar, say
 
-TET_RESOLUTION = 32
-CANCELLED = 0.9
+CANCELLED_AREA = 0.9
 """Fraction of the area that may cancel without a warning."""
-LISTED = 40
+MOST_LABELS = 40
 """Images with at most this many different whole numbers are images of labels."""
 
 
@@ -237,7 +236,7 @@ def hint(field: sh.GridField) -> str:
     """Return another line of output about sources that may have been given twice, or nothing."""
     note = field.diagnostics.note(SampledSource)
     cancelled = note.area_cancelled if note else 0.0
-    if cancelled < CANCELLED:
+    if cancelled < CANCELLED_AREA:
         return ""
     return (
         f"\n{cancelled:.4%} of the area lies within a cell of area that faces the other way, as on thin sheets: if "
@@ -260,7 +259,7 @@ def on_tets(arguments: Namespace) -> tuple[Any, sh.TetField]:
         )
     with prefix_errors(arguments.shape):
         if mesh is None:
-            resolution = arguments.resolution or TET_RESOLUTION
+            resolution = arguments.resolution or 32
             mesh = sh.tetrahedralize(shape, resolution=resolution, padding=arguments.padding)
             n = mesh.n_tets
             refuse_beyond_memory(  # the number of tets grows at least with the square of the resolution
@@ -310,7 +309,7 @@ def labels_of(image: sh.io.LabelImage) -> list[int] | None:
     """Return the labels, if these are few whole numbers; otherwise the image holds a field."""
     values = image.labels.astype(np.int8) if image.labels.dtype == bool else image.labels
     distinct = np.unique(values[np.isfinite(values)])
-    if len(distinct) > LISTED or (distinct != np.round(distinct)).any():
+    if len(distinct) > MOST_LABELS or (distinct != np.round(distinct)).any():
         return None
     return [int(label) for label in distinct]
 

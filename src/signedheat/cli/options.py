@@ -18,6 +18,7 @@ from typing import Any, NoReturn, TypeAlias
 
 from .. import __version__
 from ..errors import FileFormatError
+from ..jobs import MOST_THREADS
 from .terminal import say, write_out
 
 Summary: TypeAlias = tuple[dict[str, Any], str]
@@ -25,13 +26,12 @@ Summary: TypeAlias = tuple[dict[str, Any], str]
 Run: TypeAlias = Callable[[Namespace], Summary]
 Check: TypeAlias = Callable[[Namespace], None]
 
-MOST_WORKERS = 1024
 PLANAR = (".csv", ".svg")
 """Extensions of files with polylines in the plane."""
 IMAGES = (".npy", ".nrrd", ".vti", ".nii", ".nii.gz")
 """Extensions of files that may hold images of labels."""
 SURFACES = "surface: .stl .obj .ply .off .vtp"
-UNITS = ("micron", "mm", "millimeter", "cm", "centimeter", "inch", "foot", "m", "meter")
+LENGTH_UNITS = ("micron", "mm", "millimeter", "cm", "centimeter", "inch", "foot", "m", "meter")
 """Units of length."""
 CONSTRAINTS = ("free", "zero-set", "hard", "each-component", "soft", "soft:WEIGHT")
 """Names of the constraints without a number."""
@@ -165,14 +165,14 @@ def group(title: str, *options: Option) -> Group:
     return Group(title, options)
 
 
-INPUTS = ("shape", "mesh", "field", "file", "files", "inputs", "curves", "scan", "nominal", "tets")
+INPUT_ARGUMENTS = ("shape", "mesh", "field", "file", "files", "inputs", "curves", "scan", "nominal", "tets")
 """Arguments that may name an input file."""
 
 
 def refuse_output_over_input(arguments: Namespace) -> None:
     """Raise `FileFormatError` if an output file is also an input."""
     for written in _names(getattr(arguments, "output", None)):
-        for read in (name for argument in INPUTS for name in _names(getattr(arguments, argument, None))):
+        for read in (name for argument in INPUT_ARGUMENTS for name in _names(getattr(arguments, argument, None))):
             if written != "-" and os.path.realpath(written) == os.path.realpath(read) and not os.path.isdir(read):
                 raise FileFormatError("the output would replace the input", remedy="name another file", path=written)
 
@@ -260,8 +260,8 @@ def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
 def units(word: str) -> str:
     """Check that a word is a unit, or two units separated by a colon."""
     for unit in word.split(":", 1):
-        if unit not in UNITS:
-            raise argparse.ArgumentTypeError(f"'{unit}' is not one of {', '.join(UNITS)}")
+        if unit not in LENGTH_UNITS:
+            raise argparse.ArgumentTypeError(f"'{unit}' is not one of {', '.join(LENGTH_UNITS)}")
     return word
 
 
@@ -314,7 +314,7 @@ PLACE = group(
     UNITS_OPTION,
     option("--transform", nargs="+", metavar="M", help="16 numbers of a matrix by rows, or 12, or a file of them"),
 )
-ROOM = group(
+GRID_AROUND = group(
     "grid (by default around the shape)",
     option("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side (128)"),
     option(
@@ -330,8 +330,8 @@ ROOM = group(
     ),
 )
 GRID = group(
-    ROOM.title,
-    *ROOM.options,
+    GRID_AROUND.title,
+    *GRID_AROUND.options,
     option("--origin", type=finite, nargs="+", metavar="X", help="first node of a custom grid: X Y Z, or X Y"),
     option(
         "--shape",
@@ -342,7 +342,7 @@ GRID = group(
         help="number of its nodes: NX NY NZ, or NX NY",
     ),
 )
-LIDS = option(
+LIDS_OPTION = option(
     "--lids",
     choices=("bent", "flat"),
     default="bent",
@@ -352,7 +352,7 @@ REPAIR = group(
     "steps (all taken by default)",
     option("--as-oriented", action="store_true", help="turn no faces, normals or lines, and leave out no lines"),
     option("--keep-overlaps", action="store_true", help="keep surfaces that lie inside other bodies"),
-    LIDS,
+    LIDS_OPTION,
     option(
         "--nested",
         choices=("given", "cavities", "bodies"),
@@ -360,7 +360,7 @@ REPAIR = group(
         help="closed pieces inside others are oriented as given, cavities as in slicers, or bodies",
     ),
 )
-STEPS = group(
+COMPLETION_STEPS = group(
     REPAIR.title,
     *REPAIR.options,
     option("--plain", action="store_true", help="the method's own field, not measured to the shape itself"),
@@ -381,7 +381,7 @@ SCHEDULER = option("--scheduler", metavar="ADDRESS", help="a running Dask cluste
 
 def workers(help: str) -> Option:
     """Return the number of processes or threads."""
-    return option("--workers", type=whole_number(1, MOST_WORKERS), metavar="N", help=help)
+    return option("--workers", type=whole_number(1, MOST_THREADS), metavar="N", help=help)
 
 
 TILES = group(
@@ -435,14 +435,14 @@ COMMON = (
     ),
 )
 """Options of all commands."""
-SHARED = (LABEL, SLICES, *(one for each in (PLACE, GRID, STEPS, METHOD, TILES) for one in each.options))
+SHARED = (LABEL, SLICES, *(one for each in (PLACE, GRID, COMPLETION_STEPS, METHOD, TILES) for one in each.options))
 ABSENT: Mapping[str, Any] = {"operation": "", "shape": "", **{option.attribute: option.default for option in SHARED}}
 """Defaults of options that a command lacks, so that all commands can share the functions that read them."""
 
 DRAWING, THICKEN = "a drawing", "thicken"
-PLAIN = ("--plain", "--constraint each-component", "--constraint levels")
+WITHOUT_COMPLETION = ("--plain", "--constraint each-component", "--constraint levels")
 """Options with which the method takes a shape or curves as they are."""
-NEEDED = {
+ONLY_WITH = {
     "--tiles": "--band",
     **dict.fromkeys(("--workers", "--scheduler"), "--tiles"),
     **dict.fromkeys(("--near", "--widths", "--seed", "--normalize", "--layout"), "--sample"),
@@ -455,11 +455,11 @@ EXCLUDED = {
     "--origin": ("--resolution", "--padding"),
     "--scheduler": ("--workers",),
     "--tets": ("--spacing", "--origin", "--shape", "--band", "--label"),
-    "--every-piece": PLAIN,
+    "--every-piece": WITHOUT_COMPLETION,
 }
 """Options that contradict others, or others with a value that begins so."""
 WITHOUT_SOLIDS = {
-    **dict.fromkeys(("--band", "--lids", "--nested", "--keep-overlaps"), (*PLAIN, DRAWING, THICKEN)),
+    **dict.fromkeys(("--band", "--lids", "--nested", "--keep-overlaps"), (*WITHOUT_COMPLETION, DRAWING, THICKEN)),
     **dict.fromkeys(("--as-oriented", "--plain", "--constraint", "--diffusion"), (THICKEN,)),
 }
 """Options of solids, and what makes none of a shape."""
@@ -490,7 +490,7 @@ def refuse_contradictions(arguments: Namespace) -> None:
         for other in WITHOUT_SOLIDS.get(name, ()):
             if is_given(arguments, other):
                 error(f"{name} is for solids, and {other} uses none")
-        needed = NEEDED.get(name, name)
+        needed = ONLY_WITH.get(name, name)
         if needed in declared and not is_given(arguments, needed):
             error(f"{name} goes with {needed}")
     dimension = 2 if is_given(arguments, DRAWING) else 3

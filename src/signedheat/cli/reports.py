@@ -32,8 +32,8 @@ from ..surfaces.source_segments import segments_of
 from .operands import describe, field_or_image, labels_of
 from .options import Summary, is_planar
 
-NAMES = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
-WHOLE = 0.9999
+POINT_KINDS = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
+WHOLE_AREA = 0.9999
 """A share of the area above this is all of it: the rest is rounding error."""
 
 
@@ -148,7 +148,7 @@ def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation 
         return f"tets, {turned} of them inside out or flat" if turned else "tets, all of them sound"
     if found is None:
         return "voxels: closed and oriented"
-    if found.undecided_area > WHOLE:
+    if found.undecided_area > WHOLE_AREA:
         return "open sheets that bound nothing: `signedheat morph thicken` makes walls of them"
     mended = (
         (counts.borders, "hole", "to complete"),
@@ -158,7 +158,7 @@ def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation 
         (counts.nonmanifold_edges, "edge", "of three or more faces"),
     )
     said = [f"{_count(number, name)} {what}" for number, name, what in mended if number]
-    if found.undecided_area > 1 - WHOLE:
+    if found.undecided_area > 1 - WHOLE_AREA:
         said.append(f"{100 * found.undecided_area:.3g} % of the area bounds nothing")
     if not said:
         return "whole: closed and oriented; distance to it is exact"
@@ -197,9 +197,9 @@ def orientation_text(found: Orientation) -> str:
         edges, faces = _count(found.inconsistent_edges, "edge"), _count(found.turned_faces, "face")
         said.append(f"faces disagree at {edges}: {faces} to turn ({100 * found.turned_area:.3g} % of the area)")
     elif found.turned_parts:
-        which = "all" if found.turned_area > WHOLE else f"{_count(found.turned_parts, 'part')}"
+        which = "all" if found.turned_area > WHOLE_AREA else f"{_count(found.turned_parts, 'part')}"
         said.append(f"{which} facing inwards ({100 * found.turned_area:.3g} % of the area to turn)")
-    elif found.undecided_area < WHOLE:
+    elif found.undecided_area < WHOLE_AREA:
         said.append("facing outwards")
     kinds = (
         (found.nonorientable_parts, "nonorientable part", "nonorientable parts"),
@@ -232,7 +232,7 @@ def curve_report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str
     parts = segments_of(source, triangles, number=number)
     degree = np.bincount(parts.ends.ravel(), minlength=len(parts.nodes))
     ends = [
-        f"{NAMES[kind]} {element}"
+        f"{POINT_KINDS[kind]} {element}"
         for kind, element in zip(
             parts.nodes.kinds[degree == 1].tolist(), parts.nodes.elements[degree == 1].tolist(), strict=True
         )

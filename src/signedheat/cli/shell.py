@@ -19,9 +19,6 @@ from .solid_commands import contour, fill, intersect, morph, offset, sample, sub
 from .terminal import ProgressBar, say
 from .view_commands import demo, deviation, info, thickness, view
 
-TICK = 0.5
-"""Seconds between updates of the progress of compiling."""
-
 
 @command(
     "warmup",
@@ -39,7 +36,7 @@ def warmup(arguments: Namespace) -> Summary:
             while waiting:
                 n_done = len(names) - len(waiting)
                 progress(n_done / len(names), f"compiling, {n_done} of {len(names)} parts done")
-                done, waiting = wait(waiting, TICK, FIRST_COMPLETED)
+                done, waiting = wait(waiting, 0.5, FIRST_COMPLETED)  # or half a second, to show the progress
                 for job in done:
                     job.result()
                     n_done += 1

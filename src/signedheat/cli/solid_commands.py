@@ -15,17 +15,17 @@ from ..errors import printable
 from ..packages import require
 from .late_imports import operands as shapes
 from .options import (
+    COMPLETION_STEPS,
     FLAT_SHAPE,
     GRID,
+    GRID_AROUND,
     LABEL,
-    LIDS,
+    LIDS_OPTION,
     METHOD,
     PLACE,
     REPAIR,
-    ROOM,
     SAMPLING,
     SLICES,
-    STEPS,
     SURFACES,
     TILES,
     UNITS_OPTION,
@@ -74,7 +74,7 @@ def check_volume(arguments: Namespace) -> None:
         metavar="MESH",
         help="measure on tets, from a .mesh .msh .vtu .vtk .ele file or around the shape; OUT: .vtu .vtk .msh",
     ),
-    *(LABEL, PLACE, GRID, STEPS, METHOD, SLICES, TILES, format_option("npz")),
+    *(LABEL, PLACE, GRID, COMPLETION_STEPS, METHOD, SLICES, TILES, format_option("npz")),
     check=check_volume,
     usage="SHAPE -o OUT [options]",
 )
@@ -140,7 +140,7 @@ def check_offset(arguments: Namespace) -> None:
         help="positive outside, negative inside, 0 the closed shape",
     ),
     output(f"{SURFACES}; lines: .svg .csv"),
-    *(LABEL, PLACE, GRID, STEPS, METHOD, SLICES, TILES, format_option("stl")),
+    *(LABEL, PLACE, GRID, COMPLETION_STEPS, METHOD, SLICES, TILES, format_option("stl")),
     check=check_offset,
     usage="SHAPE DISTANCE [DISTANCE ...] -o OUT [options]",
 )
@@ -198,7 +198,7 @@ def check_morph(arguments: Namespace) -> None:
     shape_option(),
     option("distances", metavar="DISTANCE", type=finite, nargs="+", help="in the units of the file"),
     output(SURFACES),
-    *(PLACE, ROOM, STEPS, METHOD),
+    *(PLACE, GRID_AROUND, COMPLETION_STEPS, METHOD),
     group(
         "shells",
         option("--keep-outside", action="store_true", help="keep the faces given, and make the inner side only (D 0)"),
@@ -260,7 +260,7 @@ def morph(arguments: Namespace) -> Summary:
         metavar="V",
         help="close only rims through these vertices, counted from 0, including outlines of sheets",
     ),
-    *(LIDS, format_option("stl")),
+    *(LIDS_OPTION, format_option("stl")),
     usage="MESH -o OUT [options]",
 )
 def fill(arguments: Namespace) -> Summary:

@@ -34,18 +34,18 @@ from .options import (
 )
 from .terminal import ProgressBar, say, say_error
 
-PATIENCE = 5.0
+DISPLAY_SECONDS = 5.0
 """Seconds to wait for a display to answer."""
-DISTANCE = 0.15
+DEMO_OFFSET = 0.15
 """Offset of the surface in the demo."""
-CURVES = (".json",)
+CURVE_ENDINGS = (".json",)
 """Extensions of files that hold only curves."""
 
 
 def check_files(arguments: Namespace) -> None:
     """Take a second file with curves as ``--curves``; reject curves with several shapes."""
     last = Path(arguments.files[-1]).suffix.lower()
-    if len(arguments.files) == 2 and last in CURVES and arguments.curves is None:
+    if len(arguments.files) == 2 and last in CURVE_ENDINGS and arguments.curves is None:
         arguments.curves = arguments.files.pop()
     if arguments.curves is not None and len(arguments.files) > 1:
         arguments.parser.error(f"curves lie on one shape, but {len(arguments.files)} are given")
@@ -150,7 +150,7 @@ def display_answers() -> bool:
         library = ctypes.CDLL("libX11.so.6")
         library.XOpenDisplay.restype, library.XOpenDisplay.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
         library.XCloseDisplay.argtypes = [ctypes.c_void_p]
-        display = run_limited(lambda: library.XOpenDisplay(os.fsencode(name)), PATIENCE)
+        display = run_limited(lambda: library.XOpenDisplay(os.fsencode(name)), DISPLAY_SECONDS)
     except (OSError, TimeoutError):  # no such library, or a server that does not answer
         display = None
     if display:
@@ -320,26 +320,26 @@ def demo(arguments: Namespace) -> Summary:
             say(f"signedheat: no picture is written: {error}")
     shape = samples.broken_duck()
     shape.save(files["duck.stl"])
-    grid = sh.Grid.around(shape.bounds, arguments.resolution, padding=3 * DISTANCE)
+    grid = sh.Grid.around(shape.bounds, arguments.resolution, padding=3 * DEMO_OFFSET)
     field = shapes.compute(shape, grid, arguments)
-    surface: Any = field.offset(DISTANCE)
+    surface: Any = field.offset(DEMO_OFFSET)
     field.save(files["distance.vti"])
     surface.save(files["offset.stl"])
     lines = [
         f"{files['duck.stl']}: the input: {_defects(shape)}",
         f"{files['distance.vti']}: its signed distance at {' × '.join(map(str, grid.shape))} nodes",
-        f"{files['offset.stl']}: the surface {DISTANCE:g} outside: {_defects(surface)}",
+        f"{files['offset.stl']}: the surface {DEMO_OFFSET:g} outside: {_defects(surface)}",
     ]
     if "picture.png" in files:
         sh.view.save_row(
             files["picture.png"],
             ("in: holes, noise, flipped and\nduplicate faces", shape),
-            ("its signed distance", field, {"shape": shape, "levels": [DISTANCE], "across": (1,)}),
-            (f"out: the closed surface at +{DISTANCE:g}", surface),
+            ("its signed distance", field, {"shape": shape, "levels": [DEMO_OFFSET], "across": (1,)}),
+            (f"out: the closed surface at +{DEMO_OFFSET:g}", surface),
         )
         lines.append(f"{files['picture.png']}: a picture of them")
     names = [str(path) for path in files.values()]
-    return {"files": names, "distance": DISTANCE, "field": shapes.describe(field)}, "\n".join(lines)
+    return {"files": names, "distance": DEMO_OFFSET, "field": shapes.describe(field)}, "\n".join(lines)
 
 
 def _defects(shape: sh.TriangleMesh) -> str:

@@ -30,7 +30,7 @@ from ..search.face_tree import FaceTree
 from ..solver import SignedHeatSolver
 from ..surfaces.extrapolation import Diffusion
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import SMALLEST, flag, query_points, shaped
+from ..validation import SMALLEST_EXTENT, flag, query_points, shaped
 from .curve_distance import CurvesTaken, distance_to_pieces
 from .resolution import on_resolving_triangles
 
@@ -248,7 +248,7 @@ class Drawing(Frozen):
         distances, nearest, segments = self._closest(places)
         ends = self._segments[segments]
         along, away = ends[:, 1] - ends[:, 0], places - nearest
-        shares = ((nearest - ends[:, 0]) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), SMALLEST)
+        shares = ((nearest - ends[:, 0]) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), SMALLEST_EXTENT)
         left = np.stack([-along[:, 1], along[:, 0]], axis=1)
         gradients = unit(np.where((distances != 0)[:, None], np.sign(distances)[:, None] * away, left))
         given = segments < len(self.lines)

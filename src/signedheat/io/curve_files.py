@@ -25,7 +25,7 @@ from .files import PathLike, format_for, reading, replacing, text
 from .mesh_files import read_obj_elements
 from .point_files import read_point_lists
 
-KINDS = SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_point"
+GROUP_KINDS = SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_point"
 
 
 class Node(NamedTuple):
@@ -78,7 +78,7 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
     ...     read_curves(f"{folder}/curves.json", mesh)
     [Curve(3 points, open, oriented)]
     """
-    read_groups = format_for(path, READERS, "curves")
+    read_groups = format_for(path, CURVE_READERS, "curves")
     domain = surface_in_space(domain)
     with reading(path):
         groups = read_groups(path, domain)
@@ -137,7 +137,7 @@ def write_curves(
     ...     read_curves(f"{folder}/side.json", mesh)
     [Curve(2 points, open, oriented)]
     """
-    content_of = format_for(path, WRITERS, "curves")
+    content_of = format_for(path, CURVE_WRITERS, "curves")
     listed = [curves] if isinstance(curves, (Curve, SurfacePoints)) else list(curves)
     if not listed:
         raise FileFormatError("there is no curve to write", remedy="pass at least one", path=path)
@@ -338,6 +338,10 @@ def write_obj(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
     return "\n".join([*vertices, *elements]) + "\n"
 
 
-READERS: dict[str, Callable[..., Iterable[Group | Curve]]] = {".csv": read_csv, ".json": read_json, ".obj": read_obj}
-WRITERS: dict[str, Callable[..., str]] = {".json": write_json, ".obj": write_obj}
-CURVE_FORMATS = frozenset(WRITERS)
+CURVE_READERS: dict[str, Callable[..., Iterable[Group | Curve]]] = {
+    ".csv": read_csv,
+    ".json": read_json,
+    ".obj": read_obj,
+}
+CURVE_WRITERS: dict[str, Callable[..., str]] = {".json": write_json, ".obj": write_obj}
+CURVE_FORMATS = frozenset(CURVE_WRITERS)

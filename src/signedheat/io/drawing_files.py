@@ -26,17 +26,17 @@ FLAG = re.compile(r"[\s,]*([01])")
 COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])")
 ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 """Number of arguments of each command of a path."""
-FLAGS = (3, 4)
+FLAG_ARGUMENTS = (3, 4)
 """Arguments of an arc that are flags, which need no space after them."""
-UNITS = {"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "q": 96 / 101.6, "in": 96.0}
+SVG_UNITS = {"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "q": 96 / 101.6, "in": 96.0}
 """User units per unit of length; ems are those of the default font."""
-UNITS |= {"em": 16.0, "ex": 8.0}
+SVG_UNITS |= {"em": 16.0, "ex": 8.0}
 CONTAINERS = ("svg", "g", "a", "switch")
 PLACED = {"svg": ("viewBox", "x", "y"), "symbol": ("viewBox",)}
 """Attributes of drawings within a drawing that give them coordinates of their own."""
 AXES = {"x": 0, "x1": 0, "x2": 0, "cx": 0, "rx": 0, "width": 0, "y": 1, "y1": 1, "y2": 1, "cy": 1, "ry": 1, "height": 1}
 """Axes of attributes that are lengths along an axis."""
-DEPTH, MOST_USES = 100, 10**5
+MOST_NESTED, MOST_USES = 100, 10**5
 """Limits on nested groups, and on elements drawn, including repeated uses."""
 FILL_RULE = re.compile(r"fill-rule\s*:\s*(\w+)")
 TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
@@ -69,7 +69,7 @@ class _Drawing:
     ) -> Iterator[list[tuple[Floats, bool]]]:
         """Subpaths of an element and its children; those with the evenodd rule as outlines of their fill."""
         self.n_used += is_used
-        if depth > DEPTH or self.n_used > MOST_USES:
+        if depth > MOST_NESTED or self.n_used > MOST_USES:
             raise damaged("its elements contain themselves or too many others")
         kind = str(element.tag).rpartition("}")[2]
         if element.get("display") == "none" or "display:none" in element.get("style", "").replace(" ", ""):
@@ -140,9 +140,9 @@ def length(word: str, whole: float = math.nan, name: str = "length") -> float:
     unit = word[match.end() :].strip().lower() if match else ""
     if word.strip() == "auto":
         return 0.0
-    if match is None or (unit != "%" and unit not in UNITS):
+    if match is None or (unit != "%" and unit not in SVG_UNITS):
         raise damaged(f"{name} is '{word:.40}', which is not a length", element=name)
-    value = float(match[1]) * (whole / 100 if unit == "%" else UNITS[unit])
+    value = float(match[1]) * (whole / 100 if unit == "%" else SVG_UNITS[unit])
     if not math.isfinite(value):
         raise FileFormatError(f"{name} is '{word:.40}' of a drawing without a size", remedy="give it a viewBox")
     return value
@@ -195,7 +195,7 @@ def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
             raise damaged(f"a path goes on with '{data[position : position + 20].strip()}', which is not a command")
         numbers = []
         for place in range(ARGUMENTS[command.upper()]):
-            pattern = FLAG if command in "Aa" and place in FLAGS else NUMBER
+            pattern = FLAG if command in "Aa" and place in FLAG_ARGUMENTS else NUMBER
             number = pattern.match(data, position)
             if number is None:
                 raise damaged(
@@ -343,7 +343,7 @@ def read_polylines(path: PathLike) -> list[Polyline]:
     ...     read_polylines(f"{folder}/square.svg")
     [Polyline(4 points, closed)]
     """
-    read_lists = format_for(path, READERS, "polylines in the plane")
+    read_lists = format_for(path, POLYLINE_READERS, "polylines in the plane")
     with reading(path):
         lists = read_lists(path)
     lines = []
@@ -381,7 +381,7 @@ def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> Non
     ...     read_polylines(f"{folder}/square.csv")
     [Polyline(4 points, closed)]
     """
-    content_of = format_for(path, WRITERS, "polylines in the plane")
+    content_of = format_for(path, POLYLINE_WRITERS, "polylines in the plane")
     listed = [lines] if isinstance(lines, Polyline) else list(lines)
     if not listed:
         raise FileFormatError("there is no polyline to write", remedy="pass at least one", path=path)
@@ -390,12 +390,12 @@ def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> Non
         temporary.write_text(content, encoding="utf-8")
 
 
-READERS: dict[str, Callable[[PathLike], list[tuple[Floats, bool]]]] = {
+POLYLINE_READERS: dict[str, Callable[[PathLike], list[tuple[Floats, bool]]]] = {
     ".csv": lambda path: read_point_lists(path, 2),
     ".svg": read_svg,
 }
-WRITERS: dict[str, Callable[[Sequence[Polyline]], str]] = {
+POLYLINE_WRITERS: dict[str, Callable[[Sequence[Polyline]], str]] = {
     ".csv": lambda lines: write_point_lists([(line.points, line.closed) for line in lines]),
     ".svg": svg,
 }
-POLYLINE_FORMATS = frozenset(READERS)
+POLYLINE_FORMATS = frozenset(POLYLINE_READERS)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError, GeometryError
-from ..exchange import NAME, Elements
+from ..exchange import VALUES_NAME, Elements
 from ..field_kinds import Field
 from ..foreign import SurfaceShape, elements, shape_of
 from ..grids.blocks import SIDE, Blocks
@@ -31,7 +31,7 @@ from .image_files import CONFIDENCE, read_image, write_nrrd
 from .mesh_files import write_obj
 from .numpy_files import names_in_npz, read_npz, write_npz
 from .ply import read_ply, write_ply
-from .solid_arrays import NEEDED, SOURCE, arrays_of, solid_of
+from .solid_arrays import SOLID_ARRAYS, SOURCE_ARRAYS, arrays_of, solid_of
 from .tet_files import TET_FIELD_FORMATS, load_cells, store_cells
 from .vdb import write_vdb
 from .vtk_xml import read_vtp, write_vti, write_vtp
@@ -47,7 +47,7 @@ OF_BANDS = (
     "x, y, z, in the units of the shape; elsewhere coarse_values[i, j, k] at origin + (i, j, k) * coarse_spacing"
 )
 CLIPPED = "signed distance, negative inside, in the units of the shape; beyond the band plus or minus its half width"
-BYTES_PER_NODE = 20.0
+BYTES_PER_WHOLE_NODE = 20.0
 """Memory per node to write a band as a whole grid."""
 OF_CLOUDS = ("normals", "areas", "n_neighbors")
 """Arrays of the archive of a field on a point cloud, besides its points."""
@@ -61,14 +61,14 @@ def write_field(field: GridField | TetField | VertexField, path: PathLike) -> No
         save_field(field, path)
     elif isinstance(field, TetField):
         format_for(path, dict.fromkeys(TET_FIELD_FORMATS), "a field on tets")
-        store_cells(field.mesh.to_meshio({NAME: field.values}), path)
+        store_cells(field.mesh.to_meshio({VALUES_NAME: field.values}), path)
     elif isinstance(field, VertexField):
         write = format_for(path, {".npz": None, ".obj": write_obj, **VALUE_FORMATS}, "a field on a surface")
         simple = on_simple_surface(field)
         if write is None:
             return _write_vertex_npz(simple, path)
         with replacing(path) as temporary:
-            temporary.write_bytes(write(elements(simple.domain, {NAME: simple.values}), path))
+            temporary.write_bytes(write(elements(simple.domain, {VALUES_NAME: simple.values}), path))
 
 
 def save_field(field: GridField, path: PathLike) -> None:
@@ -169,10 +169,10 @@ def load_vertex_field(path: PathLike) -> VertexField:
     """Return a surface with φ at its vertices: what `VertexField.save` wrote, except as ``.obj``."""
     with reading(path):
         if extension(path) in _VALUES:
-            shape = _VALUES[extension(path)](path, (NAME,))
-            if NAME not in shape.values:
-                raise FileFormatError(f"its vertices have no {NAME}: it holds a shape, not a field")
-            return VertexField(cast("SurfaceShape", shape_of(shape)), np.asarray(shape.values[NAME], np.float64))
+            shape = _VALUES[extension(path)](path, (VALUES_NAME,))
+            if VALUES_NAME not in shape.values:
+                raise FileFormatError(f"its vertices have no {VALUES_NAME}: it holds a shape, not a field")
+            return VertexField(cast("SurfaceShape", shape_of(shape)), np.asarray(shape.values[VALUES_NAME], np.float64))
         arrays = read_npz(path, ("faces", "offsets", *OF_CLOUDS), needed=("vertices", "values"))
         vertices, values = arrays["vertices"], arrays["values"]
         if "offsets" in arrays:
@@ -190,9 +190,9 @@ def load_vertex_field(path: PathLike) -> VertexField:
 def _load_tet_field(path: PathLike) -> TetField:
     with reading(path):
         cells = load_cells(path)
-        if NAME not in cells.point_data:
-            raise FileFormatError(f"it has no point data '{NAME}': it was not written as a field")
-        values = np.asarray(cells.point_data[NAME], dtype=np.float64)
+        if VALUES_NAME not in cells.point_data:
+            raise FileFormatError(f"it has no point data '{VALUES_NAME}': it was not written as a field")
+        values = np.asarray(cells.point_data[VALUES_NAME], dtype=np.float64)
         return made(TetField, made(TetMesh.from_meshio, cells), values)
 
 
@@ -234,7 +234,9 @@ def _held_solid(path: PathLike) -> SolidQueries | None:
     """Return the solid of a field in an archive, if the archive holds one."""
     if "solid_factor" not in names_in_npz(path):
         return None
-    arrays = read_npz(path, [PREFIX + name for name in SOURCE], ["solid_factor", *(PREFIX + name for name in NEEDED)])
+    arrays = read_npz(
+        path, [PREFIX + name for name in SOURCE_ARRAYS], ["solid_factor", *(PREFIX + name for name in SOLID_ARRAYS)]
+    )
     factor = arrays.pop("solid_factor")
     if factor.shape or not np.isfinite(factor) or not factor:
         raise damaged("the scale of its solid is not a number", element="solid_factor")
@@ -249,10 +251,10 @@ def _write_npy(field: GridField, path: Path) -> None:
 def _write_for_vtk(field: GridField, path: Path) -> None:
     """Write all nodes, also of a band, for ParaView and solvers."""
     grid, convention = field.grid, CONVENTION
-    values: dict[str, NDArray[np.floating]] = {NAME: field.values}
+    values: dict[str, NDArray[np.floating]] = {VALUES_NAME: field.values}
     if field.blocks is not None:
-        refuse_large_grid(grid, BYTES_PER_NODE, 0.0)
-        values, convention = {NAME: whole_values(field)}, CLIPPED
+        refuse_large_grid(grid, BYTES_PER_WHOLE_NODE, 0.0)
+        values, convention = {VALUES_NAME: whole_values(field)}, CLIPPED
     elif field.confidence is not None:
         values[CONFIDENCE] = field.confidence
     path.write_bytes(write_vti(grid.origin, grid.spacing, values, convention))
@@ -260,7 +262,7 @@ def _write_for_vtk(field: GridField, path: Path) -> None:
 
 def _write_nrrd(field: GridField, path: Path) -> None:
     axes = np.diag(field.grid.spacing)
-    write_nrrd(path, field.values, axes, field.grid.origin, content=NAME, convention=CONVENTION)
+    write_nrrd(path, field.values, axes, field.grid.origin, content=VALUES_NAME, convention=CONVENTION)
 
 
 def whole_values(field: GridField) -> NDArray[np.float32]:

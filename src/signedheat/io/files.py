@@ -27,7 +27,7 @@ from ..memory import available_memory
 PathLike = str | os.PathLike[str]
 T = TypeVar("T")
 PACKAGE = f"{__package__.partition('.')[0]}."
-TAKEN = {".off": 14, ".stl": 5, ".xyz": 4, ".ply": 2}
+BYTES_PER_FILE_BYTE = {".off": 14, ".stl": 5, ".xyz": 4, ".ply": 2}
 """Measured memory to read a shape per byte of its file, reduced for formats that hold more than positions and faces.
 For other formats, readers estimate memory from the first parts of the file."""
 READING_MODULES = f"{__package__}.", f"{PACKAGE}packages"
@@ -112,7 +112,7 @@ def _is_ours(error: BaseException) -> bool:
 def contents(path: PathLike) -> bytes:
     """Return the bytes of a file."""
     with _opened(path) as (file, size):
-        ensure_fits(TAKEN.get(extension(path), 1) * size, path)
+        ensure_fits(BYTES_PER_FILE_BYTE.get(extension(path), 1) * size, path)
         data = file.read()
     if not data:
         raise FileFormatError("the file is empty", remedy="write or download it again", path=path)

@@ -17,15 +17,15 @@ from ..errors import FileFormatError
 from ..transforms import Body, placed
 from .files import PathLike, companion_contents, contents, damaged, ensure_fits
 
-NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+COMPONENT_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """Types of the components of accessors."""
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+COMPONENT_COUNTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 SUPPORTED = ("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp", "EXT_texture_")
 """Prefixes of extensions that are supported or do not affect shapes."""
 INSTANCES = "EXT_mesh_gpu_instancing"
-TRIANGLES, STRIP, FAN = 4, 5, 6
+TRIANGLE_MODE, STRIP_MODE, FAN_MODE = 4, 5, 6
 """Modes of primitives with faces; smaller numbers are points and lines."""
-BYTES = 200
+BYTES_PER_GLTF_TRIANGLE = 200
 """Measured memory to read a triangle of a scene with its vertices."""
 
 
@@ -44,7 +44,7 @@ def read_bodies(path: PathLike) -> list[Body]:
     places = list(_places(scene.tree))
     meshes = scene.tree.get("meshes", [])
     counts = {mesh: _corner_count(scene.tree, meshes[mesh]) for mesh in {mesh for mesh, _ in places}}
-    ensure_fits(BYTES * sum(counts[mesh] for mesh, _ in places), path)
+    ensure_fits(BYTES_PER_GLTF_TRIANGLE * sum(counts[mesh] for mesh, _ in places), path)
     bodies = {mesh: [scene.body(primitive) for primitive in meshes[mesh]["primitives"]] for mesh in counts}
     return [placed(body, matrix) for mesh, matrix in places for body in bodies[mesh] if len(body[1])]
 
@@ -58,10 +58,10 @@ class _Scene:
 
     def body(self, primitive: dict[str, Any]) -> Body:
         """Return the vertices and triangles of a primitive, without unused vertices."""
-        mode = primitive.get("mode", TRIANGLES)
-        if mode not in range(FAN + 1):
+        mode = primitive.get("mode", TRIANGLE_MODE)
+        if mode not in range(FAN_MODE + 1):
             raise damaged(f"primitives have the mode {mode}, which is not defined in glTF")
-        if mode < TRIANGLES or "POSITION" not in primitive["attributes"]:
+        if mode < TRIANGLE_MODE or "POSITION" not in primitive["attributes"]:
             return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
         points = self.numbers(primitive["attributes"]["POSITION"]).astype(np.float64)
         if points.shape[1] != 3:
@@ -77,8 +77,8 @@ class _Scene:
     def numbers(self, index: int) -> NDArray[Any]:
         """(count, width) numbers of an accessor; normalized integers become fractions."""
         accessor = self.tree["accessors"][index]
-        count, width = int(accessor["count"]), WIDTHS[accessor["type"]]
-        dtype = np.dtype(NUMBERS[accessor["componentType"]])
+        count, width = int(accessor["count"]), COMPONENT_COUNTS[accessor["type"]]
+        dtype = np.dtype(COMPONENT_TYPES[accessor["componentType"]])
         if not 0 < count <= sum(map(len, self.buffers)):
             raise damaged(f"accessor {index} announces {count} numbers, which the file does not have")
         if "bufferView" in accessor:
@@ -87,7 +87,7 @@ class _Scene:
             values = np.zeros((count, width), dtype=dtype)
         if "sparse" in accessor:
             sparse, values = accessor["sparse"], values.copy()
-            code = np.dtype(NUMBERS[sparse["indices"]["componentType"]])
+            code = np.dtype(COMPONENT_TYPES[sparse["indices"]["componentType"]])
             places = self._viewed(sparse["indices"], code, sparse["count"], 1).ravel()
             values[places] = self._viewed(sparse["values"], dtype, sparse["count"], width)
         if accessor.get("normalized") and dtype.kind in "iu":
@@ -142,12 +142,12 @@ def _read_scene(path: PathLike) -> _Scene:
 
 def _triangles(corners: Ints, mode: int) -> Ints:
     """(m, 3) triangles of a list, strip or fan of corners."""
-    if mode == TRIANGLES:
+    if mode == TRIANGLE_MODE:
         if len(corners) % 3:
             raise damaged(f"{len(corners)} corners do not form triangles")
         return corners.reshape(-1, 3)
     second, third = corners[1:-1], corners[2:]
-    if mode == FAN:
+    if mode == FAN_MODE:
         return np.stack([np.full(len(third), corners[0]), second, third], axis=1)
     faces = np.stack([corners[:-2], second, third], axis=1)
     faces[1::2] = faces[1::2, [1, 0, 2]]

@@ -41,11 +41,11 @@ nibabel: Any = lazy_module(*NIBABEL)
 
 CONFIDENCE = "confidence"
 NIFTI = (".nii", ".nii.gz")
-SHORT = {"RAS": "right-anterior-superior", "LPS": "left-posterior-superior", "LAS": "left-anterior-superior"}
+SPACE_NAMES = {"RAS": "right-anterior-superior", "LPS": "left-posterior-superior", "LAS": "left-anterior-superior"}
 """Spaces by their short names in NRRD files."""
 JOINED = {"datafile": "data file", "lineskip": "line skip", "byteskip": "byte skip", "centerings": "centers"}
 """Synonyms of fields of NRRD files."""
-PACKED = 4000
+NIFTI_BYTES_PER_BYTE = 4000
 """Memory limit for a NIfTI file per byte, since gzip may pack a thousand bytes into one."""
 _CODES = {
     name: code
@@ -86,7 +86,7 @@ class Image:
 
 def read_image(path: PathLike, formats: Collection[str], purpose: str) -> Image:
     """Read an image of real numbers."""
-    read = format_for(path, {ending: READERS[ending] for ending in formats}, purpose)
+    read = format_for(path, {ending: IMAGE_READERS[ending] for ending in formats}, purpose)
     with reading(path):
         image = read(path)
         if image.values.dtype.kind not in "biuf":
@@ -146,7 +146,7 @@ def _read_nrrd(path: PathLike) -> Image:
     steps = _nrrd_vectors(header["space directions"]) if "space directions" in header else np.diag(spacings)
     origin = _nrrd_vectors(header.get("space origin", f"({','.join('0' * values.ndim)})"))[0]
     space = header.get("space")
-    return Image(values, steps.T, origin, None if space is None else SHORT.get(space, space.lower()))
+    return Image(values, steps.T, origin, None if space is None else SPACE_NAMES.get(space, space.lower()))
 
 
 def _nrrd_header(data: bytes) -> tuple[dict[str, str], bytes]:
@@ -226,14 +226,14 @@ def _nrrd_vector(numbers: list[float]) -> str:
 
 
 def _read_nifti(path: PathLike) -> Image:
-    parts = parsed("nifti", path, *NIBABEL, bytes_per_byte=PACKED)
+    parts = parsed("nifti", path, *NIBABEL, bytes_per_byte=NIFTI_BYTES_PER_BYTE)
     values, affine = parts["values"], parts["affine"]
     while values.ndim > 3 and values.shape[-1] == 1:
         values = values[..., 0]
     return Image(values, affine[:3, :3], affine[:3, 3], "right-anterior-superior")
 
 
-READERS: dict[str, Callable[[PathLike], Image]] = {
+IMAGE_READERS: dict[str, Callable[[PathLike], Image]] = {
     ".npy": _read_npy,
     ".npz": _read_npz,
     ".nrrd": _read_nrrd,

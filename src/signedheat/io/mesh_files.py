@@ -20,18 +20,16 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers, reading, refuse_kind, text
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-FACET_WORDS = 15
-"""Least number of words in a facet: a loop of three vertices with three numbers each."""
 KEYWORDS = frozenset(
     "v vt vn vp f fo l p o g s mg lod mtllib usemtl maplib usemap cstype deg bmat step curv curv2 surf parm trim hole "
     "scrv sp end con bevel c_interp d_interp shadow_obj trace_obj ctech stech call csh bsp bzp cdc cdp res".split()
 )
 """Keywords of lines of OBJ files."""
-NUMBERS = re.compile(r"[-+.eE\d/ ]+")
+NUMBER_LINE = re.compile(r"[-+.eE\d/ ]+")
 """Matches lines of numbers with any keyword."""
-BYTES = 400
+BYTES_PER_OBJ_LINE = 400
 """Measured memory to read a line of an OBJ file."""
-MOVED = 1e-4
+ANNOUNCED_ROUNDING = 1e-4
 """Rounding error, relative to the size of a shape, above which a warning is issued."""
 _HEADER = 84  # of STL, in bytes: 80 of comment, 4 that count the facets
 
@@ -74,7 +72,7 @@ def warn_of_rounding(points: Floats, rounded: Floats) -> None:
     """Warn if rounding joins vertices of a shape, or moves them far relative to its size."""
     largest_move = float(np.abs(points - rounded).max())
     places, rounded_places = (np.count_nonzero(same_positions(p) == np.arange(len(p))) for p in (points, rounded))
-    if places > rounded_places or largest_move > MOVED * float(np.ptp(points, axis=0).max()):
+    if places > rounded_places or largest_move > ANNOUNCED_ROUNDING * float(np.ptp(points, axis=0).max()):
         joined = f" and joins {places - rounded_places:,} of them to others" if places > rounded_places else ""
         warn_user(
             f"the single precision of STL moves vertices by up to {largest_move:.2g}{joined}: save it as .ply, or move "
@@ -98,7 +96,7 @@ def _text_corners(data: bytes) -> Floats:
         )
     counts = np.searchsorted(corners, stops) - np.searchsorted(corners, begins)
     rooms = np.array(stops) - np.array(begins)
-    wrong = np.flatnonzero((counts != 3) | (rooms < FACET_WORDS))
+    wrong = np.flatnonzero((counts != 3) | (rooms < 15))  # 15 words: a loop of three vertices of three numbers
     if len(wrong) or len(corners) != 3 * len(begins):
         number = int(wrong[0]) if len(wrong) else len(begins)
         cause = f"facet {number} has {counts[number] if len(wrong) else 'other'} corners, and facets of STL have 3"
@@ -171,13 +169,13 @@ def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
     """Split lines by keyword; each keyword is replaced by the number of vertices so far."""
     lines: dict[str, list[list[Any]]] = {"v": [], "vn": [], "f": [], "l": [], "p": []}
     content = text(path)
-    ensure_fits(BYTES * sum(content.count(f"\n{keyword} ") for keyword in lines), path)
+    ensure_fits(BYTES_PER_OBJ_LINE * sum(content.count(f"\n{keyword} ") for keyword in lines), path)
     for number, line in enumerate(re.sub(r"\\[ \t]*\n", " ", content).split("\n"), start=1):
         words: list[Any] = line.partition("#")[0].split()
         if words and words[0] in lines:
             lines[words[0]].append(words)
             words[0] = len(lines["v"])
-        elif words and words[0] not in KEYWORDS and NUMBERS.fullmatch(" ".join(words[1:])):
+        elif words and words[0] not in KEYWORDS and NUMBER_LINE.fullmatch(" ".join(words[1:])):
             raise FileFormatError(
                 f"line {number} begins with '{words[0]:.20}', which is not an OBJ keyword",
                 remedy="correct or remove it",

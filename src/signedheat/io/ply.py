@@ -17,7 +17,7 @@ from ..errors import FileFormatError
 from ..exchange import Elements
 from .files import PathLike, contents, damaged, ensure_writable, parsed_numbers, replacing
 
-_TYPES = {
+PLY_TYPES = {
     name: code
     for names, code in [
         ("char int8", "i1"),
@@ -31,11 +31,9 @@ _TYPES = {
     ]
     for name in names.split()
 }
-_INTEGERS = {name: code for name, code in _TYPES.items() if code[0] != "f"}
+PLY_INTEGERS = {name: code for name, code in PLY_TYPES.items() if code[0] != "f"}
 """Types that may count the entries of a list."""
-_FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
-_ROOM = 12
-"""Number of digits kept free for the counts of a mesh that is written part by part."""
+PLY_FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
 
 
 @dataclass
@@ -124,7 +122,7 @@ def write_parts(parts: Iterator[tuple[Floats, Ints]], path: PathLike) -> tuple[i
 
     def header() -> bytes:
         """Of the same length whatever the numbers: a comment takes what they leave."""
-        free = " " * (2 * _ROOM - len(str(n_vertices)) - len(str(n_faces)))
+        free = " " * (24 - len(str(n_vertices)) - len(str(n_faces)))  # twelve digits each
         return _header_of(n_vertices, "xyz", n_faces, count_type="uchar", comment=f"signedheat{free}")
 
     with (
@@ -135,7 +133,7 @@ def write_parts(parts: Iterator[tuple[Floats, Ints]], path: PathLike) -> tuple[i
         file.write(header())
         for vertices, triangles in parts:
             file.write(np.ascontiguousarray(vertices, dtype="<f8").tobytes())
-            rows = np.empty(len(triangles), dtype=_FACE)
+            rows = np.empty(len(triangles), dtype=PLY_FACE)
             rows["count"], rows["corners"] = 3, triangles
             faces.write(rows.tobytes())
             n_vertices, n_faces = n_vertices + len(vertices), n_faces + len(triangles)
@@ -184,9 +182,9 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
                 case ["element"]:
                     elements.append(_Element(words[1], _count(words[2])))
                 case ["property"] if words[1] == "list":
-                    elements[-1].add(words[4], (_INTEGERS[words[2]], _TYPES[words[3]]))
+                    elements[-1].add(words[4], (PLY_INTEGERS[words[2]], PLY_TYPES[words[3]]))
                 case ["property"]:
-                    elements[-1].add(words[2], _TYPES[words[1]])
+                    elements[-1].add(words[2], PLY_TYPES[words[1]])
         except (IndexError, KeyError, ValueError):
             raise damaged(f"the header line '{' '.join(words)}' makes no sense: the file is damaged") from None
     if form not in ("ascii", "binary_little_endian", "binary_big_endian"):

@@ -21,12 +21,10 @@ from .sandbox import parsed
 SEPARATORS, DECIMAL_COMMAS = str.maketrans(",;", "  "), str.maketrans(",;", ". ")
 """Meanings of commas and semicolons in a table."""
 WITH_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
-NUMBERS = {"F": "f", "I": "i", "U": "u"}
+FIELD_TYPES = {"F": "f", "I": "i", "U": "u"}
 """Types of fields, with their letters in NumPy."""
-PACKED = 1000
+LAZ_BYTES_PER_BYTE = 1000
 """Memory limit for a LAZ file per byte."""
-CHECKSUM = 4
-"""Bytes at the end of each page of an E57 file."""
 SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance "
 """Namespace of the attributes by which XML names schemas."""
 
@@ -137,7 +135,7 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
         names, kind = header["FIELDS"], header["DATA"][0].lower()
         counts = [int(word) for word in header.get("COUNT", ["1"] * len(names))]
         n = int(header["POINTS"][0]) if "POINTS" in header else int(header["WIDTH"][0]) * int(header["HEIGHT"][0])
-        types = [NUMBERS[letter] + size for letter, size in zip(header["TYPE"], header["SIZE"], strict=True)]
+        types = [FIELD_TYPES[letter] + size for letter, size in zip(header["TYPE"], header["SIZE"], strict=True)]
         fields = [(f"{k}", f"<{code}", (count,)) for k, (code, count) in enumerate(zip(types, counts, strict=True))]
         row = np.dtype(fields)
         if len(names) != len(fields) or n < 0:
@@ -171,7 +169,7 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
 
 def read_las(path: PathLike) -> PointCloud:
     """Read the points of a LAS or LAZ file, with its scale and offset; it has no normals."""
-    parts = parsed("las", path, "laspy", f"{extension(path)} files", bytes_per_byte=PACKED)
+    parts = parsed("las", path, "laspy", f"{extension(path)} files", bytes_per_byte=LAZ_BYTES_PER_BYTE)
     return _cloud(parts["points"], path)
 
 
@@ -184,13 +182,13 @@ def read_e57(path: PathLike) -> PointCloud:
 
 
 def _e57_description(data: bytes) -> bytes:
-    """Return the XML of an E57 file, whose pages each end with a checksum."""
+    """Return the XML of an E57 file, whose pages each end with a checksum of four bytes."""
     if data[:8] != b"ASTM-E57" or len(data) < 48:
         raise damaged("it does not begin like an E57 file")
     offset, length, page = struct.unpack_from("<QQQ", data, 24)
-    if not CHECKSUM < page <= len(data) or max(offset, length) > len(data):
+    if not 4 < page <= len(data) or max(offset, length) > len(data):
         raise damaged(f"it announces {length} bytes of description at {offset}, and has {len(data)} bytes")
-    payload = page - CHECKSUM
+    payload = page - 4
     first, begin = divmod(offset, page)
     n_pages = -(-(begin + length) // payload)
     pages = (data[k * page : k * page + payload] for k in range(first, first + n_pages))

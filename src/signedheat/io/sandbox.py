@@ -25,7 +25,7 @@ from ..packages import ensure_installed, missing_package
 from . import parsers
 from .files import PathLike, ensure_fits, size_of
 
-RUN = (
+PARSER_PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); file = sys.argv.pop(1); "
     "exec(compile(open(file, encoding='utf-8').read(), file, 'exec'))"
 )
@@ -34,8 +34,8 @@ LEAST_MEMORY, MEMORY_PER_BYTE = 1 << 29, 100
 """Memory limit of a parser: a constant, and a factor for the size of the file."""
 LEAST_SECONDS, BYTES_PER_SECOND = 10, 20_000
 """Limit of processor time: a constant, and the bytes of a file for each further second."""
-NUMBERS = re.compile(r"[<>|][biuf][1248]")
-MOST_SAID = 1 << 24
+ARRAY_TYPE = re.compile(r"[<>|][biuf][1248]")
+MOST_ANSWERED = 1 << 24
 """Upper bound of the bytes of an answer, without its arrays."""
 ALONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 """Environment variables that limit threads to one, since idle threads take memory."""
@@ -66,7 +66,7 @@ def parsed(
     order = [function, os.path.abspath(path), json.dumps(options), str(memory), str(seconds)]
     with tempfile.TemporaryFile() as messages:
         process = subprocess.Popen(
-            [sys.executable, "-I", "-c", RUN, folders, str(parsers.__file__), *order],
+            [sys.executable, "-I", "-c", PARSER_PROGRAM, folders, str(parsers.__file__), *order],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=messages,
@@ -95,7 +95,7 @@ def parsed(
 def _answer(stream: BinaryIO, path: PathLike) -> dict[str, Any] | None:
     """Read the answer of a parser, arrays of numbers that fit in memory; None if it is incomplete."""
     try:
-        about = json.loads(stream.readline(MOST_SAID))
+        about = json.loads(stream.readline(MOST_ANSWERED))
         if "values" not in about:
             return dict(about)
         values = dict(about["values"])
@@ -103,7 +103,7 @@ def _answer(stream: BinaryIO, path: PathLike) -> dict[str, Any] | None:
     except (ValueError, KeyError, TypeError):
         return None
     for name, code, shape in shapes:
-        if not NUMBERS.fullmatch(code) or min(shape, default=0) < 0:
+        if not ARRAY_TYPE.fullmatch(code) or min(shape, default=0) < 0:
             return None
         ensure_fits(prod(shape) * np.dtype(code).itemsize, path)
         values[name] = np.empty(shape, dtype=code)

@@ -21,7 +21,7 @@ from . import gltf
 from .files import PathLike, contents, damaged, ensure_fits, extension, reading
 from .sandbox import parsed
 
-TRIANGLE_BYTES = 100
+BYTES_PER_3MF_TRIANGLE = 100
 """Memory per triangle of a 3MF package, with its vertices."""
 METRES = {
     "micron": 1e-6,
@@ -35,9 +35,9 @@ METRES = {
     "meter": 1.0,
 }
 """Units of length, including those of 3MF, in metres."""
-ROOT = "3D/3dmodel.model"
+MODEL_PART = "3D/3dmodel.model"
 PATH = "{http://schemas.microsoft.com/3dmanufacturing/production/2015/06}path"
-DEPTH = 32
+MOST_COMPONENT_DEPTH = 32
 """Largest depth of nested components."""
 
 Key = tuple[str, str]
@@ -46,11 +46,11 @@ STEP_BYTES = 10_000
 """Memory limit for a STEP file per byte: one line may describe a sphere, of any number of triangles."""
 STEP_SECONDS = 300
 """Limit of processor time for any STEP file: a single line may be slow to triangulate."""
-FINENESS = 1e-3
+FACET_DEFLECTION = 1e-3
 """Default distance of triangles from the surface, relative to the diagonal of the box around it."""
-ANGLE = 0.3
+FACET_ANGLE = 0.3
 """Approximate angle between neighbouring triangles of curved faces, in radians: 20 of them around a cylinder."""
-SEAM = 1e-6
+STEP_SEAM = 1e-6
 """Corners of neighbouring faces within this distance, relative to the diagonal, are one: Open CASCADE's precision."""
 
 
@@ -91,7 +91,7 @@ def read_3mf(path: PathLike) -> TriangleMesh:
         if not items:  # nothing is said about what to build: everything that is a mesh
             own = [_key(element, package.root, "id") for element in _all(root, "object")]
             items = [(key, np.eye(4, 3)) for key in own if len(package.object(key).faces)]
-        ensure_fits(TRIANGLE_BYTES * sum(package.count(key)[0] for key, _ in items), path)
+        ensure_fits(BYTES_PER_3MF_TRIANGLE * sum(package.count(key)[0] for key, _ in items), path)
         return _joined([body for key, matrix in items for body in package.placed(key, matrix)])
 
 
@@ -131,8 +131,8 @@ class _Package:
         if "_rels/.rels" in self._zip.namelist():
             for relation in ElementTree.fromstring(self._bytes("_rels/.rels")):
                 if relation.get("Type", "").endswith("/3dmodel"):
-                    return _part(relation.get("Target", ROOT))
-        return ROOT
+                    return _part(relation.get("Target", MODEL_PART))
+        return MODEL_PART
 
     def model(self, part: str) -> ElementTree.Element:
         """Return the root element of a part."""
@@ -153,13 +153,13 @@ class _Package:
     def count(self, key: Key, depth: int = 0) -> tuple[int, int]:
         """Count the triangles of an object with all its components, and their depth, without placing them."""
         if key not in self._counts:
-            if depth > DEPTH:
+            if depth > MOST_COMPONENT_DEPTH:
                 raise damaged("its components contain themselves, or too many others")
             item = self.object(key)
             inner = [self.count(part, depth + 1) for part, _ in item.parts]
             height = 1 + max((height for _, height in inner), default=0)
-            if height > DEPTH:
-                raise damaged(f"its components lie more than {DEPTH} levels deep")
+            if height > MOST_COMPONENT_DEPTH:
+                raise damaged(f"its components lie more than {MOST_COMPONENT_DEPTH} levels deep")
             self._counts[key] = len(item.faces) + sum(count for count, _ in inner), height
         return self._counts[key]
 
@@ -251,7 +251,7 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
     >>> mesh, cad_faces = read_step("part.step", deflection=0.01)  # doctest: +SKIP
     >>> cad_faces[signedheat.complete(mesh).closest(points).faces]  # doctest: +SKIP
     """
-    fineness = {"deflection": deflection, "fineness": FINENESS, "angle": ANGLE}
+    fineness = {"deflection": deflection, "fineness": FACET_DEFLECTION, "angle": FACET_ANGLE}
     parts = parsed(
         "step", path, "OCP", ".step files", bytes_per_byte=STEP_BYTES, least_seconds=STEP_SECONDS, **fineness
     )
@@ -260,7 +260,7 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
         raise FileFormatError("it has no surface", path=path)
     starts = np.cumsum([0, *parts["point_counts"][:-1]])
     faces = parts["triangles"] + np.repeat(starts, counts)[:, None]
-    kept, numbers = np.unique(welded(parts["points"], SEAM * parts["diagonal"]), return_inverse=True)
+    kept, numbers = np.unique(welded(parts["points"], STEP_SEAM * parts["diagonal"]), return_inverse=True)
     return TriangleMesh(parts["points"][kept], numbers.ravel()[faces]), np.repeat(np.arange(len(counts)), counts)
 
 

@@ -26,7 +26,7 @@ from .numpy_files import write_npz
 from .ply import read_ply, write_ply
 from .point_files import read_e57, read_las, read_pcd, read_xyz, write_xyz
 from .scenes import read_3mf, read_dae, read_glb, step_mesh
-from .solid_arrays import VERSION, arrays_of, holds_solid, load
+from .solid_arrays import ARCHIVE_VERSION, arrays_of, holds_solid, load
 from .tet_files import TET_FORMATS, read_tets, store_cells
 from .voxel_files import read_volume
 from .vtk_xml import read_vtp, write_vtp
@@ -79,7 +79,7 @@ WRITERS: dict[str, Callable[[Elements, PathLike], bytes]] = {
 
 SHAPE_FORMATS = frozenset(WRITERS)
 
-MANY, BYTES_PER_FACE = 100_000, 250
+CHECKED_FACES, LEAST_BYTES_PER_FACE = 100_000, 250
 """Memory is checked for this many faces or more; and a lower bound of what each face takes."""
 
 
@@ -132,11 +132,11 @@ def read(path: PathLike) -> Shape | Solid:
         found = read_shape(path)
         shape = shape_of(found) if isinstance(found, Elements) else found
         faces = getattr(shape, "n_faces", 0) or len(getattr(shape, "corners", ()))
-        if faces >= MANY:
+        if faces >= CHECKED_FACES:
             refuse_beyond_memory(
                 f"a surface of {faces:,} faces",
                 faces,
-                lambda n: float(BYTES_PER_FACE * n),
+                lambda n: float(LEAST_BYTES_PER_FACE * n),
                 lambda n: f"use at most {n:,} faces, coarsened or in parts",
             )
         return shape
@@ -190,7 +190,7 @@ def save_solid(solid: Solid, path: PathLike) -> None:
     ensure_writable(path, SOLID_FORMATS | SHAPE_FORMATS, "a solid")
     if extension(path) not in SOLID_FORMATS:
         return save(solid.surface(keep_faces=True), path)
-    write_npz(path, solid_version=VERSION, **arrays_of(solid))
+    write_npz(path, solid_version=ARCHIVE_VERSION, **arrays_of(solid))
 
 
 def save_samples(samples: Samples, path: PathLike, layout: Layout) -> None:

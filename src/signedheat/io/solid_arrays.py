@@ -18,9 +18,9 @@ from ..validation import refuse_extreme
 from .files import PathLike, reading
 from .numpy_files import names_in_npz, read_npz
 
-NEEDED = ("triangles", "origins", "confidence", "bounding", "closing", "key")
-SOURCE = ("source_vertices", "source_faces")
-VERSION = 2
+SOLID_ARRAYS = ("triangles", "origins", "confidence", "bounding", "closing", "key")
+SOURCE_ARRAYS = ("source_vertices", "source_faces")
+ARCHIVE_VERSION = 2
 """Version of the archive. Other versions are refused."""
 
 
@@ -34,7 +34,7 @@ def arrays_of(solid: Solid) -> dict[str, NDArray[Any]]:
         "closing": solid.windings.triangles,
     }
     if solid.source is not None:
-        arrays |= dict(zip(SOURCE, (solid.source.vertices, solid.source.faces), strict=True))
+        arrays |= dict(zip(SOURCE_ARRAYS, (solid.source.vertices, solid.source.faces), strict=True))
     return {**arrays, "key": _key(arrays)}
 
 
@@ -52,8 +52,8 @@ def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
     try:
         for corners in (triangles.reshape(-1, 3), closing.reshape(-1, 3)):
             refuse_extreme(corners.min(axis=0, initial=0.0), corners.max(axis=0, initial=0.0), "triangles")
-        if all(name in arrays for name in SOURCE):
-            source = TriangleMesh(*(arrays[name] for name in SOURCE))
+        if all(name in arrays for name in SOURCE_ARRAYS):
+            source = TriangleMesh(*(arrays[name] for name in SOURCE_ARRAYS))
         windings = Windings(np.ascontiguousarray(closing, dtype=np.float64))
     except GeometryError as error:
         raise FileFormatError(error.cause, remedy=error.remedy, element=error.element) from error
@@ -111,15 +111,19 @@ def load(path: PathLike) -> Solid:
     version = read_npz(path, ("solid_version",)).get("solid_version", np.zeros(1))
     if version.shape or version.dtype.kind not in "iuf" or not 0 < version < np.inf:
         raise FileFormatError("it has no solid", remedy="read fields by `load_field`, shapes by `read`", path=path)
-    if int(version) != VERSION:
-        remedy = "install a later version of signedheat" if int(version) > VERSION else "complete the shape again"
-        raise FileFormatError(f"another version wrote it ({int(version)}, not {VERSION})", remedy=remedy, path=path)
+    if int(version) != ARCHIVE_VERSION:
+        remedy = (
+            "install a later version of signedheat" if int(version) > ARCHIVE_VERSION else "complete the shape again"
+        )
+        raise FileFormatError(
+            f"another version wrote it ({int(version)}, not {ARCHIVE_VERSION})", remedy=remedy, path=path
+        )
     with reading(path):
-        return solid_of(read_npz(path, SOURCE, NEEDED))
+        return solid_of(read_npz(path, SOURCE_ARRAYS, SOLID_ARRAYS))
 
 
 def _key(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:
-    held = (arrays[name] for name in (*NEEDED, *SOURCE) if name in arrays)
+    held = (arrays[name] for name in (*SOLID_ARRAYS, *SOURCE_ARRAYS) if name in arrays)
     return np.frombuffer(fingerprint(*held), dtype=np.uint8)
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileFormatError
-from ..exchange import FLAT, NAME
+from ..exchange import FLAT_CELLS, VALUES_NAME
 from ..packages import require
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -26,7 +26,7 @@ from .files import PathLike, contents, damaged, extension, format_for, parsed_nu
 from .sandbox import parsed
 from .vtk_xml import Block, Cells, read_vtu
 
-MODULES = {
+MESHIO_MODULES = {
     ".mesh": "medit",
     ".meshb": "medit",
     ".msh": "gmsh",
@@ -38,7 +38,7 @@ MODULES = {
 """Module of meshio for each extension."""
 TETGEN = (".node", ".ele")
 """Extensions of TetGen files, which come in pairs."""
-TET_FORMATS = frozenset(MODULES)
+TET_FORMATS = frozenset(MESHIO_MODULES)
 
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
 COUNTED = {"PhysicalNames": 1, "Entities": 4, "Nodes": 2, "Elements": 2, "Periodic": 1, "NodeData": 1, "ElementData": 1}
@@ -51,7 +51,7 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
     """Read a `TetMesh`; or, from a file without tets, its surface."""
     mesh = load_cells(path)
     kinds = {block.type for block in mesh.cells}
-    if not kinds & {"triangle", "quad"} or not all(kind.startswith(FLAT) for kind in kinds):
+    if not kinds & {"triangle", "quad"} or not all(kind.startswith(FLAT_CELLS) for kind in kinds):
         return TetMesh.from_meshio(mesh)
     return (TriangleMesh if "quad" not in kinds else PolygonMesh).from_meshio(mesh)
 
@@ -59,13 +59,13 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
 def load_cells(path: PathLike) -> Any:
     """Points, cells and values at the points, as a `meshio.Mesh` has them."""
     if extension(path) == ".vtu":
-        return read_vtu(path, (NAME,))
+        return read_vtu(path, (VALUES_NAME,))
     for file in _files(path):
         if all(line.startswith(b"#") for line in contents(file).split(b"\n") if line.strip()):  # meshio would read on
             raise FileFormatError("the file is empty", remedy="write it again", path=file)
     if extension(path) == ".msh":
         _refuse_announcements(path)
-    parts = parsed("cells", path, "meshio", "tet meshes", module=MODULES[extension(path)])
+    parts = parsed("cells", path, "meshio", "tet meshes", module=MESHIO_MODULES[extension(path)])
     blocks = [Block(kind, parts[f"cells {k}"]) for k, kind in enumerate(parts["kinds"])]
     values = {name: parts[f"values {k}"] for k, name in enumerate(parts["names"])}
     return Cells(parts["points"], blocks, values)
@@ -90,7 +90,7 @@ def _files(path: PathLike) -> list[Path]:
 
 
 def _module(path: PathLike) -> Any:
-    return require(f"meshio.{format_for(path, MODULES, 'a tet mesh')}", "tet meshes")
+    return require(f"meshio.{format_for(path, MESHIO_MODULES, 'a tet mesh')}", "tet meshes")
 
 
 def _refuse_announcements(path: PathLike) -> None:

@@ -19,19 +19,19 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import FileFormatError
-from ..exchange import NAME
+from ..exchange import VALUES_NAME
 from ..grids.blocks import SIDE, Blocks
 from ..grids.grid_field import GridField
 from .files import PathLike, format_for, replacing
 
-MAGIC, FILE_VERSION, LIBRARY = 0x56444220, 224, (10, 0)
+VDB_MAGIC, VDB_VERSION, VDB_LIBRARY = 0x56444220, 224, (10, 0)
 """Magic number, version of the format, and version of a library that writes it."""
-ZIP, ALL_VALUES = 1, 6
+ZIP_FLAG, ALL_VALUES_BYTE = 1, 6
 """Flag of values packed by zlib; byte before values that says that all of them are there."""
 MOST_HALF = float(np.finfo(np.float16).max)
-SIDES, SIZES = (32, 16), (128, SIDE)
+CHILDREN_PER_EDGE, VOXELS_PER_CHILD = (32, 16), (128, SIDE)
 """Nodes above the blocks, from the top: children along each edge, and voxels along each edge of a child."""
-CONVENTION = (
+VDB_CONVENTION = (
     "signed distance, negative inside, in the units of the shape; voxel (i, j, k) at origin + (i, j, k) * spacing"
 )
 Outside = Callable[[Ints, int], NDArray[np.float32]]
@@ -90,10 +90,10 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
             path=path,
         )
     metadata: dict[str, str | bool] = {
-        "name": NAME,
+        "name": VALUES_NAME,
         "class": "level set" if field.blocks is not None else "unknown",
         "creator": "signedheat",
-        "convention": CONVENTION,
+        "convention": VDB_CONVENTION,
         "spacing": " ".join(map(repr, field.grid.spacing.tolist())),
         "shape": " ".join(map(str, field.grid.shape)),
         "is_saved_as_half_float": half,
@@ -145,7 +145,7 @@ def _in_order(
 ) -> _Tree:
     """Return the tree with its blocks in the order of the file: by top node, by cube, by place."""
     places = SIDE * blocks.places.astype(np.int64)
-    top, cube = SIDES[0] * SIZES[0], SIZES[0]
+    top, cube = CHILDREN_PER_EDGE[0] * VOXELS_PER_CHILD[0], VOXELS_PER_CHILD[0]
     order = np.lexsort(np.concatenate([places // top, places // cube, places], axis=1).T[::-1])
     return _Tree(background, places[order], values[order], active[order], outside)
 
@@ -155,13 +155,13 @@ def _write_file(
 ) -> None:
     """Write the header, and the grid with where it begins, where its voxels do, and where it ends."""
     kind = np.dtype("<f2" if half else "<f4")
-    file.write(struct.pack("<qIIIB", MAGIC, FILE_VERSION, *LIBRARY, 1) + str(uuid.uuid4()).encode())
+    file.write(struct.pack("<qIIIB", VDB_MAGIC, VDB_VERSION, *VDB_LIBRARY, 1) + str(uuid.uuid4()).encode())
     file.write(struct.pack("<II", 0, 1))  # metadata of the file; grids
-    file.write(_text(NAME) + _text("Tree_float_5_4_3" + ("_HalfFloat" if half else "")) + _text(""))
+    file.write(_text(VALUES_NAME) + _text("Tree_float_5_4_3" + ("_HalfFloat" if half else "")) + _text(""))
     offsets = file.tell()
     file.write(struct.pack("<qqq", 0, 0, 0))
     begin = file.tell()
-    file.write(struct.pack("<I", ZIP) + _metadata(metadata) + _transform(origin, spacing))
+    file.write(struct.pack("<I", ZIP_FLAG) + _metadata(metadata) + _transform(origin, spacing))
     file.write(struct.pack("<I", 1) + np.float32(kind.type(tree.background)).tobytes())  # buffers of values
     _write_topology(file, tree, kind)
     voxels = file.tell()
@@ -174,7 +174,7 @@ def _write_file(
 
 def _write_topology(file: BinaryIO, tree: _Tree, kind: np.dtype) -> None:
     """Write the nodes from the root down: which places have children, the values of the others, masks of blocks."""
-    cube, top_size = SIZES[0], SIDES[0] * SIZES[0]
+    cube, top_size = VOXELS_PER_CHILD[0], CHILDREN_PER_EDGE[0] * VOXELS_PER_CHILD[0]
     cubes_of = _by_parent(tree.places // cube * cube, top_size)
     blocks_of = _by_parent(tree.places, cube)
     file.write(struct.pack("<II", 0, len(cubes_of)))  # tiles of the root, children
@@ -190,7 +190,7 @@ def _write_topology(file: BinaryIO, tree: _Tree, kind: np.dtype) -> None:
 
 def _node(place: Ints, level: int, children: Ints, outside: Outside, kind: np.dtype) -> bytes:
     """Return a node at a place: masks of its cubes with children and of active ones (none); values, 0 at children."""
-    size, shape = SIZES[level], (SIDES[level],) * 3
+    size, shape = VOXELS_PER_CHILD[level], (CHILDREN_PER_EDGE[level],) * 3
     cubes = place + size * np.indices(shape).reshape(3, -1).T
     has_child = np.zeros(shape, dtype=bool)
     has_child[tuple((children - place).T // size)] = True
@@ -230,7 +230,7 @@ def _packed(values: NDArray[np.floating], kind: np.dtype) -> bytes:
     packed = zlib.compress(data, 1)
     is_shorter = len(packed) < len(data)
     size = struct.pack("<q", len(packed) if is_shorter else -len(data))
-    return bytes([ALL_VALUES]) + size + (packed if is_shorter else data)
+    return bytes([ALL_VALUES_BYTE]) + size + (packed if is_shorter else data)
 
 
 def _by_parent(places: Ints, size: int) -> dict[tuple[int, ...], Ints]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Frozen, read_only, short
 from ..errors import FileFormatError, GeometryError
-from ..exchange import NAME
+from ..exchange import VALUES_NAME
 from ..foreign import Represented
 from ..grids.grid import Grid
 from ..grids.grid_field import GridField
@@ -29,7 +29,7 @@ Mesh = TypeVar("Mesh", TriangleMesh, PolygonMesh)
 
 VOLUME_FORMATS = (".npy", ".nrrd", ".vti")
 LABEL_FORMATS = (*VOLUME_FORMATS, *NIFTI)
-SQUARE = 1e-4
+SQUARE_COSINE = 1e-4
 """Axes are at right angles if their cosine is at most this. NIfTI files hold them in single precision."""
 SPACES = {
     "right-anterior-superior": (1, 1, 1),
@@ -93,7 +93,7 @@ class LabelImage(Represented, Frozen):
         if not (np.isfinite(axes).all() and (lengths > 0).all() and np.isfinite(origin).all()):
             raise GeometryError("its axes have no directions", remedy="write it again", element="axes")
         cosine = float(np.abs((axes / lengths).T @ (axes / lengths) - np.eye(3)).max())
-        if cosine > SQUARE:
+        if cosine > SQUARE_COSINE:
             raise GeometryError(
                 f"its axes are not at right angles, but off by {np.degrees(np.arcsin(min(cosine, 1.0))):.3g}°",
                 remedy="resample the image along right angles",
@@ -219,7 +219,7 @@ class LabelImage(Represented, Frozen):
                 temporary.write_bytes(self._nifti(field, axes, first, path))
         elif extension(path) == ".nrrd":
             with replacing(path) as temporary:
-                write_nrrd(temporary, field.values, axes, first, self.space, content=NAME, convention=CONVENTION)
+                write_nrrd(temporary, field.values, axes, first, self.space, content=VALUES_NAME, convention=CONVENTION)
         else:
             save_field(replace(field, grid=Grid(first, field.grid.spacing, field.grid.shape), solid=None), path)
 

@@ -24,10 +24,10 @@ from ..errors import FileFormatError
 from ..exchange import Elements
 from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers
 
-_TYPES = {f"{kind}{8 * size}": f"{kind[0].lower()}{size}" for kind in ("Int", "UInt") for size in (1, 2, 4, 8)}
-_TYPES |= {"Float32": "f4", "Float64": "f8"}
-_NAMES = {code: name for name, code in _TYPES.items()}
-KINDS = {
+VTK_TYPES = {f"{kind}{8 * size}": f"{kind[0].lower()}{size}" for kind in ("Int", "UInt") for size in (1, 2, 4, 8)}
+VTK_TYPES |= {"Float32": "f4", "Float64": "f8"}
+VTK_NAMES = {code: name for name, code in VTK_TYPES.items()}
+CELL_NAMES = {
     1: "vertex",
     3: "line",
     5: "triangle",
@@ -204,7 +204,7 @@ def read_vtu(path: PathLike, names: tuple[str, ...] = ()) -> Cells:
         counts = (ends - starts)[chosen]
         for count in np.unique(counts).tolist():
             rows = starts[chosen[counts == count]]
-            blocks.append(Block(KINDS.get(kind, f"type {kind}"), corners[rows[:, None] + np.arange(count)]))
+            blocks.append(Block(CELL_NAMES.get(kind, f"type {kind}"), corners[rows[:, None] + np.arange(count)]))
     data = {
         name: arrays.of(element, n_points)
         for element in piece.iterfind("PointData/DataArray")
@@ -230,7 +230,7 @@ class _Writer:
         code = values.dtype.str[1:]
         data = values.astype("<" + code, copy=False).tobytes()
         element = (
-            f'<DataArray type="{_NAMES[code]}" Name="{name}" NumberOfComponents="{values[0].size}" '
+            f'<DataArray type="{VTK_NAMES[code]}" Name="{name}" NumberOfComponents="{values[0].size}" '
             f'format="appended" offset="{self._offset}"/>'
         )
         self._blocks += [np.array(len(data), dtype="<u8").tobytes(), data]
@@ -267,7 +267,7 @@ class _Arrays:
         """Return the `count` numbers of a DataArray element; no more are unpacked."""
         if element is None:
             return self._counted(np.empty(0), count)
-        code = _TYPES.get(element.get("type", ""))
+        code = VTK_TYPES.get(element.get("type", ""))
         if code is None:
             raise FileFormatError(f"arrays of type '{element.get('type')}' are not supported", remedy="use Float64")
         form, inline = element.get("format"), (element.text or "").split()

@@ -20,7 +20,7 @@ from .superlu import SuperLUFactor
 __all__ = ["PardisoFactor", "elimination_order", "upper_triangle", "whole"]
 
 
-LARGE = 300_000
+MKL_UNKNOWNS = 300_000
 """Number of unknowns above which MKL is recommended. A surface has three for each vertex: with 160,000 of these SuperLU
 takes 1.2 times as long on one processor, and MKL uses two of them well; with 650,000 it takes twice as long."""
 HAS_MKL = platform.machine() in ("x86_64", "AMD64") and sys.platform != "darwin"
@@ -71,6 +71,6 @@ def factorize(
         return again
     if name == "pardiso":
         return PardisoFactor(upper, None if reused else order)
-    if upper.shape[0] >= LARGE and backend is None and HAS_MKL:
+    if upper.shape[0] >= MKL_UNKNOWNS and backend is None and HAS_MKL:
         advise()
     return SuperLUFactor(upper, order)

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from ..arrays import Bools, Floats
 
-FAINT = 2.0**-900
+UNDERFLOWN = 2.0**-900
 """Size of rows, relative to the largest, below which they are computed anew: terms may have underflowed on the way
 there."""
 Solve = Callable[[NDArray[Any]], NDArray[Any]]
@@ -43,7 +43,7 @@ def restart(solve: Solve, border_forces: Forces, loads: NDArray[Any], first: Sta
     while True:
         values, logarithm = stages[-1]
         sizes = np.where(unknown, largest_components(values), 0.0)
-        faint = unknown & (sizes < FAINT * sizes.max(initial=0.0))
+        faint = unknown & (sizes < UNDERFLOWN * sizes.max(initial=0.0))
         if not faint.any():
             return stages
         inside = _rows(faint, values)

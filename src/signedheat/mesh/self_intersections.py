@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..parallel import CHUNK, n_threads
+from ..parallel import ROWS_PER_TASK, n_threads
 from .box_tree import LEAF, BoxTree, morton_codes
 from .unit_vectors import unit
 from .welding import same_positions
@@ -60,21 +60,21 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float,
         return np.stack([first, second], axis=1)[_overlapping(flat, ids, first, second, slack, depth)]
 
     def of_tree(start: int) -> Ints:
-        batch = slice(start, start + CHUNK)
+        batch = slice(start, start + ROWS_PER_TASK)
         starts, near = tree.meeting(corners[batch], slack, hubs[batch], from_leaf[batch])
         owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         chosen = ((near > owners) | (owners >= count)) & ((hubs[owners] < 0) | (hubs[owners] != hubs[near]))
         return overlapping(owners[chosen], near[chosen])
 
     def of_fans(start: int) -> Ints:
-        starts, near = around.meeting(arcs[start : start + CHUNK], 1e-6)  # angle against rounding
+        starts, near = around.meeting(arcs[start : start + ROWS_PER_TASK], 1e-6)  # angle against rounding
         owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         chosen = (near > owners) & (hubs[fans[owners]] == hubs[fans[near]])
         return overlapping(fans[owners[chosen]], fans[near[chosen]])
 
     with ThreadPoolExecutor(n_threads()) as pool:
-        parts = list(pool.map(of_tree, range(0, len(ids), CHUNK)))
-        pairs = np.concatenate(parts + list(pool.map(of_fans, range(0, int((fans < count).sum()), CHUNK))))
+        parts = list(pool.map(of_tree, range(0, len(ids), ROWS_PER_TASK)))
+        pairs = np.concatenate(parts + list(pool.map(of_fans, range(0, int((fans < count).sum()), ROWS_PER_TASK))))
     pairs = np.sort(order[pairs], axis=1)
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 

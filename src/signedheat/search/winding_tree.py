@@ -18,7 +18,7 @@ from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..mesh.box_tree import LEAF, BoxTree
 from ..mesh.triangles import area_vectors
-from ..parallel import CHUNK, in_chunks
+from ..parallel import ROWS_PER_TASK, in_chunks
 
 DEPTH = 1e-5
 """Offset behind a face, relative to its size."""
@@ -72,8 +72,10 @@ def steps_off(triangles: Floats, depth: float) -> Floats:
 def winding_sums(triangles: Floats, points: Floats) -> Floats:
     """Return (n,) winding numbers around few points, triangle by triangle (van Oosterom & Strackee 1983)."""
     numbers = np.zeros(len(points))
-    for begin in range(0, len(triangles), CHUNK):
-        block = np.ascontiguousarray(triangles[begin : begin + CHUNK].transpose(1, 2, 0))  # fast along long rows
+    for begin in range(0, len(triangles), ROWS_PER_TASK):
+        block = np.ascontiguousarray(
+            triangles[begin : begin + ROWS_PER_TASK].transpose(1, 2, 0)
+        )  # fast along long rows
         for k, point in enumerate(points):
             a, b, c = block - point[:, None]
             x, y, z = (np.sqrt(np.einsum("dn,dn->n", corner, corner)) for corner in (a, b, c))
@@ -165,7 +167,9 @@ def _moments(triangles: Floats, tree: BoxTree) -> Floats:
     """Return (2 · leaves, 23) area vector, centre, (`OPENING` · radius)², and coefficients of M and S."""
     leaves = len(tree.bounds) // 2
     grouped = tree.items.reshape(leaves, LEAF)
-    blocks = [_of_leaves(triangles, grouped[start : start + CHUNK]) for start in range(0, leaves, CHUNK)]
+    blocks = [
+        _of_leaves(triangles, grouped[start : start + ROWS_PER_TASK]) for start in range(0, leaves, ROWS_PER_TASK)
+    ]
     vectors, weights, firsts, centres, first, second, radii = (
         np.concatenate(part, axis=-1) for part in zip(*blocks, strict=True)
     )

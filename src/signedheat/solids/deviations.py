@@ -35,7 +35,7 @@ PERCENTILES = (0.0, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 100.0)
 """Percentiles of deviations in summaries."""
 EXTREME = 99.0
 """Percentile of absolute deviations at which colour scales and histograms end, so that outliers do not dominate."""
-BINS = 40
+HISTOGRAM_BINS = 40
 """Default number of bins of histograms."""
 OPEN = 0.25
 """Completed share of the surface above which a nominal part is measured as an open surface."""
@@ -154,7 +154,7 @@ class Deviation(Frozen):
         """
         return np.asarray(np.percentile(self.of_surface, percentages(percents)))
 
-    def histogram(self, bins: int = BINS) -> tuple[Ints, Floats]:
+    def histogram(self, bins: int = HISTOGRAM_BINS) -> tuple[Ints, Floats]:
         """Count points by deviation; those beyond `extreme` count in the first or last bin.
 
         Parameters

@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.tet_shapes import TetShapes, inside_out
-from ..parallel import CHUNK, in_chunks
+from ..parallel import ROWS_PER_TASK, in_chunks
 
 FLAT = 1e-10
 """Tets whose volume, relative to the cube of the longest edge, is below this contain no part of a source."""
@@ -79,8 +79,8 @@ class Planes(NamedTuple):
 def clip_triangles(mesh: TetShapes, planes: Planes, triangles: Floats) -> ClippedPolygons:
     """Clip (k, 3, 3) triangles against the tets that they cross; parts outside the mesh are dropped."""
     parts = []
-    for begin in range(0, max(len(triangles), 1), CHUNK):  # most tets near a triangle contain no part of it
-        chunk = triangles[begin : begin + CHUNK]
+    for begin in range(0, max(len(triangles), 1), ROWS_PER_TASK):  # most tets near a triangle contain no part of it
+        chunk = triangles[begin : begin + ROWS_PER_TASK]
         starts, tets = mesh.search_tree.meeting(chunk, _slack(mesh))
         parents = np.repeat(np.arange(len(chunk)), np.diff(starts))
         vectors, areas, centers, in_face = _clip(planes, chunk - planes.center, parents, tets)

@@ -12,7 +12,7 @@ import scipy
 from scipy import sparse
 
 from ..arrays import Bools, Floats, Ints, LastUsed
-from ..direct_integration import STIFFEST, SpringIntegration
+from ..direct_integration import STIFFEST_SPRING, SpringIntegration
 from ..discretization import DiffusesEach, Levels, SourceTerm, discretize
 from ..linear import Factor, factorize, upper_triangle
 from ..linear.incomplete_cholesky import IncompleteCholesky, from_first, outward_order
@@ -245,7 +245,7 @@ class TetIntegration(SpringIntegration):
 
     def penalize(self, divergence: Floats, source: SourceTerm, strength: float) -> Floats:
         """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), where A φ is corrected for the curvature of φ."""
-        strength = min(strength, STIFFEST * float(self.stiffness.diagonal().max()) / float(source.weights.max()))
+        strength = min(strength, STIFFEST_SPRING * float(self.stiffness.diagonal().max()) / float(source.weights.max()))
         free = super().penalize(divergence, source, strength)
         pull = source.interpolation.T @ (strength * source.weights * self._quadratic_correction(free, source))
         return super().penalize(divergence - pull, source, strength)

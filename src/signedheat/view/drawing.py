@@ -32,11 +32,6 @@ from .surface_pictures import draw_shape, draw_surface
 
 pillow: Any = lazy_module("PIL.Image", "pictures")
 
-SIDE = 3.4
-"""Size of the picture in inches."""
-PANEL = 4.3
-"""Side of a panel of a row, in inches."""
-
 
 def save_row(path: PathLike, *panels: tuple[Any, ...]) -> None:
     """Write a picture of several shapes and fields, side by side, each with its title.
@@ -57,7 +52,7 @@ def save_row(path: PathLike, *panels: tuple[Any, ...]) -> None:
     UnsupportedTypeError
         If something is neither a shape nor a field.
     """
-    with picture(path, PANEL * len(panels), PANEL, dpi=110) as figure:
+    with picture(path, 4.3 * len(panels), 4.3, dpi=110) as figure:  # in inches
         for k, (title, thing, *options) in enumerate(panels):
             axes = figure.add_subplot(1, len(panels), k + 1)
             if not draw(thing, axes, **(options[0] if options else {})):
@@ -70,7 +65,7 @@ def html_of(thing: object) -> str:
     """Write a line of text and, if Matplotlib is installed, a picture as HTML."""
     text = f"<code>{html.escape(repr(thing))}</code>".replace("\n", "<br>")
     try:
-        figure = new_figure(SIDE * 1.25, SIDE)
+        figure = new_figure(3.4 * 1.25, 3.4)  # in inches
         drawn = draw(thing, figure.add_subplot())
     except (MissingPackageError, GeometryError):  # the latter of fields without a value
         return text

@@ -29,8 +29,6 @@ mpl_figure: Any = lazy_module("matplotlib.figure", "pictures")
 PICTURE_FORMATS = frozenset({".png", ".pdf", ".svg", ".jpg"})
 INSIDE_TO_OUTSIDE = ["#0b3c5d", "#3f7fae", "#a9cce3", "#fbfaf5", "#f6c9a0", "#d9793a", "#8c2d04"]
 """Colours from far inside to far outside: blue, light at the surface, orange."""
-CLOSEST = 0.07
-"""Least distance between labels, relative to the length of the bar."""
 
 
 def ensure_picture_writable(path: PathLike) -> None:
@@ -104,7 +102,7 @@ def round_step(width: float) -> float:
 
 def legible(ticks: Floats, low: float, high: float) -> list[float]:
     """Zero, and ticks that are far enough from the previous one in the root of distance."""
-    apart = CLOSEST * float(signed_root(high) - signed_root(low))
+    apart = 0.07 * float(signed_root(high) - signed_root(low))  # of the length of the bar
     kept = [0.0]
     for outwards in (ticks[ticks > 0], ticks[ticks < 0][::-1]):
         last = 0.0

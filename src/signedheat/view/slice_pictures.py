@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 mpl_collections: Any = lazy_module("matplotlib.collections", "pictures")
 
-AXES = "xyz"
+AXIS_NAMES = "xyz"
 TET_NODES = 80
 """Nodes along the longest side of the grid at which a field on tets is drawn."""
 
@@ -97,8 +97,8 @@ def draw_slices(
         trusted = None if field.confidence is None else field.confidence[index]
         _draw_panel(panel, u, v, field.values[index], colors, isolines, levels, trusted)
         _draw_section(panel, shape, normal, position, float(field.grid.spacing[normal]))
-        panel.set(xlabel=AXES[horizontal], ylabel=AXES[vertical])
-        panel.set_title(f"{AXES[normal]} = {rounded(position, field.grid.spacing[normal])}", fontsize=10)
+        panel.set(xlabel=AXIS_NAMES[horizontal], ylabel=AXIS_NAMES[vertical])
+        panel.set_title(f"{AXIS_NAMES[normal]} = {rounded(position, field.grid.spacing[normal])}", fontsize=10)
     add_color_bar(axes[0].figure, axes, colors, isolines, step)
 
 
@@ -129,7 +129,7 @@ def draw_plane(field: GridField, axes: Axes, shape: SpaceSources | None = None, 
             axes.scatter(line.points[:, 0], line.points[:, 1], s=6, c="#d4145a", linewidths=0, zorder=3)
         elif isinstance(line, Polyline):
             draw_line(line, axes)
-    axes.set(xlabel=AXES[0], ylabel=AXES[1])
+    axes.set(xlabel=AXIS_NAMES[0], ylabel=AXIS_NAMES[1])
     add_color_bar(axes.figure, [axes], colors, isolines, step)
 
 

@@ -23,7 +23,7 @@ from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..io.numpy_files import write_npz
 from ..io.ply import write_ply
 from ..kinds import Shape
-from ..solids.deviations import Deviation
+from ..solids.deviations import HISTOGRAM_BINS, Deviation
 from ..solids.thickness import Thickness
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
@@ -44,11 +44,9 @@ from .figures import (
     range_of,
 )
 
-SIZE = 900
-"""Pixels along the longer side."""
-MARGIN = 10
+MARGIN_PIXELS = 10
 """Width of the empty margin in pixels."""
-VIEW = (22, -58)
+VIEW_ANGLES = (22, -58)
 """Elevation and azimuth of the view on a coloured surface, in degrees."""
 LIGHT = np.array([0.25, 0.35, 0.9]) / np.linalg.norm([0.25, 0.35, 0.9])
 """Direction to the light: right, up and towards the eye."""
@@ -70,14 +68,14 @@ class Camera:
         frame = looking(direction, up)
         seen = points @ frame[:2].T
         lower, upper = seen.min(axis=0), seen.max(axis=0)
-        scale = (SIZE - 2 * MARGIN) / max(float((upper - lower).max()), 1e-300)
-        width, height = (np.ceil((upper - lower) * scale).astype(int) + 2 * MARGIN).tolist()
+        scale = (900 - 2 * MARGIN_PIXELS) / max(float((upper - lower).max()), 1e-300)  # 900 along the longer side
+        width, height = (np.ceil((upper - lower) * scale).astype(int) + 2 * MARGIN_PIXELS).tolist()
         return cls(frame, lower, scale, width, height)
 
     def pixels(self, points: Floats) -> Floats:
         """(n, 3) column, row and depth of points in space; larger depths are nearer."""
         seen = points @ self.frame.T
-        return np.column_stack([(seen[:, :2] - self.lower) * self.scale + MARGIN, seen[:, 2] * self.scale])
+        return np.column_stack([(seen[:, :2] - self.lower) * self.scale + MARGIN_PIXELS, seen[:, 2] * self.scale])
 
     def shades(self, area_vectors: Floats) -> Floats:
         """(m,) brightness of faces, from 0.45 to 1, the same for both sides of a face."""
@@ -160,8 +158,6 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
 
 OUTER_COLOR, INNER_COLOR = np.array([0.96, 0.86, 0.55]), np.array([0.80, 0.25, 0.20])
-MOST_POINTS = 200_000
-"""Largest number of points to draw; of larger clouds, an even subset is drawn."""
 
 
 def save_scene(shape: Shape | ForeignShape, path: PathLike, up: int = 2) -> None:
@@ -204,7 +200,7 @@ def draw_shape(
 
 def draw_points(points: Floats, axes: Axes, direction: Floats, up: int = 2, colors: Floats | None = None) -> None:
     """Draw points into axes from far to near, in (n, 4) colours or in a blue that darkens with nearness."""
-    drawn = slice(None, None, max(1, len(points) // MOST_POINTS))
+    drawn = slice(None, None, max(1, len(points) // 200_000))  # of larger clouds an even subset
     pixels = Camera.around(points[drawn], direction, up).pixels(points[drawn])
     order = np.argsort(pixels[:, 2])
     x, y, depth = pixels[order].T
@@ -355,7 +351,7 @@ def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> F
         stacked = np.concatenate(normals)
         lengths = np.linalg.norm(stacked, axis=1)
         mean = (stacked[lengths > 0] / lengths[lengths > 0, None]).sum(axis=0) / len(stacked)
-    direction = oblique(*VIEW, up)
+    direction = oblique(*VIEW_ANGLES, up)
     if np.linalg.norm(mean) > 0.3:
         return mean / np.linalg.norm(mean) + 0.2 * direction
     extents = np.ptp(mesh.bounds, axis=0)
@@ -368,10 +364,6 @@ def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> F
 
 DEVIATION_FORMATS = frozenset({".csv", ".ply"}) | PICTURE_FORMATS
 THICKNESS_FORMATS = frozenset({".npz", ".ply"}) | PICTURE_FORMATS
-THICK = 95.0
-"""Percentile of thickness at which colours end."""
-BINS = 40
-"""Number of bins of the histogram of thickness."""
 COLORS = np.array([[int(color[at : at + 2], 16) for at in (1, 3, 5)] for color in INSIDE_TO_OUTSIDE])
 
 
@@ -424,7 +416,7 @@ def _thickness_colors(found: Thickness) -> NDArray[np.uint8]:
 
 def _limits(found: Thickness) -> tuple[float, float]:
     """Thicknesses at which colours begin and end."""
-    low, high = found.percentiles([0.0, THICK]).tolist()
+    low, high = found.percentiles([0.0, 95.0]).tolist()
     return (low, high) if high > low + 1e-9 * high else (0.0, high)
 
 
@@ -434,10 +426,10 @@ def _draw_thickness(found: Thickness, path: PathLike) -> None:
     colors = _thickness_colors(found) / 255
     with picture(path, 12, 5) as figure:
         surface, histogram = figure.subplots(1, 2)
-        draw_shape(found.mesh, surface, VIEW, colors=colors)
+        draw_shape(found.mesh, surface, VIEW_ANGLES, colors=colors)
         known = np.flatnonzero(~np.isnan(found.values))
         values, areas = np.clip(found.values[known], low, high), found.mesh.face_areas
-        counts, limits = np.histogram(values, BINS, (low, high), weights=100 * areas[known] / areas.sum())
+        counts, limits = np.histogram(values, HISTOGRAM_BINS, (low, high), weights=100 * areas[known] / areas.sum())
         middles = 0.5 * (limits[1:] + limits[:-1])
         bars: Any = {"color": _mixed(middles, low, high, COLORS[::-1]) / 255, "edgecolor": "0.5", "linewidth": 0.5}
         histogram.bar(middles, counts, np.diff(limits), **bars)
@@ -453,7 +445,7 @@ def _draw_deviation(found: Deviation, path: PathLike) -> None:
     with picture(path, 12, 5) as figure:
         scan, histogram = figure.subplots(1, 2)
         if isinstance(found.scan, PointCloud):
-            draw_points(found.points, scan, oblique(*VIEW), colors=scale.to_rgba(found.distances))
+            draw_points(found.points, scan, oblique(*VIEW_ANGLES), colors=scale.to_rgba(found.distances))
         else:
             draw_surface(VertexField(found.scan, found.distances), scan, colors=scale)
         figure.colorbar(scale, ax=scan, shrink=0.85, pad=0.015, extend="both", format="{x:g}")

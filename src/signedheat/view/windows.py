@@ -8,7 +8,7 @@ from typing import Any
 
 from ..curves.piecewise_field import PiecewiseField
 from ..errors import GeometryError, OutsideError
-from ..exchange import NAME
+from ..exchange import VALUES_NAME
 from ..grids.grid import Grid
 from ..grids.grid_field import GridField
 from ..grids.polyline import Polyline
@@ -104,13 +104,13 @@ def _add_colors(plotter: Any, mesh: Any, look: dict[str, Any], **options: Any) -
     bar = {"title": "signed distance", "n_labels": 5, "fmt": "%.3g"}
     limits = (-look["reach"], look["reach"])
     plotter.add_mesh(
-        mesh, scalars=NAME, cmap=look["colors"], clim=limits, nan_color="#b9b9b9", scalar_bar_args=bar, **options
+        mesh, scalars=VALUES_NAME, cmap=look["colors"], clim=limits, nan_color="#b9b9b9", scalar_bar_args=bar, **options
     )
 
 
 def _add_isolines(plotter: Any, mesh: Any, look: dict[str, Any]) -> None:
     for levels, width in ((look["levels"], 1.0), ([0.0] if look["zero"] else [], 4.0)):
-        lines = mesh.contour(list(levels), scalars=NAME) if len(levels) else None
+        lines = mesh.contour(list(levels), scalars=VALUES_NAME) if len(levels) else None
         if lines is not None and lines.n_points:
             mapper = plotter.add_mesh(lines, color=LINE, line_width=width, show_scalar_bar=False).mapper
             mapper.SetResolveCoincidentTopologyToPolygonOffset()  # draw lines above the surface they lie on
