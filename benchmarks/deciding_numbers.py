@@ -325,19 +325,22 @@ def main(seeds: int = 2) -> None:
     for name in errors[value]:
         print(f"{name:36s} " + " ".join(f"{row[name]:6.4f}" for row in errors.values()))
 
-    shares = {units: joined(units) for units in (welding.SEAM / 2, welding.SEAM, 2 * welding.SEAM, welding.GAP)}
-    print("share of seams that is joined with welding.SEAM " + ", ".join(f"{units:g}" for units in shares))
-    for name in shares[welding.SEAM]:
+    shares = {
+        units: joined(units)
+        for units in (welding.SEAM_UNITS / 2, welding.SEAM_UNITS, 2 * welding.SEAM_UNITS, welding.GAP_UNITS)
+    }
+    print("share of seams that is joined with welding.SEAM_UNITS " + ", ".join(f"{units:g}" for units in shares))
+    for name in shares[welding.SEAM_UNITS]:
         print(f"{name:54s} " + " ".join(f"{row[name]:4.0%}" for row in shares.values()))
 
     tolerances = regions.TOLERANCES
     for most in range(1, len(tolerances) + 1):
         regions.TOLERANCES = tolerances[:most]
         print(f"assemblies wrong with {most} of regions.TOLERANCES, by rounding: {listed(parted(seeds))}", flush=True)
-    for units in (welding.ROUNDING / 4, welding.ROUNDING, 4 * welding.ROUNDING):
-        chain.ROUNDING = units
-        print(f"with sides apart and welding.ROUNDING {units:g}: {listed(parted(seeds, apart=True))}", flush=True)
-    chain.ROUNDING = welding.ROUNDING
+    for units in (welding.ONE_PLACE / 4, welding.ONE_PLACE, 4 * welding.ONE_PLACE):
+        chain.ONE_PLACE = units
+        print(f"with sides apart and welding.ONE_PLACE {units:g}: {listed(parted(seeds, apart=True))}", flush=True)
+    chain.ONE_PLACE = welding.ONE_PLACE
 
 
 def listed(shares: dict[str, float]) -> str:

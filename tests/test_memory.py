@@ -21,7 +21,7 @@ from signedheat.grids.grid_discretization import bytes_of_area, fitting_spacing,
 from signedheat.memory import available_memory
 from signedheat.solids import contouring
 from signedheat.surfaces import intrinsic_discretization as intrinsic
-from signedheat.tets.lattice import BYTES_PER_TET
+from signedheat.tets.lattice import BYTES_PER_LATTICE_TET
 
 
 def test_some_memory_is_free_but_not_more_than_there_is():
@@ -213,7 +213,7 @@ def test_lattices_that_do_not_fit_name_a_resolution_that_does(free, monkeypatch)
     with refused(sh.errors.MemoryLimitError) as caught:
         sh.tetrahedralize(BALL, resolution=120)
     n_tets = sh.tetrahedralize(BALL, resolution=int(float(caught.value.remedy.split()[-1]))).n_tets
-    assert 0.4 * free < BYTES_PER_TET * n_tets <= free - memory.libraries()
+    assert 0.4 * free < BYTES_PER_LATTICE_TET * n_tets <= free - memory.libraries()
 
 
 def test_meshes_that_do_not_fit_are_refused_before_they_are_refined(monkeypatch):

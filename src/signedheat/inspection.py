@@ -11,7 +11,7 @@ from .arrays import Floats, Ints, mask_of, read_only
 from .foreign import Shape
 from .mesh.components import connected_components
 from .mesh.edges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
-from .mesh.tet_shapes import FLAT
+from .mesh.tet_shapes import FLAT_TET
 from .mesh.triangles import areas_of_polygons
 from .mesh.welding import coincident_faces, same_positions
 from .surfaces.digital_surface import DigitalSurface
@@ -106,7 +106,7 @@ def _inspect_tets(mesh: TetMesh) -> TetReport:
         n_tets=mesh.n_tets,
         parts=int(mesh.parts.max()) + 1,
         inside_out_tets=len(mesh.reoriented),
-        flat_tets=int((mesh.geometry.thickness < FLAT).sum()),
+        flat_tets=int((mesh.geometry.thickness < FLAT_TET).sum()),
         nonmanifold_faces=int((counts > 2).sum()),
         boundary_faces=int((counts == 1).sum()),
         volume=float(mesh.tet_volumes.sum()),

@@ -9,7 +9,7 @@ from signedheat import samples
 from signedheat.field_levels import on_level
 from signedheat.grids.marching import closed_surface
 from signedheat.mesh.edges import edge_table
-from signedheat.mesh.triangles import SHARP, flipped_along_creases
+from signedheat.mesh.triangles import CREASE_ANGLE, flipped_along_creases
 
 
 def bends(mesh):
@@ -25,7 +25,7 @@ def bends(mesh):
 def sharp(mesh):
     """Edges where two faces make more than 25°."""
     table = edge_table(mesh.faces)
-    return bends(mesh) > SHARP * np.linalg.norm(np.diff(mesh.vertices[table.vertices], axis=1)[:, 0], axis=1)
+    return bends(mesh) > CREASE_ANGLE * np.linalg.norm(np.diff(mesh.vertices[table.vertices], axis=1)[:, 0], axis=1)
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_no_flip_makes_it_bend_more():
 def test_smooth_surfaces_and_open_ones_stay():
     sphere = samples.sphere(4)
     assert flipped_along_creases(sphere.vertices, sphere.faces) is sphere.faces
-    ridge = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, np.tan(1.1 * SHARP)], [0, -1, np.tan(1.1 * SHARP)]])
+    ridge = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, np.tan(1.1 * CREASE_ANGLE)], [0, -1, np.tan(1.1 * CREASE_ANGLE)]])
     faces = np.array([[0, 1, 2], [1, 0, 3]])
     assert (edge_table(flipped_along_creases(ridge, faces)).face_counts <= 2).all()
     assert len(flipped_along_creases(ridge, faces[:0])) == 0

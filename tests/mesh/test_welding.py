@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from signedheat.mesh.welding import ROUNDING, joined_rims, same_positions
+from signedheat.mesh.welding import ONE_PLACE, joined_rims, same_positions
 
 PLACES = ((0, 0, 0), (1e3, -1e3, 10), (431250, 5412300, 100), (1e6, 1e6, 1e6), (1e7, 0, 0), (1e7, 1e7, 1e7))
 SIDES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
@@ -30,7 +30,7 @@ def house(unit, sides=range(6)):
 def classes(vertices, faces):
     same = same_positions(vertices)
     corners = same[faces]
-    return joined_rims(vertices, corners.ravel(), np.roll(corners, -1, axis=1).ravel(), ROUNDING)[same]
+    return joined_rims(vertices, corners.ravel(), np.roll(corners, -1, axis=1).ravel(), ONE_PLACE)[same]
 
 
 @pytest.mark.parametrize("place", PLACES)

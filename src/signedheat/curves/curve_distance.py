@@ -20,7 +20,7 @@ from ..jobs import Progress
 from ..kinds import AnySurface, SurfaceDomain
 from ..mesh.components import connected_components, grouped
 from ..mesh.edges import orient_faces, pair_halfedges
-from ..mesh.welding import GAP, SEAM, coincident_faces, joined_rims
+from ..mesh.welding import GAP_UNITS, SEAM_UNITS, coincident_faces, joined_rims
 from ..sharpening import sharpen
 from ..solver import SignedHeatSolver, distance_unwarned
 from ..surfaces.polygon_mesh import PolygonMesh
@@ -106,11 +106,11 @@ def warn_of_gaps(mesh: object) -> None:
     """Warn of vertices of rims that are nearly, but not, at the place of others."""
     if not isinstance(mesh, TriangleMesh | PolygonMesh):
         return
-    joined, nearly = (joined_rims(mesh.vertices, *_halfedges(mesh), units) for units in (SEAM, GAP))
+    joined, nearly = (joined_rims(mesh.vertices, *_halfedges(mesh), units) for units in (SEAM_UNITS, GAP_UNITS))
     gaps = np.flatnonzero((nearly != joined) & (joined == np.arange(len(joined))))
     if len(gaps):
         warn_user(
-            f"rims of the surface run along each other, less than {GAP * 2.0**-24:.0e} of its size apart, at "
+            f"rims of the surface run along each other, less than {GAP_UNITS * 2.0**-24:.0e} of its size apart, at "
             f"{len(gaps)} vertices, the first of them number {gaps[0]}: distance goes round the gap. Merge these "
             "vertices with those beside them if they are one",
             InexactWarning,
@@ -134,7 +134,7 @@ def copied_faces(faces: Ints, n_vertices: int) -> Ints:
     return first
 
 
-APART = 0.1
+UNTRUSTWORTHY = 0.1
 """The shortest completion and that by heat are announced as untrustworthy if they differ on this share of the area.
 Half as much announces no more of 259 drawings; two of 30 curves in twelve pieces, half gone, are announced for this
 reason alone, and both are wrong."""
@@ -306,7 +306,7 @@ def reason_for_doubt(
     areas, sides = strokes.areas[own], decision.best.sides[own]
     near = np.abs(field.values) <= strokes.surface.triangles.lengths_of_edges.mean()
     apart = areas[(np.sign(field.values) != sides) & ~near & ~np.isnan(field.values)].sum() / areas.sum()
-    if apart > APART:
+    if apart > UNTRUSTWORTHY:
         return (
             f"the gaps of the curves are so wide that completing them in two ways differs on {apart:.0%} of the "
             "surface. Draw more of them"

@@ -24,7 +24,7 @@ from ..grids.solid_queries import Closest
 from ..jobs import Progress, within
 from ..kinds import Sources
 from ..mesh.components import sums_of
-from ..mesh.polylines import LEAST_SHARE, FillRule, filled_outlines, without_seams
+from ..mesh.polylines import EQUAL_AREAS, FillRule, filled_outlines, without_seams
 from ..mesh.unit_vectors import unit
 from ..search.face_tree import FaceTree
 from ..solver import SignedHeatSolver
@@ -34,15 +34,13 @@ from ..validation import SMALLEST_EXTENT, flag, query_points, shaped
 from .curve_distance import CurvesTaken, distance_to_pieces
 from .resolution import on_resolving_triangles
 
-FINEST = 1024
+FINEST_DRAWING = 1024
 """Largest number of cells along a drawing with which it is completed, however fine the grid is. Three broken drawings
 differ by .010 of their radius between 128 and 512 cells, by .007 between 128 and 256."""
 STROKE_NODES = 96
 """Number of nodes along the longest side of the triangles on which strokes are compared. Of 150 drawings none is wrong
 in silence and 7 are right with a warning; halved 0 and 5, doubled 0 and 6."""
-CROSSINGS = 10**6
-"""Batch size, as points times segments."""
-NEAR = 1.5
+SIDE_CELLS = 1.5
 """Within this distance, in cells, a line decides the side itself: φ is smooth over about a cell."""
 
 
@@ -116,7 +114,7 @@ class OutlinesFilled(Note):
 
     @property
     def important(self) -> bool:
-        return self.length_inside > LEAST_SHARE
+        return self.length_inside > EQUAL_AREAS
 
 
 def outlines_filled(
@@ -143,7 +141,7 @@ def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
     size = float(np.ptp(bounds, axis=0).max())
     if size == 0:
         return asked
-    return Grid.around(bounds, spacing=float(np.clip(asked.spacing.min(), size / FINEST, size / RESOLUTION)))
+    return Grid.around(bounds, spacing=float(np.clip(asked.spacing.min(), size / FINEST_DRAWING, size / RESOLUTION)))
 
 
 def strokes_that_agree(
@@ -205,7 +203,7 @@ class Drawing(Frozen):
         zero_set = segments_of_lines(phi.contour()) if crosses else np.empty((0, 2, 2))
         if len(lines) and len(zero_set):
             away = tree_of(lines).distances(_in_space(zero_set.mean(axis=1)))
-            zero_set = zero_set[away > NEAR * float(phi.grid.spacing.max())]
+            zero_set = zero_set[away > SIDE_CELLS * float(phi.grid.spacing.max())]
         return cls(lines, zero_set, phi)
 
     @property
@@ -269,7 +267,7 @@ class Drawing(Frozen):
         on_line = nearest < len(self.lines)
         sides = np.ones(len(points)) if self.phi is None else np.where(self.phi.interpolate(points) < 0, -1.0, 1.0)
         if self.phi is not None:
-            on_line &= found.distances < NEAR * float(self.phi.grid.spacing.max())
+            on_line &= found.distances < SIDE_CELLS * float(self.phi.grid.spacing.max())
         sides[on_line] = self._sides(points[on_line], places[on_line], nearest[on_line])
         return sides * found.distances, places, nearest
 
@@ -308,7 +306,7 @@ def _enclosed(outlines: Floats, points: Floats) -> Bools:
     """(n,) whether points are within outlines that do not cross: rays from them meet an odd number of segments."""
     inside = np.zeros(len(points), dtype=bool)
     a, b = outlines.transpose(1, 0, 2)
-    step = max(1, CROSSINGS // len(outlines))
+    step = max(1, 10**6 // len(outlines))  # a million pairs at a time
     for begin in range(0, len(points), step):
         x, y = points[begin : begin + step, None].transpose(2, 0, 1)
         spans = (a[:, 1] <= y) != (b[:, 1] <= y)

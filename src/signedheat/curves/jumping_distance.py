@@ -37,12 +37,12 @@ from ..validation import flag, positive_number
 from .jumps import JumpProblem, JumpSolution, high_jumps, integration_error, is_continuous, minimize, smoothed
 from .piecewise_field import IntrinsicPiecewiseField, PiecewiseField
 
-ROUGH = 1.0
+ROUGH_INTEGRATION = 1.0
 """Integration error above which there is a warning: as large as the slopes themselves."""
 
-SOURCE_WEIGHT = 100.0
+SOURCE_CUT = 100.0
 """Factor by which a cut along or across the source is more expensive than elsewhere."""
-BYTES = {"pardiso": (2600, 0), "superlu": (525, 182)}
+BYTES_WITH_JUMPS = {"pardiso": (2600, 0), "superlu": (525, 182)}
 """Measured peak memory per triangle, and what each doubling of their number adds, by back end."""
 
 
@@ -156,7 +156,7 @@ def piecewise_distance(
     unreached = np.flatnonzero(np.isnan(phi.values[:, 0]))
     if len(unreached):
         warn_user(f"{len(unreached)} faces are connected to no source: NaN there", UnreachedWarning)
-    if error > ROUGH:
+    if error > ROUGH_INTEGRATION:
         warn_user(
             f"slopes of φ are off by {error:.3g} on average: on triangles so large or thin neither they nor cuts mean "
             "anything. Pass intrinsic=True",
@@ -187,7 +187,7 @@ def jumps_of(phi: PiecewiseField, solution: JumpSolution, error: float) -> Jumps
 
 def memory_estimate(n_triangles: int) -> float:
     """Bytes that a field on so many triangles takes at the most, besides libraries."""
-    per_triangle, per_doubling = BYTES[chosen_backend()]
+    per_triangle, per_doubling = BYTES_WITH_JUMPS[chosen_backend()]
     return n_triangles * (per_triangle + per_doubling * math.log2(max(n_triangles, 2)))
 
 
@@ -269,7 +269,7 @@ def jump_problem(triangles: IntrinsicMesh, pairs: FacePairs, slopes: Floats, gua
     length = triangles.edge_lengths[pairs.faces[:, 0], pairs.sides[:, 0]]
     spread = np.abs(offsets[:, 1] - offsets[:, 0])  # κ |e|, whatever the constants are
     weights = length * np.exp(-spread / length) * pairs.shares
-    dear = np.where(guarded[pairs.edges], SOURCE_WEIGHT, 1.0)
+    dear = np.where(guarded[pairs.edges], SOURCE_CUT, 1.0)
     return JumpProblem(
         pairs.faces,
         low=-offsets.max(axis=1),

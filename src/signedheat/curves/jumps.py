@@ -26,14 +26,16 @@ from ..mesh.polylines import assemble_polylines
 from ..surfaces.cotan import cotan_matrix, divergence
 from .piecewise_field import PiecewiseField
 
-GAP, MOST_ROUNDS = 2e-3, 3000
+DUALITY_GAP, MOST_SPLITTING_ROUNDS = 2e-3, 3000
 """Gap at which minimisation ends, and the largest number of its rounds."""
-LOOSE = 0.15
+LOOSE_GAP = 0.15
 """Below this gap it is checked whether constants leave a cut: if not, the remaining jumps are smaller than
 triangles."""
-_LOOK = 25  # rounds between two evaluations of the gap
-_THRESHOLD = 4.0  # initial threshold of the proximal step, relative to a typical difference
-_GROWTH, _PATIENCE = 2.0, 250  # factor by which it may grow, at most every so many rounds; tuned on tori and spheres
+ROUNDS_PER_LOOK = 25
+"""Rounds between two evaluations of the gap."""
+THRESHOLD_GROWTH, GROWTH_ROUNDS = 2.0, 250
+"""Factor by which the threshold of the proximal step may grow, at most every so many rounds: tuned on tori and
+spheres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +113,7 @@ def minimize(
         step = problem.differences(constants)
         best, bound = constants, problem.floor
         least = problem.objective(best)
-        threshold = _THRESHOLD * problem.scale
+        threshold = 4.0 * problem.scale  # four typical differences
         negligible = 1e-9 * threshold * problem.weights.sum()
 
         def proximal(target: Floats) -> Floats:
@@ -122,22 +124,22 @@ def minimize(
             return factor.solve(transposed @ (spring * target))
 
         steps, rounds = split_rounds(proximal, solve, problem.differences, step, step), 0
-        while least - bound > max(GAP * least, negligible) and rounds < MOST_ROUNDS:
-            constants, difference, z, before, scaled = next(islice(steps, _LOOK - 1, None))
-            rounds += _LOOK
+        while least - bound > max(DUALITY_GAP * least, negligible) and rounds < MOST_SPLITTING_ROUNDS:
+            constants, difference, z, before, scaled = next(islice(steps, ROUNDS_PER_LOOK - 1, None))
+            rounds += ROUNDS_PER_LOOK
             value = problem.objective(constants)
             if value < least:
                 best, least = constants, value
             flow = scaled * spring
             flow -= spring * problem.differences(factor.solve(transposed @ flow))
             bound = max(bound, problem.bound(flow * (2.0 * problem.weights.mean() / threshold)))
-            if enough is not None and least - bound < LOOSE * least and enough(best):
+            if enough is not None and least - bound < LOOSE_GAP * least and enough(best):
                 return JumpSolution(best, least, bound, rounds)
-            if rounds % _PATIENCE == 0 and _lags(spring, difference, low, high, z, before, scaled):
-                threshold *= _GROWTH
-                scaled *= _GROWTH  # so that the unscaled multipliers stay the same
+            if rounds % GROWTH_ROUNDS == 0 and _lags(spring, difference, low, high, z, before, scaled):
+                threshold *= THRESHOLD_GROWTH
+                scaled *= THRESHOLD_GROWTH  # so that the unscaled multipliers stay the same
             if progress is not None:
-                progress(rounds / MOST_ROUNDS)
+                progress(rounds / MOST_SPLITTING_ROUNDS)
     moved = regions_moved(problem, best)
     return JumpSolution(moved, problem.objective(moved), bound, rounds)
 
@@ -185,14 +187,14 @@ def _grounded_laplacian(incidence: sparse.csr_matrix, spring: Floats) -> sparse.
     return sparse.csr_matrix(laplacian + sparse.diags_array(held))
 
 
-FAR = 3.0
+LEAST_JUMP = 3.0
 """The largest jump on a cut is at least this many times the longest side of a typical triangle."""
 
-TWIG = 5.0
+LEAST_BRANCH_JUMP = 5.0
 """The largest jump on a branch of a cut is at least this many times that side, or half of the highest. Where directions
 turn within several triangles, there are lower jumps."""
 
-WIDTH = 10.0
+SMOOTHED_WIDTH = 10.0
 """Width of `smoothed`, relative to the root of the area of a part: that of step 3 to a thousandth. With more, M would
 be rounded away."""
 
@@ -210,11 +212,11 @@ def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: Floats) -> Bo
     ends = triangles.edges.vertices[pairs.edges[high]]
     n = triangles.n_vertices
     line = connected_components(n, *ends.T)[ends[:, 0]]
-    far = mask_of(n, line[height[high] > FAR * typical])
+    far = mask_of(n, line[height[high] > LEAST_JUMP * typical])
     high, line = high[far[line]], line[far[line]]
     highest = np.zeros(n)
     np.maximum.at(highest, line, height[high])
-    least = np.minimum(TWIG * typical, 0.5 * highest[line])
+    least = np.minimum(LEAST_BRANCH_JUMP * typical, 0.5 * highest[line])
     ends = triangles.edges.vertices[pairs.edges[high]]
     return mask_of(len(height), high[without_twigs(ends, height[high] > least)])
 
@@ -244,7 +246,7 @@ def is_continuous(
 ) -> bool:
     """Whether the constants of the faces leave no cut, neither as a line nor spread over many small jumps."""
     values = slopes + constants[:, None]
-    if np.abs(pairs.ends(values)).max(initial=0.0) > FAR * typical_size(triangles):
+    if np.abs(pairs.ends(values)).max(initial=0.0) > LEAST_JUMP * typical_size(triangles):
         return False
     corners, n = triangles.corner_vertices, triangles.n_vertices
     mean = np.bincount(corners.ravel(), values.ravel(), n) / np.maximum(np.bincount(corners.ravel(), minlength=n), 1)
@@ -273,7 +275,7 @@ def smoothed(triangles: IntrinsicMesh, pairs: FacePairs, directions: Complexes, 
     mass = opened.vertex_areas
     stiffness = cotan_matrix(opened)
     part = sparse.csgraph.connected_components(stiffness, directed=False)[1]
-    squared = WIDTH**2 * np.bincount(part, mass)[part]
+    squared = SMOOTHED_WIDTH**2 * np.bincount(part, mass)[part]
     matrix = sparse.csr_matrix(sparse.diags_array(squared) @ stiffness + sparse.diags_array(mass))
     pulled = np.bincount(owner, share * rough.ravel()) + squared * divergence(opened, directions)
     return factorize(matrix).solve(pulled)[opened.corner_vertices]

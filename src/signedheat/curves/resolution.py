@@ -20,7 +20,7 @@ from ..surfaces.surface_curves import CurveOrPoints, CurvesAndPoints
 from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.triangle_mesh import TriangleMesh
 
-SHORT = 16.0
+SHORT_CURVE = 16.0
 """Curves shorter than this, in h, all pieces included, get triangles of their own."""
 
 Surface = TypeVar("Surface", bound=SurfaceDomain)
@@ -53,7 +53,7 @@ def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
     surface, listed = surface_of(solver), flattened(curves)
     parts = chain.from_iterable(surface.segments(listed))  # refuses curves that do not fit
     lengths = [float(part.lengths.sum()) for part in parts if part.oriented]
-    short = SHORT * surface.spacing
+    short = SHORT_CURVE * surface.spacing
     if isinstance(solver.domain, TriangleMesh) and (CurveGroups.of(solver.domain, listed).lengths < short).any():
         return True
     return bool(lengths) and sum(lengths) < short

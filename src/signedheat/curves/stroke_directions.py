@@ -26,22 +26,20 @@ from ..surfaces.surface import Surface
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from ..surfaces.surface_discretization import SurfaceDiscretization
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
-from .strokes import EXPLAINED, TIE, Inside, Strokes
+from .strokes import EQUAL_COSTS, EXPLAINED, Inside, Strokes
 
-AS_GIVEN = 0.5
+TURNING_COST = 0.5
 """Cost of turning a stroke, relative to its length. Halved or doubled, one of 46 drawings changes on more than 2 % of
 the area."""
-TOGETHER = 0.5
+TOGETHER_COST = 0.5
 """Cost of turning all strokes of a curve, relative to that of turning one by one."""
-WEAKLY = 0.02
+WEAK_TURNING_COST = 0.02
 """Cost of turning a stroke of mean length if sides are smooth. If two follow each other, with a gap of half of their
 length, the energy is less by 0.05. Halved and doubled, none of 46 drawings changes."""
-MOST = 0.5
+MOST_UNEXPLAINED = 0.5
 """If more than this share of the length of all strokes bounds nothing, none is left out. Halved and doubled, none of 46
 drawings changes."""
-ROUNDS = 20
-"""Largest number of cuts until the directions agree with the sides."""
-SINGLY = 16
+TRIED_SINGLY = 16
 """Number of strokes, the longest first, that are turned or left out one by one where they explain nothing; limited for
 speed. Halved and doubled, none of 46 drawings changes."""
 HALF, TURNED = 0.45, 0.34
@@ -52,7 +50,7 @@ with a warning; at .49 of each 7 and 25, at .4 4 and 37, at .37 4 and 48; at .25
 WORTH = 0.5
 """The inside is a guess if it depends on a stroke worth less than this, relative to its length. At .4 6 and 15 of these
 drawings, halved 8 and 15, at .6 5 and 22."""
-OTHERWISE = 0.05
+CHANGED_AREA = 0.05
 """The inside depends on a stroke if this share of the area changes sides without it: halved 5 and 23 of these drawings,
 doubled 9 and 15."""
 
@@ -163,7 +161,7 @@ class Decision:
             return float(areas[by_lines | by_heat].sum()) if by_lines.any() else 0.0
 
         share = np.array([depending(rival) for rival in without]) / areas.sum()
-        little = chosen[(worth < WORTH * strokes.lengths[chosen]) & (share > OTHERWISE)]
+        little = chosen[(worth < WORTH * strokes.lengths[chosen]) & (share > CHANGED_AREA)]
         return self.pieces.curves(mask_of(len(best.signs), little))
 
 
@@ -172,7 +170,7 @@ def order_in_space(places: Sequence[Floats]) -> Ints:
     keys = np.array([[*points.mean(axis=0), *points[0]] for points in places])
     low = np.minimum(keys[:, :3].min(axis=0), keys[:, 3:].min(axis=0))
     size = max(float((keys - np.tile(low, 2)).max()), np.finfo(float).tiny)
-    return np.lexsort(np.rint((keys - np.tile(low, 2)) / (TIE * size)).T[::-1])
+    return np.lexsort(np.rint((keys - np.tile(low, 2)) / (EQUAL_COSTS * size)).T[::-1])
 
 
 def likely_curves(ends: Floats, stroke: Ints) -> tuple[Ints, Floats]:
@@ -219,17 +217,17 @@ def decide(pieces: CurvePieces) -> Decision:
         best = better
     if mostly_loose(strokes, best):
         return Decision(pieces, strokes.inside(smooth), bounds_nothing=True)
-    most = misfit(strokes, best) + TIE * strokes.lengths.sum()
+    most = misfit(strokes, best) + EQUAL_COSTS * strokes.lengths.sum()
     rivals = [inside for inside in strokes.seen if misfit(strokes, inside) <= most]
     best = min(rivals, key=lambda inside: (int((inside.signs < 0).sum()), (inside.signs < 0).tolist()))
     otherwise = [strokes.either_way(best), *(strokes.areas[inside.sides != best.sides].sum() for inside in rivals)]
-    return Decision(pieces, best, tied=bool(max(otherwise) > OTHERWISE * strokes.areas.sum()))
+    return Decision(pieces, best, tied=bool(max(otherwise) > CHANGED_AREA * strokes.areas.sum()))
 
 
 def least_of(strokes: Strokes, insides: list[Inside]) -> Inside:
     """Return the first of those with the least cost, to rounding."""
     costs = np.array([misfit(strokes, inside) for inside in insides])
-    return insides[int(np.argmax(costs <= costs.min() + TIE * strokes.lengths.sum()))]
+    return insides[int(np.argmax(costs <= costs.min() + EQUAL_COSTS * strokes.lengths.sum()))]
 
 
 def altered(signs: Floats, rows: list[int], factor: float) -> Floats:
@@ -242,20 +240,20 @@ def altered(signs: Floats, rows: list[int], factor: float) -> Floats:
 def mostly_loose(strokes: Strokes, inside: Inside) -> bool:
     """Whether most of the length bounds nothing: more of it is gone than there is."""
     lengths = strokes.lengths
-    return bool(lengths[inside.explained < EXPLAINED].sum() > MOST * lengths.sum())
+    return bool(lengths[inside.explained < EXPLAINED].sum() > MOST_UNEXPLAINED * lengths.sum())
 
 
 def cost(strokes: Strokes, inside: Inside) -> float:
     """Return the energy, and what turning costs: less for all strokes of a curve, which say one and the same thing."""
     turned, total = (np.bincount(strokes.group, strokes.lengths * way) for way in (inside.signs < 0, inside.signs != 0))
     together = (turned == total) & strokes.is_loop & (np.bincount(strokes.group) > 1)
-    return inside.energy + AS_GIVEN * float((np.where(together, TOGETHER, 1.0) * turned).sum())
+    return inside.energy + TURNING_COST * float((np.where(together, TOGETHER_COST, 1.0) * turned).sum())
 
 
 def misfit(strokes: Strokes, inside: Inside) -> float:
     """Return the same, and what loops cost that bound nothing: as if all of their strokes were turned one by one."""
     loose = strokes.whole_loops((inside.signs > 0) & (inside.explained < EXPLAINED))[strokes.group]
-    return cost(strokes, inside) + AS_GIVEN * float(strokes.lengths[loose].sum())
+    return cost(strokes, inside) + TURNING_COST * float(strokes.lengths[loose].sum())
 
 
 def turnable(strokes: Strokes, inside: Inside, movable: Bools) -> list[list[int]]:
@@ -270,8 +268,8 @@ def turnable(strokes: Strokes, inside: Inside, movable: Bools) -> list[list[int]
 
 
 def longest_of(strokes: Strokes, rows: Ints) -> Ints:
-    """Return the `SINGLY` longest of some strokes, which are tried one by one."""
-    return rows[np.argsort(-strokes.lengths[rows], kind="stable")[:SINGLY]]
+    """Return the `TRIED_SINGLY` longest of some strokes, which are tried one by one."""
+    return rows[np.argsort(-strokes.lengths[rows], kind="stable")[:TRIED_SINGLY]]
 
 
 def settled_from(strokes: Strokes, starts: list[Floats], movable: Bools) -> list[Inside]:
@@ -283,7 +281,7 @@ def settled_from(strokes: Strokes, starts: list[Floats], movable: Bools) -> list
 def settled(strokes: Strokes, signs: Floats, movable: Bools) -> Inside:
     """Sides and directions that fit each other, improved in turn until nothing changes."""
     best = inside = strokes.inside(signs)
-    for _ in range(ROUNDS):
+    for _ in range(20):
         turn = movable & (inside.explained < 0)
         if not turn.any():
             break
@@ -294,7 +292,7 @@ def settled(strokes: Strokes, signs: Floats, movable: Bools) -> Inside:
 
 def smooth_signs(strokes: Strokes, movable: Bools) -> Floats:
     """(k,) directions of least energy if sides are smooth."""
-    agreed, given = strokes.agreed, np.where(movable, WEAKLY, 1e6) * strokes.lengths
+    agreed, given = strokes.agreed, np.where(movable, WEAK_TURNING_COST, 1e6) * strokes.lengths
     given = given / strokes.lengths.mean()
     weights = np.block([[agreed, given[:, None]], [given[None], np.zeros((1, 1))]])
     signs = best_signs(weights, np.ones(len(weights)))

@@ -20,7 +20,7 @@ from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..surfaces.surface_discretization import SurfaceDiscretization
 
-UNITS = 2.0**40
+PULL_UNITS = 2.0**40
 """Sum of all pulls to one side, as integers: a flow in integers ends exactly."""
 
 
@@ -52,7 +52,7 @@ class CutGraph:
         if total == 0:
             return np.ones(len(pull))
         costs = np.minimum(np.concatenate([falling, rising])[self.order] / total, 1.0)
-        residual, pulls = (np.rint(UNITS * amounts).astype(np.int64) for amounts in (costs, 2 * pull / total))
+        residual, pulls = (np.rint(PULL_UNITS * amounts).astype(np.int64) for amounts in (costs, 2 * pull / total))
         return np.where(source_side(self.starts, self.heads, self.reverse, residual, pulls), 1.0, -1.0)
 
 
@@ -204,20 +204,20 @@ def _adopted(
 REWARD = 1.0
 """Reward for explaining a stroke, relative to its length: at most 1, since a line around a stroke is as long again.
 From 0.8 to 1.0 the table of damaged curves does not change."""
-EDGES, OF_ALL = 2.0, 0.01
+STROKE_WIDTH, WIDEST_STROKE = 2.0, 0.01
 """Distance from a stroke up to which sides count for whether it is explained, in edges of the mesh, but at most this
 share of the length of all strokes. So strokes drawn again next to it are one. Of 46 drawings none changes if both are
 halved or the first is doubled; one does if the second is."""
-STAIRS = 0.92
+STAIRCASE_LENGTH = 0.92
 """Length of a line relative to the length of the dual edges that it cuts."""
-LEVEL = 1e-6
+CORNER_ON_SEGMENT = 1e-6
 """A corner is on a segment up to this height above it, relative to its face."""
-TIE = 1e-6
+EQUAL_COSTS = 1e-6
 """Two answers cost the same if they differ by less, relative to the length of all strokes: rounding would choose."""
 EXPLAINED = 0.5
 """A stroke bounds the inside if it is explained to this share. Halved, none of 46 drawings changes; doubled, two
 change, and eleven more are announced."""
-BLOCK = 64
+STROKES_AT_ONCE = 64
 """Batch size for the jumps of strokes."""
 
 
@@ -265,7 +265,7 @@ class Strokes:
         crossed.data = np.sign(np.rint(crossed.data))
         crossed.eliminate_zeros()
         areas = triangles.vertex_areas
-        width = min(EDGES * edge, OF_ALL * float(lengths.sum()))
+        width = min(STROKE_WIDTH * edge, WIDEST_STROKE * float(lengths.sum()))
         around = widened(triangles, seen, width)
         left, right = (_means(around.multiply(around * side > 0), areas) for side in (1, -1))
         means = sparse.csr_matrix(0.5 * (left - right))
@@ -289,7 +289,7 @@ class Strokes:
         middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
         halves = np.abs(corners.mean(axis=1, keepdims=True) - middles)
         total = np.bincount(triangles.edges.face_edges.ravel(), halves.ravel(), triangles.n_edges)
-        return STAIRS * total.astype(np.float64)
+        return STAIRCASE_LENGTH * total.astype(np.float64)
 
     @cached_property
     def agreed(self) -> Floats:
@@ -304,10 +304,10 @@ class Strokes:
         blur = factorize(matrix, order=surface.vertex_order)
         k = fluxes.shape[0]
         result = np.empty((k, k))
-        for begin in range(0, k, BLOCK):
-            right = np.asfortranarray(fluxes[begin : begin + BLOCK].T.toarray())
+        for begin in range(0, k, STROKES_AT_ONCE):
+            right = np.asfortranarray(fluxes[begin : begin + STROKES_AT_ONCE].T.toarray())
             sides = surface.integration.factor.solve(right)
-            result[:, begin : begin + BLOCK] = fluxes @ blur.solve(np.asfortranarray(masses @ sides))
+            result[:, begin : begin + STROKES_AT_ONCE] = fluxes @ blur.solve(np.asfortranarray(masses @ sides))
         return 0.5 * (result + result.T)
 
     def whole_loops(self, chosen: Bools) -> Bools:
@@ -347,7 +347,7 @@ class Strokes:
         covered = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
         falling, rising = (np.where(mask, 0.0, self.costs) for mask in covered)
         pull = self.means.T @ (REWARD * self.lengths * signs)
-        pull += larger * TIE * self.lengths.sum() / self.areas.sum() * self.areas
+        pull += larger * EQUAL_COSTS * self.lengths.sum() / self.areas.sum() * self.areas
         sides = self.graph.cut(falling, rising, pull)
         first, second = sides[self.surface.triangles.edges.vertices].T
         boundary = np.where(first > second, falling, np.where(first < second, rising, 0.0))
@@ -379,8 +379,8 @@ def sides_seen(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> spar
     heights = (np.conj(step) * corners).imag / np.abs(step) * placed.sides[rows, None]
     size = triangles.edge_lengths[faces].max(axis=1, keepdims=True)
     sines = np.abs(heights) / np.maximum(np.maximum(gaps, np.abs(heights)), np.finfo(float).tiny)
-    steps_away = np.rint(gaps / (LEVEL * size))  # rounding must not decide which of two segments is nearer
-    sides = np.where(np.abs(heights) <= LEVEL * size, 0.0, np.sign(heights))
+    steps_away = np.rint(gaps / (CORNER_ON_SEGMENT * size))  # rounding must not decide which of two segments is nearer
+    sides = np.where(np.abs(heights) <= CORNER_ON_SEGMENT * size, 0.0, np.sign(heights))
     keys = (owners[rows, None] * triangles.n_vertices + triangles.corner_vertices[faces]).ravel()
     order = np.lexsort((-sines.ravel(), steps_away.ravel(), keys))
     first = order[np.concatenate([[True], np.diff(keys[order]) > 0])[: len(order)]]

@@ -234,7 +234,7 @@ def best_match(triangles: IntrinsicMesh, face: int, nodes: LocatedPoints, ends: 
     return np.array([places[0][i], places[1][j]])
 
 
-NEAR = 1e-6
+SNAP = 1e-6
 """Barycentric coordinate below which a point of a source is put on the edge or at the vertex."""
 
 
@@ -242,7 +242,7 @@ def through_vertices(triangles: IntrinsicMesh, placed: PlacedSegments) -> Placed
     """Move segments to vertices and edges that they all but pass; moved ones lose their sides."""
     nodes = placed.nodes
     on_edge, inside = nodes.kinds == EDGE, nodes.kinds == FACE
-    near = on_edge & (np.minimum(nodes.along, 1 - nodes.along) < NEAR) | inside & (nodes.barycentric < NEAR).any(axis=1)
+    near = on_edge & (np.minimum(nodes.along, 1 - nodes.along) < SNAP) | inside & (nodes.barycentric < SNAP).any(axis=1)
     curve = as_curve(triangles, placed) if near.any() else None
     return placed if curve is None else PlacedSegments.of(triangles, [curve])
 
@@ -254,7 +254,7 @@ def as_curve(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSegments 
     end_weights = np.stack([barycentric_in(triangles, faces, nodes[placed.ends[once, k]]) for k in range(2)])
     corners = triangles.corner_positions[faces]
     apart = np.abs((end_weights * corners).sum(axis=2) - placed.positions[once].T)
-    if (apart > NEAR * triangles.edge_lengths[faces].max(axis=1)).any():
+    if (apart > SNAP * triangles.edge_lengths[faces].max(axis=1)).any():
         return None
     end_weights = rounded(end_weights)
     alone = np.setdiff1d(np.arange(len(nodes)), placed.ends)
@@ -271,6 +271,6 @@ def as_curve(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSegments 
 
 
 def rounded(barycentric: Floats) -> Floats:
-    """Set barycentric coordinates below `NEAR` to zero."""
-    kept = np.where(barycentric < NEAR, 0.0, barycentric)
+    """Set barycentric coordinates below `SNAP` to zero."""
+    kept = np.where(barycentric < SNAP, 0.0, barycentric)
     return kept / kept.sum(axis=-1, keepdims=True)

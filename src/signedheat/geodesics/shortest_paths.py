@@ -111,7 +111,7 @@ class Routes(NamedTuple):
         sides = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
         middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
         spread = np.arange(n) * 0.6180339887498949
-        tolls = 1.0 + TIE * (spread - np.floor(spread))
+        tolls = 1.0 + TOLL_RANGE * (spread - np.floor(spread))
         return cls(np.full(n, np.inf), *sides, Queue.empty(n), middles.ravel(), tolls)
 
 
@@ -148,7 +148,7 @@ def path_through_vertices(
     return located[ends[:-1]]
 
 
-TIE = 1e-9
+TOLL_RANGE = 1e-9
 """Relative range of extra costs of edges: of paths around a symmetric peak, whose lengths differ by 1e-16, the same one
 is then always found. Any number from 1e-12 to 1e-6 does."""
 

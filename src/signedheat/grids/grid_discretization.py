@@ -26,19 +26,19 @@ from .multilevel import Level, collapse, diffuse_multilevel, quotients, skip_fin
 from .node_sources import NodeSources
 from .stencil import divergence, interpolation_stencil, laplacian, padded_shape, solve_poisson
 
-BYTES_PER_NODE, BYTES_PER_AREA = {1: 42, 2: 42, 3: 25, 4: 42}, 930
+BYTES_PER_GRID_NODE, BYTES_PER_CELL = {1: 42, 2: 42, 3: 25, 4: 42}, 930
 """Measured peak memory of a distance computation for each node, by dimension; and for each square cell of surface in
 space."""
-MOST_PER_NODE = 22
+MOST_BYTES_PER_NODE = 22
 """Most bytes that surface adds for each node, where it is everywhere."""
-ROOM = 1.08
+SPACING_MARGIN = 1.08
 """Factor by which the suggested spacing is larger than needed, since free memory changes from run to run."""
 
 
 def memory_estimate(grid: Grid, per_node: float | None = None, extra: float = 0.0) -> int:
     """Estimate the peak memory of a distance computation on a grid; others have `per_node` and `extra` bytes."""
     if per_node is None:
-        per_node = BYTES_PER_NODE[grid.dimension]
+        per_node = BYTES_PER_GRID_NODE[grid.dimension]
     return int(per_node * grid.n_nodes + extra) + libraries()
 
 
@@ -47,7 +47,7 @@ def bytes_of_area(area: float, spacing: Floats, n_nodes: float) -> float:
     if len(spacing) != 3:
         return 0.0
     cells = float(area / float(np.prod(spacing)) ** (2 / 3))
-    return min(round(BYTES_PER_AREA * cells, 1), MOST_PER_NODE * n_nodes)
+    return min(round(BYTES_PER_CELL * cells, 1), MOST_BYTES_PER_NODE * n_nodes)
 
 
 def refuse_large_grid(grid: Grid, per_node: float | None = None, extra: float = 0.0, area: float = 0.0) -> None:
@@ -56,7 +56,7 @@ def refuse_large_grid(grid: Grid, per_node: float | None = None, extra: float = 
     needed += int(bytes_of_area(area, grid.spacing, grid.n_nodes))
     if available is None or needed <= available:
         return
-    fitting = ROOM * fitting_spacing(grid, available, per_node, extra, area)
+    fitting = SPACING_MARGIN * fitting_spacing(grid, available, per_node, extra, area)
     spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting))
     coarser = f"choose a spacing of {spacing} or more, or a lower resolution"
     some_nodes = (fitting < grid.upper - grid.origin).all()
@@ -185,13 +185,13 @@ def _(domain: Grid) -> GridDiscretization:
     return GridDiscretization(domain)
 
 
-STIFFNESS = 10.0
+PENALTY = 10.0
 """Penalty of the augmented Lagrangian, in 1/h."""
-LEAST, STIFFEST = 1e-6, 30.0
+LEAST_PENALTY, LARGEST_PENALTY = 1e-6, 30.0
 """Least penalty in the preconditioner, and largest penalty, relative to the default."""
-BYTES_IF_EXACT = 83
+BYTES_PER_EXACT_NODE = 83
 """Measured peak memory for each node, beyond what is held already, of imposing levels exactly."""
-NEGLIGIBLE = 1e-6
+EQUAL_ROWS = 1e-6
 """Difference below which rows of samples are equal, and their levels contradict each other."""
 
 
@@ -204,7 +204,7 @@ class GridIntegration(SolvesEach):
     @property
     def soft_weight(self) -> float:
         """λ of `Soft` where none is given, in 1/length."""
-        return STIFFNESS / float(self.grid.spacing.mean())
+        return PENALTY / float(self.grid.spacing.mean())
 
     def solve(self, divergence: Floats, source: GridSource) -> Floats:
         """Minimise ∫|∇φ − Y|² with nothing imposed: ``C φ = b`` (Eq. 13)."""
@@ -220,11 +220,11 @@ class GridIntegration(SolvesEach):
         return phi
 
     def penalize(self, divergence: Floats, source: GridSource, strength: float) -> Floats:
-        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas; λ beyond `STIFFEST` is exact."""
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas; λ beyond `LARGEST_PENALTY` is exact."""
         levels = Levels(np.zeros(len(source.weights)))
-        if strength < LEAST**2 * self.soft_weight:
+        if strength < LEAST_PENALTY**2 * self.soft_weight:
             return self.solve(divergence, source)
-        if strength > STIFFEST * self.soft_weight:
+        if strength > LARGEST_PENALTY * self.soft_weight:
             return self.fit_exactly(divergence, source, levels)
         zero = np.zeros(len(source.weights))
         return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
@@ -234,7 +234,7 @@ class GridIntegration(SolvesEach):
         refuse_beyond_memory(
             f"the zero set imposed exactly on {self.grid.n_nodes:,} nodes",
             self.grid.n_nodes,
-            lambda count: BYTES_IF_EXACT * count,
+            lambda count: BYTES_PER_EXACT_NODE * count,
             lambda count: f"leave out hard=True, or use at most {count:,} nodes",
         )
         strength = self.soft_weight
@@ -268,7 +268,7 @@ class GridIntegration(SolvesEach):
             return (laplacian(phi.reshape(self.grid.shape), self.grid.spacing) + spread(pull)).ravel()
 
         # constants are in the kernel of C; their cost is that of the penalty alone, and they are settled at the end
-        constant = max(strength, LEAST * self.soft_weight) * float(weights.sum()) / self.grid.n_nodes
+        constant = max(strength, LEAST_PENALTY * self.soft_weight) * float(weights.sum()) / self.grid.n_nodes
 
         def precondition(residual: Floats) -> Floats:
             inverse = solve_poisson(residual.reshape(self.grid.shape), self.grid.spacing)
@@ -315,5 +315,5 @@ def least_correction(values: Floats, source: GridSource) -> Floats:
     touched = np.unique(source.interpolation.indices)
     change = np.zeros(source.grid.n_nodes)
     columns = source.interpolation[:, touched]
-    change[touched] = lsqr(columns, values, damp=NEGLIGIBLE, atol=1e-10, btol=1e-10, iter_lim=20000)[0]
+    change[touched] = lsqr(columns, values, damp=EQUAL_ROWS, atol=1e-10, btol=1e-10, iter_lim=20000)[0]
     return change

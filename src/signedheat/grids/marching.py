@@ -23,7 +23,7 @@ CLEARANCE = 1e-3
 """Least distance of crossings from the nodes, in cells, so that no two vertices of a surface coincide."""
 CAP = 0.01
 """Distance, in cells, by which the walls that close a surface lie outside the box of the nodes."""
-LARGEST = 1e30
+LARGEST_VALUE = 1e30
 """Marching cubes computes with single precision: numbers it is given, and their inverses, are not larger."""
 
 
@@ -39,9 +39,9 @@ def closed_surface(
         raise GeometryError("infinite values have no contour", element="values")
     height = closed_without_values(heights_above(values, spacing, level))
     largest = float(np.abs(height).max())
-    if not 1 / LARGEST < largest < LARGEST and largest > 0:
+    if not 1 / LARGEST_VALUE < largest < LARGEST_VALUE and largest > 0:
         height = height / largest
-    height = np.copysign(np.maximum(np.abs(height), 1 / LARGEST), height)  # each keeps its sign
+    height = np.copysign(np.maximum(np.abs(height), 1 / LARGEST_VALUE), height)  # each keeps its sign
     shift = 0
     if wall_signs(height) == {True, False}:
         height, shift = capped(height), 1
@@ -111,7 +111,7 @@ def capped(height: Floats) -> Floats:
 
 WINDOW = 8
 """Blocks along each edge of a window."""
-BITS = 20
+INDEX_BITS = 20
 """Bits of the index of a node along an axis."""
 Refine = Callable[[Floats], Floats]
 
@@ -172,7 +172,7 @@ def edges_of(vertices: Floats) -> tuple[Bools, Ints]:
     crossed = vertices > base
     on_edge = crossed.sum(axis=1) == 1
     a, b, c = base.astype(np.int64).T + 1  # −1 next to walls
-    return on_edge, ((a << BITS | b) << BITS | c) * 4 + np.where(on_edge, crossed.argmax(axis=1), 3)
+    return on_edge, ((a << INDEX_BITS | b) << INDEX_BITS | c) * 4 + np.where(on_edge, crossed.argmax(axis=1), 3)
 
 
 def _reaches_walls(values: BlockValues, level: float) -> bool:

@@ -38,19 +38,15 @@ from .stencil import FEW_NODES, by_slabs, slab
 
 BAND = 14.0
 """Half width, in √t, of the band around the source in which a level is swept."""
-MARGIN = 3
+RIM_WIDTH = 3
 """Width, in nodes, of the rim of the band that takes its values from the coarser level."""
-SMALL = 0.125
+SMALL_BAND = 0.125
 """Share of the grid below which a first band is swept twice as often: it costs little there."""
-COARSEST = 32
+COARSEST_NODES = 32
 """Number of nodes along every axis up to which a grid is not coarsened."""
-FEW = 4
+UNHALVED_NODES = 4
 """Number of nodes up to which an axis is not halved."""
-ROUNDS = 2
-"""Default number of rounds of all combinations of sweep directions within a band."""
-BEYOND = 2
-"""Factor of the number of rounds on levels that start from values of a finer level."""
-ROUNDS_EVERYWHERE = 12
+COARSEST_ROUNDS = 12
 """Number of rounds on the coarsest grid, where paths from the source are longer and sweeps are cheap."""
 
 
@@ -68,16 +64,20 @@ Guess = tuple[NDArray[np.float32], Bools]
 
 
 def diffuse_multilevel(
-    sources: NodeSources, time: Callable[[float], float], finest: int = 0, rounds: int = ROUNDS
+    sources: NodeSources, time: Callable[[float], float], finest: int = 0, rounds: int = 2
 ) -> list[Level]:
-    """Solve ``(1 − tΔ) X = B``, Eq. 12, on levels from `finest` on; `time` gives t by mean spacing."""
+    """Solve ``(1 − tΔ) X = B``, Eq. 12, on levels from `finest` on; `time` gives t by mean spacing.
+
+    Each level is swept in all combinations of directions, `rounds` times, or twice as often from values of a finer
+    level.
+    """
     levels: list[Level] = []
     guess = None
     while True:
         factors = coarsening(sources.shape, sources.steps)
         last = not (factors > 1).any()
         if len(levels) >= finest or last:
-            often = ROUNDS_EVERYWHERE if last else rounds if guess is None else BEYOND * rounds
+            often = COARSEST_ROUNDS if last else rounds if guess is None else 2 * rounds
             levels.append(_diffuse_level(sources, guess, time, factors, often, last))
         else:
             levels.append(Level(None, None, factors))
@@ -95,8 +95,8 @@ def coarsening(shape: tuple[int, ...], steps: Floats) -> Ints:
     """Return (4,) cells of a grid per cell of the next coarser one; axes shorter than others' spacing get one node."""
     counts = np.array(shape)
     factors = np.ones(4, dtype=np.int64)
-    wide = counts > FEW
-    if counts.max() > COARSEST:
+    wide = counts > UNHALVED_NODES
+    if counts.max() > COARSEST_NODES:
         least = steps[wide].min()
         factors[wide & (steps < 1.5 * least)] = 2
         short = (counts > 1) & ~wide & ((counts - 1) * steps <= least)
@@ -127,10 +127,10 @@ def _diffuse_level(
     else:
         width = np.ceil(BAND * np.sqrt(ratios)).astype(int)
         active = _dilated(start, width)
-        inside = _dilated(start, np.maximum(width - MARGIN, 0))
+        inside = _dilated(start, np.maximum(width - RIM_WIDTH, 0))
     if known is not None:
         active = active & ~known
-    elif not last and active.mean() < SMALL:
+    elif not last and active.mean() < SMALL_BAND:
         rounds *= 2
     vectors = diffuse_by_sweeps(sources, active, ratios, rounds, given)
     return Level(vectors, inside, factors)
@@ -194,7 +194,7 @@ def collapse(
     return result
 
 
-TINY = np.float32(1e-34)
+LEAST_KNOWN = np.float32(1e-34)
 """Size below which values count as unknown, and are taken from a coarser level."""
 
 
@@ -219,7 +219,7 @@ def _carry(
                     for m in range(STRETCH * s, min(STRETCH * (s + 1), n3)):
                         line, d = vectors[i, j, k, m], m // factors[3]
                         size = max(max(abs(line[0]), abs(line[1])), max(abs(line[2]), abs(line[3])))
-                        if (m % 2 and factors[3] == 2) or size < TINY:
+                        if (m % 2 and factors[3] == 2) or size < LEAST_KNOWN:
                             continue
                         scale = size ** (power - np.float32(1))
                         for q in range(4):
@@ -273,7 +273,7 @@ def unit_vectors(
     sizes = np.abs(components[0])
     for component in components[1:]:
         np.maximum(sizes, np.abs(component), out=sizes)
-    known = _nodes_of(inside[window], sizes.shape[3]) & (sizes >= TINY)
+    known = _nodes_of(inside[window], sizes.shape[3]) & (sizes >= LEAST_KNOWN)
     factors = np.float32(1) / np.where(known, sizes, np.float32(1))  # by which they are divided before they are squared
     squares = sum((factors * component) ** 2 for component in components[: len(out)])
     factors /= np.sqrt(np.where(known, squares, np.float32(1)))
@@ -287,7 +287,7 @@ def quotients(
     """Divide the second component by the first; `out` keeps its values where the first has underflowed."""
     window = slab(axis, start, stop)
     first, second = vectors[window][..., 0], vectors[window][..., 1]
-    known = _nodes_of(inside[window], first.shape[3]) & (first > TINY)
+    known = _nodes_of(inside[window], first.shape[3]) & (first > LEAST_KNOWN)
     np.divide(second, first, out=out[0][window], where=known)
 
 

@@ -163,17 +163,17 @@ def _distances(values: Floats, spacing: Floats, pads: Ints) -> Floats:
 
 measure: Any = lazy_module("skimage.measure", "contours")
 
-SMOOTHING = 1.0
+SIGN_BLUR = 1.0
 """Standard deviation, in cells, of the Gaussian that smooths arrays of signs. Distances of balls, half spaces and boxes
 24 to 96 nodes wide are best with .7 to 1; more rounds the edges of boxes."""
-LEAST, MOST = 0.3, 0.6
+LEAST_SIGN, LARGEST_SIGN = 0.3, 0.6
 """Bounds of smoothed signs, with which contours cross the middle third of an edge: signs contain no more. With the
 middle three fifths balls and half spaces come out a tenth better, and boxes a tenth worse."""
-UNEVEN = 0.05
+SMOOTH_CROSSING = 0.05
 """Distance, in cells, from the neighbours' paraboloids up to which a crossing is smooth. Distances of balls of four
 cells' radius are wrong by at most .04 cells, with .1 by .01; those of clipped balls by .07 and .12."""
 
-FLAT = 0.25
+FLAT_RADIUS = 0.25
 """Radius around a crossing, relative to a cell's diagonal, within which the zero set of signs with four axes is flat.
 Distances of balls and half spaces 13 to 17 nodes wide are best with .125 to .25, those of boxes with more."""
 
@@ -212,8 +212,8 @@ class Contour(NamedTuple):
 
 def smoothed_signs(signs: Floats) -> Floats:
     """Return values with the given signs, ±1, whose contour is smoother."""
-    agreement = scipy.ndimage.gaussian_filter(signs, SMOOTHING, mode="nearest") * signs
-    return signs * np.clip(agreement, LEAST, MOST)
+    agreement = scipy.ndimage.gaussian_filter(signs, SIGN_BLUR, mode="nearest") * signs
+    return signs * np.clip(agreement, LEAST_SIGN, LARGEST_SIGN)
 
 
 def zero_contour(values: Floats, steps: Floats) -> Contour:
@@ -236,7 +236,7 @@ def zero_contour(values: Floats, steps: Floats) -> Contour:
     corners = numbers[faces]
     pairs = np.concatenate([corners[:, [k, k - 1]] for k in range(3)])
     uneven = _unevenness(curved, linear, pairs[(pairs >= 0).all(axis=1)])
-    least = UNEVEN * float(steps[unused:].min())
+    least = SMOOTH_CROSSING * float(steps[unused:].min())
     smooth = uneven <= least
     points = np.where(smooth[:, None], curved.places, linear)
     return Contour(vertices, faces, numbers, zeros, curved, points, smooth, least, reach)
@@ -282,7 +282,7 @@ def _around_crossings(contour: Contour, crossings: Ints, places: Floats) -> Floa
     away = places - contour.curved.places[crossings]
     heights = contour.curved.heights(crossings, away)
     across = np.sqrt(np.maximum((away**2).sum(axis=1) - heights**2, 0.0))
-    flat = np.hypot(heights, np.maximum(across - FLAT * contour.reach, 0.0))
+    flat = np.hypot(heights, np.maximum(across - FLAT_RADIUS * contour.reach, 0.0))
     return np.where(contour.smooth[crossings], circle_distances(contour, crossings, away), flat)
 
 

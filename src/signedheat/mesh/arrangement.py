@@ -21,16 +21,16 @@ from .self_intersections import overlapping_faces
 from .triangles import face_areas, heights
 from .welding import distinct_rows, welded
 
-TOUCHING = 1e-8
+SAME_POINT = 1e-8
 """Distance, relative to the size of a shape, below which points are one, since coordinates are rounded."""
-STRAIGHT = 4.0
+ON_LINE = 4.0
 """Distance from a line within which common points of two faces lie on it, relative to that below which points are
 one."""
-PARALLEL = 1e-9
+PARALLEL_EDGES = 1e-9
 """Sine of the angle between edges below which they are parallel."""
-ALIKE = 1e-4
+COVERING_CELLS = 1e-4
 """Relative difference in area and centroid up to which cells with one outline cover each other."""
-ON_EDGE, IN_FACE, EDGES, EDGE_AND_FACE = range(4)
+ON_EDGE, IN_FACE, TWO_EDGES, EDGE_AND_FACE = range(4)
 """Kinds of meetings: a vertex lies on an edge or in a face, two edges touch, or an edge passes through a face."""
 
 
@@ -80,13 +80,13 @@ class Incidence(NamedTuple):
         return Incidence(self.owners, self.points[order])
 
 
-def meeting_faces(points: Floats, faces: Ints, touching: float = TOUCHING) -> Ints:
+def meeting_faces(points: Floats, faces: Ints, touching: float = SAME_POINT) -> Ints:
     """Return (k, 2) pairs of faces that cross, cover each other in one plane, or touch without a common vertex."""
     slack = touching * float(np.ptp(points, axis=0).max())
     return overlapping_faces(points, faces, slack, -slack)
 
 
-def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, touching: float = TOUCHING) -> Arrangement:
+def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, touching: float = SAME_POINT) -> Arrangement:
     """Divide faces where pairs, (k, 2), by default all, meet, and where edges that do not cancel end on others.
 
     Points nearer than `touching`, relative to the size of the shape, become one; thinner triangles are dropped.
@@ -106,8 +106,8 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, touching: f
 
     meetings, places = _meet(np.ascontiguousarray(points), faces, table.vertices, table.face_edges, pairs, slack)
     kinds, owners, others = meetings.T
-    points, ids = _with_new(points, meetings, places, kinds >= EDGES, others)
-    on_edge, edges, pierced, in_face = kinds == ON_EDGE, kinds == EDGES, kinds == EDGE_AND_FACE, kinds == IN_FACE
+    points, ids = _with_new(points, meetings, places, kinds >= TWO_EDGES, others)
+    on_edge, edges, pierced, in_face = kinds == ON_EDGE, kinds == TWO_EDGES, kinds == EDGE_AND_FACE, kinds == IN_FACE
     along = on_edge | edges | pierced
     lines = Lines(
         table.vertices,
@@ -192,7 +192,7 @@ def _with_segments(
     members = _members(faces, table, lines, np.unique(pairs))
     chains = Chains(lines.ends, lines.on.starts(len(lines.ends)), lines.on.points)
     starts = members.starts(len(faces))
-    rows, sides = _segments(points, starts, members.points, table.face_edges, chains, pairs, STRAIGHT * slack)
+    rows, sides = _segments(points, starts, members.points, table.face_edges, chains, pairs, ON_LINE * slack)
     own = rows[:, 1] >= len(lines.ends)
     ends = np.zeros((len(sides), 2), dtype=np.int64)
     ends[rows[own, 1] - len(lines.ends)] = rows[own, 2:]
@@ -337,8 +337,8 @@ def _with_copies_alike(pieces: Arrangement) -> Arrangement:
     areas, middles = face_areas(points[faces]), points[faces].mean(axis=1)
     totals = np.bincount(cells, areas, n)
     middles = sums_of(areas[:, None] * middles, cells, n) / np.maximum(totals, 1e-300)[:, None]
-    covers = (models != np.arange(n)) & (np.abs(totals - totals[models]) <= ALIKE * totals)
-    covers &= np.linalg.norm(middles - middles[models], axis=1) <= ALIKE * np.sqrt(totals)
+    covers = (models != np.arange(n)) & (np.abs(totals - totals[models]) <= COVERING_CELLS * totals)
+    covers &= np.linalg.norm(middles - middles[models], axis=1) <= COVERING_CELLS * np.sqrt(totals)
     copies = np.flatnonzero(covers)
     origin_of = np.empty(n, dtype=np.int64)
     origin_of[cells] = origins
@@ -376,7 +376,7 @@ def _closest(points: Floats, a: int, b: int, c: int, d: int, place: Floats) -> f
         p, q = (k + 1) % 3, (k + 2) % 3
         n[k] = u[p] * v[q] - u[q] * v[p]
         square += n[k] * n[k]
-    if not square > PARALLEL**2 * (u * u).sum() * (v * v).sum():
+    if not square > PARALLEL_EDGES**2 * (u * u).sum() * (v * v).sum():
         return np.inf
     for k in range(3):
         p, q = (k + 1) % 3, (k + 2) % 3
@@ -460,7 +460,7 @@ def _meet(points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Int
                     continue
                 off = _closest(points, a, b, c, d, place) if e < h else _closest(points, c, d, a, b, place)
                 if off <= slack:
-                    meetings.append((EDGES, min(e, h), max(e, h)))
+                    meetings.append((TWO_EDGES, min(e, h), max(e, h)))
                     places.append((place[0], place[1], place[2]))
                     hit[0, i], hit[1, k] = True, True
         for s in range(2):

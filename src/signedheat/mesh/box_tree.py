@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..compiled import compiled
 
-LEAF = 4
+BOXES_PER_LEAF = 4
 """Boxes in each leaf."""
-SPREAD = (
+SPREAD_BITS = (
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),
     (8, 0x100F00F00F00F00F),
@@ -21,9 +21,9 @@ SPREAD = (
     (2, 0x1249249249249249),
 )
 """Shifts and masks that spread the 21 low bits of a number so that each is followed by two zero bits."""
-BLOCK = 1 << 13
-"""Leaves whose slabs are computed at once; a power of two, with all nodes below `FLAT_LEVELS`."""
-FLAT_LEVELS = 8
+LEAVES_AT_ONCE = 1 << 13
+"""Leaves whose slabs are computed at once; a power of two, with all nodes below `SLAB_LEVELS`."""
+SLAB_LEVELS = 8
 """Levels of a tree over triangles, from the leaves up, that are bounded by slabs as well."""
 
 
@@ -32,7 +32,7 @@ class BoxTree(NamedTuple):
 
     # (2 · leaves, 6) lower and upper corner of the box around all below each node; lower > upper for an empty node
     bounds: Floats
-    items: Ints  # (leaves · LEAF,) the boxes in each leaf, −1 where there are none
+    items: Ints  # (leaves · BOXES_PER_LEAF,) the boxes in each leaf, −1 where there are none
     groups: Ints  # (2 · leaves,) the group of all boxes below each node; −1 if they are of several
     # (2 · leaves, 10) two directions, the mean normal and the one across long faces, each followed by the least and the
     # largest extent along it of all below each node; or (0, 10)
@@ -53,19 +53,19 @@ class BoxTree(NamedTuple):
     def in_order(cls, lower: Floats, upper: Floats, order: Ints, groups: Ints | None = None) -> BoxTree:
         """Build the tree over boxes in an order in which neighbours, and boxes of a group (−1: none), are together."""
         n = len(lower)
-        leaves = 1 << max(int(np.ceil(np.log2(max(n, 1) / LEAF))), 0)
-        items = np.full(leaves * LEAF, -1, dtype=np.int64)
+        leaves = 1 << max(int(np.ceil(np.log2(max(n, 1) / BOXES_PER_LEAF))), 0)
+        items = np.full(leaves * BOXES_PER_LEAF, -1, dtype=np.int64)
         items[:n] = order
         bounds = np.empty((2 * leaves, 6))
-        boxes = np.full((leaves * LEAF, 6), np.inf)
+        boxes = np.full((leaves * BOXES_PER_LEAF, 6), np.inf)
         boxes[:, 3:] = -np.inf
         boxes[:n, :3], boxes[:n, 3:] = lower[items[:n]], upper[items[:n]]
         bounds[0] = 0
         common = np.full(2 * leaves, -1, dtype=np.int64)
         if groups is not None:
-            own = np.append(groups, -1)[items].reshape(leaves, LEAF)
+            own = np.append(groups, -1)[items].reshape(leaves, BOXES_PER_LEAF)
             common[leaves:] = np.where((own == own[:, :1]).all(axis=1), own[:, 0], -1)
-        level, below = leaves, boxes.reshape(leaves, LEAF, 6)
+        level, below = leaves, boxes.reshape(leaves, BOXES_PER_LEAF, 6)
         while level:
             bounds[level : 2 * level, :3] = boxes_around(below[..., :3])[0]
             bounds[level : 2 * level, 3:] = boxes_around(below[..., 3:])[1]
@@ -174,7 +174,7 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, first: I
                 stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
                 depth += 2
                 continue
-            for place in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
+            for place in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
                 if items[place] >= 0:
                     if len(triangles) and _is_beyond(triangles[items[place]], lower, upper, ways, ends):
                         continue
@@ -210,17 +210,20 @@ def boxes_around(corners: Floats) -> tuple[Floats, Floats]:
 @np.errstate(all="ignore")
 def _slabs(triangles: Floats, items: Ints) -> Floats:
     """Return (2 · leaves, 10) the slabs around (n, 3, 3) triangles in the lowest nodes of a tree: see `BoxTree`."""
-    leaves, last = len(items) // LEAF, len(triangles) - 1
-    slabs, size = np.tile([0.0, 0.0, 0.0, -np.inf, np.inf], (2 * leaves, 2)), min(leaves, BLOCK)  # bound nothing
+    leaves, last = len(items) // BOXES_PER_LEAF, len(triangles) - 1
+    slabs, size = (
+        np.tile([0.0, 0.0, 0.0, -np.inf, np.inf], (2 * leaves, 2)),
+        min(leaves, LEAVES_AT_ONCE),
+    )  # bound nothing
     for begin in range(0, leaves if last >= 0 else 0, size):
-        batch = items[begin * LEAF : (begin + size) * LEAF]
+        batch = items[begin * BOXES_PER_LEAF : (begin + size) * BOXES_PER_LEAF]
         corners = triangles[np.where(batch < 0, items[last], batch)]
         sides = np.roll(corners, -1, axis=1) - corners
         normals = np.cross(sides[:, 0], sides[:, 1])
         normals[batch < 0] = 0.0
         lines = sides[np.arange(len(sides)), np.einsum("tcd,tcd->tc", sides, sides).argmax(axis=1)]
-        for level in range(min(FLAT_LEVELS, leaves.bit_length())):
-            count, below = size >> level, LEAF << level
+        for level in range(min(SLAB_LEVELS, leaves.bit_length())):
+            count, below = size >> level, BOXES_PER_LEAF << level
             normals = normals.reshape(count, -1, 3).sum(axis=1)
             ways = np.stack([normals, np.cross(normals, lines[below // 2 :: below])], axis=1)
             lengths = np.sqrt(np.einsum("nkd,nkd->nk", ways, ways))
@@ -248,7 +251,7 @@ def morton_codes(points: Floats) -> NDArray[np.uint64]:
     codes = np.zeros(len(points), dtype=np.uint64)
     for axis in range(3):
         x = ((points[:, axis] - lower[axis]) * ((2**21 - 1) / extent)).astype(np.uint64)
-        for shift, mask in SPREAD:
+        for shift, mask in SPREAD_BITS:
             x |= x << np.uint64(shift)
             x &= np.uint64(mask)
         codes |= x << np.uint64(axis)

@@ -22,14 +22,12 @@ from .curve_segments import CurveSegments, MergedSources
 from .edges import EdgeTable
 from .gluing import flip_all, glue, lay_out
 from .intrinsic_mesh import IntrinsicMesh
-from .surface_points import EDGE, FACE, VERTEX, LocatedPoints, barycentric_on_edges, points_at_vertices
+from .surface_points import EDGE, FACE, VERTEX, ZERO_COORDINATE, LocatedPoints, barycentric_on_edges, points_at_vertices
 
 Point = tuple[float, float]
 Edge = tuple[int, int]
 
-CLOSE = 1e-9
-"""Distance, in barycentric coordinates, below which a point lies on a segment."""
-FLAT = 1e-14
+FLAT_AREA = 1e-14
 """Twice the area below which a triangle is flat, and no flip makes it."""
 
 
@@ -60,7 +58,7 @@ class _Line:
     def meets(self, x: Point) -> bool:
         """Return whether a point lies on the part of the segment that is not yet done."""
         length = ((self.end[0] - self.start[0]) ** 2 + (self.end[1] - self.start[1]) ** 2) ** 0.5
-        return abs(turn(self.start, self.end, x)) <= CLOSE * length and self.done < self.share(x) <= 1
+        return abs(turn(self.start, self.end, x)) <= ZERO_COORDINATE * length and self.done < self.share(x) <= 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +110,7 @@ class Triangulation:
         for a, b in edges_of(triangle):
             p, q = self.points[a], self.points[b]
             length = ((q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2) ** 0.5
-            if (b, a) in self.apex and turn(p, q, x) <= CLOSE * length:
+            if (b, a) in self.apex and turn(p, q, x) <= ZERO_COORDINATE * length:
                 self.split(a, b, i)
                 return i
         for a, b in edges_of(triangle):
@@ -211,7 +209,7 @@ class Triangulation:
             moved, left = False, []
             for u, v in reversed(waiting):  # back and forth: flips at one end make room for the next
                 w, x = apex[u, v], apex[v, u]
-                if min(turn(points[x], points[v], points[w]), turn(points[w], points[u], points[x])) <= FLAT:
+                if min(turn(points[x], points[v], points[w]), turn(points[w], points[u], points[x])) <= FLAT_AREA:
                     left.append((u, v))
                     continue
                 del apex[u, v], apex[v, u]

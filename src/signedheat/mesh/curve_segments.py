@@ -18,8 +18,8 @@ from .polylines import assemble_polylines
 from .signed_graph import Links, signs_of
 from .surface_points import (
     EDGE,
-    SNAP,
     VERTEX,
+    ZERO_COORDINATE,
     LocatedPoints,
     barycentric_in,
     concatenated,
@@ -28,9 +28,9 @@ from .surface_points import (
 )
 from .unit_vectors import unit
 
-STRAIGHT = 1e-6
+STRAIGHT_NORMALS = 1e-6
 """Change of the unit normal between segments up to which a line may be straight: short segments have rounded ends.
-`SNAP` then decides, by how far all points are from the line between the outer ones."""
+`ZERO_COORDINATE` then decides, by how far all points are from the line between the outer ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegmen
     places = (places * triangles.corner_positions[faces, None]).sum(axis=2)
     begin, end = places[first[run[before]], 0], places[last[run[before]], 1]
     off = np.abs((np.conj(end - begin) * (places[before, 1] - begin)).imag)
-    bent = off > SNAP * triangles.edge_lengths[faces[before]].max(axis=1) * np.abs(end - begin)
+    bent = off > ZERO_COORDINATE * triangles.edge_lengths[faces[before]].max(axis=1) * np.abs(end - begin)
     bent &= merged.edges[before] < 0
     straight = np.bincount(run[before], bent, len(first))[run[before]] == 0
     ends_at = np.bincount(np.concatenate([merged.ends.ravel(), *merged.samples]), minlength=len(merged.nodes))
@@ -187,7 +187,7 @@ def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
     places_between = np.flatnonzero((np.bincount(index.ravel()) == 2) & (into >= 0) & (out >= 0))
     before, after = into[places_between], out[places_between]
     normals = merged.vectors / np.abs(merged.vectors)
-    alike = np.abs(normals[before] - normals[after]) <= STRAIGHT
+    alike = np.abs(normals[before] - normals[after]) <= STRAIGHT_NORMALS
     for elements in (merged.edges, np.where(merged.edges < 0, merged.faces, -1)):
         alike &= elements[before] == elements[after]
     places_between, before, after = places_between[alike], before[alike], after[alike]

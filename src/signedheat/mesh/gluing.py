@@ -18,9 +18,9 @@ from .components import next_in_groups
 from .edges import EdgeTable
 from .intrinsic_mesh import IntrinsicMesh
 
-FLIP, TURN, SPLIT_FACE, SPLIT_EDGE = 0, 1, 2, 3
+FLIP_STEP, TURN_STEP, SPLIT_FACE, SPLIT_EDGE = 0, 1, 2, 3
 """Kinds of steps in a history."""
-FACES, EDGES, VERTICES, STEPS, STACKED = range(5)
+N_FACES, N_EDGES, N_VERTICES, N_STEPS, N_STACKED = range(5)
 """Places in `Gluing.counts`: numbers of faces, edges, vertices, steps of the history, and edges on the stack."""
 MOST_FLIPS = 1000
 """Number of flips after which an edge is left as it is: rounding makes it flip back and forth."""
@@ -41,7 +41,7 @@ class Gluing(NamedTuple):
     length: Floats  # (e,) length of every edge, in multiples of `unit`
     fixed: Bools  # (e,) edges that must not be flipped
     flips: Ints  # (e,) how often each edge has been flipped
-    counts: Ints  # (5,) how many there are of each: see `FACES`
+    counts: Ints  # (5,) how many there are of each: see `N_FACES`
     steps: Ints  # (s, 4) the history: kind of each step, two halfedges or faces, and the new vertex
     weights: Floats  # (s, 4) the affine dependency of the points of each step
     scratch: Ints  # work array
@@ -107,10 +107,10 @@ def move(g: Gluing, old: tuple[int, ...], new: tuple[int, ...]) -> None:
 @compiled
 def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float, b: float, c: float, d: float) -> None:
     """Write one step into the history."""
-    n = g.counts[STEPS]
+    n = g.counts[N_STEPS]
     g.steps[n, 0], g.steps[n, 1], g.steps[n, 2], g.steps[n, 3] = kind, first, second, vertex
     g.weights[n, 0], g.weights[n, 1], g.weights[n, 2], g.weights[n, 3] = a, b, c, d
-    g.counts[STEPS] = n + 1
+    g.counts[N_STEPS] = n + 1
 
 
 @compiled
@@ -119,11 +119,11 @@ def faces_around(steps: Ints, n: int, around: Ints, start: Ints) -> None:
     kind = steps[n, 0]
     around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
     start[0] = start[1] = start[2] = 0
-    if kind == TURN:
+    if kind == TURN_STEP:
         around[1] = around[2] = -1
     elif kind != SPLIT_FACE:
         around[0], start[0], around[2] = steps[n, 1] // 3, steps[n, 1] % 3, -1
-    if kind == FLIP:
+    if kind == FLIP_STEP:
         around[1], start[1] = steps[n, 2] // 3, steps[n, 2] % 3
 
 
@@ -135,7 +135,7 @@ def turn_over(g: Gluing, face: int) -> None:
     g.tail[h + 1], g.tail[h + 2] = g.tail[h + 2], g.tail[h + 1]
     for k in range(3):
         g.forward[h + k] = not g.forward[h + k]
-    record(g, TURN, face, -1, -1, 0.0, 0.0, 0.0, 0.0)
+    record(g, TURN_STEP, face, -1, -1, 0.0, 0.0, 0.0, 0.0)
 
 
 @compiled
@@ -176,7 +176,7 @@ def flip(g: Gluing, h: int) -> bool:
     area_jab, area_iab, area_g, area_f, length = diamond(g, h)
     if not (length > 0.0 and area_iab > 0.0 and area_jab > 0.0):
         return False
-    record(g, FLIP, h, t, -1, area_jab, area_iab, area_g, area_f)
+    record(g, FLIP_STEP, h, t, -1, area_jab, area_iab, area_g, area_f)
     i, j, a, b = g.tail[h], g.tail[t], g.tail[h2], g.tail[t2]
     move(g, (h1, h2, t1, t2), (t2, h1, h2, t1))
     g.tail[h], g.tail[h1], g.tail[h2] = b, a, i
@@ -190,11 +190,11 @@ def flip(g: Gluing, h: int) -> bool:
 @compiled
 def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
     """Flip stacked edges until all that are not fixed are Delaunay; return False if the history is full before."""
-    while g.counts[STACKED] > 0:
-        if g.counts[STEPS] + 2 > len(g.steps):
+    while g.counts[N_STACKED] > 0:
+        if g.counts[N_STEPS] + 2 > len(g.steps):
             return False
-        g.counts[STACKED] -= 1
-        e = stack[g.counts[STACKED]]
+        g.counts[N_STACKED] -= 1
+        e = stack[g.counts[N_STACKED]]
         stacked[e] = False
         h = g.start[e]
         t = g.sibling[h]
@@ -215,16 +215,16 @@ def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
 def look_at(g: Gluing, stack: Ints, stacked: Bools, e: int) -> None:
     """Push an edge on the stack of edges to be checked."""
     if not stacked[e]:
-        stack[g.counts[STACKED]] = e
+        stack[g.counts[N_STACKED]] = e
         stacked[e] = True
-        g.counts[STACKED] += 1
+        g.counts[N_STACKED] += 1
 
 
 @compiled
 def new_edge(g: Gluing, length: float, fixed: bool) -> int:
     """Add an edge; return its id."""
-    e: int = g.counts[EDGES]
-    g.counts[EDGES] = e + 1
+    e: int = g.counts[N_EDGES]
+    g.counts[N_EDGES] = e + 1
     g.length[e], g.fixed[e], g.flips[e] = length, fixed, 0
     return e
 
@@ -247,8 +247,8 @@ def cross(a: complex, b: complex) -> float:
 def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
     """Insert a vertex x at (u, v, w) into a face (a, b, c), which becomes (a, b, x), (b, c, x), (c, a, x); return x."""
     h = 3 * f
-    n: int = g.counts[FACES]
-    x: int = g.counts[VERTICES]
+    n: int = g.counts[N_FACES]
+    x: int = g.counts[N_VERTICES]
     a, b, c = g.tail[h], g.tail[h + 1], g.tail[h + 2]
     base = g.length[g.edge[h]]
     top = apex(g, h)
@@ -259,7 +259,7 @@ def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
         new_edge(g, abs(place - base), False),
         new_edge(g, abs(place - top), False),
     )
-    g.counts[VERTICES], g.counts[FACES] = x + 1, n + 2
+    g.counts[N_VERTICES], g.counts[N_FACES] = x + 1, n + 2
     k, l = 3 * n, 3 * n + 3
     move(g, (h + 1, h + 2), (k, l))
     g.tail[k], g.tail[l] = b, c
@@ -282,14 +282,14 @@ def split_edge(g: Gluing, h: int, fraction: float) -> int:
         around[k] = y
         y = g.sibling[y]
     e: int = g.edge[h]
-    x: int = g.counts[VERTICES]
-    g.counts[VERTICES] = x + 1
+    x: int = g.counts[N_VERTICES]
+    g.counts[N_VERTICES] = x + 1
     along = fraction if g.forward[h] else 1.0 - fraction
     whole = g.length[e]
     far_edge = new_edge(g, (1.0 - along) * whole, g.fixed[e])
     for k in range(count):
-        y, n = around[k], g.counts[FACES]
-        g.counts[FACES] = n + 1
+        y, n = around[k], g.counts[N_FACES]
+        g.counts[N_FACES] = n + 1
         share = along if g.forward[y] else 1.0 - along
         record(g, SPLIT_EDGE, y, n, x, 1.0 - share, share, 0.0, 1.0)
         cut = new_edge(g, abs(apex(g, y) - share * whole), False)
@@ -362,8 +362,8 @@ def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
 
 def flip_all(gluing: Gluing) -> Gluing:
     """Flip all edges that are not fixed to Delaunay, in place; return the gluing, with room for its history."""
-    n_edges = int(gluing.counts[EDGES])
-    gluing.counts[STACKED] = n_edges
+    n_edges = int(gluing.counts[N_EDGES])
+    gluing.counts[N_STACKED] = n_edges
     stack, stacked = np.arange(n_edges)[::-1].copy(), np.ones(n_edges, dtype=bool)
     while not flip_until_delaunay(gluing, stack, stacked):
         gluing = gluing._replace(steps=doubled(gluing.steps), weights=doubled(gluing.weights))

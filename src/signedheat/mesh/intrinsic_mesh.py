@@ -20,7 +20,7 @@ from .edges import EdgeTable, edge_table
 from .triangles import Triangles
 
 Index = Ints | slice
-FLATTEST = 1e-18
+LEAST_AREA = 1e-18
 """Area, relative to the square of the longest edge, that a flatter face counts as where it divides."""
 
 
@@ -92,9 +92,9 @@ class IntrinsicMesh(Frozen):
 
     @property
     def areas_as_divisors(self) -> Floats:
-        """(m,) areas, those of flat faces as if they were `FLATTEST`."""
+        """(m,) areas, those of flat faces as if they were `LEAST_AREA`."""
         squares: Floats = (np.abs(self.edge_vectors) ** 2).max(axis=1)
-        return np.maximum(self.face_areas, FLATTEST * squares)
+        return np.maximum(self.face_areas, LEAST_AREA * squares)
 
     @cached_property
     def vertex_areas(self) -> Floats:
@@ -172,7 +172,7 @@ class IntrinsicMesh(Frozen):
         return straight, mirrored
 
 
-MARGIN = 1e-14
+TRIANGLE_MARGIN = 1e-14
 """Least margin of the triangle inequalities, relative to the mean length, to which flat triangles are mollified."""
 
 

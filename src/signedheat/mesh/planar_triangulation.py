@@ -9,12 +9,12 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 
-FLAT = 1e-13
+FLAT_HEIGHT = 1e-13
 """Height of a triangle, relative to the size of the face, below which it is flat."""
-DELAUNAY = 1e-10
+DELAUNAY_SINE = 1e-10
 """Sine of the excess over π up to which two opposite angles satisfy Delaunay's condition."""
 
-TRIES = 64
+FLIP_TRIES = 64
 """Tries to flip edges, for each that a segment crosses, after which rounding is taken to prevent it. Segments that are
 not thinner than rounding took ten at most, also across a thousand edges."""
 
@@ -57,7 +57,7 @@ def triangulate_faces(
         count = 2 * n - rim - 2
         tri, adj = np.empty((count, 3), np.int64), np.full((count, 3), -1, np.int64)
         fixed = np.zeros((count, 3), np.bool_)
-        mesh = Planar(x, tri, adj, fixed, np.zeros(n, np.int64), FLAT * size)
+        mesh = Planar(x, tri, adj, fixed, np.zeros(n, np.int64), FLAT_HEIGHT * size)
         last = _rim(mesh, corners[f])
         for i in range(rim, n):
             last = _insert(mesh, last, i)
@@ -249,7 +249,7 @@ def _bad(mesh: Planar, t: int, k: int) -> bool:
     cos_c, sin_c = acx * bcx + acy * bcy, acx * bcy - acy * bcx
     cos_d, sin_d = adx * bdx + ady * bdy, bdx * ady - bdy * adx
     scale = np.sqrt((acx**2 + acy**2) * (bcx**2 + bcy**2) * (adx**2 + ady**2) * (bdx**2 + bdy**2))
-    return sin_c * cos_d + cos_c * sin_d < -DELAUNAY * scale
+    return sin_c * cos_d + cos_c * sin_d < -DELAUNAY_SINE * scale
 
 
 @compiled
@@ -381,7 +381,7 @@ def _clear(mesh: Planar, t: int, k: int, a: int, b: int) -> int:
         t, k = s, ((j + 1) % 3 if turn > 0.0 else (j + 2) % 3)  # (u, z) or (z, head)
         tails.append(tri[t, k])
         heads.append(tri[t, (k + 1) % 3])
-    begin, left = 0, TRIES * (len(tails) + 4)
+    begin, left = 0, FLIP_TRIES * (len(tails) + 4)
     while begin < len(tails):
         left -= 1
         if left < 0:

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..parallel import ROWS_PER_TASK, n_threads
-from .box_tree import LEAF, BoxTree, morton_codes
+from .box_tree import BOXES_PER_LEAF, BoxTree, morton_codes
 from .unit_vectors import unit
 from .welding import same_positions
 
@@ -51,7 +51,7 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float,
     flat = corners.reshape(-1, 9)
     fans = np.flatnonzero(hubs >= 0)
     places = np.arange(len(ids))
-    from_leaf = np.where(places < count, places // LEAF, 0)
+    from_leaf = np.where(places < count, places // BOXES_PER_LEAF, 0)
     tree = BoxTree.over(corners[:count], places[:count], hubs[:count])
     arcs = _arcs(centred, ids[fans], hubs[fans]) if len(fans) else corners[:0]
     around = BoxTree.around(arcs) if len(fans) else tree

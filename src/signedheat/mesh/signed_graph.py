@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from ..arrays import Floats, Ints
 from ..compiled import compiled
 
-_ROUNDS = 50
+TURNING_ROUNDS = 50
 """Largest number of rounds of turning signs; usually a few suffice."""
 
 
@@ -76,7 +76,7 @@ def best_signs(weights: Floats, first: Floats) -> Floats:
 def _turned_in_groups(weights: Floats, groups: list[Ints], signs: Floats) -> Floats:
     """Turn groups of signs one after the other, as long as that makes them agree more with the others."""
     agreement, least = weights @ signs, 1e-12 * float(np.abs(weights).sum())
-    for _ in range(_ROUNDS):
+    for _ in range(TURNING_ROUNDS):
         turned = False
         for group in groups:
             own = signs[group]
@@ -138,7 +138,7 @@ def _contraction(weights: sparse.csr_matrix) -> tuple[Ints, Floats]:
 @compiled
 def turn_where_better(starts: NDArray[np.int32], neighbors: NDArray[np.int32], weights: Floats, signs: Floats) -> None:
     """Turn signs that disagree with their neighbours, one after the other, until none does."""
-    for _ in range(_ROUNDS):
+    for _ in range(TURNING_ROUNDS):
         turned = False
         for node in range(len(signs)):
             agreement = 0.0

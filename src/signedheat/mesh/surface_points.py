@@ -15,8 +15,9 @@ from .intrinsic_mesh import IntrinsicMesh
 
 VERTEX, EDGE, FACE = 0, 1, 2
 
-SNAP = 1e-9
-"""Barycentric coordinate below which it counts as zero: the point then lies on the edge or at the vertex."""
+ZERO_COORDINATE = 1e-9
+"""Barycentric coordinate, or distance in these, below which it counts as zero: the point then lies on the edge, at the
+vertex, or on the segment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +54,7 @@ def refuse_missing(kind: str, ids: Ints, n: int, name: str = "point") -> None:
 def locate_points(triangles: IntrinsicMesh, faces: Ints, barycentric: Floats, name: str = "point") -> LocatedPoints:
     """Find the vertex, edge or face that contains each point, given by its face and barycentric coordinates."""
     refuse_missing("face", faces, triangles.n_faces, name)
-    inside = np.where(barycentric < SNAP, 0.0, barycentric)
+    inside = np.where(barycentric < ZERO_COORDINATE, 0.0, barycentric)
     inside /= inside.sum(axis=1, keepdims=True)
     positive = inside > 0
     kinds = positive.sum(axis=1) - 1
@@ -197,7 +198,7 @@ def unique_points(located: LocatedPoints) -> tuple[Ints, Ints]:
     new = np.zeros(len(located), dtype=bool)
     new[:1] = True
     for column in columns:
-        new[1:] |= np.abs(np.diff(column[order])) > SNAP
+        new[1:] |= np.abs(np.diff(column[order])) > ZERO_COORDINATE
     group = np.empty(len(located), dtype=np.int64)
     group[order] = np.cumsum(new) - 1
     numbers, _ = by_first_use(group, int(new.sum()))

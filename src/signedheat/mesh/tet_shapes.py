@@ -117,13 +117,13 @@ def signed_volumes(vertices: Floats, tets: Ints) -> Floats:
     return np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6
 
 
-THIN = 1e-2
+THIN_TET = 1e-2
 """Volume, relative to the cube of the longest edge, below which a tet has a reduced weight; regular tets have 0.118."""
-FLAT = 1e-6
+FLAT_TET = 1e-6
 """Volume, relative to the cube of the longest edge, below which a tet counts as flat."""
 LEAST_MASS = 1e-9
 """Least mass of a face, relative to the mean of all; from 1e-12 to 1e-4 no test of tets changes."""
-TIE = 1e-4
+FLAT_STIFFNESS = 1e-4
 """Stiffness between the faces or vertices of flat tets, relative to the longest edge."""
 
 
@@ -134,14 +134,14 @@ class Tetrahedra(TetShapes):
     @cached_property
     def stiffness_factors(self) -> Floats:
         """(m,) w / |T|, w the `weights`, by which every term of thin tets is reduced: the stiffness stays bounded."""
-        thick = self.thickness >= THIN
+        thick = self.thickness >= THIN_TET
         cubes = np.where(self.longest_edges > 0, self.longest_edges, 1) ** 3
-        return 1 / np.where(thick, np.maximum(self.volumes, np.finfo(float).tiny), THIN * cubes)
+        return 1 / np.where(thick, np.maximum(self.volumes, np.finfo(float).tiny), THIN_TET * cubes)
 
     @cached_property
     def weights(self) -> Floats:
         """(m,) w: one, less than one for thin tets, zero for flat ones."""
-        return np.minimum(self.thickness / THIN, 1)
+        return np.minimum(self.thickness / THIN_TET, 1)
 
     @cached_property
     def fading(self) -> Floats:
@@ -152,7 +152,7 @@ class Tetrahedra(TetShapes):
     def ties(self) -> Floats:
         """(m,) extra stiffness between any two faces or vertices of a flat tet, since some belong to no other."""
         lengths = np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
-        return TIE * lengths * (1 - np.minimum(self.thickness / FLAT, 1))
+        return FLAT_STIFFNESS * lengths * (1 - np.minimum(self.thickness / FLAT_TET, 1))
 
     def face_mass(self) -> Floats:
         """Return (f,) M of Eq. 12, row sums of Eq. 23, with a least value so that M + tL is positive definite."""

@@ -152,15 +152,15 @@ def cut_into_ears(polygon: Floats, normal: Floats, allowed: Callable[[int, int],
     return np.array([*triangles, left])
 
 
-SHARP = np.deg2rad(25.0)
+CREASE_ANGLE = np.deg2rad(25.0)
 """Angle between two faces above which the edge between them is a candidate."""
-MOST = 4_000_000
+MOST_CREASED_FACES = 4_000_000
 """Number of faces above which creases stay as they are: the search for them would take more memory than the surface."""
 
 
 def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = None) -> Ints:
     """Return (m, 3) faces with edges flipped where the surface then bends less, but not at `held` vertices (n,)."""
-    if not 0 < len(faces) <= MOST:
+    if not 0 < len(faces) <= MOST_CREASED_FACES:
         return faces
     _, _, sharp = _creases(vertices, faces)
     if not len(sharp):
@@ -179,10 +179,10 @@ def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = No
 
 
 def _creases(vertices: Floats, faces: Ints) -> tuple[EdgeTable, Floats, Ints]:
-    """Return edges and unit normals of faces, and both halfedges of the edges with an angle above `SHARP`."""
+    """Return edges and unit normals of faces, and both halfedges of the edges with an angle above `CREASE_ANGLE`."""
     table, normals = edge_table(faces), unit(area_vectors(vertices[faces]))
     first, second = normals[table.pairs // 3].swapaxes(0, 1)
-    return table, normals, table.pairs[np.einsum("ij,ij->i", first, second) < np.cos(SHARP)]
+    return table, normals, table.pairs[np.einsum("ij,ij->i", first, second) < np.cos(CREASE_ANGLE)]
 
 
 def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> tuple[Ints, Ints, Ints]:

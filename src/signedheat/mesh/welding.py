@@ -9,23 +9,23 @@ from ..arrays import Bools, Floats, Ints, read_only
 from ..compiled import compiled
 from .edges import find_edges
 
-ROUNDING = 4.0
+ONE_PLACE = 4.0
 """Largest difference of coordinates of one place, in units of single precision of the size of a shape, or of the last
 places of its coordinates."""
-SEAM, GAP = 64.0, 1024.0
+SEAM_UNITS, GAP_UNITS = 64.0, 1024.0
 """Largest difference of coordinates of one vertex of a seam, and of two that are announced as nearly one, in units of
 single precision of the size of the surface. Halved, a vertex in a hundred is missed on two of twelve seams; doubled,
 nothing changes (`benchmarks/deciding_numbers.py`)."""
-COLLAPSE = 0.25
+SEAM_WIDTH = 0.25
 """Vertices farther apart than this share of the shortest edge at them are not joined as those of a seam."""
-_HALF = 0xFFFFFFFF
+_LOW = 0xFFFFFFFF
 
 
 def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:
     """Return (n,) the first vertex at the place of each that is on a rim, as of a seam; all others stay.
 
     Rims are edges of the halfedges (h,) that an odd number of faces have. Places are one if they differ by `units` of
-    single precision of the size of what is given, or by `ROUNDING` last places of coordinates that make use of these,
+    single precision of the size of what is given, or by `ONE_PLACE` last places of coordinates that make use of these,
     but never so that an edge collapses. So what single precision parted is joined wherever double precision moved it.
     """
     edges, _, counts, _, _ = find_edges(read_only(tails), read_only(heads), tails != heads, len(points))
@@ -40,11 +40,11 @@ def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:
     for ends in (tails, heads):
         np.minimum.at(shortest, places[ends], np.where(lengths > 0, lengths, np.inf))
     digits = 24 if _is_single(used) else 53
-    last_places = np.where(_is_rounded(used, digits), ROUNDING * np.abs(used).max() * 2.0**-digits, 0.0)
+    last_places = np.where(_is_rounded(used, digits), ONE_PLACE * np.abs(used).max() * 2.0**-digits, 0.0)
     tolerances = np.maximum(units * 2.0**-24 * np.ptp(used, axis=0).max(), last_places)
     near = first[np.searchsorted(rims, rims[welded(points[rims], tolerances)])]
     apart = np.abs(points[first] - points[near]).max(axis=1)
-    places[rims] = np.where(apart <= COLLAPSE * np.minimum(shortest[first], shortest[near]), near, first)
+    places[rims] = np.where(apart <= SEAM_WIDTH * np.minimum(shortest[first], shortest[near]), near, first)
     return places
 
 
@@ -116,9 +116,9 @@ def coincident_faces(corners: Ints, offsets: Ints) -> tuple[Ints, Bools]:
 @compiled
 def mixed(a: int, b: int, c: int) -> int:
     """Return a nonnegative hash of three integers: halves times odd numbers, so that no product exceeds 64 bits."""
-    x = ((a & _HALF) * 0x1E3779B1) ^ ((b & _HALF) * 0x2545F491) ^ ((c & _HALF) * 0x165667B1)
-    x ^= (((a >> 32) & _HALF) * 0x27D4EB2F) ^ (((b >> 32) & _HALF) * 0x1B873593) ^ (((c >> 32) & _HALF) * 0x0CC9E2D5)
-    x = ((x ^ (x >> 29)) & _HALF) * 0x3C6EF373
+    x = ((a & _LOW) * 0x1E3779B1) ^ ((b & _LOW) * 0x2545F491) ^ ((c & _LOW) * 0x165667B1)
+    x ^= (((a >> 32) & _LOW) * 0x27D4EB2F) ^ (((b >> 32) & _LOW) * 0x1B873593) ^ (((c >> 32) & _LOW) * 0x0CC9E2D5)
+    x = ((x ^ (x >> 29)) & _LOW) * 0x3C6EF373
     return (x ^ (x >> 27)) & 0x7FFFFFFFFFFFFFFF
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints, read_only
 from ..compiled import compiled
-from ..mesh.box_tree import LEAF, BoxTree, boxes_around, morton_codes
+from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, boxes_around, morton_codes
 from ..mesh.components import by_first_use, connected_components, sums_of
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.unit_vectors import unit
@@ -23,13 +23,13 @@ from ..mesh.welding import coincident_faces, same_positions, same_rows
 from ..parallel import in_chunks
 from .nearest_triangles import foot_on_triangle, nearest_faces, triangle_rows
 
-FOLD = 0.02
+FOLDED_EDGE = 0.02
 """Length of the sum of two unit normals below which the edge between them is a fold, and decides no side."""
-RUN = 512
+POINTS_PER_SEARCH = 512
 """Number of points after which a search starts again: a part of the points that a thread takes at a time."""
-FLAT = 0.5
+DISC_THICKNESS = 0.5
 """Thickness over radius up to which a disc is used besides the box."""
-FAR = 1e7
+FARTHEST_SEARCH = 1e7
 """Distance, in sizes of a surface, at which farther points are searched for: rounding, which grows with distance, and
 the other angle then move the nearest place by at most 1e-7 of the size."""
 
@@ -97,7 +97,7 @@ class FaceFeatures(NamedTuple):
 
 def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: int) -> tuple[Bools, Bools]:
     """Return which edges and vertices are regular."""
-    edges = (table.face_counts == 2) & (table.balance == 0) & ((edge_normals**2).sum(axis=1) > FOLD**2)
+    edges = (table.face_counts == 2) & (table.balance == 0) & ((edge_normals**2).sum(axis=1) > FOLDED_EDGE**2)
     mates = np.where(edges[table.face_edges].ravel(), table.mates, -1)
     mated = np.flatnonzero(mates >= 0)
     following = np.roll(np.arange(len(mates)).reshape(-1, 3), -1, axis=1).ravel()
@@ -163,9 +163,9 @@ class FaceTree:
         return np.sqrt(self.nearest(points)[1])
 
     def _brought_near(self, points: Floats) -> Floats:
-        """Move points farther than `FAR` sizes of the surface towards its middle, to that distance."""
+        """Move points farther than `FARTHEST_SEARCH` sizes of the surface towards its middle, to that distance."""
         lower, upper = self.tree.bounds[1, :3], self.tree.bounds[1, 3:]
-        middle, limit = 0.5 * (lower + upper), FAR * float(np.linalg.norm(upper - lower))
+        middle, limit = 0.5 * (lower + upper), FARTHEST_SEARCH * float(np.linalg.norm(upper - lower))
         away = points - middle
         distances = np.linalg.norm(away, axis=1)
         far = (distances > limit) & (limit > 0)
@@ -177,7 +177,7 @@ class FaceTree:
 
     def nearest(self, points: Floats) -> tuple[NDArray[np.int32], Floats]:
         """Return the nearest faces of points, and the squares of their distances."""
-        return nearest_faces(self.features.rows, self.tree, self.discs, points, RUN)
+        return nearest_faces(self.features.rows, self.tree, self.discs, points, POINTS_PER_SEARCH)
 
 
 @compiled
@@ -187,7 +187,7 @@ def _discs(corners: Floats, tree: BoxTree) -> Floats:
     leaves = len(bounds) // 2
     discs = np.full((2 * leaves, 8), -1.0)
     first = max(1, leaves >> 7)  # eight levels: higher nodes are not flat
-    below = LEAF * leaves // first
+    below = BOXES_PER_LEAF * leaves // first
     for node in range(first, 2 * leaves):
         if node == 2 * first:
             first, below = node, below // 2
@@ -214,7 +214,7 @@ def _discs(corners: Floats, tree: BoxTree) -> Floats:
                     low, high = min(low, along), max(high, along)
                     square = max(square, ax * ax + ay * ay + az * az - along * along)
         radius, thickness, middle = np.sqrt(square), 0.5 * (high - low), 0.5 * (high + low)
-        if thickness < FLAT * radius:
+        if thickness < DISC_THICKNESS * radius:
             slack = 1.0 + 1e-9  # against rounding
             discs[node, 0], discs[node, 1], discs[node, 2] = x + middle * nx, y + middle * ny, z + middle * nz
             discs[node, 3], discs[node, 4], discs[node, 5] = nx, ny, nz

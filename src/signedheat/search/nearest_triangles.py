@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, read_only
 from ..compiled import compiled
-from ..mesh.box_tree import LEAF, BoxTree
+from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..parallel import in_chunks
 
 # Feature codes of a foot: 0 inside the face; 1, 2, 3 on its edges (corner 0–1, 1–2, 2–0); 4, 5, 6 its corners 0, 1, 2.
@@ -293,7 +293,7 @@ def _descend(
                     stack[depth] = node ^ 1
                     depth += 1
             if node > 0:
-                first, end = (node - leaves) * LEAF, (node - leaves + 1) * LEAF
+                first, end = (node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF
             elif not begun:
                 end = np.int64(1)
             for item in range(first, end):

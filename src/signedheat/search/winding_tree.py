@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..compiled import compiled
-from ..mesh.box_tree import LEAF, BoxTree
+from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..mesh.triangles import area_vectors
 from ..parallel import ROWS_PER_TASK, in_chunks
 
-DEPTH = 1e-5
+BEHIND_FACE = 1e-5
 """Offset behind a face, relative to its size."""
-IN_PLANE = 1e-9
+APEX_IN_PLANE = 1e-9
 """Volume of the cone to a triangle, relative to the product of its edges at the apex, up to which the apex is in its
 plane."""
-OPENING = 1.25
+MOMENT_RADII = 1.25
 """Distance, relative to a node's radius, above which its moments replace its faces."""
 
 
@@ -50,12 +50,12 @@ class WindingTree:
 
     def levels(self, places: Floats, normals: Floats, areas: Floats) -> Floats:
         """Return (n,) means of the numbers on both sides of places on faces with these unit normals and areas."""
-        steps = DEPTH * np.sqrt(areas)[:, None] * normals
+        steps = BEHIND_FACE * np.sqrt(areas)[:, None] * normals
         return 0.5 * (self.numbers(places - steps) + self.numbers(places + steps))
 
     def behind(self, faces: NDArray[np.integer], places: Floats) -> Floats:
         """Return (n,) winding numbers just behind places (n, 3) in faces (n,), away from their rims."""
-        return self.numbers(places - steps_off(self.triangles[faces], DEPTH))
+        return self.numbers(places - steps_off(self.triangles[faces], BEHIND_FACE))
 
     @cached_property
     def _moments(self) -> Floats:
@@ -116,7 +116,7 @@ def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> F
                 depth += 2
             else:
                 real, imaginary = 1.0, 0.0
-                for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
+                for k in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
                     if items[k] >= 0:
                         rest, volume = solid_angle(corners, items[k], x, y, z)
                         # angles below an eighth of a turn are added by multiplying complex numbers
@@ -154,7 +154,7 @@ def mean_angle(corners: Floats, face: int, x: float, y: float, z: float) -> floa
     for c in range(0, 9, 3):
         dx, dy, dz = corners[face, c] - x, corners[face, c + 1] - y, corners[face, c + 2] - z
         scale *= np.sqrt(dx * dx + dy * dy + dz * dz)
-    return 0.0 if abs(volume) <= IN_PLANE * scale else 2.0 * np.arctan2(volume, rest)
+    return 0.0 if abs(volume) <= APEX_IN_PLANE * scale else 2.0 * np.arctan2(volume, rest)
 
 
 SQUARES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -164,9 +164,9 @@ CUBES = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 0, 1), (0, 0, 2), (0, 1, 1), (1, 1
 
 
 def _moments(triangles: Floats, tree: BoxTree) -> Floats:
-    """Return (2 · leaves, 23) area vector, centre, (`OPENING` · radius)², and coefficients of M and S."""
+    """Return (2 · leaves, 23) area vector, centre, (`MOMENT_RADII` · radius)², and coefficients of M and S."""
     leaves = len(tree.bounds) // 2
-    grouped = tree.items.reshape(leaves, LEAF)
+    grouped = tree.items.reshape(leaves, BOXES_PER_LEAF)
     blocks = [
         _of_leaves(triangles, grouped[start : start + ROWS_PER_TASK]) for start in range(0, leaves, ROWS_PER_TASK)
     ]
@@ -181,7 +181,7 @@ def _moments(triangles: Floats, tree: BoxTree) -> Floats:
         with np.errstate(invalid="ignore"):  # of empty nodes
             box = np.linalg.norm(np.maximum(centres - low, high - centres), axis=0)
         radii = np.where(weights > 0, np.minimum(radii, box), 0.0)
-        moments[rows, :3], moments[rows, 3:6], moments[rows, 6] = vectors.T, centres.T, (OPENING * radii) ** 2
+        moments[rows, :3], moments[rows, 3:6], moments[rows, 6] = vectors.T, centres.T, (MOMENT_RADII * radii) ** 2
         moments[rows, 7:13], moments[rows, 13:] = first.T, second.T
         if level == 1:
             return moments

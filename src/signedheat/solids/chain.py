@@ -20,7 +20,7 @@ from ..mesh.components import connected_components, element_components, next_in_
 from ..mesh.edges import EdgeTable, FaceOrientation, edge_table, orient_faces
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import angles_around, unit
-from ..mesh.welding import ROUNDING, coincident_faces, joined_rims, same_positions
+from ..mesh.welding import ONE_PLACE, coincident_faces, joined_rims, same_positions
 from ..search.winding_tree import WindingTree
 from ..surfaces.triangle_mesh import TriangleMesh
 from .overlaps import APART
@@ -128,7 +128,7 @@ class Chain(Frozen):
         """Make the chain of a mesh."""
         tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
         same = same_positions(mesh.vertices)
-        ids = joined_rims(mesh.vertices, same[tails], same[heads], ROUNDING)[same[mesh.faces]]
+        ids = joined_rims(mesh.vertices, same[tails], same[heads], ONE_PLACE)[same[mesh.faces]]
         first, backwards = coincident_faces(ids.ravel(), np.arange(0, 3 * len(ids) + 1, 3))
         distinct = np.flatnonzero(first == np.arange(len(ids)))
         numbers = np.full(len(ids) + 1, -1)

@@ -31,7 +31,7 @@ from ..mesh.components import element_components, sums_of
 from ..mesh.dual_cells import Crossings, DualCells, crossed_cells, dual_cells, open_cells, separate_triangles
 from ..mesh.edges import edge_table
 from ..mesh.self_intersections import self_intersections
-from ..mesh.triangles import MOST, area_vectors, divided_at
+from ..mesh.triangles import MOST_CREASED_FACES, area_vectors, divided_at
 from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
 from .gauss import Pieces, sampled
@@ -232,7 +232,7 @@ def divided_along_creases(
 ) -> tuple[Floats, Ints]:
     """Divide bent edges off the level at creases without a vertex, unless triangles would intersect."""
     new = np.ones(len(faces), dtype=bool)
-    for _ in range(DIVISIONS if len(faces) <= MOST else 0):
+    for _ in range(DIVISIONS if len(faces) <= MOST_CREASED_FACES else 0):
         edges, points = _creases_off(offset, spacing, vertices, faces, new)
         if not len(edges):
             break

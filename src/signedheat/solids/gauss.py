@@ -25,7 +25,7 @@ from scipy import sparse
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..compiled import compiled
 from ..linear.conjugate_gradients import conjugate_gradients
-from ..mesh.box_tree import LEAF, BoxTree, morton_codes
+from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, morton_codes
 from ..mesh.components import numbered, sums_of
 from ..mesh.triangles import area_vectors, face_areas, halved
 from ..mesh.unit_vectors import unit
@@ -320,10 +320,10 @@ class Dipoles:
 
     def _sums(self, values: Floats) -> Floats:
         """(2 · leaves, d) sums of (n, d) values below each node."""
-        leaves = len(self.tree.items) // LEAF
+        leaves = len(self.tree.items) // BOXES_PER_LEAF
         sums = np.zeros((2 * leaves, values.shape[1]))
         filled = self.tree.items >= 0
-        np.add.at(sums, leaves + np.flatnonzero(filled) // LEAF, values[self.tree.items[filled]])
+        np.add.at(sums, leaves + np.flatnonzero(filled) // BOXES_PER_LEAF, values[self.tree.items[filled]])
         level = leaves
         while level > 1:
             sums[level // 2 : level] = sums[level : 2 * level].reshape(-1, 2, values.shape[1]).sum(axis=1)
@@ -382,7 +382,7 @@ def _potentials(
                 stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
                 depth += 2
             else:
-                for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
+                for k in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
                     e = items[k]
                     if e >= 0 and e != p:
                         dx, dy, dz = places[e, 0] - x, places[e, 1] - y, places[e, 2] - z
@@ -420,7 +420,7 @@ def _fields(
                 stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
                 depth += 2
             else:
-                for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
+                for k in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
                     e = items[k]
                     if e >= 0 and e != p:
                         dx, dy, dz = x - places[e, 0], y - places[e, 1], z - places[e, 2]

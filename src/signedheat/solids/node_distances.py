@@ -15,7 +15,7 @@ from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..grids.blocks import SIDE
 from ..grids.grid import Grid
-from ..mesh.box_tree import LEAF, morton_codes
+from ..mesh.box_tree import BOXES_PER_LEAF, morton_codes
 from ..search.face_tree import FaceTree
 from ..search.nearest_triangles import away_from_triangle, foot_on_triangle
 from .winding import Windings
@@ -106,7 +106,7 @@ def _fill(
 ) -> Bools:
     """Write nearest faces of nodes, and squared distances; return blocks too crowded. `eighths` is `EIGHTHS`."""
     leaves, parts = len(bounds) // 2, eighths.shape[1]
-    most = LEAF * min(CROWDED, leaves) + 1
+    most = BOXES_PER_LEAF * min(CROWDED, leaves) + 1
     faces, counts = np.empty((3, parts, most), dtype=np.int32), np.empty((3, parts), dtype=np.int64)
     places, best, which = np.empty((3, parts)), np.empty(parts), np.empty(parts, dtype=np.int64)
     away, box, near = np.empty((most, 4, parts)), np.empty(9), np.empty(CROWDED, dtype=np.int64)
@@ -123,7 +123,7 @@ def _fill(
             continue
         faces[0, 0, 0], counts[0, 0] = start[b], 1
         for c in range(n_near):
-            for item in range((near[c] - leaves) * LEAF, (near[c] - leaves + 1) * LEAF):
+            for item in range((near[c] - leaves) * BOXES_PER_LEAF, (near[c] - leaves + 1) * BOXES_PER_LEAF):
                 if items[item] >= 0:
                     faces[0, 0, counts[0, 0]] = items[item]
                     counts[0, 0] += 1

@@ -16,7 +16,7 @@ from ..errors import SignedHeatError, SourceError
 from ..foreign import as_list
 from ..grids.grid import Grid
 from ..kinds import Shapes
-from ..mesh.box_tree import LEAF
+from ..mesh.box_tree import BOXES_PER_LEAF
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import indexed
 from ..parallel import in_chunks
@@ -164,7 +164,7 @@ def _steepest(
                 stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
                 depth += 2
                 continue
-            for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
+            for k in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
                 f = items[k]
                 if f < 0 or (normals[f, 0] == 0.0 and normals[f, 1] == 0.0 and normals[f, 2] == 0.0):
                     continue

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..mesh.arrangement import TOUCHING, Arrangement
+from ..mesh.arrangement import SAME_POINT, Arrangement
 from ..mesh.components import next_in_groups, sums_of
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.triangles import area_vectors, face_areas, heights
@@ -22,7 +22,7 @@ from ..mesh.unit_vectors import angles_around, unit
 from ..mesh.welding import coincident_faces
 from .winding import DEPTH, INSIDE, Windings
 
-TOLERANCES: tuple[float, ...] = (TOUCHING, 10 * TOUCHING, 100 * TOUCHING, 1000 * TOUCHING)
+TOLERANCES: tuple[float, ...] = (SAME_POINT, 10 * SAME_POINT, 100 * SAME_POINT, 1000 * SAME_POINT)
 """Distances below which points are one, relative to the size of a shape: the first with which what bounds is closed. Of
 boxes that touch, with corners moved by 1e-11 to 1e-5 of their size, none is wrong; without the last up to a seventh,
 with the first alone nine tenths (`benchmarks/deciding_numbers.py`)."""

@@ -21,7 +21,7 @@ from ..compiled import compiled
 from ..errors import SourceError
 from ..kinds import ShapeLike
 from ..memory import refuse_beyond_memory
-from ..mesh.box_tree import LEAF, BoxTree
+from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..mesh.components import connected_components, sums_of
 from ..mesh.edges import edge_table
 from ..mesh.triangles import area_vectors, corner_normals, face_areas, halved
@@ -388,7 +388,7 @@ def _descend(
                     stack[depth + 1] = stack[depth] ^ 1
                     depth += 2
                     continue
-                for item in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
+                for item in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
                     f = items[item]
                     if f < 0 or not facing[f, 0] * nx + facing[f, 1] * ny + facing[f, 2] * nz < OPPOSITE:
                         continue

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Frozen, Ints
 from ..compiled import compiled
 from ..mesh.gluing import (
-    FLIP,
+    FLIP_STEP,
     SPLIT_EDGE,
     SPLIT_FACE,
-    TURN,
+    TURN_STEP,
     Gluing,
     apex,
     diamond,
@@ -180,8 +180,8 @@ def misplaced_lines(triangles: IntrinsicMesh, lines: Lines, lengths: Floats) -> 
 BEFORE = np.full((4, 3, 3), -1)
 """By kind of step, face and corner: which of the four points is that corner before the step; `AFTER`, after it."""
 AFTER = np.full((4, 3, 3), -1)
-BEFORE[TURN, 0], AFTER[TURN, 0] = [0, 1, 2], [0, 2, 1]
-BEFORE[FLIP, :2], AFTER[FLIP, :2] = [[0, 1, 2], [1, 0, 3]], [[3, 2, 0], [2, 3, 1]]
+BEFORE[TURN_STEP, 0], AFTER[TURN_STEP, 0] = [0, 1, 2], [0, 2, 1]
+BEFORE[FLIP_STEP, :2], AFTER[FLIP_STEP, :2] = [[0, 1, 2], [1, 0, 3]], [[3, 2, 0], [2, 3, 1]]
 BEFORE[SPLIT_EDGE, 0], AFTER[SPLIT_EDGE, :2] = [0, 1, 2], [[0, 3, 2], [3, 1, 2]]
 BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
 

@@ -15,10 +15,10 @@ import numpy as np
 from ..arrays import Bools, Complexes, Floats, Ints
 from ..compiled import compiled
 from ..mesh.gluing import (
-    EDGES,
-    FACES,
-    STEPS,
-    VERTICES,
+    N_EDGES,
+    N_FACES,
+    N_STEPS,
+    N_VERTICES,
     Gluing,
     apex,
     cross,
@@ -59,7 +59,7 @@ def refine_all(
         goal = goal._replace(radius=coarsest * mean_radius)
         report = None if progress is None else lambda _: progress(1.0)  # it may cancel
         gluing, agenda, status = refined(gluing, agenda, goal, report)
-    n_edges = int(gluing.counts[EDGES])
+    n_edges = int(gluing.counts[N_EDGES])
     origin = np.full(n_edges, -1)
     fixed = np.flatnonzero(gluing.fixed[:n_edges])
     origin[fixed] = segments[agenda.segment[fixed]]
@@ -88,7 +88,7 @@ def refined(
 
 def close_faces(gluing: Gluing, agenda: Agenda) -> Bools:
     """(m,) faces whose shortest side joins vertices that nearly coincide."""
-    n_faces = int(gluing.counts[FACES])
+    n_faces = int(gluing.counts[N_FACES])
     faces = np.arange(n_faces)
     lengths = gluing.length[gluing.edge[: 3 * n_faces]].reshape(-1, 3)
     group = agenda.group[gluing.tail[: 3 * n_faces]].reshape(-1, 3)
@@ -123,7 +123,7 @@ def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
         narrow=narrow_vertices(gluing),
         group=group,
         extent=extent,
-        seen=np.array([gluing.counts[STEPS], N_BINS]),
+        seen=np.array([gluing.counts[N_STEPS], N_BINS]),
         seen_sides=np.empty((4096, 2), dtype=np.complex128),
         halfedges=np.empty((4096, 2), dtype=np.int64),
     )
@@ -170,21 +170,21 @@ class Goal(NamedTuple):
 @compiled
 def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
     """Insert vertices until every face meets the goal, where possible; pause after `patience` of them."""
-    pause = g.counts[VERTICES] + patience
+    pause = g.counts[N_VERTICES] + patience
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     while flip_until_delaunay(g, agenda.stack, agenda.stacked):
-        for n in range(agenda.seen[0], g.counts[STEPS]):
+        for n in range(agenda.seen[0], g.counts[N_STEPS]):
             faces_around(g.steps, n, around, start)
             for k in range(3):
                 if around[k] >= 0:
                     list_face(g, agenda, around[k], goal)
-        agenda.seen[0] = g.counts[STEPS]
+        agenda.seen[0] = g.counts[N_STEPS]
         f = next_bad(g, agenda, goal)
         if f < 0:
             return DONE
-        if g.counts[VERTICES] >= goal.max_vertices:
+        if g.counts[N_VERTICES] >= goal.max_vertices:
             return FULL
-        if g.counts[VERTICES] >= pause:
+        if g.counts[N_VERTICES] >= pause:
             list_face(g, agenda, f, goal)
             return PAUSED
         if not improve(g, agenda, f, goal):
@@ -221,7 +221,7 @@ def list_face(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> None:
 @compiled
 def list_all(g: Gluing, agenda: Agenda, goal: Goal) -> None:
     """Put every bad face on the lists."""
-    for f in range(g.counts[FACES]):
+    for f in range(g.counts[N_FACES]):
         list_face(g, agenda, f, goal)
 
 
@@ -330,8 +330,8 @@ def sector(g: Gluing, corner: int) -> float:
 @compiled
 def narrow_vertices(g: Gluing) -> Bools:
     """(n,) vertices at which two segments meet at less than 60°, or with a total angle of less than 60°."""
-    narrow = np.zeros(g.counts[VERTICES], dtype=np.bool_)
-    for corner in range(3 * g.counts[FACES]):
+    narrow = np.zeros(g.counts[N_VERTICES], dtype=np.bool_)
+    for corner in range(3 * g.counts[N_FACES]):
         if not narrow[g.tail[corner]]:
             narrow[g.tail[corner]] = sector(g, corner) < NARROW
     return narrow
@@ -340,15 +340,15 @@ def narrow_vertices(g: Gluing) -> Bools:
 @compiled
 def has_room(g: Gluing, agenda: Agenda, ring: int) -> bool:
     """Whether splitting an edge with so many faces fits into the arrays (splitting a face needs less)."""
-    fits: bool = 3 * (g.counts[FACES] + ring + 2) <= len(g.tail) and g.counts[EDGES] + ring + 4 <= len(g.length)
-    return fits and g.counts[VERTICES] + 1 <= len(agenda.on_segment) and g.counts[STEPS] + ring + 2 <= len(g.steps)
+    fits: bool = 3 * (g.counts[N_FACES] + ring + 2) <= len(g.tail) and g.counts[N_EDGES] + ring + 4 <= len(g.length)
+    return fits and g.counts[N_VERTICES] + 1 <= len(agenda.on_segment) and g.counts[N_STEPS] + ring + 2 <= len(g.steps)
 
 
 @compiled
 def look_around(g: Gluing, agenda: Agenda, step: int) -> None:
     """Push onto the stack the edges of all faces that steps of the history, from number `step` on, have changed."""
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
-    for n in range(step, g.counts[STEPS]):
+    for n in range(step, g.counts[N_STEPS]):
         faces_around(g.steps, n, around, start)
         for f in around:
             if f >= 0:
@@ -359,7 +359,7 @@ def look_around(g: Gluing, agenda: Agenda, step: int) -> None:
 @compiled
 def insert(g: Gluing, agenda: Agenda, f: int, p: complex) -> None:
     """Insert a vertex at p (in the frame of face f), or on the edge of the face that p nearly lies on."""
-    step = g.counts[STEPS]
+    step = g.counts[N_STEPS]
     corners = corners_of(g, f)
     area = corners[1].real * corners[2].imag
     nearest = np.abs(corners - p).min()
@@ -380,7 +380,7 @@ def insert(g: Gluing, agenda: Agenda, f: int, p: complex) -> None:
     else:
         weights /= weights.sum()
         split_face(g, f, weights[0], weights[1], weights[2])
-    new = g.counts[VERTICES] - 1
+    new = g.counts[N_VERTICES] - 1
     agenda.on_segment[new] = agenda.group[new] = -1
     agenda.narrow[new] = False
     look_around(g, agenda, step)
@@ -433,7 +433,7 @@ def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool
     angle, a power of two from there (Ruppert 1995). A face with two sides on the segment is split instead.
     """
     e = g.edge[h]
-    segment, length, step = agenda.segment[e], g.length[e], g.counts[STEPS]
+    segment, length, step = agenda.segment[e], g.length[e], g.counts[N_STEPS]
     if length < 1e-9 * agenda.segment_length[segment]:
         return True
     ring = sibling_count(g, h)
@@ -458,7 +458,7 @@ def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool
                 agenda.group[nearby], agenda.extent[nearby] = nearby, 0.0
             agenda.group[new] = agenda.group[nearby]
             agenda.extent[agenda.group[new]] += 1.01 * height
-        for k in range(g.counts[EDGES] - 1 - ring, g.counts[EDGES]):
+        for k in range(g.counts[N_EDGES] - 1 - ring, g.counts[N_EDGES]):
             agenda.segment[k] = segment
     agenda.narrow[new] = False
     look_around(g, agenda, step)

@@ -15,10 +15,10 @@ from ..mesh.components import by_first_use, grouped, members_of
 from ..mesh.conforming_refinement import cut_along
 from ..mesh.curve_segments import CurveSegments
 from ..mesh.edges import EdgeTable
-from ..mesh.intrinsic_mesh import FLATTEST, IntrinsicMesh
+from ..mesh.intrinsic_mesh import LEAST_AREA, IntrinsicMesh
 from ..mesh.polylines import assemble_polylines
 from ..mesh.surface_points import (
-    SNAP,
+    ZERO_COORDINATE,
     LocatedPoints,
     barycentric_in,
     concatenated,
@@ -99,7 +99,7 @@ def differences_of(triangles: IntrinsicMesh, faces: Ints, vectors: Complexes) ->
     q = triangles.corner_positions[faces]
     u, v = (q[:, 1] - q[:, 0])[:, None], (q[:, 2] - q[:, 0])[:, None]
     area = (np.conj(u) * v).imag
-    flat = np.flatnonzero(area[:, 0] <= FLATTEST * (np.abs(u) ** 2 + np.abs(v) ** 2)[:, 0])
+    flat = np.flatnonzero(area[:, 0] <= LEAST_AREA * (np.abs(u) ** 2 + np.abs(v) ** 2)[:, 0])
     area[flat] = 1.0
     second, third = (np.conj(vectors) * v).imag / area, (np.conj(u) * vectors).imag / area
     if len(flat):  # the shortest of the solutions that come nearest
@@ -198,12 +198,12 @@ def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[Ints, Flo
 
 def _snapped(faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
     """Move points within rounding error of an edge onto it, and turn vectors within rounding error along it."""
-    near = barycentric < SNAP
+    near = barycentric < ZERO_COORDINATE
     weights = np.where(near, 0.0, barycentric)
     weights /= weights.sum(axis=1, keepdims=True)
     size = np.abs(vectors[:, :1]).max(axis=2, keepdims=True) if vectors.shape[1] else 0.0
     flat = np.zeros(vectors.shape, dtype=bool)
-    flat[:, :1] = near[:, None] & (np.abs(vectors[:, :1]) < SNAP * size)
+    flat[:, :1] = near[:, None] & (np.abs(vectors[:, :1]) < ZERO_COORDINATE * size)
     return faces, weights, np.where(flat, 0.0, vectors)
 
 

@@ -24,7 +24,7 @@ from ..foreign import ForeignShape, converted
 from ..jobs import Progress, Stopwatch
 from ..memory import within_memory
 from ..mesh.curve_segments import CurveSegments, without_straight_nodes
-from ..mesh.gluing import STEPS, flip_all, glue, lay_out
+from ..mesh.gluing import N_STEPS, flip_all, glue, lay_out
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import refuse_missing
 from ..mesh.triangles import gradients_along
@@ -454,7 +454,7 @@ def intrinsic_delaunay(
             limit = 20 * refinement.triangles.n_vertices + 10_000 if max_vertices is None else int(max_vertices)
             gluing, origin, close, complete = refine_all(gluing, np.radians(angle), float(coarsest), limit, inner)
             marked = np.append(marked, False)[origin]
-    n = int(gluing.counts[STEPS])
+    n = int(gluing.counts[N_STEPS])
     triangles = lay_out(gluing)
     refuse_other_area(mesh, triangles)
     history = History(refinement.triangles, triangles, gluing.steps[:n].copy(), gluing.weights[:n].copy())

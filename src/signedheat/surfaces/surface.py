@@ -13,7 +13,14 @@ from ..errors import SourceError
 from ..geodesics.shortest_paths import join
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.polylines import assemble_polylines, leaving
-from ..mesh.surface_points import SNAP, barycentric_on_edges, corners_at, crossed_sides, locate_points, refuse_missing
+from ..mesh.surface_points import (
+    ZERO_COORDINATE,
+    barycentric_on_edges,
+    corners_at,
+    crossed_sides,
+    locate_points,
+    refuse_missing,
+)
 from ..mesh.triangles import Triangles, area_vectors
 from ..search.nearest_triangles import TriangleTree
 from ..validation import array_of, coordinates, finite_number, flag, numbers
@@ -89,7 +96,7 @@ def snapped(values: Floats, ends: Ints, level: float) -> Floats:
     steps[~np.isfinite(steps)] = 0.0
     steepest = np.zeros(len(values))
     np.maximum.at(steepest, ends, steps[:, None])
-    return np.where(np.abs(values - level) <= SNAP * steepest, level, values)
+    return np.where(np.abs(values - level) <= ZERO_COORDINATE * steepest, level, values)
 
 
 def gradient_directions(mesh: Triangles, values: Floats, faces: Ints) -> Floats:

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, Ints
 from ..exchange import Elements, Exchangeable
 from ..mesh.edges import EdgeTable, edge_table
-from ..mesh.intrinsic_mesh import MARGIN, IntrinsicMesh, laid_out
+from ..mesh.intrinsic_mesh import TRIANGLE_MARGIN, IntrinsicMesh, laid_out
 from ..mesh.triangles import area_vectors
-from ..mesh.welding import SEAM, joined_rims
+from ..mesh.welding import SEAM_UNITS, joined_rims
 from ..search.nearest_triangles import TriangleTree
 from ..validation import coordinates, element_ids, used_bounds
 from .surface import Surface
@@ -100,12 +100,12 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     @cached_property
     def intrinsic(self) -> IntrinsicMesh:
         """The triangles in the plane, joined at seams, with edges lengthened by rounding so that each has an area."""
-        return laid_out(self.joined, MARGIN)[0]
+        return laid_out(self.joined, TRIANGLE_MARGIN)[0]
 
     @cached_property
     def places(self) -> Ints:
         """(n,) the first vertex at the place of each boundary vertex, as along seams; all others are their own."""
-        return joined_rims(self.vertices, self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel(), SEAM)
+        return joined_rims(self.vertices, self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel(), SEAM_UNITS)
 
     @cached_property
     def joined(self) -> TriangleMesh:

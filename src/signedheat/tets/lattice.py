@@ -30,15 +30,15 @@ from ..surfaces.point_cloud import PointCloud
 from ..validation import finite_number, refuse_extreme
 from .tet_mesh import TetMesh
 
-FINEST = 1e9
+FINEST_LATTICE = 1e9
 """Largest resolution that is accepted; memory runs out before."""
 LEAST_GRADING = 2.7
 """Below this, neighbouring leaves could differ by more than a factor of two in size: g/2 must exceed √3·¾."""
 MOST_TETS = 50_000_000
 """Largest number of tets: distance on more would need over 70 GB."""
-CELLS = 2.7
+CELLS_OF_ALL_LEVELS = 2.7
 """Cells of all levels, relative to those of the finest level within one grading of the surface; measured 2.4 to 2.8."""
-BYTES_PER_TET = 350
+BYTES_PER_LATTICE_TET = 350
 """Measured peak memory of meshing; distance takes more."""
 
 
@@ -102,7 +102,7 @@ def tetrahedralize(
     volume_cells = float(counts.astype(np.float64).prod())
     surface_cells = 2 * grading * area / spacing**2 if depth else 0.0
     if surface_cells > volume_cells:
-        _refuse_too_many(12 * surface_cells, 12 * CELLS * surface_cells, size, 2)
+        _refuse_too_many(12 * surface_cells, 12 * CELLS_OF_ALL_LEVELS * surface_cells, size, 2)
     else:
         _refuse_too_many(12 * volume_cells, 12 * volume_cells, size, 3)
     origin = lower - (counts * coarse - sides) / 2
@@ -138,7 +138,7 @@ def _refuse_too_many(least: float, expected: float, resolution: float, power: in
         )
 
     count = math.ceil(min(least, 1e18))
-    refuse_beyond_memory(f"a lattice of {least:,.3g} tets", count, lambda number: BYTES_PER_TET * number, lower)
+    refuse_beyond_memory(f"a lattice of {least:,.3g} tets", count, lambda number: BYTES_PER_LATTICE_TET * number, lower)
     if least > MOST_TETS:
         raise MemoryLimitError(f"the lattice would have over {least:,.0f} tets", remedy=lower(MOST_TETS))
 
@@ -219,8 +219,8 @@ def _box_around(shape: Any, resolution: int, padding: float | None) -> tuple[Flo
             f"{shape!r} has no extent in space of three dimensions to put a mesh around", element="shape"
         )
     size = finite_number(resolution, "resolution", 1, GeometryError)
-    if size > FINEST:
-        raise GeometryError(f"resolution must be at most {FINEST:g}, not {size:g}", element="resolution")
+    if size > FINEST_LATTICE:
+        raise GeometryError(f"resolution must be at most {FINEST_LATTICE:g}, not {size:g}", element="resolution")
     padding = room_around((lower, upper)) if padding is None else finite_number(padding, "padding", 0, GeometryError)
     refuse_extreme(lower - padding, upper + padding, "padding")
     return lower - padding, upper - lower + 2 * padding, longest / size

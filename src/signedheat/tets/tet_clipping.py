@@ -17,11 +17,11 @@ from ..compiled import compiled
 from ..mesh.tet_shapes import TetShapes, inside_out
 from ..parallel import ROWS_PER_TASK, in_chunks
 
-FLAT = 1e-10
+SOURCELESS_TET = 1e-10
 """Tets whose volume, relative to the cube of the longest edge, is below this contain no part of a source."""
-TOUCHING = 1e-9
+IN_FACE_PLANE = 1e-9
 """Distance, relative to the size of a face, within which a point counts as lying in its plane."""
-GRAZING = 1e-6
+SIGHT_OUTSIDE = 1e-6
 """Length, relative to the size of the tets, by which a line of sight may lie outside the mesh."""
 
 
@@ -62,13 +62,13 @@ class Planes(NamedTuple):
         signs = np.sign(np.einsum("mki,mki->mk", normals[faces.tet_faces], mesh.area_vectors))
         turned = inside_out(mesh)
         signs[turned] *= -1  # so that lines pass
-        solid = (mesh.thickness > FLAT) & ~turned
+        solid = (mesh.thickness > SOURCELESS_TET) & ~turned
         counts = np.bincount(faces.tet_faces[solid].ravel(), minlength=len(normals))
         return cls(
             tet_faces=np.ascontiguousarray(faces.tet_faces),
             normals=normals,
             offsets=np.einsum("fi,fi->f", normals, (a + b + c) / 3),
-            tolerances=TOUCHING * np.sqrt(twice_area) + 1e-15 * np.abs(points).max(),
+            tolerances=IN_FACE_PLANE * np.sqrt(twice_area) + 1e-15 * np.abs(points).max(),
             signs=signs,
             shares=1 / np.maximum(counts, 1),
             solid=solid,

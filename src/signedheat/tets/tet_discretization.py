@@ -19,7 +19,7 @@ from ..linear.incomplete_cholesky import IncompleteCholesky, from_first, outward
 from ..linear.restarts import Stage, matrix_forces, solve_with_restarts
 from ..memory import refuse_beyond_memory
 from ..mesh.unit_vectors import unit
-from .tet_clipping import GRAZING, Planes, visible
+from .tet_clipping import SIGHT_OUTSIDE, Planes, visible
 from .tet_mesh import TetMesh
 from .tet_source import TetSource, tet_source
 
@@ -29,16 +29,16 @@ DIRECT_VERTICES = 40_000
 """Number of vertices up to which step 3 is factorised."""
 DIRECTION_ERROR = 1e-3
 """Componentwise residual at which conjugate gradients stop: directions are then right to about 0.01°."""
-SPRINGS = 30.0
+TET_SPRINGS = 30.0
 """Strength of the springs that impose levels, times the mean edge length."""
-BYTES_PER_TET, BYTES_PER_FACTORED = 1750, 2900
+BYTES_PER_ITERATED, BYTES_PER_FACTORED = 1750, 2900
 """Measured peak memory for each tet, by conjugate gradients and by factorisation."""
 
 
 def memory_estimate(n_tets: int) -> float:
     """Estimate the peak memory, in bytes, of a first distance on a mesh of this many tets."""
     factored = min(n_tets, DIRECT_FACES // 2)  # a tet has about two faces of its own
-    return max(BYTES_PER_TET * n_tets, BYTES_PER_FACTORED * factored)
+    return max(BYTES_PER_ITERATED * n_tets, BYTES_PER_FACTORED * factored)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ class TetDiscretization(DiffusesEach):
     def integration(self) -> TetIntegration:
         """Step 3."""
         matrix = upper_triangle(self.mesh.geometry.vertex_laplacian(self.unknowns, self.n_unknowns))
-        strength = SPRINGS / (3 * self.spacing)
+        strength = TET_SPRINGS / (3 * self.spacing)
         if self.n_unknowns <= DIRECT_VERTICES:
             return TetIntegration(matrix, strength=strength, gradients=self._gradients)
         return TetIntegration(matrix, factorize=from_first, spring=1e4, strength=strength, gradients=self._gradients)
@@ -135,7 +135,7 @@ class TetDiscretization(DiffusesEach):
         planes, centers = self.planes, self.mesh.tet_barycenters
         nearest = source.centers[scipy.spatial.cKDTree(source.centers).query(centers)[1]]
         begins, ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
-        return visible(planes, self.mesh.faces.neighbors, begins, ends, GRAZING * self.spacing)
+        return visible(planes, self.mesh.faces.neighbors, begins, ends, SIGHT_OUTSIDE * self.spacing)
 
     @cached_property
     def _laplacian(self) -> sparse.csr_matrix:

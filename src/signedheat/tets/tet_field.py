@@ -28,22 +28,22 @@ CLEARANCE = 1e-3
 """Least distance of crossings from the ends of edges, relative to these, so that no two vertices coincide."""
 
 # By the bits of a mask of the corners below the level: an even permutation that puts these first, and their number.
-_ORDERS = np.zeros((16, 4), dtype=np.int64)
-_COUNTS = np.array([bin(mask).count("1") for mask in range(16)])
-_PAIRS = {(0, 1): (2, 3), (0, 2): (3, 1), (0, 3): (1, 2), (1, 2): (0, 3), (1, 3): (2, 0), (2, 3): (0, 1)}
+BELOW_FIRST = np.zeros((16, 4), dtype=np.int64)
+N_BELOW = np.array([bin(mask).count("1") for mask in range(16)])
+EVEN_PAIRS = {(0, 1): (2, 3), (0, 2): (3, 1), (0, 3): (1, 2), (1, 2): (0, 3), (1, 3): (2, 0), (2, 3): (0, 1)}
 for _k, _order in enumerate([(0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)]):
-    _ORDERS[1 << _k] = _ORDERS[15 - (1 << _k)] = _order
-for (_i, _j), _rest in _PAIRS.items():
-    _ORDERS[(1 << _i) | (1 << _j)] = (_i, _j, *_rest)
+    BELOW_FIRST[1 << _k] = BELOW_FIRST[15 - (1 << _k)] = _order
+for (_i, _j), _rest in EVEN_PAIRS.items():
+    BELOW_FIRST[(1 << _i) | (1 << _j)] = (_i, _j, *_rest)
 
 # By the number of corners below the level: triangles between crossings, each crossing given by two corners of its edge.
-_CUTS = {
+TET_CUTS = {
     1: [[(0, 1), (0, 2), (0, 3)]],
     2: [[(0, 2), (0, 3), (1, 3)], [(0, 2), (1, 3), (1, 2)]],
     3: [[(0, 1), (0, 3), (0, 2)]],
 }
 # The part of a boundary face below the level, likewise; (k, k) is corner k itself.
-_LIDS = {
+FACE_LIDS = {
     1: [[(0, 0), (0, 1), (0, 2)]],
     2: [[(0, 0), (1, 1), (1, 2)], [(0, 0), (1, 2), (2, 0)]],
     3: [[(0, 0), (1, 1), (2, 2)]],
@@ -67,18 +67,18 @@ def closed_level_set(mesh: TetShapes, values: Floats, gradients: Floats, level: 
             remedy="choose another level or a larger mesh",
             element=f"level {level:g}",
         )
-    keys, _ = _triangles(tets, used, len(mesh.vertices), _CUTS)
+    keys, _ = _triangles(tets, used, len(mesh.vertices), TET_CUTS)
     faces = face_table(tets)
     walls = faces.vertices[faces.tet_counts == 1]
     if below[walls].any() and not below[walls].all():
-        keys = np.concatenate([keys, _triangles(walls, below[walls], len(mesh.vertices), _LIDS)[0]])
+        keys = np.concatenate([keys, _triangles(walls, below[walls], len(mesh.vertices), FACE_LIDS)[0]])
     return manifold(*_crossings(mesh.vertices, values, gradients, level, keys, CLEARANCE))
 
 
 def level_triangles(vertices: Floats, tets: Ints, values: Floats, level: float) -> tuple[Floats, Ints, Ints]:
     """Return the level set of the linear interpolant, open at the boundary: positions, triangles, tet of each."""
     finite = np.flatnonzero(~np.isnan(values[tets]).any(axis=1))
-    keys, owners = _triangles(tets[finite], (values < level)[tets[finite]], len(vertices), _CUTS)
+    keys, owners = _triangles(tets[finite], (values < level)[tets[finite]], len(vertices), TET_CUTS)
     return *_crossings(vertices, values, np.zeros_like(vertices), level, keys, 0.0), finite[owners]
 
 
@@ -106,10 +106,10 @@ def _triangles(
     corners = elements.shape[1]
     masks = below @ (1 << np.arange(corners))
     if corners == 4:
-        orders, counts = _ORDERS, _COUNTS
+        orders, counts = BELOW_FIRST, N_BELOW
     else:
         orders = np.array([[0, 1, 2], [0, 1, 2], [1, 2, 0], [0, 1, 2], [2, 0, 1], [2, 0, 1], [1, 2, 0], [0, 1, 2]])
-        counts = _COUNTS[:8]
+        counts = N_BELOW[:8]
     keys, owners = [], []
     for count, triangles in table.items():
         chosen = np.flatnonzero(counts[masks] == count)

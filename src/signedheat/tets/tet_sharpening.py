@@ -30,13 +30,13 @@ from ..search.nearest_triangles import TriangleTree, foot_on_triangle
 from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_field, sharpened
 from ..surfaces.point_cloud import PointCloud
 from ..transforms import joined_triangles
-from .tet_clipping import GRAZING, Planes, barycentric, beyond, stays_inside
+from .tet_clipping import SIGHT_OUTSIDE, Planes, barycentric, beyond, stays_inside
 from .tet_discretization import TetDiscretization, lowered_tets
 from .tet_field import TetField, level_triangles
 
-NEAR = 2.0
+SIDE_EDGES = 2.0
 """Distance from a face, in mean edges, within which the face's side decides the sign."""
-FAR = 1.5
+FAR_EDGES = 1.5
 """Distance from all faces, in mean edges, beyond which the zero set completes the shape."""
 
 
@@ -59,9 +59,9 @@ def _(
     tolerance: float,
     report: Callable[[], None] | None,
 ) -> Nearest:
-    """Measure any-angle distance to the given faces, and to the zero set farther than `FAR` from all of them.
+    """Measure any-angle distance to the given faces, and to the zero set farther than `FAR_EDGES` from all of them.
 
-    Within `NEAR` of a face its side decides the sign, where the shape is closed and consistent around the nearest
+    Within `SIDE_EDGES` of a face its side decides the sign, where the shape is closed and consistent around the nearest
     place.
     """
     points = lowered.mesh.vertices[lowered.vertices] - lowered.planes.center
@@ -71,7 +71,7 @@ def _(
     features = None if given is None else _faces_of(given, lowered.planes.center)
     if features is not None:
         face_tree, n_faces = FaceTree.of(features), len(features.rows)
-        missing = face_tree.distances(positions[corners].mean(axis=1)) > FAR * lowered.spacing
+        missing = face_tree.distances(positions[corners].mean(axis=1)) > FAR_EDGES * lowered.spacing
         corners = np.concatenate([features.faces, corners[missing] + len(features.vertices)])
         owners = np.concatenate([np.full(n_faces, -1), owners[missing]])
         positions = np.concatenate([features.vertices, positions])
@@ -85,7 +85,7 @@ def _(
     distances, triangles, hidden = run_cancellable(measured, report)
     if features is not None:
         near = face_tree.search(points)
-        decided = near.regular & (near.distances < NEAR * lowered.spacing)
+        decided = near.regular & (near.distances < SIDE_EDGES * lowered.spacing)
         decided &= (triangles < n_faces) & (distances <= near.distances * (1 + 1e-9))
         sides[decided] = np.where(near.cosines < 0, -1, 1)[decided]
     return Nearest(distances, sides, (RoundCorners(hidden), *notes))
@@ -135,7 +135,7 @@ def _distance_around(
     triangles[np.isnan(values)] = -1
     vertices = Vertices(points, unknowns, mesh.faces.neighbors, *_rows_with(unknowns, len(values)))
     surface = SourceSurface(tree.rows, corners, *_rows_with(corners, len(positions)), owners)
-    slack = GRAZING * lowered.spacing
+    slack = SIGHT_OUTSIDE * lowered.spacing
     distances, places, hidden = _any_angle(planes, vertices, surface, triangles, slack, Queue.empty(len(points)))
     curved = np.flatnonzero(np.isfinite(distances) & (owners[triangles] >= 0))
     tets, places = owners[triangles[curved]], places[curved]
