@@ -22,7 +22,7 @@ import signedheat as sh
 from signedheat.samples import torus
 from signedheat.surfaces import intrinsic_discretization as intrinsic
 
-LIMITS = (intrinsic.COARSEST, 1.25, 2.0, np.inf)
+LIMITS = (intrinsic.COARSEST_TRIANGLE, 1.25, 2.0, np.inf)
 
 
 def tables() -> None:
@@ -33,18 +33,18 @@ def tables() -> None:
 
 def table(listed_meshes: Iterator[tuple[str, sh.TriangleMesh]]) -> None:
     rows: dict[str, list[tuple[float, ...]]] = {}
-    default = intrinsic.COARSEST
+    default = intrinsic.COARSEST_TRIANGLE
     for name, mesh in listed_meshes:
         if not intrinsic.is_spoiled(mesh):
             continue
         cases = [case(mesh, seed) for seed in (10, 11)]
         plain = measured(mesh, cases, False)
         for limit in LIMITS:
-            intrinsic.COARSEST = limit
+            intrinsic.COARSEST_TRIANGLE = limit
             found = measured(mesh, cases, "auto")
             ratios = [a / b for a, b in zip(found[:3], plain[:3], strict=True)]
             rows.setdefault(f"largest {limit:g}", []).extend((*ratios, error) for error in found[3:])
-        intrinsic.COARSEST = default
+        intrinsic.COARSEST_TRIANGLE = default
         rows.setdefault("as they are", []).extend((1.0, 1.0, 1.0, error) for error in plain[3:])
         shown = rows[f"largest {default:g}"][-1]
         print(

@@ -26,7 +26,10 @@ from signedheat.mesh.triangles import area_vectors
 from signedheat.solids import bounding, chain, completion, gauss, overlaps, regions
 
 MODULES = (bounding, gauss, overlaps)
-NUMBERS = ("SHEET", "COHERENT", "CHANCE", "ALONG", "REACH", "HINT", "APART", "HELD", "AGREEMENT", "MANY", "SLENDER")
+NUMBERS = (
+    "SHEET", "COHERENT_LEVELS", "CHANCE_LEVEL", "PARTLY_INSIDE", "GAP_REACH", "HINT", "OUTSIDE", "WEIGHT_DAMPING",
+    "PLANE_AGREEMENT", "LOOSE_DIPOLES", "SLENDER_TRIANGLE",
+)  # fmt: skip
 CHANGED = 0.01
 """Share of the area by which a scene must change to be printed."""
 
@@ -316,12 +319,12 @@ def main(seeds: int = 2) -> None:
             moved = [f"{scene} {other[scene]:.3f}" for scene in usual if abs(other[scene] - usual[scene]) > CHANGED]
             print(f"{number} {value:g} → {changed:g}: {'; '.join(moved) or 'nothing'}", flush=True)
 
-    value, errors = completion.TORN, {}
+    value, errors = completion.TORN_LEVEL, {}
     for changed in (value / 2, value, 2 * value):
-        completion.TORN = changed
+        completion.TORN_LEVEL = changed
         errors[changed] = enclosed(seeds)
-    completion.TORN = value
-    print("error of the volume with completion.TORN " + ", ".join(f"{changed:g}" for changed in errors))
+    completion.TORN_LEVEL = value
+    print("error of the volume with completion.TORN_LEVEL " + ", ".join(f"{changed:g}" for changed in errors))
     for name in errors[value]:
         print(f"{name:36s} " + " ".join(f"{row[name]:6.4f}" for row in errors.values()))
 

@@ -26,10 +26,10 @@ from signedheat.grids.grid_discretization import memory_estimate as grid_estimat
 from signedheat.memory import libraries
 from signedheat.solids.completion import bytes_to_complete, complete
 from signedheat.solids.sampling import BYTES_PER_SAMPLE
-from signedheat.solids.tiles import BYTES_AT_WORK, BYTES_IN_BAND, BYTES_PER_NODE, blocks_near
+from signedheat.solids.tiles import BYTES_AT_WORK, BYTES_IN_BAND, BYTES_PER_DENSE_NODE, blocks_near
 from signedheat.surfaces.digital_surface import count_surfels
-from signedheat.surfaces.intrinsic_discretization import BYTES_REFINED
-from signedheat.surfaces.surface_discretization import BYTES_PER_POINT, BYTES_PER_VOXEL, LIGHTER, NEIGHBORS
+from signedheat.surfaces.intrinsic_discretization import BYTES_PER_REFINED
+from signedheat.surfaces.surface_discretization import BYTES_OF_NEIGHBORS, BYTES_PER_POINT, BYTES_PER_VOXEL, LIGHTER
 from signedheat.surfaces.surface_discretization import memory_estimate as surface_estimate
 from signedheat.tets.tet_discretization import memory_estimate as tet_estimate
 
@@ -78,7 +78,7 @@ def case(kind: str, size: int) -> tuple[Callable[[], object], float]:
         return lambda: sh.SignedHeatSolver(polygons).distance(at), surface_estimate(round(LIGHTER * 4 * len(quads)))
     if kind == "points":
         cloud = sh.PointCloud(spiral(size))
-        beside = NEIGHBORS + BYTES_PER_POINT * size
+        beside = BYTES_OF_NEIGHBORS + BYTES_PER_POINT * size
         both = [0, size // 2]  # `points_at` makes the triangles
         return lambda: sh.SignedHeatSolver(cloud).distance(cloud.points_at(both)), surface_estimate(2 * size) + beside
     if kind == "voxels":
@@ -105,7 +105,7 @@ def refined(size: int) -> tuple[Callable[[], object], float]:
         [sys.executable, "-c", code, str(size)], cwd=Path(__file__).parent, capture_output=True, text=True, check=True
     )
     n = int(found.stdout)
-    return lambda: sh.SignedHeatSolver(mesh, intrinsic=True).distance(ring), surface_estimate(n) + BYTES_REFINED * n
+    return lambda: sh.SignedHeatSolver(mesh, intrinsic=True).distance(ring), surface_estimate(n) + BYTES_PER_REFINED * n
 
 
 def count_refined(size: int) -> int:
@@ -135,7 +135,9 @@ def solid(shape: Callable[[], SurfaceShape], closed: bool, size: int) -> tuple[C
     made = shape()
     grid = sh.Grid.around(made.bounds, size)
     count = made.n_points if isinstance(made, sh.PointCloud) else made.triangulation.n_faces
-    estimate = max(grid_estimate(grid, BYTES_PER_NODE, BYTES_AT_WORK) - libraries(), bytes_to_complete(made, count))
+    estimate = max(
+        grid_estimate(grid, BYTES_PER_DENSE_NODE, BYTES_AT_WORK) - libraries(), bytes_to_complete(made, count)
+    )
     return lambda: sh.signed_distance(made, grid), estimate
 
 

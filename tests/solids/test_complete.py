@@ -13,8 +13,8 @@ from shapes.bodies import finer
 from signedheat import samples
 from signedheat.diagnostics import BoundsNothing, LeftOut
 from signedheat.solids.completion import seam_triangles
-from signedheat.solids.overlaps import FEW, levels_within
-from signedheat.solids.winding import open_edges_of
+from signedheat.solids.overlaps import levels_within
+from signedheat.solids.winding import SUMMED_POINTS, open_edges_of
 
 
 def grid_sheet(origin, one, other, n=8):
@@ -632,7 +632,10 @@ def test_levels_of_few_faces_are_those_of_many():
     triangles, groups = ball.vertices[ball.faces], 3 + 4 * (np.arange(ball.n_faces) >= ball.n_faces // 2)
     ways, faces = np.where(groups == 3, 2, -1), np.arange(0, ball.n_faces, 5)
     counts = np.where(np.arange(ball.n_faces) % 40 == 7, 0, ways)
-    few = [levels_within(triangles, groups, counts, batch) for batch in np.array_split(faces, len(faces) // FEW + 1)]
+    few = [
+        levels_within(triangles, groups, counts, batch)
+        for batch in np.array_split(faces, len(faces) // SUMMED_POINTS + 1)
+    ]
     many = levels_within(triangles, groups, counts, faces)
     np.testing.assert_allclose(many, np.concatenate(few), rtol=0, atol=0.05)  # farther faces are summed together
     np.testing.assert_allclose(many, 0.5 * ways[faces], rtol=0, atol=0.15)

@@ -5,7 +5,7 @@ import pytest
 
 from signedheat import samples
 from signedheat.mesh.edges import edge_table
-from signedheat.solids.closing import MOST_SIDES, small_lids
+from signedheat.solids.closing import LOST_FACE_SIDES, small_lids
 
 
 def unordered(faces):
@@ -55,9 +55,9 @@ def test_holes_that_touch_at_a_vertex_are_two():
 @pytest.mark.parametrize("height", [0.1, 3.0])
 def test_a_small_hole_is_closed_where_the_surface_goes_on_across_it(height):
     """Around 90° the lid does not go on as the sides do: they may be the end of something longer."""
-    for n in (6, 8, MOST_SIDES + 1):
+    for n in (6, 8, LOST_FACE_SIDES + 1):
         vertices, faces = ring_with_lid_missing(n, height)
-        goes_on = height < 1 and n <= MOST_SIDES
+        goes_on = height < 1 and n <= LOST_FACE_SIDES
         assert len(small_lids(vertices, faces)) == (n - 2 if goes_on else 0)
 
 

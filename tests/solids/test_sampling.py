@@ -7,7 +7,7 @@ import signedheat as sh
 from refusals import refused
 from shapes import bodies
 from signedheat import samples
-from signedheat.solids.sample_set import WIDTHS
+from signedheat.solids.sample_set import NOISE_WIDTHS
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +145,7 @@ def test_what_cannot_be_sampled_says_so(tmp_path, box):
     assert not sh.sample(box, 10, near=0, widths=[]).near.any()
     with pytest.raises(sh.errors.FileFormatError):
         sh.sample(box, 10).save(tmp_path / "samples.txt")
-    assert WIDTHS[0] ** 2 == pytest.approx(10 * WIDTHS[1] ** 2, rel=0.01)
+    assert NOISE_WIDTHS[0] ** 2 == pytest.approx(10 * NOISE_WIDTHS[1] ** 2, rel=0.01)
 
 
 def test_numbers_of_samples_that_make_no_sense_or_do_not_fit_are_refused(box):

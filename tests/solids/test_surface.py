@@ -300,7 +300,7 @@ def test_distances_between_surfaces_are_proven_whichever_way_they_are_divided():
 
 
 def test_surfaces_that_are_not_simplified_are_returned_with_a_warning(monkeypatch):
-    monkeypatch.setattr(simplification, "ATTEMPTS", 0)  # as where none of them succeeds
+    monkeypatch.setattr(simplification, "TOLERANCE_ATTEMPTS", 0)  # as where none of them succeeds
     surface = samples.sphere(2)
     with pytest.warns(sh.errors.InexactWarning, match="not simplified"):
         assert simplification.simplified(surface, 0.08) is surface

@@ -9,7 +9,7 @@ import signedheat as sh
 from refusals import refused
 from signedheat.discretization import discretize
 from signedheat.surfaces.extrapolation import default_diffusion
-from signedheat.surfaces.vector_heat import EXPONENTS, extrapolated
+from signedheat.surfaces.vector_heat import TIME_EXPONENTS, extrapolated
 
 ROUND = (1.2, 0.6)  # half axes of an ellipse
 
@@ -42,7 +42,7 @@ def test_error_falls_like_the_triangles_size(shear):
     assert fine < 0.5 * min(relative_error(36, shear, tau) for tau in (1.0, 4.0))
 
 
-@pytest.mark.parametrize("power", EXPONENTS)
+@pytest.mark.parametrize("power", TIME_EXPONENTS)
 def test_errors_of_both_kinds_cancel(power):
     """X = exp(i (.3 + ε tᵉ)) at t = 1, of whose two changes with t the columns are made."""
     slope = 1j * 0.02 * power

@@ -499,7 +499,7 @@ def test_of_chords_that_cross_the_shorter_is_taken():
 
 def test_frames_of_edges_stay_where_flat_triangles_are_thickened(monkeypatch):
     """The first face of an edge, by whose layout its frame is, is not always the lowest one."""
-    monkeypatch.setattr(lowering, "THICKNESS", 1.0)
+    monkeypatch.setattr(lowering, "MOLLIFIED_MARGIN", 1.0)
     made = sh.intrinsic_delaunay(squashed(sphere(3)), refine=True)
     lowered = discretize(made).triangles
     assert not np.allclose(lowered.edge_lengths, made.triangles.edge_lengths)

@@ -9,7 +9,7 @@ from signedheat.mesh.intrinsic_mesh import IntrinsicMesh
 from signedheat.surfaces.cotan import assemble, cotan_matrix
 from signedheat.surfaces.digital_surface import boundary_surfels, corrected_normals, smoothed_corners
 from signedheat.surfaces.local_triangulations import hole_fillings
-from signedheat.surfaces.plane_fits import MERGED, noisy_sizes, share_of_two_sides
+from signedheat.surfaces.plane_fits import MERGED_SHARE, noisy_sizes, share_of_two_sides
 from signedheat.surfaces.point_cloud import sign_links, spread_out
 from signedheat.surfaces.source_segments import segments_of_each
 from signedheat.surfaces.vector_heat import extrapolated, nonmanifold_frames
@@ -68,8 +68,8 @@ def test_two_sides_are_told_from_noise():
     random = np.random.default_rng(0)
     points, up = random.random((2000, 3)) * (1, 1, 0), np.tile([0.0, 0, 1], (2000, 1))
     sides, noise = 0.005 * random.choice([-1, 1], 2000), 0.005 * random.normal(size=2000)
-    assert share_of_two_sides(points + up * sides[:, None], up) > MERGED
-    assert share_of_two_sides(points + up * noise[:, None], up) < MERGED
+    assert share_of_two_sides(points + up * sides[:, None], up) > MERGED_SHARE
+    assert share_of_two_sides(points + up * noise[:, None], up) < MERGED_SHARE
 
 
 def test_extrapolation_cancels_an_error_like_1_over_t():

@@ -43,7 +43,7 @@ from ..solids.completion import Completion, Lids, complete
 from ..solids.heat_surfaces import Heat
 from ..solids.kept_faces import given_surface, unjoined
 from ..solids.overlaps import Nesting
-from ..solids.sample_set import WIDTHS, Layout
+from ..solids.sample_set import NOISE_WIDTHS, Layout
 from ..solids.sampling import sample, training_points
 from ..solids.simplification import simplified
 from ..solids.solid import Solid
@@ -82,7 +82,7 @@ class Sampling:
 
     n: int = 250_000
     near: float = 0.8
-    widths: tuple[float, ...] = WIDTHS
+    widths: tuple[float, ...] = NOISE_WIDTHS
     seed: int = 0
     normalize: bool = False
     layout: Layout = "arrays"

@@ -27,7 +27,7 @@ from ..mesh.triangles import face_areas
 from ..mesh.welding import indexed
 from ..solids.mesh_orientation import Orientation, orientation
 from ..solids.thickness import Widths, widths
-from ..solids.tiles import BYTES_AT_WORK, BYTES_PER_NODE
+from ..solids.tiles import BYTES_AT_WORK, BYTES_PER_DENSE_NODE
 from ..surfaces.source_segments import segments_of
 from .operands import describe, field_or_image, labels_of
 from .options import Summary, is_planar
@@ -301,7 +301,7 @@ def _least_spacing(shape: Any) -> float | None:
     if available is None or not (shape.bounds[1] > shape.bounds[0]).any():
         return None
     grid = sh.Grid.around(shape.bounds, 128)
-    spacing = fitting_spacing(grid, available, BYTES_PER_NODE, BYTES_AT_WORK, 0.0)
+    spacing = fitting_spacing(grid, available, BYTES_PER_DENSE_NODE, BYTES_AT_WORK, 0.0)
     return float(spacing.max()) if (spacing < grid.upper - grid.origin).all() else None
 
 
@@ -309,7 +309,7 @@ def _memory(shape: Any, resolution: int) -> int | None:
     """Estimate memory for a grid around the shape; None if the shape is a single place."""
     if not (shape.bounds[1] > shape.bounds[0]).any():
         return None
-    return memory_estimate(sh.Grid.around(shape.bounds, resolution), BYTES_PER_NODE, BYTES_AT_WORK)
+    return memory_estimate(sh.Grid.around(shape.bounds, resolution), BYTES_PER_DENSE_NODE, BYTES_AT_WORK)
 
 
 def _table(summary: dict[str, Any]) -> str:

@@ -26,7 +26,7 @@ from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs
 from ..mesh.surface_points import VERTEX, barycentric_in
 from ..method import diffuse, normalize
-from ..surfaces.intrinsic_discretization import ANGLE, COARSEST, checked_intrinsic, is_spoiled, lowered
+from ..surfaces.intrinsic_discretization import AUTO_ANGLE, COARSEST_TRIANGLE, checked_intrinsic, is_spoiled, lowered
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay, triangle_mesh
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.source_segments import given_curves
@@ -202,11 +202,11 @@ def _retriangulated(
         return domain, conforming(discretization, sources)
     fits = conforms(discretization, sources)
     if isinstance(domain, TriangleMesh) and (intrinsic is True or (intrinsic == "auto" and is_spoiled(domain))):
-        angle = 28.0 if intrinsic is True else ANGLE
+        angle = 28.0 if intrinsic is True else AUTO_ANGLE
         ways = (sources,) if intrinsic is True else ((), sources)  # unoriented curves along edges must keep these
         try:
             for keep in ways:
-                refined = intrinsic_delaunay(domain, keep, refine=True, angle=angle, coarsest=COARSEST)
+                refined = intrinsic_delaunay(domain, keep, refine=True, angle=angle, coarsest=COARSEST_TRIANGLE)
                 if conforms(surface := _lowered(refined), sources):
                     return refined, surface
         except GeometryError:  # faces too thin

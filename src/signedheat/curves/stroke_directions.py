@@ -21,7 +21,7 @@ from ..mesh.signed_graph import best_signs
 from ..parallel import n_threads
 from ..solver import SignedHeatSolver
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
-from ..surfaces.source_segments import STRAIGHT, as_curves, nearest_others
+from ..surfaces.source_segments import NEARLY_CLOSED, as_curves, nearest_others
 from ..surfaces.surface import Surface
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from ..surfaces.surface_discretization import SurfaceDiscretization
@@ -87,7 +87,7 @@ class CurvePieces:
         if not movable.any():
             return None
         group, gaps = likely_curves(np.concatenate([places[order[k]][[0, -1]] for k in first]), stroke)
-        is_loop = gaps < STRAIGHT * np.bincount(group, [part.lengths.sum() for part in parts])
+        is_loop = gaps < NEARLY_CLOSED * np.bincount(group, [part.lengths.sum() for part in parts])
         strokes = Strokes.of(surface, parts, float(domain.triangulation.edge_lengths.mean()), group, is_loop)
         return cls(np.array(numbers, dtype=np.int64)[order], stroke[copy], movable, strokes)
 

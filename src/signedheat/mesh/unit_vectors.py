@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..parallel import n_threads
 
+ANGLE_ROUNDING = 1e-6
+"""Angles up to this, in radians, are rounding errors."""
+
 
 def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
     """Scale vectors to length one, by the largest component first: X's square underflows long before X."""

@@ -23,6 +23,8 @@ from ..mesh.welding import coincident_faces, same_positions, same_rows
 from ..parallel import in_chunks
 from .nearest_triangles import foot_on_triangle, nearest_faces, triangle_rows
 
+EQUALLY_NEAR = 1e-9
+"""Relative difference of distances, or of sines, below which two faces or segments are equally near."""
 FOLDED_EDGE = 0.02
 """Length of the sum of two unit normals below which the edge between them is a fold, and decides no side."""
 POINTS_PER_SEARCH = 512

@@ -22,22 +22,22 @@ from .gauss import Dipoles, Matrix, Pieces, means, sampled, system_of, without_s
 from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, directed, levels_of_pieces, levels_within
 from .rims import meeting_edges, open_edges
 
-COHERENT = 0.7
+COHERENT_LEVELS = 0.7
 """Least coherence of the levels of loose pieces that are the remains of a body. Bodies have .81 to 1, however little is
 left of them; leaves, cards and strips have .3 to .6, however many there are."""
-CHANCE = 0.42
+CHANCE_LEVEL = 0.42
 """n loose pieces bound nothing if their level times √(n + 1) is at most this: choosing their signs explains as much.
 Two sheets a quarter of their width apart have .38, three sides of a box .2, a side that four others lack .47, and a
 ball that has lost 85 % of its faces .95."""
-ALONG = 0.25
+PARTLY_INSIDE = 0.25
 """Loose pieces lie along the surface of closed ones if the share of them inside differs from a whole number by more."""
-REACH = 1.5
+GAP_REACH = 1.5
 """Largest distance between faces of two pieces that belong together, relative to the size of the smaller piece."""
-NEAREST = 9
+COMPARED_FACES = 9
 """Number of nearest sampled faces that each face is compared with, itself included."""
-PLACES = 100_000
+SAMPLED_FACES = 100_000
 """Number of sampled faces, spread evenly, besides one for each piece."""
-PROBES = 16
+NESTED_PROBES = 16
 """Number of triangles of a closed piece, spread evenly, all of which lie within other pieces if it is nested."""
 
 
@@ -161,7 +161,7 @@ def _nested(
     if len(np.unique(owners)) == 1:
         return outward, 0, 0
     names, labels = np.unique(owners, return_inverse=True)
-    faces, places = sampled(Pieces(triangles, labels), PROBES * len(names))
+    faces, places = sampled(Pieces(triangles, labels), NESTED_PROBES * len(names))
     probes, own = owners[faces], np.abs(counts[counted[faces]])
     normals = unit(area_vectors(triangles[faces]))
     tree = WindingTree.of(directed(chain.triangles, counts * outward[pieces]))
@@ -225,7 +225,7 @@ def open_bounding(
         mean = means(values, clusters[rows], weights, n)
         square = means(values**2, clusters[rows], weights, n)
         amount = _counted(areas * loose, groups, clusters)
-        body = (mean * np.sqrt(amount + 1) >= CHANCE) & (mean**2 >= COHERENT * square)
+        body = (mean * np.sqrt(amount + 1) >= CHANCE_LEVEL) & (mean**2 >= COHERENT_LEVELS * square)
         thresholds = np.minimum(SHEET, 2 * SHEET * mean) if isinstance(system, Matrix) else -np.inf  # dipoles are noisy
         least = np.where(body, thresholds, np.inf)[clusters]
         wrong = alive & (levels < np.where(loose, least, SHEET * np.minimum(1.0, 2.0 * by_itself)))
@@ -272,20 +272,20 @@ def _along(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | Ints) ->
     around = WindingTree.of(directed(chain.triangles, counts)).numbers(chain.triangles[chosen].mean(axis=1))
     owners = clusters[pieces[chosen]]
     inside = means(around, owners, chain.areas[chosen], int(owners.max()) + 1)
-    return (clusters >= 0) & (np.abs(inside - np.round(inside)) > ALONG)[clusters]
+    return (clusters >= 0) & (np.abs(inside - np.round(inside)) > PARTLY_INSIDE)[clusters]
 
 
 def clusters_of(pieces: Pieces) -> Ints:
-    """(p,) cluster of each piece. Pieces are joined if they are within `REACH` times the size of the smaller one."""
+    """(p,) cluster of each piece. Pieces are joined if they are within `GAP_REACH` sizes of the smaller one."""
     n = len(pieces.areas)
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     np.minimum.at(low, pieces.labels, pieces.triangles.min(axis=1))
     np.maximum.at(high, pieces.labels, pieces.triangles.max(axis=1))
     radii = 0.5 * np.linalg.norm(high - low, axis=1)
     elements = without_slender(pieces)
-    faces, places = sampled(elements, min(len(elements.labels), PLACES))
+    faces, places = sampled(elements, min(len(elements.labels), SAMPLED_FACES))
     owners = elements.labels[faces]
-    away, near = scipy.spatial.cKDTree(places).query(places, min(NEAREST, len(places)), workers=-1)
+    away, near = scipy.spatial.cKDTree(places).query(places, min(COMPARED_FACES, len(places)), workers=-1)
     away, others = away.reshape(len(places), -1), owners[near].reshape(len(places), -1)
-    joined = away < 2 * REACH * np.minimum(radii[owners][:, None], radii[others])
+    joined = away < 2 * GAP_REACH * np.minimum(radii[owners][:, None], radii[others])
     return connected_components(n, np.repeat(owners, joined.sum(axis=1)), others[joined])

@@ -19,16 +19,14 @@ from ..arrays import Bools, Floats, Frozen, Ints, mask_of
 from ..mesh.components import connected_components, element_components, next_in_groups
 from ..mesh.edges import EdgeTable, FaceOrientation, edge_table, orient_faces
 from ..mesh.triangles import area_vectors, face_areas
-from ..mesh.unit_vectors import angles_around, unit
+from ..mesh.unit_vectors import ANGLE_ROUNDING, angles_around, unit
 from ..mesh.welding import ONE_PLACE, coincident_faces, joined_rims, same_positions
 from ..search.winding_tree import WindingTree
 from ..surfaces.triangle_mesh import TriangleMesh
-from .overlaps import APART
-from .winding import INSIDE
+from .overlaps import OUTSIDE
+from .winding import INSIDE_WINDING
 
-SAME_ANGLE = 1e-6
-"""Faces around an edge coincide, to rounding, if the angle between them is at most this, in radians."""
-MOSTLY = 0.9
+CAVITY_SHARE = 0.9
 """Least share of its area that faces into a cell that is a cavity, and of the outside that faces outwards. By chance
 all six walls of a cell face inwards once in 64 times."""
 
@@ -58,7 +56,7 @@ def inner_walls(chain: Chain) -> Bools:
     complexes = chain.complexes
     gaps = np.where(last, 2 * np.pi, 0.0) + angles[following] - angles
     many = table.face_counts[edges] > 2
-    unclear = many & ~(gaps > SAME_ANGLE)  # also where an angle is no number
+    unclear = many & ~(gaps > ANGLE_ROUNDING)  # also where an angle is no number
     balance = np.bincount(edges, np.where(forward, 1, -1), len(table.vertices))
     nonmanifold, unbalanced = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     nonmanifold[complexes[faces[many]]] = unbalanced[complexes[faces[balance[edges] != 0]]] = True
@@ -79,7 +77,7 @@ def inner_walls(chain: Chain) -> Bools:
 
 
 def _reaching_out(chain: Chain, inner: Bools, outer: Bools, turned: Bools) -> Bools:
-    """(m,) whether the inner faces that each is connected with lie outside the cells, by more than `APART`.
+    """(m,) whether the inner faces that each is connected with lie outside the cells, by more than `OUTSIDE`.
 
     `outer`, (m,), are the faces around all cells; those that are `turned` face into them.
     """
@@ -87,10 +85,10 @@ def _reaching_out(chain: Chain, inner: Bools, outer: Bools, turned: Bools) -> Bo
     if not len(rows):
         return result
     around = np.where((turned & outer)[:, None, None], chain.triangles[:, ::-1], chain.triangles)[outer]
-    outside = WindingTree.of(around).numbers(chain.triangles[rows].mean(axis=1)) < INSIDE
+    outside = WindingTree.of(around).numbers(chain.triangles[rows].mean(axis=1)) < INSIDE_WINDING
     parts = element_components(chain.edges.face_edges[rows])
     beyond, total = (np.bincount(parts, chain.areas[rows] * share) for share in (outside, 1.0))
-    result[rows] = (beyond > APART * total)[parts]
+    result[rows] = (beyond > OUTSIDE * total)[parts]
     return result
 
 
@@ -106,10 +104,10 @@ def _cavities(shells: Ints, inside: Bools, areas: Floats) -> Bools:
     """Find the shells that are cavities: faces face into them, and the whole complex was given facing outwards."""
     front, back = shells.T
     outer = inside[front] != inside[back]
-    if areas[outer & inside[back]].sum() < MOSTLY * areas[outer].sum():
+    if areas[outer & inside[back]].sum() < CAVITY_SHARE * areas[outer].sum():
         return np.zeros(len(inside), dtype=bool)
     facing_in = np.bincount(front, areas, len(inside))
-    return inside & (facing_in >= MOSTLY * (facing_in + np.bincount(back, areas, len(inside))))
+    return inside & (facing_in >= CAVITY_SHARE * (facing_in + np.bincount(back, areas, len(inside))))
 
 
 @dataclass(frozen=True, eq=False)

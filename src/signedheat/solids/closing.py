@@ -21,30 +21,28 @@ from ..mesh.box_tree import BoxTree
 from ..mesh.components import connected_components, element_components, sums_of
 from ..mesh.edges import EdgeTable, edge_keys, edge_table
 from ..mesh.triangles import area_vectors, face_areas
-from ..mesh.unit_vectors import unit
+from ..mesh.unit_vectors import ANGLE_ROUNDING, unit
 from . import lids, walls
 from .lids import Lid, running_mean, vertex_normals
 from .rims import boundary, corners_of, loops, open_edges
 from .spanning import Frame, frame_of, side_lengths
 
-REACH = 0.25
+STRIP_WIDTH = 0.25
 """Width of the strip of surface around an opening that is sampled, relative to the opening's width."""
-SHARP = 0.7
+SMOOTH_COSINE = 0.7
 """Edges are sharp if the cosine between the normals of their faces is below this."""
-SAMPLES = 16
+STRIP_SAMPLES = 16
 """Number of samples across that strip."""
-MOST = 16384
+MOST_RIM_SAMPLES = 16384
 """Number of samples around a rim: where faces would be divided into more, they are not; where more were given, every
 second, third or so is taken."""
-STIFF = 0.03
+HALF_BENDING_DEPTH = 0.03
 """The bending of a wall of this depth, relative to the strip's, counts half."""
-AGREEMENT = 0.35
+BEND_RATIO = 0.35
 """Ratio between how far a surface bends and how far it would have to bend. A lid does not bend below this ratio, and is
 clamped above twice this ratio. On a ball the ratio is 1."""
-NARROWEST = 1e-9
+NARROWEST_OPENING = 1e-9
 """Least width of an opening, relative to the length of its rim: narrower ones are rounding error."""
-UNBENT = 1e-6
-"""Angles below this, in radians, are rounding error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,14 +59,14 @@ def width_of(lid: Lid) -> float:
     """Width of an opening: four areas over the length of its rim, the diameter of a circle; never zero."""
     rim = lid.vertices[: lid.n_rim]
     length = float(side_lengths(rim).sum())
-    return max(4.0 * float(face_areas(lid.vertices[lid.faces]).sum()) / length, NARROWEST * length)
+    return max(4.0 * float(face_areas(lid.vertices[lid.faces]).sum()) / length, NARROWEST_OPENING * length)
 
 
 def samples_near(
     triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spatial.cKDTree, reach: float
 ) -> RimSamples:
-    """Sample the triangles within reach of a rim, at most reach / `SAMPLES` apart unless these are too many."""
-    size = reach / SAMPLES
+    """Sample the triangles within reach of a rim, at most reach / `STRIP_SAMPLES` apart unless these are too many."""
+    size = reach / STRIP_SAMPLES
     near_rim = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
     triangles, patches = triangles[near_rim], patches[near_rim]
     near, labels, count = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)], 0
@@ -78,7 +76,7 @@ def samples_near(
         away = rim.query(centres)[0]
         triangles, patches, radii, away = (values[away < reach + radii] for values in (triangles, patches, radii, away))
         fine = radii <= size
-        fine |= count + 4 * int((~fine).sum()) > MOST
+        fine |= count + 4 * int((~fine).sum()) > MOST_RIM_SAMPLES
         chosen = fine & (away < reach)
         count += int(chosen.sum())
         near.append(triangles[chosen])
@@ -90,7 +88,7 @@ def samples_near(
     pieces = np.concatenate(near)
     vectors, areas = area_vectors(pieces), face_areas(pieces)
     proper = np.flatnonzero(areas > 0)
-    proper = proper[:: max(1, len(proper) // MOST)]
+    proper = proper[:: max(1, len(proper) // MOST_RIM_SAMPLES)]
     normals = vectors[proper] / areas[proper, None]
     return RimSamples(pieces.mean(axis=1)[proper], normals, areas[proper], np.concatenate(labels)[proper])
 
@@ -102,7 +100,7 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     turn by k W: on a ball these are the same, on a box k is 0.
     """
     n, loop = lid.n_rim, lid.vertices[: lid.n_rim]
-    reach = REACH * width
+    reach = STRIP_WIDTH * width
     steps = side_lengths(loop)
     m = max(1, min(n // 4, round(reach / steps.mean())))
     along = unit(np.roll(loop, -m, axis=0) - np.roll(loop, m, axis=0))
@@ -123,15 +121,16 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     coordinates = np.einsum("kij,kj->ki", frame[rows], x)
     mean = means(coordinates)
     coordinates = coordinates - mean[rows]
-    spread = means(coordinates[:, :, None] * coordinates[:, None, :]) + (STIFF * reach) ** 2 * np.eye(2)
+    spread = means(coordinates[:, :, None] * coordinates[:, None, :]) + (HALF_BENDING_DEPTH * reach) ** 2 * np.eye(2)
     slopes = np.linalg.solve(spread, means(coordinates[:, :, None] * (normals - middle[rows])[:, None, :]))
     at_rim = unit(middle - np.einsum("ni,nij->nj", mean, slopes)) * enough[:, None]
     outwards = unit(np.cross(at_rim, along))
     bends, must = width * (slopes[:, 0] * outwards).sum(axis=1), 2.0 * (outwards * vertex_normals(lid)[:n]).sum(axis=1)
     least, most = np.minimum(np.abs(bends), np.abs(must)), np.maximum(np.abs(bends), np.abs(must))
-    ratio = np.sign(bends * must) * least / np.maximum(most, UNBENT)
-    held = enough * np.clip(ratio / AGREEMENT - 1.0, 0.0, 1.0)
-    fits = np.minimum(1.0, np.abs(must) / np.maximum(np.abs(bends), UNBENT))  # more curved, it would not come round
+    ratio = np.sign(bends * must) * least / np.maximum(most, ANGLE_ROUNDING)
+    held = enough * np.clip(ratio / BEND_RATIO - 1.0, 0.0, 1.0)
+    # more curved, it would not come round
+    fits = np.minimum(1.0, np.abs(must) / np.maximum(np.abs(bends), ANGLE_ROUNDING))
     curvatures = np.where(enough, fits * (slopes * frame).sum(axis=(1, 2)), 0.0)
     return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(held, m), 0.0)
 
@@ -147,9 +146,9 @@ def _within(samples: RimSamples, loop: Floats, patches: Ints, reach: float) -> t
     return rows[own], near[own]
 
 
-MOST_SIDES = 16
+LOST_FACE_SIDES = 16
 """Holes with more sides may have lost vertices as well as faces."""
-BENT = np.deg2rad(70.0)
+LARGEST_BEND = np.deg2rad(70.0)
 """A lid continues the surface if the root mean square of the angles at the rim is below this. At the end of a tube it
 is 90°."""
 
@@ -261,11 +260,11 @@ def _angle(a: Floats, b: Floats) -> float:
     return float(np.arccos(min(max(a[0] * b[0] + a[1] * b[1] + a[2] * b[2], -1.0), 1.0)))
 
 
-NONE = np.empty((0, 2), dtype=np.int64)
+NO_EDGES = np.empty((0, 2), dtype=np.int64)
 """No edges."""
 
 
-def closed_by(vertices: Floats, faces: Ints, *, bent: bool = True, outlines: Ints = NONE) -> tuple[Floats, Ints]:
+def closed_by(vertices: Floats, faces: Ints, *, bent: bool = True, outlines: Ints = NO_EDGES) -> tuple[Floats, Ints]:
     """Close the boundary of (m, 3) triangles: (n + k, 3) vertices, and (p, 3) triangles that balance each edge.
 
     Small holes get triangles between corners, rims that run along each other strips, other loops lids: `bent` ones, or
@@ -300,7 +299,7 @@ class _Surface(Frozen):
 
     vertices: Floats
     faces: Ints
-    outlines: Ints = field(default_factory=lambda: NONE)
+    outlines: Ints = field(default_factory=lambda: NO_EDGES)
 
     @cached_property
     def loops(self) -> list[Ints]:
@@ -340,7 +339,7 @@ class _Surface(Frozen):
     def patches(self) -> Ints:
         """(m,) component of each face; edges that are not sharp connect faces."""
         first, second = self.edges.pairs.T // 3
-        smooth = (self.normals[first] * self.normals[second]).sum(axis=1) > SHARP
+        smooth = (self.normals[first] * self.normals[second]).sum(axis=1) > SMOOTH_COSINE
         return connected_components(len(self.faces), first[smooth], second[smooth])
 
     @cached_property
@@ -364,7 +363,7 @@ class _Surface(Frozen):
         return face, self.faces[face, (side + 2) % 3]
 
 
-def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
+def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints:
     """(k, 3) triangles between the vertices of small holes and of gaps without area."""
     surface = _Surface(vertices, faces, outlines)
     triangles, chosen, corners = [np.empty((0, 3), dtype=np.int64)], [], []
@@ -372,7 +371,7 @@ def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
         places = corners_of(surface.vertices[loop])
         if len(places) < 3:
             triangles.append(fan(loop))
-        elif len(places) <= MOST_SIDES:
+        elif len(places) <= LOST_FACE_SIDES:
             chosen.append(loop)
             corners.append(places)
     if not chosen:
@@ -387,7 +386,7 @@ def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
     for loop, places, lid in zip(
         chosen,
         corners,
-        least_bent(surface.vertices, rims, np.concatenate(normals), taken, BENT),
+        least_bent(surface.vertices, rims, np.concatenate(normals), taken, LARGEST_BEND),
         strict=True,
     ):
         if len(lid):
@@ -411,7 +410,7 @@ def fan(points: Ints) -> Ints:
     return np.stack([np.full(len(points) - 2, points[0]), points[1:-1], points[2:]], axis=1)
 
 
-def strips(vertices: Floats, faces: Ints, outlines: Ints = NONE) -> Ints:
+def strips(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints:
     """(k, 3) triangles between rims that run along each other, in part or all around."""
     surface = _Surface(vertices, faces, outlines)
     chain = np.concatenate([faces, *walls.seams(_rims(surface))])
@@ -460,7 +459,7 @@ def _spanned(surface: _Surface, loop: Ints, frame: Frame | None, bent: bool) -> 
     if bent:
         width, points = width_of(flat), flat.vertices[: flat.n_rim]
         near = samples_near(
-            surface.triangles, surface.tree, surface.patches, scipy.spatial.cKDTree(points), REACH * width
+            surface.triangles, surface.tree, surface.patches, scipy.spatial.cKDTree(points), STRIP_WIDTH * width
         )
         ends = surface.patches[behind[rim.edges_at(flat.places)]]
         normals, curvatures, held = continuation(flat, near, ends, width)
@@ -473,7 +472,7 @@ def _spanned(surface: _Surface, loop: Ints, frame: Frame | None, bent: bool) -> 
         places = corners_of(corners)
         if len(places) < 3:
             return np.empty((0, 3)), fan(np.arange(len(loop)))
-        if len(places) <= MOST_SIDES:
+        if len(places) <= LOST_FACE_SIDES:
             triangles = least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[0]
             return np.empty((0, 3)), _with_sides(np.arange(len(loop)), places, triangles)
     return lids.draped(corners, rim.starts, frame, plate or flat)

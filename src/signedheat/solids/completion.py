@@ -40,7 +40,7 @@ from .rims import boundary, loops
 from .solid import Solid
 from .union import TriangleGroup, united
 
-SIDES = 16
+GAP_SIDES = 16
 """Gaps between a rim and a border with up to this many sides are closed by triangles between their vertices."""
 
 
@@ -69,25 +69,23 @@ def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) ->
 
 def small_gaps(vertices: Floats, faces: Ints) -> Ints:
     """(k, 3) triangles that fill the small gaps that seams leave."""
-    around = [loop for loop in loops(vertices, faces, boundary(faces)) if len(loop) <= SIDES]
+    around = [loop for loop in loops(vertices, faces, boundary(faces)) if len(loop) <= GAP_SIDES]
     return np.concatenate([np.empty((0, 3), dtype=np.int64), *map(fan, around)])
 
 
-STEPS = 2
-"""Number of timed steps."""
-BYTES_PER_FACE = 1400
+BYTES_PER_COMPLETED_FACE = 1400
 """Peak memory per face, measured on meshes of 330,000 faces; points take less."""
-BYTES_IF_LOOSE, BYTES_OF_HEAT = 3400, 150_000_000
+BYTES_PER_LOOSE_FACE, BYTES_OF_HEAT = 3400, 150_000_000
 """Peak memory per loose triangle; and memory of the grid on which loose triangles and points are completed."""
-CELLS = 2.0
+CELLS_PER_POINT_GAP = 2.0
 """Number of cells between neighbouring points of a cloud."""
-MATCH = (1e-6, 0.75)
+NOISE_RANGE = (1e-6, 0.75)
 """Distances between corners that noise has separated lie in this range, relative to the size of pieces."""
-TORN = 0.2
+TORN_LEVEL = 0.2
 """Heat completes loose pieces up to this level, which a fifth to two fifths of a body have; beyond, lids do, which keep
 to the faces. For balls, tori and a cow without 45 % of their triangles, lids enclose .1 % too little and heat .3 % too
 much; without 65 %, lids miss 1 to 12 % and heat 1 %."""
-SEAM = 0.75
+ZERO_SET_FACES = 0.75
 """The zero set of φ stands for the faces within this distance of them, in cells."""
 
 Completing = Literal["lids", "heat"]
@@ -203,7 +201,7 @@ def completed(
         lambda n: bytes_to_complete(joined, n),
         lambda n: f"simplify it to {n} {parts}, or free memory",
     )
-    stopwatch = Stopwatch(progress, STEPS)
+    stopwatch = Stopwatch(progress, 2)
     if isinstance(joined, PointCloud):
         with stopwatch("orient") as run:
             cloud, notes = joined, list[Note]()
@@ -232,11 +230,11 @@ def completed(
 def bytes_to_complete(shape: SurfaceShape, count: int) -> float:
     """Estimate the peak memory of completing a shape like this one with `count` faces."""
     if isinstance(shape, PointCloud):
-        return BYTES_OF_HEAT + BYTES_PER_FACE * count
+        return BYTES_OF_HEAT + BYTES_PER_COMPLETED_FACE * count
     mesh = shape.triangulation
     if mesh.n_vertices == 3 * mesh.n_faces and mesh.n_faces > 1:
-        return BYTES_OF_HEAT + BYTES_IF_LOOSE * count
-    return BYTES_PER_FACE * count
+        return BYTES_OF_HEAT + BYTES_PER_LOOSE_FACE * count
+    return BYTES_PER_COMPLETED_FACE * count
 
 
 def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
@@ -250,7 +248,7 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
     for cluster in np.unique(clusters[(clusters >= 0) & (counts > 0)]):
         chosen = np.flatnonzero((clusters == cluster) & (counts > 0))
         scatter = 0.0 if by_heat else scatter_of(vertices[faces[chosen]], decided.pieces[chosen])
-        if by_heat or scatter or decided.levels[chosen[0]] < TORN:
+        if by_heat or scatter or decided.levels[chosen[0]] < TORN_LEVEL:
             torn[chosen] = True
             surfaces += _completed_by_heat(vertices, faces[chosen], chain.firsts[chosen], scatter, method)
     bounds = np.repeat(np.arange(len(faces)), np.where(torn, 0, counts))  # a face that bounds twice is taken twice
@@ -296,7 +294,7 @@ def _completed_by_heat(
     tree = FaceTree.of_triangles(triangles)
     patches = made[0][made[1]]
     cell = float(np.median(np.linalg.norm(patches[:, 1] - patches[:, 0], axis=1)))
-    away = tree.distances(patches.mean(axis=1)) > SEAM * cell
+    away = tree.distances(patches.mean(axis=1)) > ZERO_SET_FACES * cell
     if not len(boundary(faces)):
         return [replace(given, closing=True)]
     places = np.concatenate([vertices, made[0]])
@@ -316,7 +314,7 @@ def scatter_of(triangles: Floats, labels: Ints) -> float:
     others = owners[neighbours] != owners[:, None]
     nearest = np.where(others, near, np.inf).min(axis=1)
     sizes = np.repeat(np.sqrt(face_areas(triangles)), 3)
-    moved = (nearest > MATCH[0] * sizes) & (nearest < MATCH[1] * sizes)
+    moved = (nearest > NOISE_RANGE[0] * sizes) & (nearest < NOISE_RANGE[1] * sizes)
     return float(np.median(nearest[moved])) if moved.mean() > 0.5 else 0.0
 
 
@@ -327,7 +325,7 @@ def _from_points(cloud: PointCloud, method: Heat) -> Solid:
             "the point cloud has no normals, which are needed to tell inside from outside", remedy="give it normals"
         )
     gap = mean_gap(np.asarray(cloud.points))
-    made = heat_surface(cloud, method, gap / CELLS)
+    made = heat_surface(cloud, method, gap / CELLS_PER_POINT_GAP)
     if made is not None:
         return united([TriangleGroup.made(made[0][made[1]])], True, points=cloud.points)
     first, second = axes_across(cloud.normals)

@@ -18,7 +18,7 @@ from ..kinds import ShapeLike
 from ..memory import within_memory
 from ..mesh.triangles import face_areas
 from ..packages import lazy_module
-from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
+from ..search.face_tree import EQUALLY_NEAR, FaceFeatures, FaceTree, NearestFaces
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -31,19 +31,17 @@ from .solid import Solid
 
 pictures: Any = lazy_module("signedheat.view.surface_pictures", "pictures")
 
-PERCENTILES = (0.0, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 100.0)
+SUMMARY_PERCENTILES = (0.0, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 100.0)
 """Percentiles of deviations in summaries."""
-EXTREME = 99.0
+EXTREME_PERCENTILE = 99.0
 """Percentile of absolute deviations at which colour scales and histograms end, so that outliers do not dominate."""
 HISTOGRAM_BINS = 40
 """Default number of bins of histograms."""
-OPEN = 0.25
+OPEN_SHARE = 0.25
 """Completed share of the surface above which a nominal part is measured as an open surface."""
-APART = 0.05
+WORST_PLACES = 0.05
 """Distance between the worst places, over the diagonal of the box around a scan, below which they are one."""
-TIE = 1e-9
-"""Relative difference below which distances are equal."""
-STRAIGHT = 1 - 1e-6
+STRAIGHT_ABOVE = 1 - 1e-6
 """Cosine to the normal above which a point is straight above or below its nearest place."""
 
 
@@ -106,7 +104,7 @@ class Deviation(Frozen):
     @property
     def extreme(self) -> float:
         """The 99th percentile of the absolute deviations."""
-        return float(np.percentile(np.abs(self.of_surface), EXTREME))
+        return float(np.percentile(np.abs(self.of_surface), EXTREME_PERCENTILE))
 
     def within(self, tolerance: float) -> float:
         """Compute the share of points within a tolerance of the part, on either side.
@@ -131,7 +129,7 @@ class Deviation(Frozen):
         """
         return float((np.abs(self.of_surface) <= finite_number(tolerance, "tolerance", least=0)).mean())
 
-    def percentiles(self, percents: ArrayLike = PERCENTILES) -> Floats:
+    def percentiles(self, percents: ArrayLike = SUMMARY_PERCENTILES) -> Floats:
         """Compute percentiles of the deviations.
 
         Parameters
@@ -205,7 +203,7 @@ class Deviation(Frozen):
         (3, True)
         """
         ids = self._ids[np.argsort(-np.abs(self.of_surface), kind="stable")]
-        reach = APART * float(np.linalg.norm(np.ptp(self.points[ids], axis=0)))
+        reach = WORST_PLACES * float(np.linalg.norm(np.ptp(self.points[ids], axis=0)))
         chosen: list[int] = []
         while len(ids) and len(chosen) < n:
             chosen.append(int(ids[0]))
@@ -219,7 +217,7 @@ class Deviation(Frozen):
             "points": len(self.of_surface),
             "mean": float(self.of_surface.mean()),
             "rms": self.rms,
-            "percentiles": {f"{p:g}": v for p, v in zip(PERCENTILES, self.percentiles().tolist(), strict=True)},
+            "percentiles": {f"{p:g}": v for p, v in zip(SUMMARY_PERCENTILES, self.percentiles().tolist(), strict=True)},
             "on_completion": float(self.completed[self._ids].mean()),
             "beyond_rim": float(self.beyond_rim[self._ids].mean()),
         }
@@ -311,7 +309,7 @@ def deviation(
     is_open, surface = _open_surface(solid, part)
     if surface is not None:
         front = FaceTree.of(surface).search(points)
-        by_side = is_open | ((distances > 0) & (front.distances <= (1 + TIE) * distances))
+        by_side = is_open | ((distances > 0) & (front.distances <= (1 + EQUALLY_NEAR) * distances))
         signed = np.where(front.cosines < 0, -front.distances, front.distances)
         distances, completed = np.where(by_side, signed, distances), completed & ~by_side
         nearest = np.where(by_side[:, None], front.places, nearest)
@@ -324,7 +322,7 @@ def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, Face
     if isinstance(given, PointCloud):
         return False, None
     areas, was_given = face_areas(solid.triangles), solid.origins >= 0
-    is_open = bool(areas[~was_given].sum() > OPEN * areas.sum())
+    is_open = bool(areas[~was_given].sum() > OPEN_SHARE * areas.sum())
     has_sides = was_given.copy()
     if not is_open:
         has_sides &= ~solid.bounding
@@ -350,4 +348,4 @@ def _beyond_rim(surface: FaceFeatures, front: NearestFaces) -> Bools:
     features, faces = front.features, front.faces
     corners = (features - 1) % 3
     is_beyond = np.where(features > 3, rim_vertices[surface.faces[faces, corners]], on_rim[faces, corners])
-    return is_beyond & (features > 0) & (front.distances > 0) & (np.abs(front.cosines) < STRAIGHT)
+    return is_beyond & (features > 0) & (front.distances > 0) & (np.abs(front.cosines) < STRAIGHT_ABOVE)

@@ -32,32 +32,32 @@ from ..mesh.unit_vectors import unit
 from ..parallel import in_chunks
 from ..search.winding_tree import WindingTree, mean_angle
 
-HELD = 0.01
+WEIGHT_DAMPING = 0.01
 """λ: keeps weights small where no level is asked for."""
-EMPTY = 1e-12
+LEAST_AREA_SHARE = 1e-12
 """Least area that a piece counts with, relative to the whole area; no level is asked for on pieces without area."""
-AGREEMENT = 1.0
+PLANE_AGREEMENT = 1.0
 """μ: weight of neighbours that lie in one plane."""
-NEIGHBORS = 12
+PLANE_NEIGHBORS = 12
 """Number of neighbours that an element is compared with."""
-DENSE = 3000
+MATRIX_PIECES = 3000
 """Up to this many pieces W is a matrix; with more, each face is a dipole, and W is applied through a tree."""
-ENTRIES = 5_000_000
+MATRIX_ENTRIES = 5_000_000
 """Largest number of entries of W. It limits at how many places the level is asked for, besides one for each piece."""
-SAMPLES = 10_000
+LEVEL_PLACES = 10_000
 """Largest number of such places."""
-MANY = 64
+LOOSE_DIPOLES = 64
 """This many loose triangles or more become dipoles; fewer get exact solid angles, which tell noise for what it is."""
-STEPS = 10
+GRADIENT_STEPS = 10
 """Number of steps of conjugate gradients. They give the signs of the direct solution."""
-LARGE = 256
+TREE_FACES = 256
 """A piece of this many faces or more has a tree of its own, which sums their solid angles."""
-FAR, OPENING = 4.0, 2.0
+PIECE_RADII, NODE_RADII = 4.0, 2.0
 """Pieces, and nodes of the tree, are dipoles beyond this distance, relative to their radius."""
-SLENDER, HALVINGS = 12.0, 6
+SLENDER_TRIANGLE, SLENDER_HALVINGS = 12.0, 6
 """Triangles are halved, so many times at most, if the square of their longest side over their area exceeds this: one
 dipole must not stand for a strip. An equilateral triangle has 2.3, a strip six times as long as wide 12."""
-ELEMENTS = 200_000
+MOST_DIPOLES = 200_000
 """Largest number of dipoles; of more faces, this many are drawn evenly."""
 
 
@@ -82,8 +82,8 @@ class Pieces(Frozen):
 def system_of(pieces: Pieces) -> Matrix | Dipoles:
     """Make the system of some pieces: dipoles for many loose triangles, exact solid angles for the rest."""
     sizes, areas = np.bincount(pieces.labels), pieces.areas
-    many = areas.sum() ** 2 > MANY * (areas**2).sum() and areas[sizes == 1].sum() > 0.5 * areas.sum()
-    return Dipoles.of_triangles(pieces) if many or len(areas) > DENSE else Matrix.of(pieces)
+    many = areas.sum() ** 2 > LOOSE_DIPOLES * (areas**2).sum() and areas[sizes == 1].sum() > 0.5 * areas.sum()
+    return Dipoles.of_triangles(pieces) if many or len(areas) > MATRIX_PIECES else Matrix.of(pieces)
 
 
 def means(values: Floats, groups: Ints, weights: Floats, n: int) -> Floats:
@@ -106,7 +106,7 @@ class Matrix:
     @classmethod
     def of(cls, pieces: Pieces) -> Matrix:
         """Sample places on the pieces, and compute their winding numbers there."""
-        faces, places = sampled(pieces, min(SAMPLES, ENTRIES // len(pieces.areas)))
+        faces, places = sampled(pieces, min(LEVEL_PLACES, MATRIX_ENTRIES // len(pieces.areas)))
         order = np.argsort(pieces.labels, kind="stable")
         starts = np.concatenate([[0], np.cumsum(np.bincount(pieces.labels))])
         triangles = pieces.triangles[order]
@@ -122,7 +122,7 @@ class Matrix:
         matrix, balls = np.zeros((len(places), k)), np.c_[centres, reaches]
         corners = np.ascontiguousarray(triangles).reshape(-1, 9)
         _small_pieces(corners, starts, vectors, balls, places, rank[faces], matrix)
-        for piece in np.flatnonzero(np.diff(starts) > LARGE):
+        for piece in np.flatnonzero(np.diff(starts) > TREE_FACES):
             own, begin = owners == piece, starts[piece]
             tree = WindingTree.of(triangles[begin : starts[piece + 1]])
             matrix[~own, piece] = tree.numbers(places[~own])
@@ -145,7 +145,7 @@ class Matrix:
         normal = weighted.T @ self.matrix
         normal += agreement(self.places, self.normals, shares, self.owners).toarray()
         held = np.bincount(self.owners, shares, self.matrix.shape[1])
-        normal[np.diag_indices_from(normal)] += HELD * np.maximum(held, EMPTY)
+        normal[np.diag_indices_from(normal)] += WEIGHT_DAMPING * np.maximum(held, LEAST_AREA_SHARE)
         return np.asarray(scipy.linalg.solve(normal, weighted.T @ (0.5 + self.within), assume_a="pos"))
 
     def levels(self, signs: Floats) -> Floats:
@@ -164,10 +164,10 @@ class Matrix:
 def without_slender(pieces: Pieces) -> Pieces:
     """Halve slender triangles."""
     triangles, labels = pieces.triangles, pieces.labels
-    for _ in range(HALVINGS):
+    for _ in range(SLENDER_HALVINGS):
         lengths = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
-        slender = lengths.max(axis=1) ** 2 > SLENDER * face_areas(triangles)
-        if not slender.any() or len(triangles) + slender.sum() > ELEMENTS:
+        slender = lengths.max(axis=1) ** 2 > SLENDER_TRIANGLE * face_areas(triangles)
+        if not slender.any() or len(triangles) + slender.sum() > MOST_DIPOLES:
             break
         halves = halved(triangles[slender], lengths[slender].argmax(axis=1))
         triangles = np.concatenate([triangles[~slender], halves])
@@ -208,12 +208,12 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
 def _small_pieces(
     corners: Floats, starts: Ints, vectors: Floats, balls: Floats, places: Floats, own: Ints, matrix: Floats
 ) -> None:
-    """Winding numbers of small pieces at places on faces; beyond `FAR` radii they are dipoles."""
+    """Winding numbers of small pieces at places on faces; beyond `PIECE_RADII` radii they are dipoles."""
     for piece in range(len(starts) - 1):
         begin, end = starts[piece], starts[piece + 1]
-        if end - begin > LARGE:
+        if end - begin > TREE_FACES:
             continue
-        beyond = (FAR * balls[piece, 3]) ** 2
+        beyond = (PIECE_RADII * balls[piece, 3]) ** 2
         for p in range(len(places)):
             dx, dy, dz = balls[piece, 0] - places[p, 0], balls[piece, 1] - places[p, 1], balls[piece, 2] - places[p, 2]
             square = dx * dx + dy * dy + dz * dz
@@ -244,8 +244,8 @@ class Dipoles:
         """Make a dipole for each triangle or part of a slender one, or for as many as fit."""
         pieces = without_slender(pieces)
         faces, areas = np.arange(len(pieces.triangles)), pieces.face_areas
-        if len(faces) > ELEMENTS:
-            faces = np.unique(sampled(pieces, ELEMENTS)[0])
+        if len(faces) > MOST_DIPOLES:
+            faces = np.unique(sampled(pieces, MOST_DIPOLES)[0])
             kept = np.bincount(pieces.labels[faces], areas[faces], len(pieces.areas))
             areas = areas * (pieces.areas / np.maximum(kept, np.finfo(float).tiny))[pieces.labels]
         triangles = pieces.triangles[faces]
@@ -264,7 +264,7 @@ class Dipoles:
         low, high = self.tree.bounds[:, :3], self.tree.bounds[:, 3:]
         with np.errstate(invalid="ignore"):  # of nothing
             radii = 0.5 * np.linalg.norm(high - low, axis=1) + float(np.median(self.softening))
-            balls = np.concatenate([0.5 * (low + high), (OPENING * radii[:, None]) ** 2], axis=1)
+            balls = np.concatenate([0.5 * (low + high), (NODE_RADII * radii[:, None]) ** 2], axis=1)
         return np.where(np.isfinite(balls), balls, 0.0)
 
     def chosen(self, kept: Bools) -> Dipoles:
@@ -279,14 +279,14 @@ class Dipoles:
         """(k,) weights after a fixed number of steps of conjugate gradients."""
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
         smooth = agreement(self.places, self.normals, shares, self.owners)
-        held = HELD * np.bincount(self.owners, shares)
+        held = WEIGHT_DAMPING * np.bincount(self.owners, shares)
 
         def system(weights: Floats) -> Floats:
             return self._adjoint(shares * self._numbers(weights)) + smooth @ weights + held * weights
 
         inverse = 1.0 / np.maximum(smooth.diagonal() + held, np.finfo(float).tiny)
         wanted = self._adjoint((0.5 + self.within) * shares)
-        return conjugate_gradients(system, wanted, lambda rest: inverse * rest, tolerance=0.0, limit=STEPS)
+        return conjugate_gradients(system, wanted, lambda rest: inverse * rest, tolerance=0.0, limit=GRADIENT_STEPS)
 
     def levels(self, signs: Floats) -> Floats:
         """(n,) levels at the places, without the bodies ignored there."""
@@ -333,7 +333,7 @@ class Dipoles:
 
 def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> sparse.csr_array:
     """(k, k) signed Laplacian, times μ, of pieces whose neighbours lie roughly in one plane, but not of many places."""
-    n, k = len(places), min(NEIGHBORS, len(places) - 1)
+    n, k = len(places), min(PLANE_NEIGHBORS, len(places) - 1)
     near = scipy.spatial.cKDTree(places).query(places, k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), near.ravel()
     apart = owners[tails] != owners[heads]
@@ -345,7 +345,7 @@ def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> 
     total = np.bincount(tails, np.abs(strength), n) + np.bincount(heads, np.abs(strength), n)
     scale = np.sqrt(shares / np.maximum(total, 1e-12))
     counts = np.bincount(owners)[owners]  # places of two large pieces may be farther apart than the pieces are
-    strength *= AGREEMENT * scale[tails] * scale[heads] / np.minimum(counts[tails], counts[heads])
+    strength *= PLANE_AGREEMENT * scale[tails] * scale[heads] / np.minimum(counts[tails], counts[heads])
     size = int(owners.max()) + 1
     links = sparse.coo_array((strength, (owners[tails], owners[heads])), shape=(size, size)).tocsr()
     links = links + links.T

@@ -31,11 +31,11 @@ from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
 from .point_orientation import fitted_to_points
 
-BLOCK = 4
+DIPOLE_CELLS = 4
 """Edge, in cells, of the blocks whose area vectors are one dipole for the walls."""
-CORE = 2.0
+DIPOLE_CORE = 2.0
 """Within this distance, in cells, the field of a dipole is that of a ball."""
-CLEARANCE = 10
+FAR_FIELD = 10
 """Number of cells that the far field needs between the shape and the walls."""
 
 
@@ -45,13 +45,13 @@ def winding_numbers(samples: AreaSamples) -> Floats:
     nodes, vectors = samples.nodes.nonzero()
     nodes = nodes[:, 1:]
     # layers of nodes are added so that no vectors are near the walls
-    below, above = (np.maximum(0, CLEARANCE - room) for room in (nodes.min(axis=0), shape - 1 - nodes.max(axis=0)))
+    below, above = (np.maximum(0, FAR_FIELD - room) for room in (nodes.min(axis=0), shape - 1 - nodes.max(axis=0)))
     inner = tuple(slice(first, first + n) for first, n in zip(below, shape, strict=True))
     size = tuple((shape + below + above).tolist())
     right = _divergence(nodes + below, vectors, size, spacing)
     dipoles, strengths = blocks_of_dipoles(samples.positions + below, samples.vectors)
     walls = [_wall(axis, end, size) for axis in range(3) for end in (0, 1)]
-    core = CORE * float(spacing.max())
+    core = DIPOLE_CORE * float(spacing.max())
     with ThreadPoolExecutor(n_threads()) as pool:
         jobs = [
             pool.submit(_far_field, lattice.reshape(-1, 3) * spacing, dipoles * spacing, strengths, axis, core)
@@ -73,8 +73,8 @@ def winding_numbers(samples: AreaSamples) -> Floats:
 
 
 def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Floats]:
-    """Mean positions and sums of the area vectors in blocks of `BLOCK` cells."""
-    blocks = np.floor(positions / BLOCK).astype(np.int64)
+    """Mean positions and sums of the area vectors in blocks of `DIPOLE_CELLS` cells."""
+    blocks = np.floor(positions / DIPOLE_CELLS).astype(np.int64)
     blocks -= blocks.min(axis=0)
     owners = blocks[:, 0]
     for column in blocks.T[1:]:
@@ -137,14 +137,14 @@ def _far_field(places: Floats, dipoles: Floats, strengths: Floats, axis: int, co
     return value, slope
 
 
-ROOM = 0.15
+HEAT_PADDING = 0.15
 """Room around the shape, relative to its longest side. The surface stays within it, however large later grids are."""
-NODES = (32, 144)
+HEAT_NODES = (32, 144)
 """Least and most nodes along the longest side."""
-SURE = 0.4
+SURE_WINDING = 0.4
 """The winding number, relative to that inside, decides instead of φ where it is nearer to 0 or 1 than this. φ bulges
 towards the corners of the box: of half a cow as points 11 % are wrong (20 % with .25, 32 % without the rule)."""
-FRAGMENTS = 0.06
+FRAGMENT_LEVEL = 0.06
 """A whole shape of at most this level bounds nothing. An eighth of the faces of a ball has .0625, 400 leaves anywhere
 up to .034, 40 on a stem .043."""
 
@@ -161,13 +161,13 @@ def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0
     """Extract the closed zero set of φ around a shape, in cells as wide as noise; None if it bounds nothing."""
     bounds = shape.bounds
     side = float(np.ptp(bounds, axis=0).max())
-    nodes = int(np.clip((1 + 2 * ROOM) * side / cell, *NODES)) if cell > 0 else NODES[1]
-    grid = Grid.around(bounds, nodes, ROOM * side)
+    nodes = int(np.clip((1 + 2 * HEAT_PADDING) * side / cell, *HEAT_NODES)) if cell > 0 else HEAT_NODES[1]
+    grid = Grid.around(bounds, nodes, HEAT_PADDING * side)
     samples = sample_on_grid([shape], grid)
     winding = winding_numbers(samples)
     areas = np.linalg.norm(samples.vectors, axis=1)
     level = float(np.average(scipy.ndimage.map_coordinates(winding, samples.positions.T, order=1), weights=areas))
-    if level < FRAGMENTS:
+    if level < FRAGMENT_LEVEL:
         return None
     source = GridSource(samples, grid, method.diffusion)
     discretization = discretize(grid)
@@ -178,7 +178,7 @@ def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0
         method.constraint or ZeroSet(),
     )
     share = winding / (2 * level)
-    phi[((phi < 0) & (share < SURE)) | ((phi >= 0) & (share > 1 - SURE))] *= -1.0
+    phi[((phi < 0) & (share < SURE_WINDING)) | ((phi >= 0) & (share > 1 - SURE_WINDING))] *= -1.0
     steps = np.array(grid.spacing)
     if isinstance(shape, PointCloud) and shape.normals is not None:
         phi = fitted_to_points(phi, steps, shape.points - grid.origin, shape.normals)

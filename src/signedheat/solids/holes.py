@@ -21,7 +21,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import element_ids, positive_number
 from .bounding import Bounding, bounding
 from .chain import Chain
-from .closing import NONE, closed_by
+from .closing import NO_EDGES, closed_by
 from .completion import Completion, Lids
 from .rims import boundary, loops
 from .spanning import side_lengths
@@ -140,7 +140,9 @@ def fill_holes(
     chosen &= lengths <= most
     filled, left = ([loop for loop, yes in zip(around, chosen, strict=True) if yes == kind] for kind in (True, False))
     outlines = [np.stack([loop, np.roll(loop, -1)], axis=1) for loop in left]
-    points, added = closed_by(vertices, faces, bent=options.lids == "bent", outlines=np.concatenate([NONE, *outlines]))
+    points, added = closed_by(
+        vertices, faces, bent=options.lids == "bent", outlines=np.concatenate([NO_EDGES, *outlines])
+    )
     virtual = len(vertices) - given.n_vertices  # within polygons, which no lid touches
     added = _as_neighbours(faces, turned, added)
     added = np.where(added < given.n_vertices, added, added - virtual)

@@ -24,19 +24,19 @@ from .contouring import crossings_in, joined_crossings, traced
 
 Function: TypeAlias = Callable[[Floats], ArrayLike]
 """Returns one number for each of (n, 3) points; gradients are three."""
-TOGETHER = 1 << 17
+NODES_AT_ONCE = 1 << 17
 """Batch size for calls of the function."""
-BYTES_PER_NODE = 40.0
+BYTES_PER_FUNCTION_NODE = 40.0
 """Measured memory per node."""
-APART = 1e-9
+LEAST_WEIGHT = 1e-9
 """Nodes with a smaller weight do not count for a point: on an edge of the grid only its ends do."""
-EDGE = np.cos(np.deg2rad(15.0))
+EDGE_COSINE = np.cos(np.deg2rad(15.0))
 """An edge passes between nodes if the cosine between the slope at a node and the mean around it is below this."""
-ROUND = 0.1
+KNOWN_SLOPE = 0.1
 """Slopes that change by a larger share from node to node are not known well."""
-CLEAR = 0.25
+CLEAR_ERRORS = 0.25
 """The maximum or the minimum of planes counts if the ratio of their errors at nodes is below this."""
-CORNERS = np.array(list(np.ndindex(2, 2, 2)))
+CELL_CORNERS = np.array(list(np.ndindex(2, 2, 2)))
 """Corners of a cell."""
 
 
@@ -96,23 +96,23 @@ class NodePlanes:
         cells = (points - self.origin) / self.spacing
         base = np.clip(np.floor(cells).astype(np.int64), 0, np.array(self.values.shape) - 2)
         shares = (cells - base)[:, None]
-        weights = np.where(CORNERS == 1, shares, 1 - shares).prod(axis=2)
-        weights[weights < APART] = 0.0
-        nodes = tuple((base[:, None] + CORNERS).transpose(2, 0, 1))
+        weights = np.where(CELL_CORNERS == 1, shares, 1 - shares).prod(axis=2)
+        weights[weights < LEAST_WEIGHT] = 0.0
+        nodes = tuple((base[:, None] + CELL_CORNERS).transpose(2, 0, 1))
         values, slopes = self.values[nodes], self.gradients[nodes]
         known = (weights > 0) & self.known[nodes]
         shared = np.where(known, weights, 0.0)
         total = shared.sum(axis=1, keepdims=True)
-        middle = (shared[..., None] * slopes).sum(axis=1) / np.maximum(total, APART)
-        slopes = np.where((known | (total < APART))[..., None], slopes, middle[:, None])
-        heights = values + np.einsum("nkd,nkd->nk", slopes, (shares - CORNERS) * self.spacing)
+        middle = (shared[..., None] * slopes).sum(axis=1) / np.maximum(total, LEAST_WEIGHT)
+        slopes = np.where((known | (total < LEAST_WEIGHT))[..., None], slopes, middle[:, None])
+        heights = values + np.einsum("nkd,nkd->nk", slopes, (shares - CELL_CORNERS) * self.spacing)
         mixed, mean = (weights * heights).sum(axis=1), (weights[..., None] * slopes).sum(axis=1)
         ways = unit(slopes)
         together = unit(np.where(known[..., None], ways, 0.0).sum(axis=1))
         agreement = np.where(known, np.einsum("nkd,nd->nk", ways, together), 1.0).min(axis=1)
-        rows = np.flatnonzero(agreement < EDGE)
+        rows = np.flatnonzero(agreement < EDGE_COSINE)
         values, slopes, heights, counts = values[rows], slopes[rows], heights[rows], known[rows]
-        between = (CORNERS[None, :] - CORNERS[:, None]) * self.spacing  # from each corner to the others
+        between = (CELL_CORNERS[None, :] - CELL_CORNERS[:, None]) * self.spacing  # from each corner to the others
         planes = values[:, :, None] + np.einsum("nkd,kjd->nkj", slopes, between)
         errors, places = [], []
         for sign in (1.0, -1.0):
@@ -121,7 +121,7 @@ class NodePlanes:
             errors.append(np.where(counts, np.abs(sign * highest - values), 0.0).sum(axis=1))
             places.append((sign * heights + hidden).argmax(axis=1))
         for own, other, place in zip(errors, errors[::-1], places, strict=True):
-            clear = np.flatnonzero(own < CLEAR * other)
+            clear = np.flatnonzero(own < CLEAR_ERRORS * other)
             mixed[rows[clear]] = heights[clear, place[clear]]
             mean[rows[clear]] = slopes[clear, place[clear]]
         return mixed, mean
@@ -204,10 +204,10 @@ def contour(
     else:
         refuse_beside("an array, which has its own cells", spacing=spacing, resolution=resolution)
         surface, grid = _of_array(f, gradient, box, height)
-    refuse_large_grid(grid, BYTES_PER_NODE)
+    refuse_large_grid(grid, BYTES_PER_FUNCTION_NODE)
     parts = []
-    for begin in range(0, grid.n_nodes, TOGETHER):
-        nodes = np.unravel_index(np.arange(begin, min(begin + TOGETHER, grid.n_nodes)), grid.shape)
+    for begin in range(0, grid.n_nodes, NODES_AT_ONCE):
+        nodes = np.unravel_index(np.arange(begin, min(begin + NODES_AT_ONCE, grid.n_nodes)), grid.shape)
         parts.append(surface.distance(grid.origin + np.stack(nodes, axis=1) * grid.spacing))
     values = np.concatenate(parts).reshape(grid.shape)
     within = [(box[0, k] <= x) & (x <= box[1, k]) for k, x in enumerate(grid.axes)]
@@ -250,8 +250,8 @@ def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats
 def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
     """Call a function on points, and check its (n, 1) or (n, 3) finite numbers."""
     parts = [np.empty((0, *(shape or (1,))))]
-    for begin in range(0, len(points), TOGETHER):
-        asked = points[begin : begin + TOGETHER]
+    for begin in range(0, len(points), NODES_AT_ONCE):
+        asked = points[begin : begin + NODES_AT_ONCE]
         numbers = np.asarray(f(asked), dtype=np.float64)
         if numbers.shape not in ((len(asked), *shape), (len(asked), *(shape or (1,)))):
             raise SignedHeatError(
@@ -284,7 +284,7 @@ def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, 
     if gradient is None:
         along = [_slopes(values, axis) for axis in range(3)]
         slopes, bends = (np.stack(parts, axis=-1) / steps for parts in zip(*along, strict=True))
-        known = np.linalg.norm(bends, axis=-1) <= ROUND * np.linalg.norm(slopes, axis=-1)
+        known = np.linalg.norm(bends, axis=-1) <= KNOWN_SLOPE * np.linalg.norm(slopes, axis=-1)
     else:
         known = np.ones(values.shape, dtype=bool)
         if callable(gradient):
@@ -318,6 +318,6 @@ def _slopes(values: Floats, axis: int) -> tuple[Floats, Floats]:
         least[nodes] = np.where(better, bent, least[nodes])
         if shift:
             sides[nodes] = np.fmax(sides[nodes], bent)
-    through = sides[1:-1] < CLEAR * np.abs(bends)  # both sides bend less by far: an edge runs through the node
+    through = sides[1:-1] < CLEAR_ERRORS * np.abs(bends)  # both sides bend less by far: an edge runs through the node
     least[1:-1] = np.where(through, np.abs(bends), least[1:-1])
     return np.moveaxis(slopes, 0, axis), np.moveaxis(least, 0, axis)

@@ -27,14 +27,11 @@ from .regions import cut_and_sided, widest
 from .tiles import Evaluated
 from .winding import Windings
 
-OFF = 0.5
+MISSING_FACE = 0.5
 """Distance from the faces, in cells, above which a contour shows that faces are missing. Cut edges are nearer."""
-SHIFT = np.array([0.37, 0.41, 0.43])
+WALL_SHIFT = np.array([0.37, 0.41, 0.43])
 """Shift of the walls of boxes, in cells, so that they do not lie in faces along the axes."""
-ATTEMPTS = 6
-"""Number of times that boxes are put around edges that do not join and triangles that pass through each other, each
-time with other walls."""
-SQUARES = np.array([[[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [1, 1, 1], [1, 0, 1]]])
+CELL_SQUARES = np.array([[[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [1, 1, 1], [1, 0, 1]]])
 """Corners of the sides of a cell across the first axis, counter-clockwise as seen from outside."""
 
 
@@ -77,11 +74,11 @@ def given_surface(solid: Evaluated, contour: Callable[[], TriangleMesh], cell: f
         return whole.mesh, np.zeros((0, 3))
     best: tuple[Joined, Boxes | None] | None = None if whole.open else (whole, None)
     surface = contour()
-    bad = [_far(surface, whole.points[whole.faces], OFF * cell)]
+    bad = [_far(surface, whole.points[whole.faces], MISSING_FACE * cell)]
     found: Joined = whole
-    for attempt in range(ATTEMPTS):
+    for attempt in range(6):  # with other walls each time
         bad.append(_along(found.points[found.bad], 0.5 * cell))
-        boxes = Boxes.around(np.concatenate(bad), cell, (attempt + 1) * SHIFT % 1)
+        boxes = Boxes.around(np.concatenate(bad), cell, (attempt + 1) * WALL_SHIFT % 1)
         found = _exchanged(whole, windings, surface, boxes)
         if not found.open and (best is None or len(found.bad) < len(best[0].bad)):
             best = found, boxes
@@ -194,7 +191,7 @@ class Boxes:
                 step = np.zeros(3, dtype=np.int64)
                 step[axis] = 2 * side - 1
                 outer = self.places[~_among(self.places + step, self.places)]
-                found.append(outer[:, None] + np.roll(SQUARES[side], axis, axis=1))
+                found.append(outer[:, None] + np.roll(CELL_SQUARES[side], axis, axis=1))
         quads = np.concatenate(found)
         return self.cell * (np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) + self.shift)
 

@@ -19,18 +19,18 @@ from . import spanning
 from .rims import corners_of
 from .spanning import Frame, Spanned, area_vector, frame_of, points_inside, side_lengths, spanned
 
-PIECES = 128
+LOOP_POINTS = 128
 """Number of points of the loop that a lid spans. Half or twice as many change the volume by less than 1 %."""
-SMOOTH = 1 / 48
+RIM_SMOOTHING = 1 / 48
 """Zigzags of a rim are averaged over this share of its length."""
-ROUNDS = 3
+FILM_ROUNDS = 3
 """Number of times that a film is solved for, each time with the lengths of the last."""
-AT_REST, MOVES = 1e-3, 64
+PLATE_AT_REST, PLATE_MOVES = 1e-3, 64
 """A plate is at rest once it will move by at most this share of the diagonal of its rim, and after so many moves at the
 most. Nearly all plates rest after 5 to 40 moves."""
-CLOSE = 0.5
+RIM_CLEARANCE = 0.5
 """Points of the smooth lid nearer to the rim than this are left out, relative to the mean distance of its points."""
-PLANE = 1e-12
+FILM_AT_REST = 1e-12
 """A film is at rest when it moves by less, relative to its size. One in a plane is at rest from the start."""
 
 
@@ -57,7 +57,7 @@ class SmoothRim:
 
     length: float  # that of the loop
     starts: Floats  # (n + 1,) share of it at which each corner of the loop comes; the last is 1
-    points: Floats  # (k, 3) means over parts of the loop of `SMOOTH` of its length
+    points: Floats  # (k, 3) means over parts of the loop of `RIM_SMOOTHING` of its length
     # (k + 1,) share of its length at which the middle of each part comes, from the corner that is farthest from the
     # loop's centre on, once around
     places: Floats
@@ -80,9 +80,9 @@ class SmoothRim:
 
         away = np.linalg.norm(corners - sums[-1], axis=1)
         first = starts[spanning.farthest(corners, away)]
-        places = first + np.arange(PIECES + 1) / PIECES
-        ends = integral(places[:-1] + 0.5 * SMOOTH), integral(places[:-1] - 0.5 * SMOOTH)
-        return cls(length, starts, (ends[0] - ends[1]) / SMOOTH, places)
+        places = first + np.arange(LOOP_POINTS + 1) / LOOP_POINTS
+        ends = integral(places[:-1] + 0.5 * RIM_SMOOTHING), integral(places[:-1] - 0.5 * RIM_SMOOTHING)
+        return cls(length, starts, (ends[0] - ends[1]) / RIM_SMOOTHING, places)
 
     def edges_at(self, places: Floats) -> Ints:
         """(m,) the last corner before each place."""
@@ -90,9 +90,9 @@ class SmoothRim:
 
 
 def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
-    """Edges and shares of points along a loop: its vertices, and more, at most 1 / `PIECES` of its length apart."""
+    """Edges and shares of points along a loop: vertices, and more, at most 1 / `LOOP_POINTS` of its length apart."""
     lengths = side_lengths(loop)
-    counts = np.maximum(np.ceil(lengths * PIECES / lengths.sum() - 1e-9), 1).astype(np.int64)
+    counts = np.maximum(np.ceil(lengths * LOOP_POINTS / lengths.sum() - 1e-9), 1).astype(np.int64)
     edges, number = numbered(counts)
     return edges, number / counts[edges]
 
@@ -111,7 +111,7 @@ def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:
     inner = inner[triangulation.inner]
     points = triangulation.rim(rim.points)
     first = np.zeros((len(inner), 3)) if frame is None else frame[0] + inner @ frame[1].T
-    places = rim.places[triangulation.edges] + triangulation.shares / PIECES
+    places = rim.places[triangulation.edges] + triangulation.shares / LOOP_POINTS
     return Film(
         np.concatenate([points, first]),
         triangulation.faces,
@@ -121,7 +121,7 @@ def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:
     )
 
 
-EVEN = 1e-3
+EVEN_SHARE = 1e-3
 """Share to which points around a disc are as far apart as if all sides of the loop were of one length."""
 
 
@@ -135,12 +135,12 @@ def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tup
     edges, shares = cut_to_pieces(loop)
     if frame is None:
         even = np.arange(len(edges)) / len(edges)  # no two are at one place, where sides are as short as rounding
-        flat = _around_disc((1 - EVEN) * (starts[edges] + shares * np.diff(starts)[edges]) + EVEN * even)
+        flat = _around_disc((1 - EVEN_SHARE) * (starts[edges] + shares * np.diff(starts)[edges]) + EVEN_SHARE * even)
         inner = np.arange(n, len(over.plane))
     else:
         rim = (loop[edges] + shares[:, None] * ways[edges] - frame[0]) @ frame[1]
         away = scipy.spatial.cKDTree(rim).query(over.plane[n:])[0]
-        inner = n + np.flatnonzero(away > CLOSE * float(np.linalg.norm(ways, axis=1).sum()) / PIECES)
+        inner = n + np.flatnonzero(away > RIM_CLEARANCE * float(np.linalg.norm(ways, axis=1).sum()) / LOOP_POINTS)
         edges, shares = np.arange(len(loop)), np.zeros(len(loop))
         flat = (loop - frame[0]) @ frame[1]
     triangulation = spanning.spanned(flat, over.plane[inner])
@@ -166,11 +166,11 @@ def film(pattern: Film) -> Film:
         return pattern
     edges, sides = np.unique(_sides(faces, len(plane)), return_inverse=True)
     shape, size = np.c_[plane, np.zeros(len(plane))], np.ptp(vertices[:n], axis=0).max()
-    for _ in range(1 + ROUNDS):
+    for _ in range(1 + FILM_ROUNDS):
         weights = np.bincount(sides.ravel(), _cotangents(shape, faces).ravel())
         matrix = _laplacian(*np.divmod(edges, len(plane)), np.maximum(weights, 1e-6), len(plane))
         shape = _extended(matrix, vertices[:n])
-        if np.abs(shape - vertices).max() <= PLANE * size:
+        if np.abs(shape - vertices).max() <= FILM_AT_REST * size:
             break
         vertices = shape
     return replace(pattern, vertices=vertices)
@@ -211,7 +211,7 @@ def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: f
     springs = (1.0 / np.maximum(held, 1e-9) - 1.0) * 0.25 * width * 0.5 * (lengths + np.roll(lengths, 1))
     size = float(np.linalg.norm(np.ptp(rim, axis=0)))
     moves, share = [size], 1.0
-    for _ in range(MOVES):
+    for _ in range(PLATE_MOVES):
         up = vertex_normals(lid)
         matrix = stiffness(lid)
         areas = np.bincount(lid.faces.ravel(), np.repeat(face_areas(lid.vertices[lid.faces]) / 3, 3))
@@ -232,7 +232,7 @@ def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: f
         if not moves[-1] <= size:
             return None
         slowed = moves[-1] / moves[-2]
-        if slowed < 1 and moves[-1] * slowed / (1 - slowed) <= AT_REST * size:
+        if slowed < 1 and moves[-1] * slowed / (1 - slowed) <= PLATE_AT_REST * size:
             break
     return lid
 
@@ -279,13 +279,13 @@ def running_mean(values: Floats, reach: int) -> Floats:
     return np.convolve(np.concatenate([values[len(values) - reach :], values, values[:reach]]), window, mode="valid")
 
 
-FLAT = 0.01
+COPLANAR = 0.01
 """Distance from a plane, relative to their size, below which points lie in it."""
-FOLDED = -0.8
+FOLDED_LID = -0.8
 """Cosine between the normals of a lid and of the surface at its rim below which the lid is folded back."""
-MANY = 256
+FLAT_LID_CORNERS = 256
 """Number of corners above which a flat lid gets inner points, to avoid slivers."""
-MOST_RUNS = 16
+MOST_PLANAR_RUNS = 16
 """Number of planar runs above which a rim has no creased lid."""
 
 
@@ -311,7 +311,7 @@ def is_flat(points: Floats) -> bool:
     """Whether points lie in a plane."""
     around = points - points.mean(axis=0)
     normal = np.linalg.eigh(around.T @ around)[1][:, 0]
-    return bool(np.abs(around @ normal).max() <= FLAT * np.linalg.norm(np.ptp(points, axis=0)))
+    return bool(np.abs(around @ normal).max() <= COPLANAR * np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def flat_lid(loop: Floats) -> tuple[Floats, Ints] | None:
@@ -362,9 +362,9 @@ def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
     starts = points[[side.points[0] for side in sides]]
     ways = unit(np.roll(starts, -1, axis=0) - starts)
     across = unit(np.cross(np.roll(ways, 1, axis=0), ways))
-    goes_on = np.abs((across * np.roll(ways, -1, axis=0)).sum(axis=1)) <= FLAT  # the side after next is coplanar
+    goes_on = np.abs((across * np.roll(ways, -1, axis=0)).sum(axis=1)) <= COPLANAR  # the side after next is coplanar
     begins = np.flatnonzero(~np.roll(goes_on, 1))
-    if not 0 < len(begins) <= MOST_RUNS:
+    if not 0 < len(begins) <= MOST_PLANAR_RUNS:
         return []
     runs = []
     for corner, after in zip(begins, np.append(begins[1:], begins[0] + n), strict=True):
@@ -373,7 +373,7 @@ def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
         places = np.concatenate([*(side.points for side in chosen), sides[(first + count) % n].points[:1]])
         opening = area_vector(points[places])
         surface = np.sum([side.normal for side in chosen], axis=0)
-        folded = opening @ surface <= FOLDED * np.linalg.norm(opening) * np.linalg.norm(surface)
+        folded = opening @ surface <= FOLDED_LID * np.linalg.norm(opening) * np.linalg.norm(surface)
         if is_flat(points[places]) and not (folded and surface.any()):
             runs.append(_Run(first, count, places, opening))
     return sorted(runs, key=lambda run: -float(np.linalg.norm(run.opening)))
@@ -389,7 +389,7 @@ def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple
             continue
         around = (first, second, third)
         planes = unit(np.stack([run.opening for run in around]))
-        if abs(np.linalg.det(planes)) < FLAT:
+        if abs(np.linalg.det(planes)) < COPLANAR:
             continue
         middles = np.stack([points[run.points].mean(axis=0) for run in around])
         peak = np.linalg.solve(planes, (planes * middles).sum(axis=1))
@@ -422,7 +422,7 @@ def _filled(points: Floats, n_rim: int, polygons: list[Ints]) -> tuple[Floats, I
         if frame is None:
             return None
         plane, inner = (corners - frame[0]) @ frame[1], np.empty((0, 2))
-        if len(corners) > MANY:
+        if len(corners) > FLAT_LID_CORNERS:
             inner = points_inside((SmoothRim.of(corners).points - frame[0]) @ frame[1])
         lid = spanned(plane, inner)
         if lid is None:

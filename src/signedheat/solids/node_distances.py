@@ -20,11 +20,11 @@ from ..search.face_tree import FaceTree
 from ..search.nearest_triangles import away_from_triangle, foot_on_triangle
 from .winding import Windings
 
-SLACK = 1e-12
+SQUARE_ROUNDING = 1e-12
 """Relative rounding error of squares."""
 EIGHTHS = np.stack([np.arange(8) >> 2, np.arange(8) >> 1 & 1, np.arange(8) & 1])
 """(3, 8) offsets of the eighths of a cube."""
-CROWDED = 1500
+CROWDED_LEAVES = 1500
 """Number of candidate leaves above which the nodes of a block are searched one by one."""
 ALONG_A_CURVE = np.stack(
     [sum((np.arange(SIDE**3) >> (3 * bit + 2 - axis) & 1) << bit for bit in range(3)) for axis in range(3)], axis=1
@@ -73,7 +73,7 @@ def _inside(windings: Windings, grid: Grid, first: Ints, values: Floats) -> Bool
     """Find the nodes inside; connected nodes farther than half a step from any surface share one test."""
     origin, steps = grid.origin + first * grid.spacing, grid.spacing
     inside = np.zeros(values.shape, dtype=bool)
-    far = values > 0.5 * (1.0 + SLACK) * float(steps.max())
+    far = values > 0.5 * (1.0 + SQUARE_ROUNDING) * float(steps.max())
     groups, count = scipy.ndimage.label(far)
     if count:
         most = np.zeros(count + 1)
@@ -106,10 +106,10 @@ def _fill(
 ) -> Bools:
     """Write nearest faces of nodes, and squared distances; return blocks too crowded. `eighths` is `EIGHTHS`."""
     leaves, parts = len(bounds) // 2, eighths.shape[1]
-    most = BOXES_PER_LEAF * min(CROWDED, leaves) + 1
+    most = BOXES_PER_LEAF * min(CROWDED_LEAVES, leaves) + 1
     faces, counts = np.empty((3, parts, most), dtype=np.int32), np.empty((3, parts), dtype=np.int64)
     places, best, which = np.empty((3, parts)), np.empty(parts), np.empty(parts, dtype=np.int64)
-    away, box, near = np.empty((most, 4, parts)), np.empty(9), np.empty(CROWDED, dtype=np.int64)
+    away, box, near = np.empty((most, 4, parts)), np.empty(9), np.empty(CROWDED_LEAVES, dtype=np.int64)
     stack, cubes = np.empty(64, dtype=np.int64), np.empty((3 * parts, 5), dtype=np.int64)
     crowded = np.zeros(len(firsts), dtype=np.bool_)
     for b in range(len(firsts)):
@@ -188,7 +188,7 @@ def _divide(
         counts[e] = 0
         for d in range(4):
             ways[d, e] = away[which[e], d, e]
-        ways[0, e] = best[e] * (1.0 + SLACK) + half[0] * half[0] + half[1] * half[1] + half[2] * half[2]
+        ways[0, e] = best[e] * (1.0 + SQUARE_ROUNDING) + half[0] * half[0] + half[1] * half[1] + half[2] * half[2]
     a, b, c = 2.0 * half[0], 2.0 * half[1], 2.0 * half[2]
     for at in range(count):
         total = 0
@@ -244,7 +244,7 @@ def _can_be_nearest(bounds: Floats, discs: Floats, node: int, box: Floats) -> bo
             least = min(least, y * y - 2.0 * e * (q - y))
         total += least - q * q
         scale += q * q
-    if total >= SLACK * scale:
+    if total >= SQUARE_ROUNDING * scale:
         return False
     thick = discs[node, 7]
     if thick < 0.0:
@@ -257,7 +257,7 @@ def _can_be_nearest(bounds: Floats, discs: Floats, node: int, box: Floats) -> bo
     out = max(1.0 - discs[node, 6] / from_axis, 0.0) if from_axis > 0.0 else 0.0
     up = along - min(max(along, -thick), thick)
     x, y, z = out * x + up * nx, out * y + up * ny, out * z + up * nz  # from the nearest place of the disc
-    low = x * x + y * y + z * z - scale * (1.0 + SLACK)
+    low = x * x + y * y + z * z - scale * (1.0 + SQUARE_ROUNDING)
     for d in range(3):
         away = x if d == 0 else y if d == 1 else z
         low -= 2.0 * box[3 + d] * abs(away - box[d] + box[6 + d]) + box[3 + d] * box[3 + d]

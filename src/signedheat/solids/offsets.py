@@ -28,9 +28,9 @@ from .tiles import Evaluated
 
 Reach: TypeAlias = Callable[[Floats], Floats]
 """Signed distance of the surface from each of (n, 3) places of the solid."""
-TOGETHER = 1e-7
+MEETING_DISTANCE = 1e-7
 """Triangles meet at a place if their distances from it differ by at most this, relative to the size of the solid."""
-STEP = 1e-6
+DIFFERENCE_STEP = 1e-6
 """Step of the differences that say how a distance varies, relative to the size of the solid."""
 ALONG_AXES = np.concatenate([np.eye(3), -np.eye(3)])
 
@@ -98,7 +98,7 @@ class Offset:
             return heights, gradients
         sides = np.sign(reach[near])
         features, tree = self.solid.tree.features, self.solid.tree.tree
-        slack = TOGETHER * float(np.ptp(tree.bounds[1].reshape(2, 3), axis=0).max())
+        slack = MEETING_DISTANCE * float(np.ptp(tree.bounds[1].reshape(2, 3), axis=0).max())
 
         def part(rows: Floats) -> tuple[Floats, Ints]:
             return _steepest(features.rows, tree.bounds, tree.items, self._normals, rows, slack)
@@ -120,7 +120,7 @@ class Offset:
     def _variation(self, points: Floats) -> Floats:
         """(n, 3) gradients of the distance of the surface, at the nearest places of points."""
         assert callable(self.reach)
-        step = STEP * float(np.ptp(self.solid.tree.tree.bounds[1].reshape(2, 3), axis=0).max())
+        step = DIFFERENCE_STEP * float(np.ptp(self.solid.tree.tree.bounds[1].reshape(2, 3), axis=0).max())
         around = (points[:, None] + step * ALONG_AXES).reshape(-1, 3)
         reaches = self.reach(self.solid.tree.search(around).places).reshape(-1, 2, 3)
         return (reaches[:, 0] - reaches[:, 1]) / (2 * step)
@@ -175,9 +175,9 @@ def _steepest(
     return heights, faces
 
 
-SMOOTH = np.cos(np.deg2rad(40.0))
+SMOOTH_RIM = np.cos(np.deg2rad(40.0))
 """A rim is smooth between two sides if the cosine between the directions away from them is above this."""
-ASIDE = 1e-7
+OFF_SYMMETRY = 1e-7
 """Places are moved off planes of symmetry by this share of a cell before they are measured."""
 
 
@@ -223,11 +223,11 @@ class SheetWall:
         at_ends = np.stack([outward, outward], axis=1)
         for end, other in ((0, 0), (1, 1)):  # mean directions where the rim is smooth
             mates = around[ends[on_rim][:, end], other]
-            smooth = (mates >= 0) & (np.einsum("ni,ni->n", outward, outward[mates]) > SMOOTH)
+            smooth = (mates >= 0) & (np.einsum("ni,ni->n", outward, outward[mates]) > SMOOTH_RIM)
             at_ends[smooth, end] = unit(outward[smooth] + outward[mates[smooth]])
         rim = TriangleTree.of(places[:, [0, 1, 1]]) if len(places) else None
         outward = np.concatenate([at_ends, np.zeros((1, 2, 3))])
-        step = ASIDE * float(grid.spacing.min())
+        step = OFF_SYMMETRY * float(grid.spacing.min())
         return cls(FaceTree.of(features), grid.origin, step, above, below, rim, places, sides, around, outward)
 
     def depths(self, points: Floats) -> Floats:

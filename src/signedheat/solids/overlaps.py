@@ -27,11 +27,7 @@ from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import unit
 from ..search.winding_tree import WindingTree, mean_angle
 from .gauss import Dipoles, Matrix, Pieces, sampled
-from .winding import INSIDE
-
-FEW = 16
-"""If the level of at most this many triangles of a group is wanted, the triangles of the group are summed one by
-one."""
+from .winding import INSIDE_WINDING, SUMMED_POINTS
 
 
 def directed(triangles: Floats, counts: Floats | Ints) -> Floats:
@@ -47,9 +43,9 @@ def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) ->
     rank = np.argsort(order)
     corners = np.ascontiguousarray(triangles[order]).reshape(-1, 9)
     wanted = np.bincount(labels[faces])[labels[faces]]
-    levels, few = np.zeros(len(faces)), np.flatnonzero(wanted <= FEW)
+    levels, few = np.zeros(len(faces)), np.flatnonzero(wanted <= SUMMED_POINTS)
     levels[few] = _among_few(corners, starts, counts[order], rank[faces[few]], labels[faces[few]])
-    for group in np.unique(labels[faces][wanted > FEW]):
+    for group in np.unique(labels[faces][wanted > SUMMED_POINTS]):
         chosen = np.flatnonzero(labels[faces] == group)
         members = order[starts[group] : starts[group + 1]]
         tree, some = WindingTree.of(directed(triangles[members], counts[members])), triangles[faces[chosen]]
@@ -87,7 +83,7 @@ SHEET = 0.146
 · ¼. Flat and wavy sheets have 0, a seventh of a ball .16, half of one .31, all of it ½."""
 HINT = 0.5
 """A piece was given as facing one way if the area that does so exceeds the rest by this share."""
-APART = 0.05
+OUTSIDE = 0.05
 """Two bodies overlap if a larger share of the area of one lies outside the other; a body lies within if at most this
 share of its rims is outside. Half of the rims of a bowl's or a vase's inside lie outside its outside."""
 
@@ -170,9 +166,9 @@ def bodies_around(
     full = 2 * np.abs(np.append(bodies.levels, 0.5))[others]
     share = np.clip(numbers_there / full, 0.0, 1.0)  # 1 as if nothing of the other body was gone
     surface_within = np.maximum(
-        *(mean(~on_rim, share > INSIDE, *pair) for pair in ((homes_there, others), (others, homes_there)))
+        *(mean(~on_rim, share > INSIDE_WINDING, *pair) for pair in ((homes_there, others), (others, homes_there)))
     )
-    not_nested, enclosed = surface_within < 1 - APART, mean(on_rim, share, homes_there, others) >= 1 - APART
+    not_nested, enclosed = surface_within < 1 - OUTSIDE, mean(on_rim, share, homes_there, others) >= 1 - OUTSIDE
     every = np.ones(count, dtype=bool)
     stays = {"given": bodies.as_given, "cavities": ~every, "bodies": every}[nested][homes_there]
     ignored = (homes_there != others) & (not_nested | (enclosed & stays))

@@ -40,15 +40,15 @@ def orient_points(cloud: PointCloud) -> tuple[PointCloud, OrientedPoints]:
     return PointCloud(cloud.points, normals, cloud.areas, cloud.n_neighbors), OrientedPoints(fitted, turned)
 
 
-NEIGHBOURS = 30
+FIT_NEIGHBORS = 30
 """Number of nearest points for each node."""
-FITTED = 12
+WEIGHTED_POINTS = 12
 """Number of those that get a weight, among those that face along ∇φ."""
-ALIKE = 0.3
+FACING_COSINE = 0.3
 """Cosine between normal and ∇φ above which a point faces along ∇φ."""
-WIDTH = 2.0
+FIT_WIDTH = 2.0
 """Width of the fit on both sides of the zero set, in cells, as a cubic interpolant needs."""
-REACH = 1.5
+FIT_REACH = 1.5
 """The fit has full weight within this distance of points, in mean gaps; one gap farther it has none."""
 
 
@@ -59,10 +59,10 @@ def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats
     of their normals: the planes with either lie on two sides of a curved surface. Points against ∇φ do not count.
     """
     tree = scipy.spatial.cKDTree(points)
-    n_neighbours = min(NEIGHBOURS, len(points))
+    n_neighbours = min(FIT_NEIGHBORS, len(points))
     gap = mean_gap(points)
     result = np.array(phi, dtype=np.float64)
-    nodes = np.argwhere(np.abs(phi) < WIDTH * float(steps.max()))
+    nodes = np.argwhere(np.abs(phi) < FIT_WIDTH * float(steps.max()))
 
     def moves(rows: Ints) -> tuple[Floats]:
         places, along = rows * steps, unit(_slopes(phi, rows, steps))
@@ -96,9 +96,9 @@ def _fit(
 ) -> tuple[Floats, Floats]:
     """Height of each place above the surface through the (k, n, 3) points around it, and its weight."""
     cosines = np.einsum("pki,pi->pk", normals, ahead)
-    facing = cosines > ALIKE
+    facing = cosines > FACING_COSINE
     ranked = np.sort(np.where(facing, reach, np.inf), axis=1)
-    last = ranked[:, min(FITTED, ranked.shape[1]) - 1]
+    last = ranked[:, min(WEIGHTED_POINTS, ranked.shape[1]) - 1]
     radius = 1.01 * np.where(np.isfinite(last), last, reach[:, -1])
     bell = np.maximum(1.0 - (reach / radius[:, None]) ** 2, 0.0) ** 2
     weights = np.where(facing, bell * cosines**2, 0.0)
@@ -109,4 +109,4 @@ def _fit(
     heights /= np.where(total > 0, total, 1.0)
     gap = gap if gap > 0 else float(reach.max()) or 1.0  # most points coincide
     enough = np.clip(((weights > 0).sum(axis=1) - 2) / 4, 0.0, 1.0)
-    return heights, enough * np.where(total > 0, np.clip(1.0 + REACH - ranked[:, 0] / gap, 0.0, 1.0), 0.0)
+    return heights, enough * np.where(total > 0, np.clip(1.0 + FIT_REACH - ranked[:, 0] / gap, 0.0, 1.0), 0.0)

@@ -20,15 +20,15 @@ from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.triangles import area_vectors, face_areas, heights
 from ..mesh.unit_vectors import angles_around, unit
 from ..mesh.welding import coincident_faces
-from .winding import DEPTH, INSIDE, Windings
+from .winding import INSIDE_WINDING, OFF_FACE, Windings
 
 TOLERANCES: tuple[float, ...] = (SAME_POINT, 10 * SAME_POINT, 100 * SAME_POINT, 1000 * SAME_POINT)
 """Distances below which points are one, relative to the size of a shape: the first with which what bounds is closed. Of
 boxes that touch, with corners moved by 1e-11 to 1e-5 of their size, none is wrong; without the last up to a seventh,
 with the first alone nine tenths (`benchmarks/deciding_numbers.py`)."""
-SAMPLES = 3
+PROBED_FACES = 3
 """Number of faces of each component on both sides of which winding numbers are computed; their median counts."""
-NEAR = 4.0
+PROBE_DISTANCE = 4.0
 """Distance from a face at which its sides are probed, relative to the tolerance for coinciding faces."""
 
 
@@ -59,9 +59,9 @@ class Regions:
         vectors = area_vectors(pieces.points[pieces.faces])
         parents = unit(sums_of(vectors, pieces.origins, int(pieces.origins.max(initial=-1)) + 1))
         normals = parents[pieces.origins[distinct]]
-        step = NEAR * touching * float(np.ptp(pieces.points, axis=0).max())
+        step = PROBE_DISTANCE * touching * float(np.ptp(pieces.points, axis=0).max())
         numbers, contradictions = _windings(pieces.points, pieces.faces[distinct], normals, times, windings, step)
-        behind, ahead = (numbers > INSIDE).T
+        behind, ahead = (numbers > INSIDE_WINDING).T
         behind, ahead = (
             np.where(reverse, *pair) for pair in ((ahead[groups], behind[groups]), (behind[groups], ahead[groups]))
         )
@@ -114,9 +114,9 @@ def _windings(
     # the widest faces of each part
     order = np.lexsort((-heights(points[faces]), labels))
     starts = np.searchsorted(labels[order], np.arange(int(labels.max(initial=-1)) + 1))
-    chosen = order[np.arange(n) - starts[labels[order]] < SAMPLES]
+    chosen = order[np.arange(n) - starts[labels[order]] < PROBED_FACES]
     corners = points[faces[chosen]]
-    away = np.minimum(np.maximum(DEPTH * np.sqrt(face_areas(corners)), step), 0.05 * heights(corners))
+    away = np.minimum(np.maximum(OFF_FACE * np.sqrt(face_areas(corners)), step), 0.05 * heights(corners))
     away, centres = away[:, None] * normals[chosen], corners.mean(axis=1)
     sampled = windings.numbers_once(np.concatenate([centres - away, centres + away]))
     offsets, owners = sampled - levels[chosen].T.ravel(), np.tile(labels[chosen], 2)

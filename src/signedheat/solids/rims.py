@@ -14,16 +14,17 @@ from ..mesh.edges import edge_table
 from ..mesh.triangles import corner_normals
 from ..mesh.unit_vectors import angles_around, unit
 
-PLACES = 8
-"""Number of places on an edge from which edges that run along it are searched for, nearer together than `ALONG`."""
-ALONG = 0.1
+EDGE_PLACES = 8
+"""Number of places on an edge from which edges that run along it are searched for, nearer together than
+`ALONG_EDGE`."""
+ALONG_EDGE = 0.1
 """Two edges run along each other within this distance, relative to the longer one. Chords of the same arc are less than
 .05 apart if it has 16 or more."""
-SHARED = 3
+SHARED_PLACES = 3
 """Number of places of one of two edges that lie along the other. Edges that only meet at a corner share fewer."""
-OPPOSITE = -0.7
+OPPOSITE_EDGES = -0.7
 """Edges run in opposite directions if their cosine is at most this; with 0, leaves that cross are one part."""
-STRAIGHT = 1e-5
+STRAIGHT_RIM = 1e-5
 """A vertex is no corner if the angle between its two edges is at most this, in radians."""
 
 
@@ -119,7 +120,7 @@ def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) ->
 def corners_of(points: Floats) -> Ints:
     """(k,) corners of a closed loop: points where it does not go straight on."""
     ahead = unit(np.roll(points, -1, axis=0) - points)
-    return np.flatnonzero(np.linalg.norm(ahead - np.roll(ahead, 1, axis=0), axis=1) > STRAIGHT)
+    return np.flatnonzero(np.linalg.norm(ahead - np.roll(ahead, 1, axis=0), axis=1) > STRAIGHT_RIM)
 
 
 def meeting_edges(ends: Floats) -> tuple[Ints, Ints, Bools]:
@@ -127,10 +128,10 @@ def meeting_edges(ends: Floats) -> tuple[Ints, Ints, Bools]:
     along = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(along, axis=1)
     ways = along / np.maximum(lengths, 1e-300)[:, None]
-    shares = (np.arange(PLACES) + 0.5) / PLACES
+    shares = (np.arange(EDGE_PLACES) + 0.5) / EDGE_PLACES
     places = (ends[:, :1] + shares[:, None] * along[:, None]).reshape(-1, 3)
-    owners = np.repeat(np.arange(len(ends)), PLACES)
-    tree, reach = scipy.spatial.cKDTree(places), ALONG * lengths[owners]
+    owners = np.repeat(np.arange(len(ends)), EDGE_PLACES)
+    tree, reach = scipy.spatial.cKDTree(places), ALONG_EDGE * lengths[owners]
     counts = tree.query_ball_point(places, reach, return_length=True)
     crowded = np.flatnonzero(counts > 1)  # each place finds itself
     near = tree.query_ball_point(places[crowded], reach[crowded]) if len(crowded) else []
@@ -139,9 +140,9 @@ def meeting_edges(ends: Floats) -> tuple[Ints, Ints, Bools]:
     # each place with the edges that it lies along, whichever of the two is the longer
     beside = np.unique(np.concatenate([first, second]) * len(ends) + owners[np.concatenate([second, first])])
     pairs, shared = np.unique(owners[beside // len(ends)] * len(ends) + beside % len(ends), return_counts=True)
-    pairs = np.stack([pairs // len(ends), pairs % len(ends)], axis=1)[shared >= SHARED]
+    pairs = np.stack([pairs // len(ends), pairs % len(ends)], axis=1)[shared >= SHARED_PLACES]
     first, second = np.unique(np.sort(pairs, axis=1), axis=0).T
     cosines = (ways[first] * ways[second]).sum(axis=1)
     alike = np.where((cosines < 0)[:, None, None], ends[second, ::-1], ends[second])
-    meeting = (np.abs(cosines) > -OPPOSITE) & (ends[first] != alike).any(axis=(1, 2))
+    meeting = (np.abs(cosines) > -OPPOSITE_EDGES) & (ends[first] != alike).any(axis=(1, 2))
     return first[meeting], second[meeting], cosines[meeting] < 0

@@ -18,7 +18,7 @@ from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import finite_number, whole_number
 from .completion import complete
-from .sample_set import WIDTHS, Samples
+from .sample_set import NOISE_WIDTHS, Samples
 
 BYTES_PER_SAMPLE = 165
 """Peak memory per sample, including the search for its nearest face."""
@@ -26,7 +26,12 @@ BYTES_PER_SAMPLE = 165
 
 @within_memory
 def sample(
-    shape: GridField | Shapes, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = WIDTHS, seed: int = 0
+    shape: GridField | Shapes,
+    n: int = 250_000,
+    *,
+    near: float = 0.8,
+    widths: Sequence[float] = NOISE_WIDTHS,
+    seed: int = 0,
 ) -> Samples:
     """Sample points with distances and gradients, near the surface of a shape and around it.
 
@@ -119,7 +124,7 @@ def evenly_on(triangles: Floats, n: int, random: np.random.Generator) -> tuple[F
     return a + u * (b - a) + v * (c - a), faces
 
 
-SHARP = np.deg2rad(30.0)
+SHARP_ANGLE = np.deg2rad(30.0)
 """Angle between two faces above which their edge is sharp."""
 
 
@@ -144,7 +149,7 @@ def training_points(
     on = {"random_surface": (places, normals[faces]), "sharp_surface": _on_sharp_edges(surface, normals, n, random)}
     around = {"vol": center + radius * random.uniform(-1.0, 1.0, (n, 3))}
     for name, (middles, _) in zip(("random_near", "sharp_near"), on.values(), strict=True):
-        widths = radius * np.resize(WIDTHS, len(middles))
+        widths = radius * np.resize(NOISE_WIDTHS, len(middles))
         around[name] = middles + widths[:, None] * random.normal(size=middles.shape)
     labelled: dict[str, Floats] = {}
     for name, points in around.items():
@@ -158,7 +163,7 @@ def _on_sharp_edges(
 ) -> tuple[Floats, Floats]:
     """(n, 3) places uniform along sharp edges, and means of the normals on both sides."""
     pairs = edge_table(surface.faces).pairs
-    pairs = pairs[normals[pairs // 3].prod(axis=1).sum(axis=1) < np.cos(SHARP)]
+    pairs = pairs[normals[pairs // 3].prod(axis=1).sum(axis=1) < np.cos(SHARP_ANGLE)]
     if not len(pairs):
         return np.zeros((0, 3)), np.zeros((0, 3))
     tails, heads = surface.vertices[surface.faces.ravel()[pairs]].swapaxes(0, 1)  # halfedges run opposite ways

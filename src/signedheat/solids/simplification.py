@@ -16,14 +16,12 @@ from ..surfaces.triangle_mesh import TriangleMesh
 
 manifold3d: Any = lazy_module("manifold3d", "simplified surfaces")
 
-ATTEMPTS = 8
+TOLERANCE_ATTEMPTS = 8
 """Number of attempts, each with half the tolerance for manifold3d, until its result is acceptable. Of 51 surfaces at
 .02 to .5 cells 48 took seven or fewer. In the others manifold3d removed a spike or a body larger than the tolerance."""
-ROUNDS = 60
-"""Number of times that pieces are divided; more would prove hardly anything. Parts of 14,000 faces took 17."""
-LEAST = 1e-3
+CUT_WIDTH = 1e-3
 """Least width on both sides of a cut, relative to the tolerance."""
-LARGE = 3.0
+LARGE_PIECE = 3.0
 """Pieces are halved if their longest side exceeds that of the nearest triangle by this factor."""
 
 
@@ -38,7 +36,7 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
             remedy="leave out the tolerance",
             element="surface",
         )
-    for attempt in range(ATTEMPTS):
+    for attempt in range(TOLERANCE_ATTEMPTS):
         simpler = given.simplify(0.5**attempt * tolerance)
         if simpler.is_empty():
             continue
@@ -64,7 +62,7 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
     pieces = mesh.vertices[mesh.faces]
     if tree.nearest(mesh.vertices)[1].max() > distance**2:
         return False
-    for _ in range(ROUNDS):
+    for _ in range(60):  # more would prove hardly anything: parts of 14,000 faces took 17
         faces, squares = tree.nearest(pieces.mean(axis=1))
         if squares.max() > distance**2:
             return False
@@ -72,7 +70,7 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
         rest = of_corners.reshape(-1, 3).max(axis=1) > distance
         if not rest.any():
             return True
-        pieces = _divided(pieces[rest], tree.features.rows[faces[rest]], LEAST * distance)
+        pieces = _divided(pieces[rest], tree.features.rows[faces[rest]], CUT_WIDTH * distance)
     return False
 
 
@@ -87,7 +85,7 @@ def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
     shorter = np.minimum(beyond.max(axis=2), -beyond.min(axis=2))
     side = shorter.argmax(axis=1)
     row = np.arange(len(pieces))
-    large = sides.max(axis=1) > LARGE * rows[:, [9, 12, 15]].max(axis=1)
+    large = sides.max(axis=1) > LARGE_PIECE * rows[:, [9, 12, 15]].max(axis=1)
     cut = ~large & (shorter[row, side] > least)
     return np.concatenate([_cut(pieces[cut], beyond[row, side][cut]), halved(pieces[~cut], sides[~cut].argmax(axis=1))])
 

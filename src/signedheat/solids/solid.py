@@ -33,7 +33,7 @@ from ..validation import finite_number, flag, positive_number, query_points, ref
 from .contouring import announce_lost, sharp_surface
 from .kept_faces import given_surface, unjoined
 from .offsets import Offset, Reach
-from .sample_set import WIDTHS, Samples
+from .sample_set import NOISE_WIDTHS, Samples
 from .simplification import simplified
 from .tiles import Scheduler, band_field, dense_field
 from .winding import Windings
@@ -46,11 +46,11 @@ unions: Any = lazy_module("signedheat.solids.union", "solids")
 if TYPE_CHECKING:
     import pyvista
 
-MANY = 1 << 18
+POINTS_SORTED = 1 << 18
 """Batch size for sorting points."""
-CLEAR = 1e-9
+CLEAR_DISTANCE = 1e-9
 """Relative distance above which the side of a point is reliable."""
-SLANT = 1e-3
+CLEAR_COSINE = 1e-3
 """Cosine between the normal and the direction from the surface above which the side is reliable."""
 ON_SURFACE = 1e-12
 """Relative distance up to which a point is on the surface: the gradient there is the normal."""
@@ -207,8 +207,8 @@ class Solid(Displayed, Represented, Frozen):
 
         places, shape = query_points(points, 3)
         result = np.empty(len(places))
-        for begin in range(0, len(places), MANY):
-            order = begin + order_in_space(places[begin : begin + MANY])
+        for begin in range(0, len(places), POINTS_SORTED):
+            order = begin + order_in_space(places[begin : begin + POINTS_SORTED])
             (result[order],) = in_chunks(measured, places[order])
         return shaped(result, shape)
 
@@ -475,7 +475,7 @@ class Solid(Displayed, Represented, Frozen):
         )
 
     def sample(
-        self, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = WIDTHS, seed: int = 0
+        self, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = NOISE_WIDTHS, seed: int = 0
     ) -> Samples:
         """Sample points with distances and gradients, near the surface and around it: see `signedheat.sample`.
 
@@ -600,8 +600,8 @@ class Solid(Displayed, Represented, Frozen):
 
     def _inside(self, points: Floats, found: NearestFaces) -> Bools:
         """(n,) whether points are inside: by the normal at the nearest place, or the winding number if in doubt."""
-        clear = found.regular & self.bounding[self.features.ids[found.faces]] & (np.abs(found.cosines) > SLANT)
-        clear &= found.distances > CLEAR * float(np.abs(self.tree.tree.bounds[1]).max())
+        clear = found.regular & self.bounding[self.features.ids[found.faces]] & (np.abs(found.cosines) > CLEAR_COSINE)
+        clear &= found.distances > CLEAR_DISTANCE * float(np.abs(self.tree.tree.bounds[1]).max())
         inside = found.cosines < 0
         if not clear.all():
             inside[~clear] = self.windings.inside(points[~clear])

@@ -11,13 +11,11 @@ from ..arrays import Bools, Floats, Ints
 from ..mesh.components import connected_components
 from ..mesh.edges import edge_keys, edge_table
 
-GROWTH = 0.35
+LAYER_GROWTH = 0.35
 """Growth of triangles with their distance from the rim, relative to that distance."""
-TIES = 128
+MOST_TIES = 128
 """Largest number of equally distant points of a loop that are compared, and of places where they are."""
-SPLITS = 8
-"""Number of times that edges of a rim are halved until all of them are edges of the triangulation."""
-MOVED = 1e-9
+TIE_MOVE = 1e-9
 """Points are moved by this, relative to the size of the loop, to choose among equal triangles; rounding is 1e-15."""
 Frame = tuple[Floats, Floats]
 """Origin and (3, 2) axes of a plane."""
@@ -70,11 +68,11 @@ def frame_of(rim: Floats) -> Frame | None:
 
 def farthest(loop: Floats, away: Floats) -> int:
     """Find the point of a closed loop that is farthest away; of several, where the loop then stays away longest."""
-    ties = np.flatnonzero(away > (1 - 1e-9) * away.max())[:TIES]
+    ties = np.flatnonzero(away > (1 - 1e-9) * away.max())[:MOST_TIES]
     if len(ties) == 1:
         return int(ties[0])
     starts = shares_of(loop)[0]
-    onward = (starts[ties, None] + np.arange(TIES) / TIES) % 1.0
+    onward = (starts[ties, None] + np.arange(MOST_TIES) / MOST_TIES) % 1.0
     far = np.interp(onward, starts, np.append(away, away[0])) / max(float(away.max()), 1e-300)
     return int(ties[np.lexsort(np.rint(1e6 * far).T[::-1])[-1]])
 
@@ -101,7 +99,7 @@ def spanned(loop: Floats, inner: Floats) -> Spanned | None:
     """Delaunay triangles of a polygon in the plane, with those points that are inside; None if it crosses itself."""
     count = len(loop)
     edges, shares = np.arange(count), np.zeros(count)
-    for _ in range(SPLITS):
+    for _ in range(8):  # until all edges of the rim, halved, are edges of the triangulation
         n = len(edges)
         rim = loop[edges] + shares[:, None] * (np.roll(loop, -1, axis=0) - loop)[edges]
         points = np.concatenate([rim, inner])
@@ -144,7 +142,7 @@ def counterclockwise(points: Floats) -> Ints:
     numbers = np.arange(len(points))[:, None]
     moves = (numbers * 0.5 * (5**0.5 - 1) * np.array([1.0, 2**0.5])) % 1.0 - 0.5
     size = float(np.ptp(points, axis=0).max())
-    moved = points + MOVED * size * moves
+    moved = points + TIE_MOVE * size * moves
     faces = scipy.spatial.Delaunay(moved).simplices.astype(np.int64)
     a, b, c = moved[faces].transpose(1, 0, 2)
     clockwise = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) < (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
@@ -161,7 +159,7 @@ def points_inside(polygon: Floats) -> Floats:
     layers = [np.zeros((0, 2))]
     begin = 0.75 * size
     while begin < 0.5 * float((high - low).max()):
-        step = size if len(layers) == 1 else GROWTH * begin + size
+        step = size if len(layers) == 1 else LAYER_GROWTH * begin + size
         end = begin + 2.0 * step
         rows = np.arange(low[1], high[1] + step, step * 0.75**0.5)
         columns = np.arange(low[0], high[0] + step, step)
@@ -191,5 +189,5 @@ def points_in_disc(n: int) -> Floats:
         turn += np.pi / count
         angles = turn + 2 * np.pi * np.arange(count) / count
         rings.append(radius * np.stack([np.cos(angles), np.sin(angles)], axis=1))
-        step *= 1 + GROWTH
+        step *= 1 + LAYER_GROWTH
     return np.concatenate(rings)

@@ -39,24 +39,22 @@ from .sampling import evenly_on
 
 pictures: Any = lazy_module("signedheat.view.surface_pictures", "pictures")
 
-N_PLACES = 10_000
+WIDTH_PLACES = 10_000
 """Number of places at which walls and gaps of a shape are measured."""
-SHARE = 0.01
+WIDTH_QUANTILE = 0.01
 """Quantile of the widths of walls, or gaps, that is reported."""
-OPPOSITE = -0.5
+OPPOSITE_FACES = -0.5
 """Cosine between the normals of faces below which they are opposite sides of a wall."""
-COINCIDENT = 1e-6
+COINCIDENT_FACES = 1e-6
 """Faces at this distance or less coincide, to single precision, relative to the largest coordinate."""
-SMOOTH = np.cos(np.deg2rad(25.0))
+SMOOTH_EDGE = np.cos(np.deg2rad(25.0))
 """Cosine between the normals of two faces above which the surface is smooth across their edge."""
-SLACK = 4e-3
+ROUND_WALL = 4e-3
 """A round wall may reach into a ball by this share of the square of its radius."""
 FINER = 1e-2
 """Around the place that the ball touches the share becomes smaller by this factor, again and again."""
 SETTLED = 1e-12
 """That share for flat walls."""
-STEPS = 60
-"""Largest number of steps towards a diameter."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +196,7 @@ class Thickness(Frozen):
         return f"Thickness({len(self.values)} faces, {low:.3g} to {high:.3g}, median {median:.3g})"
 
 
-BYTES_PER_PIECE = 400.0
+BYTES_PER_FACE_PIECE = 400.0
 """Peak memory per piece of a face, measured on a ball cut into 240,000."""
 
 
@@ -246,7 +244,7 @@ def thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
     refuse_beyond_memory(
         f"thickness at {pieces:,} places",
         pieces,
-        lambda n: BYTES_PER_PIECE * n,
+        lambda n: BYTES_PER_FACE_PIECE * n,
         lambda fits: f"lower the resolution from {parts} to {int(parts * np.sqrt(fits / pieces))}",
     )
     triangles, owners = _cut(solid.outward, largest)
@@ -265,7 +263,7 @@ def widths(shape: Mesh) -> Widths:
     triangles = triangles[face_areas(triangles) > 0]
     if not len(triangles):
         return Widths(None, None, None, None, None, None)
-    places, faces = evenly_on(triangles, N_PLACES, np.random.default_rng(0))
+    places, faces = evenly_on(triangles, WIDTH_PLACES, np.random.default_rng(0))
     normals, tree = _normals_at(triangles, faces, places), FaceTree.of_triangles(triangles)
     facing = tree.features.face_normals
     names, ids = indexed(triangles)[1], tree.features.ids
@@ -277,8 +275,8 @@ def widths(shape: Mesh) -> Widths:
     walls, gaps = measured
     thinnest = None if np.isnan(walls).all() else int(np.nanargmin(walls))
     return Widths(
-        wall=_quantile(walls, SHARE),
-        gap=_quantile(gaps, SHARE),
+        wall=_quantile(walls, WIDTH_QUANTILE),
+        gap=_quantile(gaps, WIDTH_QUANTILE),
         typical_wall=_quantile(walls, 0.5),
         typical_gap=_quantile(gaps, 0.5),
         thinnest=None if thinnest is None else float(walls[thinnest]),
@@ -290,7 +288,7 @@ def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) 
     """(n,) diameters of largest balls behind places, or NaN, and the face each touches; `facing` 0 is no wall."""
     lower, upper = tree.tree.bounds[1, :3], tree.tree.bounds[1, 3:]
     extent = float(np.linalg.norm(upper - lower))
-    least = COINCIDENT * float(np.abs(tree.tree.bounds[1]).max())
+    least = COINCIDENT_FACES * float(np.abs(tree.tree.bounds[1]).max())
 
     # least and greatest components of the normals of all faces below each node
     ways = BoxTree.in_order(facing, facing, tree.tree.items[: len(facing)]).bounds
@@ -310,7 +308,7 @@ def _normals_at(triangles: Floats, faces: Ints, places: Floats) -> Floats:
     """(n, 3) unit normals at places, mixed of means at corners: others would tilt balls, and make them small."""
     ids = indexed(triangles)[1]
     flat, pairs = unit(area_vectors(triangles)), edge_table(ids).pairs
-    pairs = pairs[np.einsum("ij,ij->i", *flat[pairs // 3].swapaxes(0, 1)) > SMOOTH]
+    pairs = pairs[np.einsum("ij,ij->i", *flat[pairs // 3].swapaxes(0, 1)) > SMOOTH_EDGE]
     following = np.roll(np.arange(ids.size).reshape(-1, 3), -1, axis=1).ravel()
     first, second = pairs.T
     fans = connected_components(ids.size, np.append(first, following[first]), np.append(following[second], second))
@@ -352,13 +350,13 @@ def _descend(
 ) -> None:
     """Diameters, no more than in `out`, at (n, 6) places and their normals: what reaches into a ball makes it smaller.
 
-    Less than `SLACK` is left out first, since a ball that fits a round wall touches all of it; then `FINER`, and so on.
+    Less than `ROUND_WALL` is left out first: a ball that fits a round wall touches all of it; then `FINER`, and so on.
     """
     leaves, stack = len(bounds) // 2, np.empty(66, dtype=np.int64)
     for p in range(len(places)):
         x, y, z = places[p, 0], places[p, 1], places[p, 2]
         nx, ny, nz = places[p, 3], places[p, 4], places[p, 5]
-        diameter, tx, ty, tz, reach, slack = out[p], x, y, z, np.inf, SLACK
+        diameter, tx, ty, tz, reach, slack = out[p], x, y, z, np.inf, ROUND_WALL
         while slack > SETTLED:
             stack[0], depth = 1, 1
             while depth > 0:
@@ -372,7 +370,7 @@ def _descend(
                 least_cosine = 0.0
                 for k, along in ((0, nx), (1, ny), (2, nz)):
                     least_cosine += min(along * ways[node, k], along * ways[node, 3 + k])
-                if least_cosine >= OPPOSITE:
+                if least_cosine >= OPPOSITE_FACES:
                     continue
                 if discs[node, 7] >= 0.0:
                     dx, dy, dz = mx - discs[node, 0], my - discs[node, 1], mz - discs[node, 2]
@@ -390,10 +388,10 @@ def _descend(
                     continue
                 for item in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
                     f = items[item]
-                    if f < 0 or not facing[f, 0] * nx + facing[f, 1] * ny + facing[f, 2] * nz < OPPOSITE:
+                    if f < 0 or not facing[f, 0] * nx + facing[f, 1] * ny + facing[f, 2] * nz < OPPOSITE_FACES:
                         continue
                     best, qx, qy, qz = diameter, tx, ty, tz
-                    for _ in range(STEPS):
+                    for _ in range(60):
                         radius = 0.5 * best
                         mx, my, mz = x - radius * nx, y - radius * ny, z - radius * nz
                         square, _, fx, fy, fz = foot_on_triangle(rows, f, mx, my, mz)

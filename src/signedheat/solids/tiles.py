@@ -42,17 +42,17 @@ from ..validation import positive_number
 from .node_distances import distances_in, solved
 from .winding import Windings
 
-EDGE = 8
+TILE = 8
 """Blocks along each edge of the tiles of dense grids; small, so that threads finish together."""
-BYTES_PER_NODE = 12.0
+BYTES_PER_DENSE_NODE = 12.0
 """Memory per node for a value and a confidence."""
 BYTES_AT_WORK = 40e6
 """Measured memory of tiles computed at once, and of compiled kernels."""
 BYTES_IN_BAND = 6.5
 """Memory per node of a band, including its share of the tables of blocks."""
-COARSE = 65
+COARSE_NODES = 65
 """About the most nodes along the longest side of the coarse grid of a band, whose cells are 2, 4, 8, … fine ones."""
-SOME, UNSURE = 1024, 1.5
+FOLLOWED_CUBES, COUNT_FACTOR = 1024, 1.5
 """Cubes of each size that are followed to estimate the number of blocks, and by what factor it may be wrong."""
 Result = TypeVar("Result")
 
@@ -77,14 +77,14 @@ class Evaluated(SolidQueries, Protocol):
 def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> GridField[Literal[3]]:
     """Compute the signed distance to a solid at all nodes of a grid."""
     refuse_plane_grid(grid)
-    refuse_large_grid(grid, BYTES_PER_NODE, BYTES_AT_WORK)
+    refuse_large_grid(grid, BYTES_PER_DENSE_NODE, BYTES_AT_WORK)
     values, confidence = np.empty(grid.shape), np.empty(grid.shape, dtype=np.float32)
     n_blocks = -(-np.array(grid.shape) // SIDE)
-    firsts = np.stack(np.meshgrid(*(np.arange(0, n, EDGE) for n in n_blocks), indexing="ij"), axis=-1).reshape(-1, 3)
+    firsts = np.stack(np.meshgrid(*(np.arange(0, n, TILE) for n in n_blocks), indexing="ij"), axis=-1).reshape(-1, 3)
     tree, windings = prepared(solid)
 
     def tile(first: Ints) -> tuple[Floats, NDArray[np.float32]]:
-        stop = np.minimum(first + EDGE, n_blocks)
+        stop = np.minimum(first + TILE, n_blocks)
         axes = (np.arange(*ends) for ends in zip(first, stop, strict=True))
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         return distances_in(tree, windings, grid, SIDE * first, places)
@@ -109,7 +109,7 @@ def band_field(
     refuse_plane_grid(grid)
     width = positive_number(width, "band")
     tree, windings = prepared(solid)
-    coarse = dense_field(solid, coarser(grid, 1 << max(0, math.ceil(math.log2(max(grid.shape) / COARSE)))), None)
+    coarse = dense_field(solid, coarser(grid, 1 << max(0, math.ceil(math.log2(max(grid.shape) / COARSE_NODES)))), None)
     reach = width + float(np.linalg.norm(grid.spacing))  # complete the cells at the ends of the band
     limit = blocks_that_fit(store)
     places, factor = blocks_near(tree, grid, reach, limit)
@@ -144,7 +144,7 @@ def band_field(
 
 def tiles_of(blocks: Blocks) -> list[Ints]:
     """Rows of the blocks of each tile."""
-    tiles = blocks.places.astype(np.int64) // EDGE
+    tiles = blocks.places.astype(np.int64) // TILE
     _, owners = np.unique(tiles, axis=0, return_inverse=True)
     order = np.argsort(owners.ravel(), kind="stable")
     return np.split(order, np.flatnonzero(np.diff(owners.ravel()[order])) + 1)
@@ -164,9 +164,9 @@ def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> tuple[I
 def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: float) -> tuple[Ints, int]:
     """(n, 3) places of blocks that `near` wants, and 1; or none, and how many times larger cells would have to be."""
     if math.prod(-(-n // SIDE) for n in grid.shape) > limit:
-        numbers = {side: number for side, _, number in _cubes(grid, near, SOME)}
-        if max(numbers.values()) > UNSURE * limit:
-            return np.zeros((0, 3), dtype=np.int64), 2 * max(s for s in numbers if numbers[s] * UNSURE > limit)
+        numbers = {side: number for side, _, number in _cubes(grid, near, FOLLOWED_CUBES)}
+        if max(numbers.values()) > COUNT_FACTOR * limit:
+            return np.zeros((0, 3), dtype=np.int64), 2 * max(s for s in numbers if numbers[s] * COUNT_FACTOR > limit)
     for side, places, number in _cubes(grid, near, None):
         if number > limit:
             return places[:0], 2 * side
@@ -233,9 +233,6 @@ def in_threads(solve: Callable[[Ints], Result], places: Iterable[Ints]) -> Itera
 
 
 distributed: Any = lazy_module("distributed", "Dask clusters")
-
-RETRIES = 3
-"""Number of times a cluster retries a tile after its worker has died."""
 
 
 class ClusterClient(Protocol):
@@ -379,7 +376,7 @@ def _computed(folder: str, key: str, missing: list[int], scheduler: Scheduler) -
         jobs = [scheduler.submit(solve_into, folder, key, number) for number in missing]
         yield from _finished(jobs, as_completed(jobs), folder)
     else:  # not `pure`, because tasks have side effects
-        options = {"pure": False, "retries": RETRIES}
+        options = {"pure": False, "retries": 3}
         jobs = [scheduler.submit(solve_into, folder, key, number, **options) for number in missing]
         yield from _finished(jobs, distributed.as_completed(jobs), folder)
 

@@ -28,7 +28,7 @@ from .regions import cut_and_sided
 from .solid import Solid, completed_area, still_true
 from .winding import Windings
 
-TRUST = 0.05
+TRUST_DISTANCE = 0.05
 """Confidence in the completion is ½ at this distance from given faces, relative to the shape's diagonal."""
 
 
@@ -143,7 +143,7 @@ def _confidence(triangles: Floats, given: Bools, whole: TriangleGroup, points: F
         return confidence
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     away = scipy.spatial.cKDTree(points).query(triangles[~given].mean(axis=1), workers=-1)[0]
-    trust = TRUST * diagonal / np.maximum(TRUST * diagonal + away, np.finfo(float).tiny)
+    trust = TRUST_DISTANCE * diagonal / np.maximum(TRUST_DISTANCE * diagonal + away, np.finfo(float).tiny)
     confidence[~given] = np.minimum(trust, np.nextafter(np.float32(1), np.float32(0)))
     return confidence
 
@@ -164,7 +164,7 @@ def joined_surfaces(surfaces: list[TriangleGroup]) -> TriangleGroup:
     )
 
 
-BOX = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+BOX_SIDES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
 """Corners of the sides of a box, counter-clockwise as seen from outside; corner 4 i + 2 j + k is at (i, j, k)."""
 
 
@@ -184,7 +184,7 @@ def intersection(a: Solid, b: Solid) -> Solid:
     room = float(np.ptp(bounds, axis=0).max())
     lower, upper = bounds[0] - room, bounds[1] + room
     corners = np.where(np.array(list(np.ndindex(2, 2, 2))) > 0, upper, lower)
-    inwards = np.concatenate([BOX[:, [0, 2, 1]], BOX[:, [0, 3, 2]]])
+    inwards = np.concatenate([BOX_SIDES[:, [0, 2, 1]], BOX_SIDES[:, [0, 3, 2]]])
     return _combination(a, b, turned=False, around=corners[inwards])
 
 

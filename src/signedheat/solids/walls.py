@@ -19,7 +19,7 @@ NARROW = 0.3
 angles to the surface; where the surface goes straight on, it closes them if its area is the lesser one. A bowl of half
 a ball whose wall is a quarter of its radius has .28, a box without its lid, a tenth as thick as it is wide, .32, two
 square sheets a quarter of their width apart .5."""
-LARGE = 0.1
+LARGE_OPENING = 0.1
 """A wall ends where the area of those lids exceeds this share of their parts' area. Otherwise each side goes on over
 its own opening: holes two fifths as wide as a hollow ball have .04, a cup .2, a bowl .5."""
 
@@ -148,7 +148,7 @@ def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
             if (smaller.radius, j) >= (larger.radius, i) or larger.opening @ smaller.opening >= 0:
                 continue
             lids = float(np.linalg.norm(larger.opening) + np.linalg.norm(smaller.opening))
-            if lids > LARGE * areas[np.unique(np.concatenate([larger.parts, smaller.parts]))].sum():
+            if lids > LARGE_OPENING * areas[np.unique(np.concatenate([larger.parts, smaller.parts]))].sum():
                 (area, onward), (again, back) = _way(larger, smaller), _way(smaller, larger)
                 if area + again <= 2 * lids * (NARROW + (1 - NARROW) * (onward + back) / max(area + again, 1e-300)):
                     widths.append(((area + again) / lids, i, j))

@@ -13,11 +13,11 @@ from ..mesh.edges import edge_table
 from ..mesh.welding import same_positions
 from ..search.winding_tree import WindingTree, steps_off, winding_sums
 
-INSIDE = 0.5
+INSIDE_WINDING = 0.5
 """Winding number above which a point is inside; exact winding numbers are integers."""
-FEW = 16
-"""For this many points or fewer a sum over all triangles takes less time and memory than a tree."""
-DEPTH = 1e-6
+SUMMED_POINTS = 16
+"""At this many points or fewer, sums over all triangles take less time and memory than a tree."""
+OFF_FACE = 1e-6
 """Offset in front of a face and behind it, relative to its size."""
 
 
@@ -49,15 +49,15 @@ class Windings(Frozen):
 
     def numbers_once(self, points: Floats) -> Floats:
         """(n,) winding numbers, summed without a tree if the points are few: for callers that ask only once."""
-        return winding_sums(self.triangles, points) if len(points) <= FEW else self.numbers(points)
+        return winding_sums(self.triangles, points) if len(points) <= SUMMED_POINTS else self.numbers(points)
 
     def inside(self, points: Floats) -> Bools:
         """(n,) whether points are inside."""
-        return self.numbers(points) > INSIDE
+        return self.numbers(points) > INSIDE_WINDING
 
     def sides(self, triangles: Floats) -> tuple[Bools, Bools]:
         """(n,) whether places just behind (n, 3, 3) triangles are inside; and the same just in front of them."""
-        step, centres = steps_off(triangles, DEPTH), triangles.mean(axis=1)
+        step, centres = steps_off(triangles, OFF_FACE), triangles.mean(axis=1)
         return self.inside(centres - step), self.inside(centres + step)
 
 

@@ -175,18 +175,16 @@ class DigitalSurface(Displayed, Surface):
         return f"DigitalSurface({' × '.join(map(str, self.volume.shape))} voxels, radius={self.radius:.3g})"
 
 
-STAY = 0.003
+STAYING = 0.003
 """Weight of staying in the middle of a cell: stairs some four voxels long become slopes. Mean error of normals of a
 ball, an ellipsoid and a torus of 96 voxels: 1.0° to 1.4°; at .01 1.8° to 2.1°, at .001 .8° to 1.3°; of a box along the
 axes, whose sides bend outwards, 5.5°, 4.4°, 6.5°."""
-REACH = 0.49
+LARGEST_MOVE = 0.49
 """Largest move of a vertex along each axis, in voxels: below a half, so that no two coincide, in single precision
 either."""
-STEP = 0.24
-"""Step of the gradient descent, at which every bending mode decays: below 2 / (2² + STAY)."""
-MOST = 200
-"""Largest number of steps; the slowest modes that `STAY` allows need about 4 / √STAY."""
-MOVED = 1e-4
+DESCENT_STEP = 0.24
+"""Step of the gradient descent, at which every bending mode decays: below 2 / (2² + `STAYING`)."""
+LAST_MOVE = 1e-4
 """Largest move of a vertex in the last step, in voxels."""
 
 
@@ -203,7 +201,7 @@ def surface_net(volume: Bools) -> tuple[Floats, Ints]:
     rows = np.arange(len(first))
     shares = relaxed[cells.quads, along[:, None]].mean(axis=1) - first[rows, along]
     choices = np.stack([relaxed, 0.5 * (relaxed + middles), middles])
-    crossings = replace(crossings, shares=np.clip(shares, 0.5 - REACH, 0.5 + REACH))
+    crossings = replace(crossings, shares=np.clip(shares, 0.5 - LARGEST_MOVE, 0.5 + LARGEST_MOVE))
     vertices, faces = separate_triangles(cells, crossings, choices)
     return vertices - 2, faces
 
@@ -216,7 +214,7 @@ def _rooms(cells: DualCells, crossings: Crossings) -> tuple[Floats, Floats]:
     sums = sums_of(np.repeat(crossed, 4, axis=0), cells.quads.ravel(), count)
     alone = (np.bincount(cells.owners)[cells.owners] == 1)[:, None]
     middles = np.where(alone, cells.places[cells.owners] + 0.5, sums / degrees[:, None])
-    return middles, np.where(alone, REACH, 0.0)
+    return middles, np.where(alone, LARGEST_MOVE, 0.0)
 
 
 def _relaxed(quads: Ints, middles: Floats, room: Floats) -> Floats:
@@ -230,15 +228,15 @@ def _relaxed(quads: Ints, middles: Floats, room: Floats) -> Floats:
     bending = sparse.csr_array(sparse.eye_array(count) - sparse.diags_array(weights) @ links)
     back = bending.T.tocsr()
     places, ahead, pace = middles, middles, 1.0
-    for _ in range(MOST):
-        slope = back @ (bending @ ahead) + STAY * (ahead - middles)
-        new = np.clip(ahead - STEP * slope, middles - room, middles + room)
+    for _ in range(200):  # the slowest modes that `STAYING` allows need about 4 / √STAYING, 73
+        slope = back @ (bending @ ahead) + STAYING * (ahead - middles)
+        new = np.clip(ahead - DESCENT_STEP * slope, middles - room, middles + room)
         returning = ((ahead - new) * (new - places)).sum() > 0
         faster = 1.0 if returning else 0.5 * (1 + np.sqrt(1 + 4 * pace**2))
         ahead = new + (0.0 if returning else (pace - 1) / faster) * (new - places)
         moved = float(np.abs(new - places).max())
         places, pace = new, faster
-        if moved < MOVED:
+        if moved < LAST_MOVE:
             break
     return places
 
@@ -267,9 +265,9 @@ def smoothed_corners(vertices: Floats, corners: Ints, normals: Floats) -> Floats
     return vertices + moved.reshape(n, 3)
 
 
-STEEPEST = 0.05
+STEEPEST_NORMAL = 0.05
 """Least cosine of the angle between a corrected normal and the square's own."""
-WIDEST, NARROWEST = 1e3, 1e-3
+WIDEST_BLUR, NARROWEST_BLUR = 1e3, 1e-3
 """Radius in extents of the volume, and width in voxels, beyond which a blur changes no normal any more."""
 
 
@@ -327,7 +325,7 @@ def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: 
     if radius == 0:
         return own
     extent = spacing * volume.shape
-    width = np.maximum(0.5 * min(radius, WIDEST * float(extent.max())) / spacing, NARROWEST)
+    width = np.maximum(0.5 * min(radius, WIDEST_BLUR * float(extent.max())) / spacing, NARROWEST_BLUR)
     padded = np.pad(volume, 1).astype(np.float32)
     reach = [min(int(4 * w + 0.5), n) for w, n in zip(width, padded.shape, strict=True)]  # beyond, there is nothing
     inside = tuple((surfels.voxels + 1).T)
@@ -339,7 +337,7 @@ def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: 
         gradient[:, axis] = (slope[inside].astype(np.float64) + slope[outside]) / spacing[axis]
     length = np.linalg.norm(gradient, axis=1, keepdims=True)
     normals = np.divide(-gradient, length, out=own.copy(), where=length > 0)
-    steep = STEEPEST - (normals * own).sum(axis=1)
+    steep = STEEPEST_NORMAL - (normals * own).sum(axis=1)
     normals += np.maximum(steep, 0)[:, None] * own
     return normals / np.linalg.norm(normals, axis=1)[:, None]
 

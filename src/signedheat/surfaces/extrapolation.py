@@ -14,9 +14,9 @@ from ..validation import positive_number
 from .surface_discretization import SurfaceDiscretization
 from .surface_source import SurfaceSource
 
-FINE = 263.0
+FINE_EXTENT = 263.0
 """Extent of a surface, in h, above which τ grows: that of 20,000 vertices in equilateral triangles."""
-AT_ENDS = 1 / 3
+TIME_AT_ENDS = 1 / 3
 """τ where curves end, relative to that of the extrapolation: the paper's 1 by default."""
 
 
@@ -74,7 +74,7 @@ def default_diffusion(discretization: Discretization) -> Diffusion:
     """
     if not isinstance(discretization, SurfaceDiscretization):
         return 1.0
-    fineness = max(discretization.extent / FINE, 1.0)
+    fineness = max(discretization.extent / FINE_EXTENT, 1.0)
     return Extrapolated(tau=Extrapolated.tau * fineness ** (2 / 5))
 
 
@@ -87,7 +87,7 @@ def lowered_for_times(discretization: Discretization, sources: Sequence[Any], di
         raise UnsupportedTypeError(
             "directions are extrapolated in time on surfaces only", remedy="pass a number", element="diffusion"
         )
-    at_ends = replace(source, time=AT_ENDS * source.time)
+    at_ends = replace(source, time=TIME_AT_ENDS * source.time)
     if all(source.ending[part.nodes.faces].all() for part in source.parts):  # no part has closed curves alone
         return [at_ends]
     everywhere = replace(source, extrapolated=True)

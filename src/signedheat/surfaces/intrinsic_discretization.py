@@ -18,23 +18,23 @@ from .source_segments import CurveGroups
 from .surface_discretization import SurfaceDiscretization, refuse_too_many, vertices_joined
 from .triangle_mesh import TriangleMesh
 
-SPOILED = 0.0015
-"""Fraction of the area in triangles with an angle above `LARGE`, from which a mesh is refined."""
-LARGE = 120.0
+LARGE_ANGLE_SHARE = 0.0015
+"""Fraction of the area in triangles with an angle above `LARGE_ANGLE`, from which a mesh is refined."""
+LARGE_ANGLE = 120.0
 """Angle in degrees."""
-NEEDLES = 0.1
-"""Fraction of the area in triangles with an angle below `SMALL`, from which a mesh is refined."""
-SMALL = 10.0
+SMALL_ANGLE_SHARE = 0.1
+"""Fraction of the area in triangles with an angle below `SMALL_ANGLE`, from which a mesh is refined."""
+SMALL_ANGLE = 10.0
 """Angle in degrees. Needles resolve distance by their length only, even right-angled ones."""
-ANGLE = 20.0
+AUTO_ANGLE = 20.0
 """Smallest angle of "auto", in degrees: the vertices that 28 would take are better spent on large triangles."""
-COARSEST = 1.41
+COARSEST_TRIANGLE = 1.41
 """Circumradius of the largest triangles, over the mean one: larger ones resolve neither curves nor directions."""
-BYTES_REFINED = 750
+BYTES_PER_REFINED = 750
 """Memory of each triangle of a refinement, besides that of distance on it."""
 SHARE_OF_PIECE = 0.5
 """h over the length of the pieces of a curve that is to be completed, where triangles are larger."""
-THICKNESS = 1e-9
+MOLLIFIED_MARGIN = 1e-9
 """Margin of the triangle inequalities, relative to the mean length, in the triangles that the method runs on."""
 
 
@@ -50,7 +50,7 @@ class Retriangulated:
 
     mesh: TriangleMesh
     progress: Progress | None = field(default=None, repr=False)
-    coarsest: ClassVar[float] = COARSEST
+    coarsest: ClassVar[float] = COARSEST_TRIANGLE
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Refine the mesh intrinsically, with the sources along edges."""
@@ -78,7 +78,7 @@ def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
     """Discretise a domain; refine meshes with many large or small angles, unless faces are too thin for that."""
     if isinstance(domain, TriangleMesh) and is_spoiled(domain):
         try:
-            return refined(domain, progress, angle=ANGLE)
+            return refined(domain, progress, angle=AUTO_ANGLE)
         except GeometryError:
             pass
     return discretize(domain)
@@ -96,9 +96,9 @@ def is_spoiled(mesh: TriangleMesh) -> bool:
     a, b, c = np.sort(mesh.edge_lengths[mesh.edges.face_edges], axis=1).T
     areas = mesh.face_areas
     total = max(float(areas.sum()), 1e-300)
-    large = c**2 - a**2 - b**2 > -2 * np.cos(np.radians(LARGE)) * a * b
-    small = b**2 + c**2 - a**2 > 2 * np.cos(np.radians(SMALL)) * b * c
-    return bool(areas[large].sum() >= SPOILED * total or areas[small].sum() >= NEEDLES * total)
+    large = c**2 - a**2 - b**2 > -2 * np.cos(np.radians(LARGE_ANGLE)) * a * b
+    small = b**2 + c**2 - a**2 > 2 * np.cos(np.radians(SMALL_ANGLE)) * b * c
+    return bool(areas[large].sum() >= LARGE_ANGLE_SHARE * total or areas[small].sum() >= SMALL_ANGLE_SHARE * total)
 
 
 def refined(
@@ -106,10 +106,10 @@ def refined(
     progress: Progress | None = None,
     keep: Sequence[Any] = (),
     angle: float = 28.0,
-    coarsest: float = COARSEST,
+    coarsest: float = COARSEST_TRIANGLE,
 ) -> SurfaceDiscretization:
     """Discretise a mesh by its intrinsic Delaunay refinement; fields are reported on the mesh, and kept on both."""
-    refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", more=BYTES_REFINED * mesh.n_faces)  # which only grow
+    refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", more=BYTES_PER_REFINED * mesh.n_faces)  # which only grow
     domain = intrinsic_delaunay(mesh, keep, refine=True, angle=angle, coarsest=coarsest, progress=progress)
     refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
     return lowered(domain, domain=mesh, restriction=mesh.places, triangulation=domain)
@@ -118,7 +118,7 @@ def refined(
 def lowered(triangulation: IntrinsicTriangulation, /, **options: Any) -> SurfaceDiscretization:
     """Discretise an intrinsic triangulation, with longer edges if triangles are flat; options override fields."""
     triangles = triangulation.triangles
-    lengths, added = mollify(triangles.edge_lengths, THICKNESS)
+    lengths, added = mollify(triangles.edge_lengths, MOLLIFIED_MARGIN)
     if added:
         thicker = IntrinsicMesh.from_lengths(triangles.corner_vertices, lengths, triangles.n_vertices, triangles.edges)
         # which halfedge leads each edge must not change

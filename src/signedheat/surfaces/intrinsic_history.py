@@ -30,6 +30,7 @@ from ..mesh.gluing import (
     glue,
 )
 from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.surface_points import ZERO_COORDINATE
 
 
 class Lines(NamedTuple):
@@ -177,20 +178,17 @@ def misplaced_lines(triangles: IntrinsicMesh, lines: Lines, lengths: Floats) -> 
     return np.unique(lines.owners[~(finite & (traced <= 2 * lengths[lines.owners] + rounding))])
 
 
-BEFORE = np.full((4, 3, 3), -1)
-"""By kind of step, face and corner: which of the four points is that corner before the step; `AFTER`, after it."""
-AFTER = np.full((4, 3, 3), -1)
-BEFORE[TURN_STEP, 0], AFTER[TURN_STEP, 0] = [0, 1, 2], [0, 2, 1]
-BEFORE[FLIP_STEP, :2], AFTER[FLIP_STEP, :2] = [[0, 1, 2], [1, 0, 3]], [[3, 2, 0], [2, 3, 1]]
-BEFORE[SPLIT_EDGE, 0], AFTER[SPLIT_EDGE, :2] = [0, 1, 2], [[0, 3, 2], [3, 1, 2]]
-BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
+BEFORE_STEP = np.full((4, 3, 3), -1)
+"""By kind of step, face and corner: which of the four points is that corner before the step; `AFTER_STEP`, after it."""
+AFTER_STEP = np.full((4, 3, 3), -1)
+BEFORE_STEP[TURN_STEP, 0], AFTER_STEP[TURN_STEP, 0] = [0, 1, 2], [0, 2, 1]
+BEFORE_STEP[FLIP_STEP, :2], AFTER_STEP[FLIP_STEP, :2] = [[0, 1, 2], [1, 0, 3]], [[3, 2, 0], [2, 3, 1]]
+BEFORE_STEP[SPLIT_EDGE, 0], AFTER_STEP[SPLIT_EDGE, :2] = [0, 1, 2], [[0, 3, 2], [3, 1, 2]]
+BEFORE_STEP[SPLIT_FACE, 0], AFTER_STEP[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
 
-OUTWARD = 1e-6
+OUTWARD_SINE = 1e-6
 """A line that leaves the surface at an angle with less than this sine runs along its boundary."""
-ALONG = 1e-9
-"""Barycentric coordinates of a point and of a direction, over the largest, below which a line runs along an edge.
-From face to face lines drift by some 1e-15; results are the same from 1e-12 to 1e-7."""
-ROUNDING = 1e-10
+SQUARE_LENGTH_ROUNDING = 1e-10
 """Rounding error of squared lengths, relative to the size of their terms."""
 
 
@@ -223,7 +221,7 @@ def transfer(steps: Ints, weights: Floats, links: Links, begin: NDArray[np.int32
             kind, side = steps[n, 0], 0
             while around[side] != faces[p]:
                 side += 1
-            old, new = (BEFORE[kind], AFTER[kind]) if links.forward else (AFTER[kind], BEFORE[kind])
+            old, new = (BEFORE_STEP[kind], AFTER_STEP[kind]) if links.forward else (AFTER_STEP[kind], BEFORE_STEP[kind])
             place = exchange(kind, weights[n], links.forward, old[side], start[side], new, start, rows[p])
             faces[p] = around[place]
             n = np.int64(links.next_of_face[n, place])
@@ -279,11 +277,11 @@ def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, s
     f, left, slides = face, 1.0, 0
     w, v = barycentric.copy(), vectors.copy()
     square, rounding = squared_length(g, f, v[0])
-    longest = 4.0 * (abs(square) + ROUNDING * rounding)
+    longest = 4.0 * (abs(square) + SQUARE_LENGTH_ROUNDING * rounding)
     for _ in range(1000000):
         largest = max(abs(v[0, 0]), abs(v[0, 1]), abs(v[0, 2]))
         for k in range(3):  # a line that only rounding separates from an edge may cross to its other side midway
-            if w[k] < ALONG and abs(v[0, k]) < ALONG * largest:
+            if w[k] < ZERO_COORDINATE and abs(v[0, k]) < ZERO_COORDINATE * largest:  # lines drift by 1e-15 a face
                 w[k] = v[0, k] = 0.0
         step, leaving = left, -1
         for k in range(3):
@@ -308,7 +306,7 @@ def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, s
         n += 1
         left -= step
         square, rounding = squared_length(g, f, v[0])
-        if leaving < 0 or left < 1e-12 or not square <= longest + ROUNDING * rounding:
+        if leaving < 0 or left < 1e-12 or not square <= longest + SQUARE_LENGTH_ROUNDING * rounding:
             break
         h = 3 * f + (leaving + 1) % 3
         t = g.sibling[h]
@@ -317,7 +315,7 @@ def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, s
         if t == h or g.sibling[t] != h:  # where no single face goes on; only rounding leads out: go along the edge
             top, base = apex(g, h), g.length[g.edge[h]]
             x, y = top.real, top.imag
-            if slides == 2 or y * abs(v[0, a]) > OUTWARD * abs(base * v[0, j] + x * v[0, a]):
+            if slides == 2 or y * abs(v[0, a]) > OUTWARD_SINE * abs(base * v[0, j] + x * v[0, a]):
                 break
             slides += 1
             v[0, i] += v[0, a] * (1.0 - x / base)

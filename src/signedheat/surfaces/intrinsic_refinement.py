@@ -39,8 +39,6 @@ PER_FACE = ("tail", "edge", "forward", "front", "sibling")
 PER_EDGE = ("start", "length", "fixed", "flips")
 TO_GROW = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow", "group", "extent")
 """Arrays of a `Gluing`, per face and per edge, and of an `Agenda`, that become longer as there are more triangles."""
-PATIENCE = 5000
-"""New vertices between two progress reports, made in some hundredths of a second."""
 
 
 def refine_all(
@@ -54,7 +52,7 @@ def refine_all(
     segments, agenda = agenda_of(gluing)
     goal = Goal(np.tan(angle / 2) ** 2, np.inf, max_vertices)
     gluing, agenda, status = refined(gluing, agenda, goal, progress)
-    if status == DONE and coarsest < np.inf:
+    if status == REFINED and coarsest < np.inf:
         mean_radius = float(np.sqrt(4 / 27**0.5 * lay_out(gluing).face_areas.mean())) / gluing.unit
         goal = goal._replace(radius=coarsest * mean_radius)
         report = None if progress is None else lambda _: progress(1.0)  # it may cancel
@@ -63,7 +61,7 @@ def refine_all(
     origin = np.full(n_edges, -1)
     fixed = np.flatnonzero(gluing.fixed[:n_edges])
     origin[fixed] = segments[agenda.segment[fixed]]
-    return gluing, origin, close_faces(gluing, agenda), status != FULL
+    return gluing, origin, close_faces(gluing, agenda), status != LIMIT_REACHED
 
 
 def refined(
@@ -74,15 +72,15 @@ def refined(
     listed = np.flatnonzero(agenda.bins >= 0)  # by size: the largest come first, so that their list says how far it is
     done = 0.0
     while True:
-        status = refine(gluing, agenda, goal, PATIENCE)
+        status = refine(gluing, agenda, goal, 5000)  # vertices, made in some hundredths of a second
         if status == PAUSED and progress is not None:
             done = max(done, float(listed[-1] - agenda.seen[1]) / len(listed))
             progress(min(done, 1.0))
-        if status == GROW:
+        if status == ARRAYS_FULL:
             grown: dict[str, Any] = {k: doubled(getattr(gluing, k)) for k in (*PER_FACE, *PER_EDGE, "steps", "weights")}
             gluing = gluing._replace(**grown)
             agenda = agenda._replace(**{k: doubled(getattr(agenda, k)) for k in TO_GROW})
-        if status not in (PAUSED, GROW):
+        if status not in (PAUSED, ARRAYS_FULL):
             return gluing, agenda, status
 
 
@@ -113,7 +111,7 @@ def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
     return segments, Agenda(
         stack=np.empty(n_edges, dtype=np.int64),
         stacked=np.zeros(n_edges, dtype=bool),
-        bins=np.full(N_BINS, -1, dtype=np.int64),
+        bins=np.full(BAD_FACE_LISTS, -1, dtype=np.int64),
         next_face=np.full(n_faces, -1, dtype=np.int64),
         listed=np.zeros(n_faces, dtype=bool),
         segment=segment,
@@ -123,17 +121,17 @@ def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
         narrow=narrow_vertices(gluing),
         group=group,
         extent=extent,
-        seen=np.array([gluing.counts[N_STEPS], N_BINS]),
+        seen=np.array([gluing.counts[N_STEPS], BAD_FACE_LISTS]),
         seen_sides=np.empty((4096, 2), dtype=np.complex128),
         halfedges=np.empty((4096, 2), dtype=np.int64),
     )
 
 
-DONE, GROW, FULL, PAUSED = 0, 1, 2, 3
+REFINED, ARRAYS_FULL, LIMIT_REACHED, PAUSED = 0, 1, 2, 3
 """Why `refine` returned: no bad face is left; arrays are full; vertex limit reached; pause to report progress."""
-NARROW = np.pi / 3
+NARROW_ANGLE = np.pi / 3
 """Where segments meet at less than this, or a vertex has a smaller total angle, small angles cannot be avoided."""
-N_BINS = 256
+BAD_FACE_LISTS = 256
 """Number of lists of bad faces: two for each power of two of the circumradius."""
 
 
@@ -181,16 +179,16 @@ def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
         agenda.seen[0] = g.counts[N_STEPS]
         f = next_bad(g, agenda, goal)
         if f < 0:
-            return DONE
+            return REFINED
         if g.counts[N_VERTICES] >= goal.max_vertices:
-            return FULL
+            return LIMIT_REACHED
         if g.counts[N_VERTICES] >= pause:
             list_face(g, agenda, f, goal)
             return PAUSED
         if not improve(g, agenda, f, goal):
             list_face(g, agenda, f, goal)
-            return GROW
-    return GROW
+            return ARRAYS_FULL
+    return ARRAYS_FULL
 
 
 @compiled
@@ -212,7 +210,7 @@ def list_face(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> None:
         return
     n, d = tangent_at(g, preceding(h))
     radius = g.length[g.edge[h]] * (n + d) / np.sqrt(n * d) if n > 0.0 and d > 0.0 else np.inf
-    place = min(max(N_BINS // 2 + int(2.0 * np.log2(min(max(radius, 1e-30), 1e30))), 0), N_BINS - 1)
+    place = min(max(BAD_FACE_LISTS // 2 + int(2.0 * np.log2(min(max(radius, 1e-30), 1e30))), 0), BAD_FACE_LISTS - 1)
     agenda.next_face[f] = agenda.bins[place]
     agenda.bins[place] = f
     agenda.listed[f] = True
@@ -228,7 +226,7 @@ def list_all(g: Gluing, agenda: Agenda, goal: Goal) -> None:
 @compiled
 def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
     """Return the bad face of (nearly) the largest circumradius, or −1."""
-    for place in range(N_BINS - 1, -1, -1):
+    for place in range(BAD_FACE_LISTS - 1, -1, -1):
         while agenda.bins[place] >= 0:
             f: int = agenda.bins[place]
             agenda.bins[place] = agenda.next_face[f]
@@ -250,9 +248,9 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     if is_hopeless(g, agenda, h) or (close and not is_cap(g, agenda, f)):
         return True
     outcome, place, center = find_circumcenter(g, f)  # the place is the face that has it, or the halfedge in the way
-    if outcome == LOST:
+    if outcome == CENTER_LOST:
         return True
-    segment = place if outcome == BLOCKED else encroached(g, agenda, place, center)
+    segment = place if outcome == CENTER_BLOCKED else encroached(g, agenda, place, center)
     if segment >= 0:
         return close or coincide(g, agenda, segment) or split_segment(g, agenda, segment, f, goal)
     n, d = tangent_at(g, preceding(h))
@@ -296,7 +294,7 @@ def is_cap(g: Gluing, agenda: Agenda, f: int) -> bool:
 def is_hopeless(g: Gluing, agenda: Agenda, h: int) -> bool:
     """Whether the small angle opposite to h cannot be avoided: it is given by the surface or by its segments."""
     corner = preceding(h)
-    if agenda.narrow[g.tail[corner]] and sector(g, corner) < NARROW:
+    if agenda.narrow[g.tail[corner]] and sector(g, corner) < NARROW_ANGLE:
         return True
     a, b = agenda.on_segment[g.tail[h]], agenda.on_segment[g.tail[following(h)]]
     if a < 0 or b < 0 or a == b:
@@ -333,7 +331,7 @@ def narrow_vertices(g: Gluing) -> Bools:
     narrow = np.zeros(g.counts[N_VERTICES], dtype=np.bool_)
     for corner in range(3 * g.counts[N_FACES]):
         if not narrow[g.tail[corner]]:
-            narrow[g.tail[corner]] = sector(g, corner) < NARROW
+            narrow[g.tail[corner]] = sector(g, corner) < NARROW_ANGLE
     return narrow
 
 
@@ -405,7 +403,7 @@ def vertex_near_edge(g: Gluing, h: int) -> tuple[int, float, float]:
     while True:
         top = apex(g, y)
         along = top.real / length if g.forward[y] == g.forward[h] else 1.0 - top.real / length
-        if top.imag < min(height, NEARNESS * length * min(along, 1.0 - along)):
+        if top.imag < min(height, NEAR_GROUP * length * min(along, 1.0 - along)):
             nearby, height, fraction = g.tail[preceding(y)], top.imag, along
         y = g.sibling[y]
         if y == h:
@@ -466,7 +464,7 @@ def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool
     return True
 
 
-INSIDE, BLOCKED, LOST = 0, 1, 2
+CENTER_INSIDE, CENTER_BLOCKED, CENTER_LOST = 0, 1, 2
 """Outcomes of `find_circumcenter`."""
 
 
@@ -486,14 +484,14 @@ def unfold(g: Gluing, h: int, side: int, tail: complex, head: complex) -> tuple[
 
 @compiled
 def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, complex]:
-    """Walk from the barycentre of a face to its circumcentre: INSIDE a face, BLOCKED by a halfedge, or LOST if flat."""
+    """Walk from the barycentre of a face to its circumcentre: inside a face, blocked by a halfedge, or lost if flat."""
     corners = corners_of(g, f)
     base, x, y = corners[1].real, corners[2].real, corners[2].imag
     if not y > 0.0:
-        return LOST, f, 0j
+        return CENTER_LOST, f, 0j
     center = complex(0.5 * base, 0.5 * (x * (x - base) / y + y))
     if not np.isfinite(center.imag):
-        return LOST, f, 0j
+        return CENTER_LOST, f, 0j
     start = corners.sum() / 3.0
     side, entry = 1, -1
     for _ in range(100000):
@@ -507,12 +505,12 @@ def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, complex]:
             if k != entry and beyond > worst and left * right <= 0.0:
                 leaving, worst = k, beyond
         if leaving < 0 and not outside < 1e-9:
-            return LOST, f, 0j
+            return CENTER_LOST, f, 0j
         if leaving < 0:
             break
         h = 3 * f + leaving
         if g.fixed[g.edge[h]]:
-            return BLOCKED, h, 0j
+            return CENTER_BLOCKED, h, 0j
         t, tail, head = g.sibling[h], corners[leaving], corners[(leaving + 1) % 3]
         top, turned = unfold(g, h, side, tail, head)
         if turned == side:
@@ -521,7 +519,7 @@ def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, complex]:
         corners[entry], corners[(entry + 1) % 3], corners[(entry + 2) % 3] = tail, head, top
     unit = (corners[1] - corners[0]) / g.length[g.edge[3 * f]]
     place = (center - corners[0]) * unit.conjugate()
-    return INSIDE, f, complex(place.real, side * place.imag)
+    return CENTER_INSIDE, f, complex(place.real, side * place.imag)
 
 
 @compiled
@@ -559,7 +557,7 @@ def encroached(g: Gluing, agenda: Agenda, f: int, p: complex) -> int:
     return -1
 
 
-NEARNESS = 0.01
+NEAR_GROUP = 0.01
 """Vertices nearly coincide where the size of their group is less than this fraction of the distance to any other."""
 
 
@@ -577,7 +575,7 @@ def coinciding(tail: Ints, head: Ints, length: Floats, order: Ints, n_vertices: 
     """Group vertices that nearly coincide; return the first vertex of the group of each, or −1, and there its extent.
 
     From short to long edges (Kruskal), a group is kept whose extent, the sum of the lengths that made it, is less than
-    `NEARNESS` times the next edge that leaves it; of nested ones the largest is.
+    `NEAR_GROUP` times the next edge that leaves it; of nested ones the largest is.
     """
     parent, node = np.arange(n_vertices), np.arange(n_vertices)
     first, second = np.full(2 * n_vertices, -1), np.full(2 * n_vertices, -1)
@@ -596,7 +594,7 @@ def coinciding(tail: Ints, head: Ints, length: Floats, order: Ints, n_vertices: 
         count += 1
     inside, group, size = np.full(count, -1), np.full(n_vertices, -1), np.zeros(n_vertices)
     for joined in range(count - 1, n_vertices - 1, -1):
-        if inside[joined] < 0 and leaving[joined] < np.inf and extent[joined] < NEARNESS * leaving[joined]:
+        if inside[joined] < 0 and leaving[joined] < np.inf and extent[joined] < NEAR_GROUP * leaving[joined]:
             inside[joined] = joined
         inside[first[joined]] = inside[second[joined]] = inside[joined]
     name = np.full(count, -1)

@@ -207,7 +207,7 @@ def _snapped(faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, F
     return faces, weights, np.where(flat, 0.0, vectors)
 
 
-LEAST = 1e-12
+ZERO_VALUE = 1e-12
 """Size of values, relative to the largest, below which they count as zero."""
 
 
@@ -216,7 +216,7 @@ def level_lines(history: History, refinement: ConformingRefinement, values: Floa
 
     Returns faces and barycentric coordinates of each polyline, larger values to its left, and whether it is closed.
     """
-    least = LEAST * max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-300)
+    least = ZERO_VALUE * max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-300)
     line = zero_line(history.after, cleared(history.after, values, least))
     if not len(line.faces):
         return []

@@ -44,7 +44,7 @@ AREA_ERROR = 1e-4
 """Largest relative change of the area of a mesh. It is 1e-7 at most where some faces are degenerate."""
 LARGEST_ANGLE = 30.0
 """Degrees; for larger minimum angles refinement need not terminate."""
-UPWARD = (np.pi / 4) ** np.arange(3)
+GENERIC_DIRECTION = (np.pi / 4) ** np.arange(3)
 """Direction along which no two points with algebraic coordinates have the same height."""
 
 
@@ -443,7 +443,7 @@ def intrinsic_delaunay(
         listed, _ = given_curves(mesh, list(keep) if isinstance(keep, Sequence) else [keep])
         parts = list(chain.from_iterable(segments_of_each(listed, base, mesh.vertices)))
         parts = without_straight_nodes(base, parts) if parts else []
-        refinement = ConformingRefinement.of(base, parts, (mesh.vertices - mesh.bounds[0]) @ UPWARD)
+        refinement = ConformingRefinement.of(base, parts, (mesh.vertices - mesh.bounds[0]) @ GENERIC_DIRECTION)
         marked, complete = refinement.marked, True
     with stopwatch("flip"):
         gluing = flip_all(glue(refinement.triangles, marked))

@@ -34,23 +34,23 @@ from ..parallel import in_chunks
 from ..search.nearest_triangles import TriangleTree
 from .plane_fits import point_spacing
 
-NORMALS = 2.0
+NORMAL_DISTANCE = 2.0
 """Spacings added to the distance of a neighbour for each unit of length between its normal and the point's, so that
 points on the other side of a plate are four spacings farther. 72 thin clouds have 2,750 edges at holes, at 1 4,400, at
 3 2,030; but then 6 of 12 balls of 200 random points have a hole, at 2 none."""
-OPPOSITE = -0.5
+OPPOSITE_SIDES = -0.5
 """Cosine between the normals of two points below which they lie on different sides of a plate. At -0.8 and at 0 edges
 at holes are 4 and 8 % more."""
-FLAT = 0.03
+SAME_SIDE_HEIGHT = 0.03
 """Height over a point's tangent plane, in spacings, up to which another point lies on the same side, whatever its
 normal. At 0.01 edges at holes are 3 % fewer, at 0.1 51 % more."""
-PULL = 0.03
+OWN_NORMAL_WEIGHT = 0.03
 """Weight of a point's own normal in its tangent plane, relative to that of its neighbours: it decides where these lie
 along a line, as on the narrow side of a plate. At 0.01 edges at holes are 44 % more; at 0.1 6 % fewer, but 3 of 12
 balls of 200 random points have a hole."""
-NEAREST = 7
+SPACING_NEIGHBORS = 7
 """Number of neighbours from which spacing is estimated."""
-_CHUNK = 65536
+PROPOSED_AT_ONCE = 65536
 """Number of points that propose triangles at once."""
 
 
@@ -127,17 +127,17 @@ class TangentPlanes:
     def of(cls, points: Floats, normals: Floats, n_neighbors: int) -> TangentPlanes:
         """Fit planes to the neighbours on the same side: the normals of scans often belong to another mesh."""
         k, many = (min(size, len(points) - 1) for size in (n_neighbors, 2 * n_neighbors))
-        nearest = min(NEAREST, many)
+        nearest = min(SPACING_NEIGHBORS, many)
         tree = scipy.spatial.cKDTree(points)
 
         def fitted(rows: Floats) -> tuple[NDArray[Any], ...]:
             centers, own = rows[:, :3], rows[:, 3:]
             distances, near = tree.query(centers, k=many + 1)
             spacing = point_spacing(distances[:, nearest], nearest)
-            flat = FLAT * spacing
+            flat = SAME_SIDE_HEIGHT * spacing
             others, opposed = turned_alike(points[near] - centers[:, None], own[:, None], normals[near], flat[:, None])
             apart = np.linalg.norm(others - own[:, None], axis=2)
-            distances = np.hypot(distances, NORMALS * spacing[:, None] * apart)
+            distances = np.hypot(distances, NORMAL_DISTANCE * spacing[:, None] * apart)
             order = np.argsort(distances, axis=1, kind="stable")[:, : k + 1]
             near, distances, opposed = (np.take_along_axis(a, order, axis=1) for a in (near, distances, opposed))
             offsets, reach = points[near] - centers[:, None], distances[:, -1]
@@ -191,7 +191,7 @@ def turned_alike(offsets: Floats, normal: Floats, others: Floats, flat: Floats) 
 
     A contrary normal is a mistake in the tangent plane, or if of both points only one is above the other.
     """
-    contrary = dot(normal, others) < OPPOSITE
+    contrary = dot(normal, others) < OPPOSITE_SIDES
     over, under = dot(offsets, normal), -dot(offsets, others)
     same = contrary & ((np.abs(over) < flat) | (over * under < 0))
     return np.where(same[..., None], -others, others), contrary & ~same
@@ -207,7 +207,7 @@ def principal_axes(offsets: Floats, weights: Floats, normals: Floats, reach: Flo
     weights = weights[..., None]
     offsets = offsets - (weights * offsets).sum(axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True)
     covariance = (weights * offsets).transpose(0, 2, 1) @ offsets
-    pull = PULL * reach**2 * weights.sum(axis=(1, 2))
+    pull = OWN_NORMAL_WEIGHT * reach**2 * weights.sum(axis=(1, 2))
     covariance += pull[:, None, None] * (np.eye(3) - normals[:, :, None] * normals[:, None])
     first, second = np.moveaxis(np.linalg.eigh(covariance)[1][:, :, :0:-1], 2, 0)
     return np.stack([first, second, np.cross(first, second)], axis=1)
@@ -217,8 +217,8 @@ def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, al
     """(m, 3) distinct triangles that `centers` (c,) propose of `allowed` neighbours (c, k), and (m,) votes."""
     triangles = [np.empty((0, 3), dtype=np.int64)]
     k = neighbors.shape[1]
-    for begin in range(0, len(centers), _CHUNK):
-        part = slice(begin, begin + _CHUNK)
+    for begin in range(0, len(centers), PROPOSED_AT_ONCE):
+        part = slice(begin, begin + PROPOSED_AT_ONCE)
         chunk = centers[part]
         places = planes.unfolded(np.repeat(chunk, k), neighbors[part].ravel()).reshape(len(chunk), k, 2)
         # the others are moved to the origin, where voronoi_fans skips them
@@ -308,26 +308,26 @@ def facing(planes: TangentPlanes, normals: Floats, faces: Ints) -> Ints:
     return np.where((area < 0)[:, None], faces[:, [0, 2, 1]], faces)
 
 
-MAX_SIDES = 64
+CELL_ROOM = 64
 """Sides of a Voronoi cell, and triangles at a point, for which there is room."""
-TOUCHING = 1e-7
+SECTOR_OVERLAP = 1e-7
 """Radians by which the sectors of two triangles at a corner may overlap."""
 
 
 @compiled
 def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
-    """(n, MAX_SIDES) Delaunay neighbours of the origin among places (n, k, 2), counter-clockwise; (n,) sides.
+    """(n, CELL_ROOM) Delaunay neighbours of the origin among places (n, k, 2), counter-clockwise; (n,) sides.
 
     The Voronoi cell, a square to ±1, is cut by bisectors of neighbours, nearest first; sides left are −1, and count.
     """
     n, k = places.shape[:2]
-    neighbours = np.full((n, MAX_SIDES), -1, dtype=np.int64)
+    neighbours = np.full((n, CELL_ROOM), -1, dtype=np.int64)
     counts = np.zeros(n, dtype=np.int64)
     for i in range(n):
-        corner = np.empty((MAX_SIDES, 2))  # corner c is where side c starts
-        beyond = np.full(MAX_SIDES, -1, dtype=np.int64)
-        new_corner = np.empty((MAX_SIDES, 2))
-        new_beyond = np.empty(MAX_SIDES, dtype=np.int64)
+        corner = np.empty((CELL_ROOM, 2))  # corner c is where side c starts
+        beyond = np.full(CELL_ROOM, -1, dtype=np.int64)
+        new_corner = np.empty((CELL_ROOM, 2))
+        new_beyond = np.empty(CELL_ROOM, dtype=np.int64)
         corner[0, 0], corner[1, 0], corner[2, 0], corner[3, 0] = 1.0, 1.0, -1.0, -1.0
         corner[0, 1], corner[1, 1], corner[2, 1], corner[3, 1] = -1.0, 1.0, 1.0, -1.0
         m, farthest = 4, 2.0
@@ -341,7 +341,7 @@ def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
             cut = False
             for c in range(m):
                 cut = cut or corner[c, 0] * px + corner[c, 1] * py > half + slack
-            if not cut or m + 1 >= MAX_SIDES:
+            if not cut or m + 1 >= CELL_ROOM:
                 continue
             new = 0
             for c in range(m):
@@ -373,19 +373,19 @@ def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
 def accept_apart(triangles: Ints, starts: Floats, widths: Floats, n_points: int) -> Bools:
     """(m,) triangles whose sectors, from starts (m, 3) counter-clockwise by widths, overlap none accepted earlier."""
     accepted = np.zeros(len(triangles), dtype=np.bool_)
-    sectors = np.zeros((n_points, MAX_SIDES, 2))
+    sectors = np.zeros((n_points, CELL_ROOM, 2))
     count = np.zeros(n_points, dtype=np.int64)
     for f in range(len(triangles)):
         apart = True
         for k in range(3):
             v = triangles[f, k]
-            apart = apart and count[v] < MAX_SIDES
+            apart = apart and count[v] < CELL_ROOM
             for s in range(count[v]):
                 ahead = (starts[f, k] - sectors[v, s, 0]) % (2 * np.pi)
                 behind = (sectors[v, s, 0] - starts[f, k]) % (2 * np.pi)
-                inside = min(ahead, behind) > TOUCHING and (ahead < sectors[v, s, 1] - TOUCHING)
-                around = min(ahead, behind) > TOUCHING and (behind < widths[f, k] - TOUCHING)
-                same = min(ahead, behind) <= TOUCHING and min(widths[f, k], sectors[v, s, 1]) > TOUCHING
+                inside = min(ahead, behind) > SECTOR_OVERLAP and (ahead < sectors[v, s, 1] - SECTOR_OVERLAP)
+                around = min(ahead, behind) > SECTOR_OVERLAP and (behind < widths[f, k] - SECTOR_OVERLAP)
+                same = min(ahead, behind) <= SECTOR_OVERLAP and min(widths[f, k], sectors[v, s, 1]) > SECTOR_OVERLAP
                 apart = apart and not (inside or around or same)
         if apart:
             accepted[f] = True
@@ -396,12 +396,12 @@ def accept_apart(triangles: Ints, starts: Floats, widths: Floats, n_points: int)
     return accepted
 
 
-MOST_SIDES = 12
+HOLE_SIDES = 12
 """Holes with more sides are left open."""
 
 
 def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
-    """Fill holes of at most `MOST_SIDES` sides, which faces surround, by triangles; no diagonal is an edge already."""
+    """Fill holes of at most `HOLE_SIDES` sides, which faces surround, by triangles; no diagonal is an edge already."""
     edges = edge_table(faces)
     face, side = np.nonzero(edges.face_counts[edges.face_edges] == 1)
     tails, heads = faces[face, side], faces[face, (side + 1) % 3]
@@ -435,7 +435,7 @@ def next_around_gap(points: Floats, normals: Floats, tails: Ints, heads: Ints) -
 def _loop_from(start: int, following: Ints) -> list[int]:
     """Follow the boundary edges of a loop; return none if they do not close."""
     loop = [start]
-    while len(loop) <= MOST_SIDES:
+    while len(loop) <= HOLE_SIDES:
         onward = int(following[loop[-1]])
         if onward == start:
             return loop

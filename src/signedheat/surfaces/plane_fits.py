@@ -29,16 +29,16 @@ TWO_SIDES = 0.9
 """Mean distance of neighbours from a quadric through them, relative to the root of its mean square, above which they
 are those of two sides: where these are even, it is .88 to .99, where they are random .83 to .96, but of one noisy side
 .74 to .86."""
-MERGED = 0.03
+MERGED_SHARE = 0.03
 """Share of points with neighbours on two sides from which a cloud is announced. Of scans, CAD and tori with up to .4
 spacings of noise at most .014 are such; of plates, bowls, lenses and tubes whose sides are merged .25 to 1."""
 ONE_SIDE = 0.02
 """Root mean square distance from a quadric, in spacings, up to which neighbours are taken for those of one side."""
-ON_QUADRIC = 24
+QUADRIC_NEIGHBORS = 24
 """Number of neighbours to which a quadric is fitted."""
 STARTS = 5
 """Number of planes from which the fit to points on a surface starts, since it ends at the nearest of several sheets."""
-_TRIED = 2000
+TRIED_POINTS = 2000
 """Number of points on which it is tried whether they are noisy, or have two sides."""
 
 
@@ -70,7 +70,7 @@ def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
     if largest < CLEAN_NEIGHBORS:
         return []
     tree = scipy.spatial.cKDTree(points)
-    tried = np.arange(0, len(points), -(-len(points) // _TRIED))
+    tried = np.arange(0, len(points), -(-len(points) // TRIED_POINTS))
     if normals is not None:
         reach = float(np.median(tree.query(points[tried], k=CLEAN_NEIGHBORS + 1)[0][:, -1]))
         tree = scipy.spatial.cKDTree(np.column_stack([points, reach * normals]))
@@ -98,7 +98,7 @@ def point_spacing(distances: Floats, k: int) -> Floats:
 
 def share_of_two_sides(points: Floats, normals: Floats) -> float:
     """Share of points whose neighbours lie at two heights over a quadric, as on plates thinner than the spacing."""
-    k = min(ON_QUADRIC, len(points) - 1)
+    k = min(QUADRIC_NEIGHBORS, len(points) - 1)
     tree = scipy.spatial.cKDTree(points)
 
     def two_sided(tried: Ints) -> tuple[Bools]:
@@ -116,7 +116,7 @@ def share_of_two_sides(points: Floats, normals: Floats) -> float:
         enough = (weights > 0).sum(axis=1) > k / 2
         return ((mean > TWO_SIDES * root) & (root > ONE_SIDE) & enough,)
 
-    return float(in_chunks(two_sided, np.arange(0, len(points), -(-len(points) // _TRIED)))[0].mean())
+    return float(in_chunks(two_sided, np.arange(0, len(points), -(-len(points) // TRIED_POINTS)))[0].mean())
 
 
 def planes_near(

@@ -26,24 +26,24 @@ from ..exchange import Elements, Exchangeable
 from ..mesh.signed_graph import Links, signs_of
 from ..mesh.welding import same_rows
 from ..validation import coordinates, finite_rows, frozen, numbers, whole_number
-from .local_triangulations import FLAT, LocalTriangulations, local_triangulations, turned_alike
-from .plane_fits import MERGED, PlaneFits, fit_planes, noise_scale, noisy_sizes, point_spacing, share_of_two_sides
+from .local_triangulations import SAME_SIDE_HEIGHT, LocalTriangulations, local_triangulations, turned_alike
+from .plane_fits import MERGED_SHARE, PlaneFits, fit_planes, noise_scale, noisy_sizes, point_spacing, share_of_two_sides
 from .surface import Surface
 from .triangle_mesh import TriangleMesh
 
 if TYPE_CHECKING:
     import trimesh  # noqa: F401  named in the base class
 
-CONTRARY = 0.35
+CONTRARY_NORMALS = 0.35
 """Share of the given normals that may contradict the orientation of the points, unless all are inverted. It is .39 to
 .49 where both sides of a plate are taken for one, and .3 where .3 of the normals are turned."""
-SEAM = 0.35
+BAD_SEAM = 0.35
 """Number of edges next to another side across which triangles face opposite ways, over the root of the number of
 points, above which there is a warning. On scans, CAD and a box with up to .15 spacings of noise it is at most .07,
 where parts of thin plates face the wrong way mostly .41 to .96."""
 STEEP = 0.7
 """Cosine between a normal and the direction to a neighbour above which the neighbour lies on another side."""
-_NEARBY = 13
+EDGE_NEIGHBORS = 13
 """Number of points near an edge that may lie on another side: about twice its own neighbourhood."""
 
 
@@ -176,19 +176,19 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
                 element="points",
             )
         against = 0.0 if given is None else float(((normals * given).sum(axis=1) < 0).mean())
-        if min(against, 1 - against) > CONTRARY:
+        if min(against, 1 - against) > CONTRARY_NORMALS:
             warn_user(
                 f"{against:.0%} of the normals contradict the sides that the points show, as on plates "
                 "thinner than half of the distance between points",
                 InexactWarning,
             )
-        elif share_of_two_sides(points, triangulated.normals) > MERGED:
+        elif share_of_two_sides(points, triangulated.normals) > MERGED_SHARE:
             warn_user(
                 "the points look like those of both sides of a plate thinner than they are apart, which are taken for "
                 "one side with noise. Give normals, or more points",
                 InexactWarning,
             )
-        elif (turned := edges_turned(points, triangulated.normals, triangulated.faces)) > SEAM * np.sqrt(len(ids)):
+        elif (turned := edges_turned(points, triangulated.normals, triangulated.faces)) > BAD_SEAM * np.sqrt(len(ids)):
             warn_user(
                 f"along {turned} edges the sides of neighbours contradict each other: which side is which is a guess "
                 "there. Give normals, or more points",
@@ -223,7 +223,7 @@ def edges_turned(points: Floats, normals: Floats, faces: Ints) -> int:
     halfedges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     edges, uses = np.unique(halfedges, axis=0, return_counts=True)
     twice = edges[uses > 1]
-    near = scipy.spatial.cKDTree(points).query(points[twice], k=min(_NEARBY, len(points)))[1]
+    near = scipy.spatial.cKDTree(points).query(points[twice], k=min(EDGE_NEIGHBORS, len(points)))[1]
     offsets = points[near] - points[twice][:, :, None]
     over = np.abs((offsets * normals[twice][:, :, None]).sum(axis=3)) > STEEP * np.linalg.norm(offsets, axis=3)
     return int(over.any(axis=(1, 2)).sum())
@@ -234,35 +234,35 @@ def _same_length(values: Floats, points: Floats, name: str) -> None:
         raise GeometryError(f"there are {len(points)} points, but {len(values)} {name}", element=name)
 
 
-SPREAD = 0.35
+KEPT_SPACING = 0.35
 """Distance between the noisy points that are kept, in reaches: larger than the noise that planes leave."""
-MOST = 100_000
+MOST_TET_POINTS = 100_000
 """Number of points for which tets are made; the others take the signs of their neighbours."""
-GIVEN_WEIGHT = 0.1
+GIVEN_SIGN_WEIGHT = 0.1
 """Weight of given signs, over half the sum of the weights of all links of a point."""
 MOST_WRONG = 3.0
 """Given signs stay unless the share that seems wrong exceeds this many times the share of contradictions."""
-WORSE = 0.0015
+COHERENCE_GAIN = 0.0015
 """Gain of coherence for which larger neighbourhoods are taken, and loss at which no larger ones are tried."""
 JOGGLE = 1e-4
 """Random move of points, over the distance to neighbours: flat faces and lattices are slow to triangulate."""
-STEEPEST = 0.5
+BALL_COSINE = 0.5
 """Cosine between a normal and the direction to a ball's centre below which a ball links no signs."""
-LONE = 4.0
+OUTLIER_DISTANCE = 4.0
 """Distance from a point to its neighbours, over that of these to theirs, above which it is an outlier. Where spacing is
 even it is up to 1.4, where density halves within three spacings 1.6."""
-NEARBY = 8
+DIRECT_NEIGHBORS = 8
 """Number of neighbours with which a point is compared directly."""
 DIRECT_WEIGHT = 0.1
 """Weight of a link between neighbours, over that of a ball; with noisy points they weigh the same."""
 UPWARD = np.array([0.01, 0.1, 1.0])
 """Direction of out where nothing decides it, as for points in a plane: up, and on vertical planes along the second
 axis. If a component is halved or doubled, planes keep their sides."""
-MUTUAL = 0.98
+MUTUALLY_BELOW = 0.98
 """Share of pairs of near points with opposite normals of which each is below the other, less the share of those of
 which each is above it, above which given normals are kept on thin sheets: there it is 1, and .9 if a fifth of the
 normals are turned."""
-_CHUNK = 4096
+LISTED_AT_ONCE = 4096
 """Number of points whose neighbours are listed at once."""
 
 
@@ -291,13 +291,13 @@ def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
 
     That is if all over the cloud, of two near points with opposite normals, each is below the other, or each above.
     """
-    k = min(NEARBY, len(points) - 1)
+    k = min(DIRECT_NEIGHBORS, len(points) - 1)
     distances, near = scipy.spatial.cKDTree(points).query(points, k=k + 1)
-    flat = FLAT * point_spacing(distances[:, k:], k)
+    flat = SAME_SIDE_HEIGHT * point_spacing(distances[:, k:], k)
     offsets = points[near] - points[:, None]
     opposed = turned_alike(offsets, given[:, None], given[near], flat)[1]
     below = -np.sign((offsets * given[:, None]).sum(axis=2))[opposed]
-    if len(below) == 0 or abs(below.mean()) < MUTUAL:
+    if len(below) == 0 or abs(below.mean()) < MUTUALLY_BELOW:
         return signs
     thin = opposed.any(axis=1)
     inverted = below.mean() < 0 and (signs[~thin] if not thin.all() else signs).sum() < 0
@@ -311,26 +311,26 @@ def fitted_outward(points: Floats) -> tuple[PlaneFits, OutwardSigns]:
         fits = fit_planes(points, size)
         tried.append((fits, outward_signs(fits, fits.axes)))
         best = max(outward.coherence for _, outward in tried)
-        if tried[-1][1].coherence < best - WORSE:
+        if tried[-1][1].coherence < best - COHERENCE_GAIN:
             break
-    return next((fits, outward) for fits, outward in tried if outward.coherence >= best - WORSE)
+    return next((fits, outward) for fits, outward in tried if outward.coherence >= best - COHERENCE_GAIN)
 
 
 def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> OutwardSigns:
     """Find signs that turn axes (n, 3) outwards."""
     # links between chosen points; node m of the graph is the outside, node m + 1 the signs as given
     n = len(axes)
-    chosen = spread_out(fits.places, SPREAD * fits.reaches) if fits.noisy else np.arange(n)
+    chosen = spread_out(fits.places, KEPT_SPACING * fits.reaches) if fits.noisy else np.arange(n)
     chosen = chosen[~_lone(fits.places[chosen], fits.reaches[chosen])]
-    if len(chosen) > MOST:
-        chosen = np.sort(np.random.default_rng(0).choice(chosen, MOST, replace=False))
+    if len(chosen) > MOST_TET_POINTS:
+        chosen = np.sort(np.random.default_rng(0).choice(chosen, MOST_TET_POINTS, replace=False))
     places = fits.places[chosen]
     links, sided = sign_links(places, axes[chosen], fits.reaches[chosen], fits.noisy)
     m = len(chosen)
     if given or not sided:
         typical = 0.5 * float(np.median(links.strength(m + 1)[:m]))
         own = np.ones(m) if given else axes[chosen] @ UPWARD
-        links = Links.joined(links, Links(np.arange(m), np.full(m, m + 1), GIVEN_WEIGHT * typical * own))
+        links = Links.joined(links, Links(np.arange(m), np.full(m, m + 1), GIVEN_SIGN_WEIGHT * typical * own))
     # signs of the chosen points, relative to the outside or to the given signs; others follow their neighbours
     decision = signs_of(links, m + 2)
     signs = np.zeros(n)
@@ -346,8 +346,8 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> Outward
 
 def _lone(places: Floats, reaches: Floats) -> Bools:
     """(n,) outliers: points farther from their neighbours than these are from theirs."""
-    near = scipy.spatial.cKDTree(places).query(places, k=min(NEARBY + 1, len(places)), workers=-1)[1]
-    return reaches > LONE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
+    near = scipy.spatial.cKDTree(places).query(places, k=min(DIRECT_NEIGHBORS + 1, len(places)), workers=-1)[1]
+    return reaches > OUTLIER_DISTANCE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
 
 
 def _followed(places: Floats, normals: Floats, others: Floats, axes: Floats) -> Floats:
@@ -377,8 +377,8 @@ def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = Fals
 
 
 def _confidence(cosines: Floats) -> Floats:
-    """Signed fourth power of cosines, zero below `STEEPEST`."""
-    return np.where(np.abs(cosines) > STEEPEST, np.sign(cosines) * cosines**4, 0.0)
+    """Signed fourth power of cosines, zero below `BALL_COSINE`."""
+    return np.where(np.abs(cosines) > BALL_COSINE, np.sign(cosines) * cosines**4, 0.0)
 
 
 def _ball_links(places: Floats, axes: Floats, tets: Ints) -> Links:
@@ -415,7 +415,7 @@ def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> L
 
 def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
     """Link neighbours as if on a circle: reflected in the plane midway, one axis is the other."""
-    n, k = len(places), min(NEARBY, len(places) - 1)
+    n, k = len(places), min(DIRECT_NEIGHBORS, len(places) - 1)
     neighbors = scipy.spatial.cKDTree(places).query(places, k=k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), neighbors.ravel()
     step = places[heads] - places[tails]
@@ -430,8 +430,8 @@ def spread_out(points: Floats, radii: Floats) -> Ints:
     """Ids, ascending, of points (n, d) that are kept: in order, all not within the radius (n,) of one kept before."""
     tree = scipy.spatial.cKDTree(points)
     kept = np.ones(len(points), dtype=bool)
-    for begin in range(0, len(points), _CHUNK):
-        part = np.arange(begin, min(begin + _CHUNK, len(points)))
+    for begin in range(0, len(points), LISTED_AT_ONCE):
+        part = np.arange(begin, min(begin + LISTED_AT_ONCE, len(points)))
         part = part[kept[part]]
         near = tree.query_ball_point(points[part], radii[part], workers=-1)
         ends = np.cumsum([0, *map(len, near)])

@@ -36,7 +36,7 @@ from .surface_curves import Curve, CurveOrPoints, ElementList, SurfacePoints
 from .triangle_mesh import TriangleMesh
 
 Positions: TypeAlias = Floats | None
-ONE_POINT = 1e-14
+SOURCE_POINT = 1e-14
 """Distance of points, relative to the size of a surface, up to which they are one."""
 
 
@@ -220,12 +220,12 @@ def _is_point(domain: Surface, curve: Curve) -> bool:
     if not hasattr(triangles, "vertices"):
         return False
     extent = np.ptp(domain.positions(curve), axis=0).max()
-    return bool(extent <= ONE_POINT * np.ptp(triangles.bounds, axis=0).max())
+    return bool(extent <= SOURCE_POINT * np.ptp(triangles.bounds, axis=0).max())
 
 
-STRAIGHT = 0.5
+NEARLY_CLOSED = 0.5
 """A single piece is a curve with a gap if the distance between its ends, relative to its length, is less than this."""
-ROUND = 0.15
+ONE_PIECE = 0.15
 """Scale of a single piece, relative to its length: about the radius of a circle of that length."""
 
 
@@ -234,7 +234,7 @@ class CurveGroups:
     """Groups of open oriented curves."""
 
     lengths: Floats  # (g,) total length of the pieces of each group
-    scales: Floats  # (g,) mean length of the pieces, weighted by length; for a single piece its length times `ROUND`
+    scales: Floats  # (g,) mean length of the pieces, weighted by length; of a single one `ONE_PIECE` times its length
 
     @classmethod
     def of(cls, mesh: TriangleMesh, curves: Sequence[Any]) -> CurveGroups:
@@ -248,11 +248,11 @@ class CurveGroups:
         ends = np.array([p[[0, -1]] for p in points]).reshape(-1, 3)
         groups = connected_components(len(pieces), *nearest_others(ends).T)
         gaps = np.linalg.norm(ends[::2] - ends[1::2], axis=1)
-        used = (np.bincount(groups)[groups] > 1) | (gaps < STRAIGHT * lengths)
+        used = (np.bincount(groups)[groups] > 1) | (gaps < NEARLY_CLOSED * lengths)
         groups, lengths = np.unique(groups[used], return_inverse=True)[1].ravel(), lengths[used]
         totals = np.bincount(groups, lengths).astype(np.float64)
         means = np.bincount(groups, lengths**2) / np.maximum(totals, 1e-300)
-        return cls(totals, np.where(np.bincount(groups) > 1, means, ROUND * totals))
+        return cls(totals, np.where(np.bincount(groups) > 1, means, ONE_PIECE * totals))
 
 
 def nearest_others(ends: Floats) -> Ints:

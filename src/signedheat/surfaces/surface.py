@@ -26,7 +26,7 @@ from ..search.nearest_triangles import TriangleTree
 from ..validation import array_of, coordinates, finite_number, flag, numbers
 from .surface_curves import Curve, SurfacePoints
 
-SAME = 2e-5
+ONE_CROSSING = 2e-5
 """Distance, over a face's least height, up to which points in a row are one: where a line passes a vertex that rounding
 puts next to it, it crosses edges up to 1e-5 of that apart. Of 22,000 steps of completed curves on spheres none is
 between 3e-6 and 3e-5, and 15 between 3e-5 and 1e-3."""
@@ -72,7 +72,7 @@ def checked_levels(values: ArrayLike, level: float, n_vertices: int) -> tuple[Fl
 
 
 def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
-    """Curves without points closer than `SAME` of a face's least height to the next one; one point is no curve."""
+    """Curves without points within `ONE_CROSSING` of a face's least height of the next one; one point is no curve."""
     kept_curves = []
     for curve in curves:
         corners = mesh.vertices[mesh.faces[curve.faces]]
@@ -80,7 +80,7 @@ def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
         sides = np.roll(corners, -1, axis=1) - corners
         longest = np.linalg.norm(sides, axis=2).max(axis=1)
         twice = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-        room = SAME * twice / np.where(longest > 0, longest, 1.0)
+        room = ONE_CROSSING * twice / np.where(longest > 0, longest, 1.0)
         kept = leaving(points, curve.closed, room)
         if len(kept) > 1:
             leaves = kept if curve.closed else kept[:-1]

@@ -64,7 +64,7 @@ class SurfaceDiscretization:
     def integration(self) -> SurfaceIntegration:
         """Step 3."""
         ordered = partial(factorize, order=self.vertex_order)
-        return SurfaceIntegration(self.stiffness, factorize=ordered, strength=STRENGTH / self.spacing)
+        return SurfaceIntegration(self.stiffness, factorize=ordered, strength=SURFACE_SPRINGS / self.spacing)
 
     @cached_property
     def stiffness(self) -> sparse.csr_matrix:
@@ -169,14 +169,14 @@ def large_angles(triangles: IntrinsicMesh) -> float:
     return share if share >= 0.01 else 0.0
 
 
-BYTES = {"pardiso": (1200, 40), "superlu": (100, 200)}
+BYTES_PER_TRIANGLE = {"pardiso": (1200, 40), "superlu": (100, 200)}
 """Peak memory of each triangle by back end, and its growth with every doubling of their number, by the fill of factors.
 Measured on 20,000 to 310,000 triangles with one diffusion time."""
 
 
 def memory_estimate(n_triangles: int) -> float:
     """Estimate the bytes of a first distance on so many triangles."""
-    each, per_doubling = BYTES[chosen_backend()]
+    each, per_doubling = BYTES_PER_TRIANGLE[chosen_backend()]
     return n_triangles * (each + per_doubling * math.log2(max(n_triangles, 2)))
 
 
@@ -191,9 +191,9 @@ def refuse_too_many(triangles: int, count: int, elements: str, more: float = 0.0
     )
 
 
-STRENGTH = 100.0
+SURFACE_SPRINGS = 100.0
 """Strength of the springs along curves that cross faces, in 1/h: measured on twenty meshes, good and bad."""
-SOFT = 10.0
+SOFT_STRENGTH = 10.0
 """λ of `Soft` where none is given, in 1/h."""
 
 
@@ -204,7 +204,7 @@ class SurfaceIntegration(SpringIntegration):
     @property
     def soft_weight(self) -> float:
         """λ of `Soft` where none is given, in 1/length."""
-        return SOFT / STRENGTH * self.strength
+        return SOFT_STRENGTH / SURFACE_SPRINGS * self.strength
 
     def anchored(self, source: SourceTerm) -> Factor:
         """Factor of C with φ held at zero along the source, as stiffly at every sample."""
@@ -257,14 +257,16 @@ def lowered_polygons(domain: PolygonMesh) -> SurfaceDiscretization:
     return replace(lowered, domain=domain, restriction=lowered.restriction[: domain.n_vertices], spacing=spacing)
 
 
-NEIGHBORS, BYTES_PER_POINT = 40_000_000, 1300
+BYTES_OF_NEIGHBORS, BYTES_PER_POINT = 40_000_000, 1300
 """Measured bytes of the libraries that find neighbours, and of the neighbours, in addition to those of triangles."""
 
 
 @discretize.register
 def _(domain: PointCloud) -> SurfaceDiscretization:
     # h is the mean distance between neighbouring points, the scale below which they do not determine the surface
-    refuse_too_many(2 * domain.n_points, domain.n_points, "points", more=NEIGHBORS + BYTES_PER_POINT * domain.n_points)
+    refuse_too_many(
+        2 * domain.n_points, domain.n_points, "points", more=BYTES_OF_NEIGHBORS + BYTES_PER_POINT * domain.n_points
+    )
     mesh = domain.triangulation
     used = mask_of(domain.n_points, mesh.faces)
     duplicates = int((domain.representatives != np.arange(domain.n_points)).sum())

@@ -24,6 +24,7 @@ from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import EDGE, VERTEX, incident_faces
+from ..search.face_tree import EQUALLY_NEAR
 from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_field, sharpened
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .source_segments import given_curves
@@ -39,7 +40,7 @@ INVENTED = 0.05
 UNDECIDED = 0.1
 """Share of the vertices whose sides curves without ends decide, up to which these bound nothing: curves that bound a
 region decide all vertices but those next to them. With it, no level set of 96 on eight meshes causes a warning."""
-NEGLIGIBLE = 1e-3
+INVENTED_IF_UNDECIDED = 1e-3
 """`INVENTED` for curves that bound nothing: a loop around a hole through a plate has a completion of that share if the
 hole's circumference is that share of its own."""
 FALSE_ZERO_WIDTH = 4.0
@@ -160,7 +161,7 @@ def nearest_curve(
     note = SharpenedToCurves(share, len(sides.free_ends), float(bounded.mean()))
     reached = ~np.isnan(values)
     decided = (bounded & reached).sum() / max(reached.sum(), 1)
-    if share > (INVENTED if decided > UNDECIDED else NEGLIGIBLE) and not note.free_ends:
+    if share > (INVENTED if decided > UNDECIDED else INVENTED_IF_UNDECIDED) and not note.free_ends:
         warn_user(
             f"curves without free ends bound no region: {100 * share:.2g} % of what distance is measured to is "
             "where its sign must change elsewhere. piecewise_distance lets it jump there",
@@ -233,10 +234,6 @@ def note_on_searches(triangles: IntrinsicMesh, *counts: int) -> GeodesicWindows:
     return note
 
 
-TIE = 1e-9
-"""Relative difference of distances, or of sines, below which two segments are equally near."""
-
-
 @dataclass(frozen=True, eq=False)
 class CurveSides:
     """The sides of the vertices of a surface, as far as oriented curves decide them."""
@@ -285,17 +282,17 @@ def nearest_sides(triangles: IntrinsicMesh, placed: PlacedSegments, ends: Ints) 
     corner = triangles.corner_positions[faces] - start
     share, gap = nearest_shares(corner, step)
     height = (np.conj(step) * corner).imag / np.abs(step)
-    height[np.abs(height) <= TIE * np.abs(step)] = 0.0
+    height[np.abs(height) <= EQUALLY_NEAR * np.abs(step)] = 0.0
     is_end = mask_of(len(placed.nodes), ends)
     bare = ((share == 0) & is_end[placed.ends[rows, 0], None]) | ((share == 1) & is_end[placed.ends[rows, 1], None])
     vertex = triangles.corner_vertices[faces]
     reach = np.full(n, np.inf)
     np.minimum.at(reach, vertex, gap)
-    nearest = gap <= reach[vertex] * (1 + TIE)
+    nearest = gap <= reach[vertex] * (1 + EQUALLY_NEAR)
     sine = np.abs(height) / np.maximum(gap, 1e-300)
     front = np.zeros(n)
     np.maximum.at(front, vertex[nearest], sine[nearest])
-    chosen = nearest & (sine >= front[vertex] - TIE)
+    chosen = nearest & (sine >= front[vertex] - EQUALLY_NEAR)
     shown = np.where(bare, 0, np.sign(height) * sides[:, None])
     left, right, bare_end = (
         np.bincount(vertex[chosen & test], minlength=n) > 0 for test in (shown > 0, shown < 0, bare)

@@ -24,7 +24,7 @@ from ..mesh.surface_points import concatenated
 from ..mesh.unit_vectors import unit
 from .cotan import assemble
 
-EXPONENTS = (-1.0, 0.5)
+TIME_EXPONENTS = (-1.0, 0.5)
 """Powers of t in the error of Y: h²/t from cells that do not resolve exp(−r/√t), and √t from smoothing."""
 
 
@@ -94,7 +94,7 @@ class VectorHeat:
 
 
 def extrapolated(columns: Complexes) -> Complexes:
-    """(m,) directions Y without errors like the `EXPONENTS` of t, from (m, 3) columns X, R X and R² X.
+    """(m,) directions Y without errors like the `TIME_EXPONENTS` of t, from (m, 3) columns X, R X and R² X.
 
     With ``D = t d/dt`` it is ``Π (1 − D/e) Y`` over exponents e, which takes ``t^e`` to zero. For ``R = (M + tL)⁻¹ M``,
     ``D X = R X − X`` and ``D² X = X − 3 R X + 2 R² X``; those of Y follow from the angle θ of X = exp(ρ + iθ).
@@ -103,7 +103,7 @@ def extrapolated(columns: Complexes) -> Complexes:
     with np.errstate(all="ignore"):
         first, second = once / x - 1.0, 1.0 - 3.0 * (once / x) + 2.0 * (twice / x)
         turn, bend = first.imag, (second - first**2).imag
-        linear, quadratic = -sum(1.0 / e for e in EXPONENTS), 1.0 / float(np.prod(EXPONENTS))
+        linear, quadratic = -sum(1.0 / e for e in TIME_EXPONENTS), 1.0 / float(np.prod(TIME_EXPONENTS))
         factor = 1.0 + 1j * linear * turn + quadratic * (1j * bend - turn**2)
     return unit(x.copy()) * np.where(np.isfinite(factor), factor, 1.0)
 
