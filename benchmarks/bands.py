@@ -20,7 +20,7 @@ import numpy as np
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.grids.blocks import SIDE, Blocks
+from signedheat.grids.blocks import BLOCK, Blocks
 from signedheat.grids.marching import block_contour
 
 CELLS = 4.0
@@ -75,18 +75,18 @@ def libigl(mesh: sh.TriangleMesh, grid: sh.Grid) -> Surface:
     import igl
 
     vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
-    steps, limit = grid.spacing, -(-np.array(grid.shape) // SIDE)
+    steps, limit = grid.spacing, -(-np.array(grid.shape) // BLOCK)
     places = np.argwhere(np.ones(tuple(limit), dtype=bool))
-    centres = grid.origin + (places * SIDE + 0.5 * (SIDE - 1)) * steps
-    radius = 0.5 * float(np.linalg.norm((SIDE - 1) * steps)) + (CELLS + 2) * float(steps[0])
+    centres = grid.origin + (places * BLOCK + 0.5 * (BLOCK - 1)) * steps
+    radius = 0.5 * float(np.linalg.norm((BLOCK - 1) * steps)) + (CELLS + 2) * float(steps[0])
     blocks = Blocks.of(places[np.abs(np.linalg.norm(centres, axis=1) - 1) < radius], grid.shape)
-    inner = np.stack(np.meshgrid(*[np.arange(SIDE)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    points = grid.origin + (blocks.places[:, None] * SIDE + inner).reshape(-1, 3) * steps
+    inner = np.stack(np.meshgrid(*[np.arange(BLOCK)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = grid.origin + (blocks.places[:, None] * BLOCK + inner).reshape(-1, 3) * steps
     kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     values = np.concatenate(
         [igl.signed_distance(points[k : k + 500_000], vertices, faces, kind)[0] for k in range(0, len(points), 500_000)]
     )
-    low, cells = block_contour(blocks, values.astype(np.float32).reshape(-1, SIDE, SIDE, SIDE), steps, 0.0)
+    low, cells = block_contour(blocks, values.astype(np.float32).reshape(-1, BLOCK, BLOCK, BLOCK), steps, 0.0)
     return grid.origin + low * steps, cells
 
 

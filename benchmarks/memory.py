@@ -20,7 +20,7 @@ import signedheat as sh
 from signedheat import samples
 from signedheat.curves.jumping_distance import memory_estimate as piecewise_estimate
 from signedheat.foreign import SurfaceShape
-from signedheat.grids.blocks import NODES
+from signedheat.grids.blocks import BLOCK_NODES
 from signedheat.grids.grid_discretization import bytes_of_area
 from signedheat.grids.grid_discretization import memory_estimate as grid_estimate
 from signedheat.memory import libraries
@@ -149,7 +149,7 @@ def band(closed: bool, size: int) -> tuple[Callable[[], object], float]:
     width = 4 * float(grid.spacing.max())
     places = blocks_near(made.tree, grid, width + float(np.linalg.norm(grid.spacing)), 2**40)
     assert places is not None
-    return lambda: made.field(grid=grid, band=width), NODES * BYTES_IN_BAND * len(places) + BYTES_AT_WORK
+    return lambda: made.field(grid=grid, band=width), BLOCK_NODES * BYTES_IN_BAND * len(places) + BYTES_AT_WORK
 
 
 def sampled(size: int) -> tuple[Callable[[], object], float]:

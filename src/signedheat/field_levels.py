@@ -10,7 +10,7 @@ import numpy as np
 from .arrays import Floats, Ints
 from .errors import OutsideError
 from .grids.grid import Grid
-from .grids.marching import CLEARANCE
+from .mesh.edges import CLEARANCE
 
 LEVEL_ACCURACY = 1e-3
 """Distance from a level, in cells, at which a point is close enough."""

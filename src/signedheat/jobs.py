@@ -22,7 +22,7 @@ logger: logging.Logger = logging.getLogger("signedheat")
 MOST_THREADS = 1024
 """Largest number of threads, or of processes, that is accepted."""
 CLEAR_LINE = "\r\x1b[2K"
-"""Clears a progress bar from a terminal."""
+"""Clears the current line of a terminal."""
 
 Progress = Callable[[float, str], None]
 """Called with the fraction done, from 0 to 1, and the name of the step that begins."""

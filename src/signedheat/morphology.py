@@ -38,7 +38,7 @@ from .mesh.triangles import part_volumes
 from .search.face_tree import FaceFeatures, FaceTree
 from .search.nearest_triangles import weights_in
 from .solids.completion import complete
-from .solids.contouring import SAMPLED, sharp_surface
+from .solids.contouring import CONTOUR_PLACES, sharp_surface
 from .solids.gauss import Pieces, sampled
 from .solids.implicit_surfaces import contour
 from .solids.offsets import Offset, Reach, SheetWall, checked_reach
@@ -279,7 +279,7 @@ def offset(
     reach: float | Reach
     if callable(distance):
         reach = checked_reach(distance)
-        between = sampled(Pieces(solid.triangles, np.zeros(len(solid.triangles), dtype=np.int64)), SAMPLED)[1]
+        between = sampled(Pieces(solid.triangles, np.zeros(len(solid.triangles), dtype=np.int64)), CONTOUR_PLACES)[1]
         largest = float(reach(np.concatenate([solid.triangles.reshape(-1, 3), between])).max())
     elif (values := numbers(distance, "distance", SignedHeatError)).ndim:
         reach, largest = checked_reach(_linear(shape, values)), float(values.max(initial=0.0))

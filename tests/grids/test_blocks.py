@@ -1,7 +1,7 @@
 import numpy as np
 
 from shapes.grid_cases import sphere
-from signedheat.grids.blocks import NODES, SIDE, Blocks, BlockValues
+from signedheat.grids.blocks import BLOCK, BLOCK_NODES, Blocks, BlockValues
 from signedheat.grids.marching import block_contour, closed_surface
 from signedheat.search.face_tree import FaceFeatures, FaceTree
 
@@ -9,13 +9,13 @@ from signedheat.search.face_tree import FaceFeatures, FaceTree
 def scattered(shape, share, seed=0):
     """Some blocks of a grid with random values, and all values of it with NaN where there are none."""
     rng = np.random.default_rng(seed)
-    limit = -(-np.array(shape) // SIDE)
+    limit = -(-np.array(shape) // BLOCK)
     places = np.argwhere(rng.random(limit) < share)
     blocks = Blocks.of(places[rng.permutation(len(places))], shape)
-    values = rng.normal(size=(len(blocks), SIDE, SIDE, SIDE)).astype(np.float32)
-    dense = np.full(limit * SIDE, np.nan, dtype=np.float32)
-    for place, block in zip(blocks.places * SIDE, values, strict=True):
-        dense[tuple(slice(p, p + SIDE) for p in place)] = block
+    values = rng.normal(size=(len(blocks), BLOCK, BLOCK, BLOCK)).astype(np.float32)
+    dense = np.full(limit * BLOCK, np.nan, dtype=np.float32)
+    for place, block in zip(blocks.places * BLOCK, values, strict=True):
+        dense[tuple(slice(p, p + BLOCK) for p in place)] = block
     return blocks, values, dense[tuple(slice(0, n) for n in shape)]
 
 
@@ -62,10 +62,10 @@ def test_contour_is_that_of_the_whole_grid():
     shape, spacing = (70, 83, 66), np.array([0.1, 0.08, 0.11])
     nodes = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), axis=-1) * spacing
     dense = (np.sin(1.3 * nodes).sum(axis=-1) + 0.2).astype(np.float32)  # leaves the grid, in many parts
-    blocks = Blocks.of(np.argwhere(np.ones(-(-np.array(shape) // SIDE), dtype=bool)), shape)
-    values = np.full((len(blocks), SIDE, SIDE, SIDE), np.nan, dtype=np.float32)
-    for row, place in enumerate(blocks.places * SIDE):
-        part = dense[tuple(slice(p, p + SIDE) for p in place)]
+    blocks = Blocks.of(np.argwhere(np.ones(-(-np.array(shape) // BLOCK), dtype=bool)), shape)
+    values = np.full((len(blocks), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
+    for row, place in enumerate(blocks.places * BLOCK):
+        part = dense[tuple(slice(p, p + BLOCK) for p in place)]
         values[row][tuple(slice(0, n) for n in part.shape)] = part
     vertices, faces = block_contour(BlockValues(blocks, values), spacing, 0.3)
     whole, others = closed_surface(dense.astype(np.float64), np.zeros(3), spacing, 0.3)
@@ -80,7 +80,7 @@ def test_distances_are_exact_and_those_of_a_block_of_points_know_nothing_of_othe
     mesh = sphere(800)
     tree = FaceTree.of(FaceFeatures.of(mesh.vertices + 2.0, mesh.faces))
     rng = np.random.default_rng(3)
-    points = rng.uniform(0, 4, (6 * NODES, 3))
+    points = rng.uniform(0, 4, (6 * BLOCK_NODES, 3))
     found = tree.search(points)
     a, b, c = (mesh.vertices[mesh.faces[:, k]] + 2.0 for k in range(3))
     some = rng.choice(len(points), 200)
@@ -92,7 +92,7 @@ def test_distances_are_exact_and_those_of_a_block_of_points_know_nothing_of_othe
         assert found.distances[p] <= nearest + 1e-12
         assert found.distances[p] >= nearest - 0.02
     np.testing.assert_allclose(np.linalg.norm(points - found.places, axis=1), found.distances, atol=1e-12)
-    alone = tree.search(points[3 * NODES : 4 * NODES])
-    np.testing.assert_array_equal(alone.distances, found.distances[3 * NODES : 4 * NODES])
+    alone = tree.search(points[3 * BLOCK_NODES : 4 * BLOCK_NODES])
+    np.testing.assert_array_equal(alone.distances, found.distances[3 * BLOCK_NODES : 4 * BLOCK_NODES])
     np.testing.assert_array_equal(alone.faces, found.faces[3 * 512 : 4 * 512])
     np.testing.assert_allclose(tree.distances(points), found.distances, atol=1e-12)

@@ -18,8 +18,9 @@ from types import FrameType
 from typing import Any, TextIO
 
 from ..errors import FileFormatError, SignedHeatError, printable
+from ..jobs import CLEAR_LINE
 
-PLAIN = str.maketrans(
+REPLACED_CHARACTERS = str.maketrans(
     {
         "×": "x",
         "φ": "phi",
@@ -39,11 +40,7 @@ PLAIN = str.maketrans(
 )
 """Replacements for characters that a stream cannot encode."""
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-CLEAR = "\r\x1b[2K"
-"""Clears the current line of a terminal."""
-SHORTLY = 0.05
-"""Seconds after which a signal that was lost is sent again."""
-APART = 1.0
+SIGNAL_PAUSE = 1.0
 """Seconds within which further signals are ignored."""
 
 
@@ -70,7 +67,7 @@ def fitting(text: str, stream: TextIO) -> str:
     try:
         text.encode(encoding)
     except UnicodeEncodeError:
-        return text.translate(PLAIN).encode(encoding, "backslashreplace").decode(encoding)
+        return text.translate(REPLACED_CHARACTERS).encode(encoding, "backslashreplace").decode(encoding)
     return text
 
 
@@ -138,12 +135,12 @@ class ProgressBar:
         width = max(10, min(40, shutil.get_terminal_size().columns - 36))
         full = round(width * min(max(fraction, 0.0), 1.0))
         seconds = time.perf_counter() - self._begin
-        _write_error(CLEAR, f"{'━' * full}{'╌' * (width - full)} {fraction:4.0%} {seconds:6.1f} s  {step}", "")
+        _write_error(CLEAR_LINE, f"{'━' * full}{'╌' * (width - full)} {fraction:4.0%} {seconds:6.1f} s  {step}", "")
 
     def clear(self) -> None:
         """Clear the bar to make room for a line of text."""
         if self._is_shown:
-            _write_error(CLEAR, "", "")
+            _write_error(CLEAR_LINE, "", "")
 
     def __enter__(self) -> ProgressBar:
         return self
@@ -165,7 +162,7 @@ class Signals:
 
     def __init__(self) -> None:
         self.caught: int | None = None
-        self._last = -APART
+        self._last = -SIGNAL_PAUSE
         self._before: dict[int, Any] = {}
         self._hook = sys.unraisablehook
 
@@ -184,7 +181,7 @@ class Signals:
 
     def _raise(self, number: int, frame: FrameType | None) -> None:
         now = time.monotonic()
-        if self.caught is not None and now - self._last < APART:
+        if self.caught is not None and now - self._last < SIGNAL_PAUSE:
             return
         self.caught, self._last = number, now
         raise Stopped
@@ -193,8 +190,8 @@ class Signals:
         """Send a signal again that came while a library called Python, which loses exceptions; report all others."""
         if self.caught is None or not isinstance(lost.exc_value, Stopped):
             return self._hook(lost)
-        self._last = -APART
-        threading.Timer(SHORTLY, _send, [self.caught]).start()
+        self._last = -SIGNAL_PAUSE
+        threading.Timer(0.05, _send, [self.caught]).start()
 
 
 def _send(number: int) -> None:
@@ -205,7 +202,7 @@ def _send(number: int) -> None:
         signal.raise_signal(number)
 
 
-INPUTS = ("shape", "mesh", "field", "file")
+STANDARD_INPUTS = ("shape", "mesh", "field", "file")
 """Arguments that may name standard input."""
 
 
@@ -226,7 +223,7 @@ class StandardFiles:
 @contextmanager
 def standard_files(arguments: Namespace) -> Iterator[StandardFiles]:
     """Replace ``-`` among the arguments by temporary files, and write the result to standard output."""
-    inputs = [name for name in INPUTS if getattr(arguments, name, None) == "-"]
+    inputs = [name for name in STANDARD_INPUTS if getattr(arguments, name, None) == "-"]
     output = getattr(arguments, "output", None) == "-"
     listed = getattr(arguments, "files", []) == ["-"]
     if not (inputs or listed or output):

@@ -32,7 +32,7 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 from .geodesic_sources import GeodesicSources, PlacedSegments, as_curve, nearest_shares, through_vertices, zero_line
 from .heap_kernels import Queue, pop, push
 
-WINDOWS_PER_EDGE, FEW_WINDOWS, ON_SMALL = 100, 4_000_000, 1000
+WINDOWS_PER_EDGE, FEW_WINDOWS, WINDOWS_IF_SMALL = 100, 4_000_000, 1000
 """Average number of windows per edge, and numbers on small meshes, above which a search is cut short; ten per edge are
 usual on smooth surfaces. Small meshes of many sheets make more, which is little in all."""
 MANY_PER_EDGE, MANY_WINDOWS = 30, 50_000
@@ -90,7 +90,7 @@ def is_pseudosource(triangles: IntrinsicMesh) -> Bools:
 
 def window_limit(triangles: IntrinsicMesh) -> int:
     """Return the number of windows at which a search is cut short."""
-    return min(ON_SMALL * 3 * triangles.n_faces, WINDOWS_PER_EDGE * triangles.n_edges + FEW_WINDOWS)
+    return min(WINDOWS_IF_SMALL * 3 * triangles.n_faces, WINDOWS_PER_EDGE * triangles.n_edges + FEW_WINDOWS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,7 @@ class PausedSearch:
     @property
     def slack(self) -> float:
         """By how much a path must be longer than another, in lengths of an edge, to be dropped for it."""
-        return ROUND + 2.0 * self.tolerance
+        return DISTANCE_ROUNDING + 2.0 * self.tolerance
 
     @property
     def has_ended(self) -> bool:
@@ -130,17 +130,17 @@ class PausedSearch:
     @property
     def windows(self) -> int:
         """Number of windows made so far."""
-        return int(self.search.counts[MADE])
+        return int(self.search.counts[WINDOWS_MADE])
 
     def until(self, limit: int, report: Report | None) -> PausedSearch:
         """Go on to the end, or until this many windows have been made; return the same search."""
         search = self.search
-        while search.queue.size[0] > 0 and search.counts[MADE] < limit:
+        while search.queue.size[0] > 0 and search.counts[WINDOWS_MADE] < limit:
             if report is not None:
                 report()
-            if search.counts[WANTED]:
-                search.larger().counts[WANTED] = 0
-            most = min(search.counts[MADE] + (1 << 16), limit)
+            if search.counts[MISSING_ROWS]:
+                search.larger().counts[MISSING_ROWS] = 0
+            most = min(search.counts[WINDOWS_MADE] + (1 << 16), limit)
             continue_search(self.faces, search, self.slack, self.tolerance, most)
         return self
 
@@ -174,7 +174,7 @@ def shortest_arcs(tails: Ints, heads: Ints, lengths: Floats, n: int) -> csr_matr
     return csr_matrix(entries, shape=(n, n))
 
 
-FLIPPED = 0.05
+NOT_DELAUNAY = 0.05
 """Share of edges that are not Delaunay above which the search makes Delaunay triangles."""
 
 
@@ -182,7 +182,7 @@ def in_delaunay_triangles(
     triangles: IntrinsicMesh, placed: PlacedSegments
 ) -> tuple[IntrinsicMesh, PlacedSegments] | None:
     """Return the surface in Delaunay triangles, with sources along edges; None if there is nothing to gain."""
-    if not triangles.agree_on_lengths or share_to_flip(triangles) < FLIPPED:
+    if not triangles.agree_on_lengths or share_to_flip(triangles) < NOT_DELAUNAY:
         return None
     curve = as_curve(triangles, placed)
     if curve is None:
@@ -199,9 +199,9 @@ def share_to_flip(triangles: IntrinsicMesh) -> float:
     return float(((sums < -1e-9) & (triangles.edges.face_counts == 2)).mean())
 
 
-ROUND = 1e-10
+DISTANCE_ROUNDING = 1e-10
 """Rounding error of distances, relative to the length of an edge."""
-MANY = 4
+COMPARED_WINDOWS = 4
 """Number of windows on a halfedge whose comparison with each other is as much work as making one."""
 
 
@@ -227,14 +227,14 @@ def _collect(
         search.counts,
     )
     count, before = list_length(following, queued[halfedge]), list_length(following, settled[halfedge])
-    counts[MADE] += count * (count + before) // MANY**2  # each is compared with all others
+    counts[WINDOWS_MADE] += count * (count + before) // COMPARED_WINDOWS**2  # each is compared with all others
     chosen = np.empty((count, 6))
     count, row = 0, queued[halfedge]
     while row >= 0:
         w = windows[row]
         is_left, other = not outrun(w, at_tail, at_head, length, slack), settled[halfedge]
         while is_left and other >= 0:
-            trim_by(windows[other], w, ROUND * length)
+            trim_by(windows[other], w, DISTANCE_ROUNDING * length)
             is_left, other = w[S1] - w[S0] > 1e-12 * length, following[other]
         if is_left:
             k = count
@@ -301,13 +301,13 @@ def list_length(following: Ints, row: int) -> int:
 def continue_search(faces: Faces, search: Search, slack: float, tolerance: float, limit: int) -> None:
     """Propagate in order of distance until nothing is queued, room is wanted, or `limit` windows have been made."""
     queue, counts = search.queue, search.counts
-    while queue.size[0] > 0 and counts[MADE] < limit:
+    while queue.size[0] > 0 and counts[WINDOWS_MADE] < limit:
         item = queue.items[0]
         is_halfedge, most = item < len(search.queued), search.most[item]
         if is_halfedge:
             most *= list_length(search.following, search.queued[item])
-        if counts[USED] + most > len(search.windows):
-            counts[WANTED] = most
+        if counts[USED_ROWS] + most > len(search.windows):
+            counts[MISSING_ROWS] = most
             return
         pop(queue)
         if is_halfedge:
@@ -580,7 +580,7 @@ class Search(NamedTuple):
     """The state of a search: distances so far, and windows in lists by halfedge, queued to go on or settled.
 
     Windows are rows of one array; `following` links those of a list, and the free ones. Row 0 is for scratch. The queue
-    holds halfedges, then vertices that paths bend around; `counts` are those at `USED`, `FREE`, ….
+    holds halfedges, then vertices that paths bend around; `counts` are those at `USED_ROWS`, `FIRST_FREE`, ….
     """
 
     distance: Floats
@@ -607,7 +607,7 @@ class Search(NamedTuple):
 
     def larger(self) -> Search:
         """Enlarge this search to at least the room that was wanted, in place: a copy would need twice the memory."""
-        room = len(self.windows) + max(len(self.windows) // 2, int(self.counts[WANTED]))
+        room = len(self.windows) + max(len(self.windows) // 2, int(self.counts[MISSING_ROWS]))
         refuse_beyond_memory(
             "exact distance along the surface",
             room - len(self.windows),
@@ -619,27 +619,27 @@ class Search(NamedTuple):
         return self
 
 
-USED, FREE, MADE, WANTED = range(4)
+USED_ROWS, FIRST_FREE, WINDOWS_MADE, MISSING_ROWS = range(4)
 """Rows ever used, the first free row among them, windows made so far, and rows that were missing."""
 
 
 @compiled
 def take_row(counts: Ints, following: Ints) -> int:
     """Take a row for a window; there must be room."""
-    row = counts[FREE]
+    row = counts[FIRST_FREE]
     if row >= 0:
-        counts[FREE] = following[row]
+        counts[FIRST_FREE] = following[row]
     else:
-        row = counts[USED]
-        counts[USED] += 1
+        row = counts[USED_ROWS]
+        counts[USED_ROWS] += 1
     return int(row)
 
 
 @compiled
 def free_row(counts: Ints, following: Ints, row: int) -> None:
     """Give a row back."""
-    following[row] = counts[FREE]
-    counts[FREE] = row
+    following[row] = counts[FIRST_FREE]
+    counts[FIRST_FREE] = row
 
 
 @compiled
@@ -699,7 +699,7 @@ def propagate_across(
             put(w, windows, row)
             following[row] = queued[halfedge]
             queued[halfedge] = row
-            counts[MADE] += 1
+            counts[WINDOWS_MADE] += 1
             if queue.places[halfedge] < 0:
                 push(queue, halfedge, near + 1.5 * length)
 

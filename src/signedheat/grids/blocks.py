@@ -1,7 +1,7 @@
 """Sparse grids: blocks of 8³ nodes near a surface, and tables that find them.
 
-A grid of any size is divided into blocks of `SIDE` nodes along each axis, and those into cubes of `CUBE` blocks. Cubes
-that hold blocks have a table of their own: memory grows with the blocks, not with the grid.
+A grid of any size is divided into blocks of `BLOCK` nodes along each axis, and those into cubes of `CUBE` blocks.
+Cubes that hold blocks have a table of their own: memory grows with the blocks, not with the grid.
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..compiled import compiled
 
-SIDE = 8
+BLOCK = 8
 """Nodes along each edge of a block."""
 CUBE = 16
 """Blocks along each edge of a cube."""
-NODES = SIDE**3
+BLOCK_NODES = BLOCK**3
 """Nodes in a block."""
+WINDOW = 8
+"""Blocks along each edge of a window: large grids are worked on window by window."""
 Tables: TypeAlias = tuple[NDArray[np.int32], NDArray[np.int32]]
 
 
@@ -29,14 +31,14 @@ Tables: TypeAlias = tuple[NDArray[np.int32], NDArray[np.int32]]
 class Blocks:
     """The blocks of a grid that exist."""
 
-    # (n, 3) their first nodes, divided by `SIDE`, in order of cubes, and of rows within each cube
+    # (n, 3) their first nodes, divided by `BLOCK`, in order of cubes, and of rows within each cube
     places: NDArray[np.int32]
     shape: tuple[int, int, int]  # nodes of the grid along each axis
 
     @classmethod
     def of(cls, places: NDArray[np.integer], shape: tuple[int, ...]) -> Blocks:
         """Make blocks at (n, 3) places, in order and without repetition."""
-        cubes = -(-np.array(shape) // (SIDE * CUBE))
+        cubes = -(-np.array(shape) // (BLOCK * CUBE))
         ranked = np.asarray(places, dtype=np.int64).reshape(-1, 3)
         cube = np.ravel_multi_index(tuple((ranked // CUBE).T), tuple(cubes))
         within = np.ravel_multi_index(tuple((ranked % CUBE).T), (CUBE,) * 3)
@@ -49,7 +51,7 @@ class Blocks:
     @cached_property
     def tables(self) -> Tables:
         """Number of each cube, −1 where it holds nothing; and (cubes, 16, 16, 16) the block at each place in a cube."""
-        cubes = np.full(tuple(-(-n // (SIDE * CUBE)) for n in self.shape), -1, dtype=np.int32)
+        cubes = np.full(tuple(-(-n // (BLOCK * CUBE)) for n in self.shape), -1, dtype=np.int32)
         if not len(self):
             return cubes, np.full((0, CUBE, CUBE, CUBE), -1, dtype=np.int32)
         places = self.places.astype(np.int64)
@@ -64,7 +66,7 @@ class Blocks:
     def rows(self, places: NDArray[np.integer]) -> NDArray[np.int32]:
         """Return (k,) the number of the block at each of (k, 3) places; −1 where there is none, or no grid."""
         wanted = np.asarray(places, dtype=np.int64)
-        limit = -(-np.array(self.shape) // SIDE)
+        limit = -(-np.array(self.shape) // BLOCK)
         inside = np.flatnonzero(((wanted >= 0) & (wanted < limit)).all(axis=1))
         cubes, rows = self.tables
         result = np.full(len(wanted), -1, dtype=np.int32)
@@ -90,10 +92,10 @@ class BlockValues:
     def __getitem__(self, nodes: tuple[NDArray[np.integer], ...]) -> Floats:
         """Return (k,) values at nodes, given by their three indices; NaN where there is no block."""
         wanted = np.stack(nodes, axis=1)
-        row = self.blocks.rows(wanted // SIDE)
+        row = self.blocks.rows(wanted // BLOCK)
         result = np.full(len(row), np.nan)
         held = row >= 0
-        a, b, c = (wanted[held] % SIDE).T
+        a, b, c = (wanted[held] % BLOCK).T
         result[held] = self.values[row[held], a, b, c]
         return result
 
@@ -104,15 +106,15 @@ class BlockValues:
 
     def window(self, first: NDArray[np.integer], shape: tuple[int, int, int]) -> NDArray[np.float32]:
         """Return values in a box of nodes from `first` on; NaN where there are none."""
-        low, high = first // SIDE, -(-(first + np.array(shape)) // SIDE)
+        low, high = first // BLOCK, -(-(first + np.array(shape)) // BLOCK)
         counts = high - low
         rows = self.blocks.rows(low + np.indices(counts).reshape(3, -1).T)
-        nodes = np.full((len(rows), SIDE, SIDE, SIDE), np.nan, dtype=np.float32)
+        nodes = np.full((len(rows), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
         nodes[rows >= 0] = self.values[rows[rows >= 0]]
-        by_axis = nodes.reshape(*counts, SIDE, SIDE, SIDE).transpose(0, 3, 1, 4, 2, 5).reshape(SIDE * counts)
-        for axis, end in enumerate(self.shape - SIDE * low):  # the last blocks reach beyond the grid
+        by_axis = nodes.reshape(*counts, BLOCK, BLOCK, BLOCK).transpose(0, 3, 1, 4, 2, 5).reshape(BLOCK * counts)
+        for axis, end in enumerate(self.shape - BLOCK * low):  # the last blocks reach beyond the grid
             np.moveaxis(by_axis, axis, 0)[max(end, 0) :] = np.nan
-        return by_axis[tuple(slice(a, a + n) for a, n in zip(first - SIDE * low, shape, strict=True))]
+        return by_axis[tuple(slice(a, a + n) for a, n in zip(first - BLOCK * low, shape, strict=True))]
 
 
 @compiled
@@ -134,12 +136,12 @@ def _interpolate(tables: Tables, values: NDArray[np.float32], points: Floats, li
             a, b, c = corner >> 2 & 1, corner >> 1 & 1, corner & 1
             part = (f if a else 1.0 - f) * (g if b else 1.0 - g) * (h if c else 1.0 - h)
             if part > 0.0:
-                u, v, w = (i + a) // SIDE, (j + b) // SIDE, (k + c) // SIDE
+                u, v, w = (i + a) // BLOCK, (j + b) // BLOCK, (k + c) // BLOCK
                 cube = cubes[u // CUBE, v // CUBE, w // CUBE]
                 row = rows[cube, u % CUBE, v % CUBE, w % CUBE] if cube >= 0 else np.int32(-1)
                 if row < 0:
                     total = np.nan
                     break
-                total += part * values[row, (i + a) % SIDE, (j + b) % SIDE, (k + c) % SIDE]
+                total += part * values[row, (i + a) % BLOCK, (j + b) % BLOCK, (k + c) % BLOCK]
         out[p] = total
     return out

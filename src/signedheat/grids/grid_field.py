@@ -24,7 +24,7 @@ from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import contiguous, finite_number, query_points, shaped
-from .blocks import SIDE, Blocks, BlockValues
+from .blocks import BLOCK, Blocks, BlockValues
 from .grid import Dimension, Grid
 from .marching import Refine, block_contour, closed_surface, contour_parts, level_lines
 from .polyline import Polyline
@@ -110,7 +110,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             object.__setattr__(self, "confidence", confidence)
 
     def _check_blocks(self, blocks: Blocks) -> None:
-        if self.values.shape != (len(blocks), SIDE, SIDE, SIDE) or blocks.shape != self.grid.shape:
+        if self.values.shape != (len(blocks), BLOCK, BLOCK, BLOCK) or blocks.shape != self.grid.shape:
             raise GeometryError(
                 f"{len(blocks)} blocks of a grid of {blocks.shape} nodes have values of shape {self.values.shape} on "
                 f"one of {self.grid.shape}",
@@ -383,8 +383,8 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         for i, x in enumerate(self.grid.axes[0]):  # plane by plane, in bounded memory
             plane = np.stack(np.meshgrid([x], *self.grid.axes[1:], indexing="ij"), axis=-1).reshape(-1, 3)
             values[i] = self.whole.interpolate(plane).reshape(self.grid.shape[1:])
-        for place, block in zip(self.blocks.places.astype(np.int64) * SIDE, self.values, strict=True):
-            part = tuple(slice(p, min(p + SIDE, n)) for p, n in zip(place, self.grid.shape, strict=True))
+        for place, block in zip(self.blocks.places.astype(np.int64) * BLOCK, self.values, strict=True):
+            part = tuple(slice(p, min(p + BLOCK, n)) for p, n in zip(place, self.grid.shape, strict=True))
             values[part] = block[tuple(slice(0, s.stop - s.start) for s in part)]
         return GridField(self.grid, values, self.diagnostics, solid=self.solid)
 

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError, OutsideError
 from ..mesh.components import places_among
+from ..mesh.edges import CLEARANCE
 from ..packages import lazy_module
-from .blocks import SIDE, BlockValues
+from .blocks import BLOCK, WINDOW, BlockValues
 
 measure: Any = lazy_module("skimage.measure", "contours")
 
-CLEARANCE = 1e-3
-"""Least distance of crossings from the nodes, in cells, so that no two vertices of a surface coincide."""
 CAP = 0.01
 """Distance, in cells, by which the walls that close a surface lie outside the box of the nodes."""
 LARGEST_VALUE = 1e30
@@ -109,8 +108,6 @@ def capped(height: Floats) -> Floats:
     return padded
 
 
-WINDOW = 8
-"""Blocks along each edge of a window."""
 INDEX_BITS = 20
 """Bits of the index of a node along an axis."""
 Refine = Callable[[Floats], Floats]
@@ -129,8 +126,8 @@ def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Itera
     least = CLEARANCE * float(spacing.min())
     capped = _reaches_walls(values, level)
     for window in np.unique(values.blocks.places // WINDOW, axis=0).astype(np.int64):
-        first = window * WINDOW * SIDE
-        shape = np.full(3, WINDOW * SIDE + 1)
+        first = window * WINDOW * BLOCK
+        shape = np.full(3, WINDOW * BLOCK + 1)
         if capped:  # a layer of nodes outside the walls
             beyond = (first == 0).astype(np.int64)
             first, shape = first - beyond, shape + beyond
@@ -180,8 +177,8 @@ def _reaches_walls(values: BlockValues, level: float) -> bool:
     signs: set[bool] = set()
     for axis, n in enumerate(values.shape):
         for node in (0, n - 1):
-            rows = np.flatnonzero(values.blocks.places[:, axis] == node // SIDE)
-            wall: NDArray[np.float32] = np.moveaxis(values.values[rows], axis + 1, 0)[node % SIDE]
+            rows = np.flatnonzero(values.blocks.places[:, axis] == node // BLOCK)
+            wall: NDArray[np.float32] = np.moveaxis(values.values[rows], axis + 1, 0)[node % BLOCK]
             signs |= {bool(sign) for sign in np.unique(wall[~np.isnan(wall)] < level)}
     return len(signs) == 2
 
@@ -209,7 +206,7 @@ def contour_parts(values: BlockValues, spacing: Floats, level: float, refine: Re
     count = 0
     for window, points, triangles in window_surfaces(values, spacing, level):
         on_edge, keys = edges_of(points)
-        on_wall = (points % (WINDOW * SIDE) == 0).any(axis=1)
+        on_wall = (points % (WINDOW * BLOCK) == 0).any(axis=1)
         shared = np.flatnonzero(on_edge & on_wall)
         numbers = np.full(len(points), -1, dtype=np.int64)
         for step in np.ndindex(3, 3, 3):

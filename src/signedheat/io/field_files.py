@@ -14,7 +14,7 @@ from ..errors import FileFormatError, GeometryError
 from ..exchange import VALUES_NAME, Elements
 from ..field_kinds import Field
 from ..foreign import SurfaceShape, elements, shape_of
-from ..grids.blocks import SIDE, Blocks
+from ..grids.blocks import BLOCK, Blocks
 from ..grids.grid import Grid
 from ..grids.grid_discretization import refuse_large_grid
 from ..grids.grid_field import GridField
@@ -206,7 +206,7 @@ def _load_band(path: PathLike) -> GridField:
         places = arrays["places"]
         if places.ndim != 2 or places.dtype.kind not in "iu" or places.shape[1] != len(grid.shape):
             raise damaged("its blocks have no places", element="places")
-        if len(places) and not ((places >= 0) & (places * SIDE < grid.shape)).all():
+        if len(places) and not ((places >= 0) & (places * BLOCK < grid.shape)).all():
             raise damaged("its blocks lie outside of the grid", element="places")
         blocks = Blocks.of(places, grid.shape)
         if not np.array_equal(blocks.places, places):
@@ -269,15 +269,17 @@ def whole_values(field: GridField) -> NDArray[np.float32]:
     """Fill in a band's values at all nodes; beyond the band they are plus or minus its half width."""
     assert field.blocks is not None
     grid, width = field.grid, np.float32(field.width)
-    counts = -(-np.array(grid.shape) // SIDE)
+    counts = -(-np.array(grid.shape) // BLOCK)
     places = np.argwhere(np.ones(counts, dtype=bool))
     rows = field.blocks.rows(places)
-    middles = np.minimum(places[rows < 0] * SIDE + 0.5 * (SIDE - 1), np.array(grid.shape) - 1)
-    parts = np.full((len(places), SIDE, SIDE, SIDE), width, dtype=np.float32)
+    middles = np.minimum(places[rows < 0] * BLOCK + 0.5 * (BLOCK - 1), np.array(grid.shape) - 1)
+    parts = np.full((len(places), BLOCK, BLOCK, BLOCK), width, dtype=np.float32)
     parts[rows < 0] *= np.where(field(grid.origin + middles * grid.spacing) < 0, -1, 1)[:, None, None, None]
     parts[rows >= 0] = np.clip(field.values[rows[rows >= 0]], -width, width)
     a, b, c = counts
-    whole = parts.reshape(a, b, c, SIDE, SIDE, SIDE).transpose(0, 3, 1, 4, 2, 5).reshape(a * SIDE, b * SIDE, c * SIDE)
+    whole = (
+        parts.reshape(a, b, c, BLOCK, BLOCK, BLOCK).transpose(0, 3, 1, 4, 2, 5).reshape(a * BLOCK, b * BLOCK, c * BLOCK)
+    )
     return np.ascontiguousarray(whole[tuple(slice(0, n) for n in grid.shape)])
 
 

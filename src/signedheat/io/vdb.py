@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints
 from ..errors import FileFormatError
 from ..exchange import VALUES_NAME
-from ..grids.blocks import SIDE, Blocks
+from ..grids.blocks import BLOCK, Blocks
 from ..grids.grid_field import GridField
 from .files import PathLike, format_for, replacing
 
@@ -29,7 +29,7 @@ VDB_MAGIC, VDB_VERSION, VDB_LIBRARY = 0x56444220, 224, (10, 0)
 ZIP_FLAG, ALL_VALUES_BYTE = 1, 6
 """Flag of values packed by zlib; byte before values that says that all of them are there."""
 MOST_HALF = float(np.finfo(np.float16).max)
-CHILDREN_PER_EDGE, VOXELS_PER_CHILD = (32, 16), (128, SIDE)
+CHILDREN_PER_EDGE, VOXELS_PER_CHILD = (32, 16), (128, BLOCK)
 """Nodes above the blocks, from the top: children along each edge, and voxels along each edge of a child."""
 VDB_CONVENTION = (
     "signed distance, negative inside, in the units of the shape; voxel (i, j, k) at origin + (i, j, k) * spacing"
@@ -124,12 +124,12 @@ def _band(field: GridField) -> _Tree:
 def _whole(field: GridField) -> _Tree:
     """All nodes of a grid in blocks; those without a value, and what fills the last blocks, are inactive."""
     shape = field.grid.shape
-    counts = -(-np.array(shape) // SIDE)
+    counts = -(-np.array(shape) // BLOCK)
     background = np.nextafter(np.float32(np.nanmax(field.values)), np.float32(np.inf))
-    padded = np.full(counts * SIDE, np.nan, dtype=np.float32)
+    padded = np.full(counts * BLOCK, np.nan, dtype=np.float32)
     padded[tuple(slice(0, n) for n in shape)] = field.values
     a, b, c = counts
-    values = padded.reshape(a, SIDE, b, SIDE, c, SIDE).transpose(0, 2, 4, 1, 3, 5).reshape(-1, SIDE, SIDE, SIDE)
+    values = padded.reshape(a, BLOCK, b, BLOCK, c, BLOCK).transpose(0, 2, 4, 1, 3, 5).reshape(-1, BLOCK, BLOCK, BLOCK)
     blocks = Blocks.of(np.argwhere(np.ones(counts, dtype=bool)), shape)
     values = values[np.ravel_multi_index(tuple(blocks.places.astype(np.int64).T), tuple(counts))]
     active = ~np.isnan(values)
@@ -144,7 +144,7 @@ def _in_order(
     blocks: Blocks, values: NDArray[np.floating], active: Bools, background: np.float32, outside: Outside
 ) -> _Tree:
     """Return the tree with its blocks in the order of the file: by top node, by cube, by place."""
-    places = SIDE * blocks.places.astype(np.int64)
+    places = BLOCK * blocks.places.astype(np.int64)
     top, cube = CHILDREN_PER_EDGE[0] * VOXELS_PER_CHILD[0], VOXELS_PER_CHILD[0]
     order = np.lexsort(np.concatenate([places // top, places // cube, places], axis=1).T[::-1])
     return _Tree(background, places[order], values[order], active[order], outside)

@@ -32,9 +32,9 @@ from .components import connected_components
 from .self_intersections import self_intersections
 from .triangles import flipped_along_creases
 
-AROUND = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+CELLS_AROUND = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 """β and γ of an edge in the four cells around it, counter-clockwise as seen from the end of the edge."""
-AFTER = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
+AXES_AFTER = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
 """Each axis, with those that follow it."""
 
 
@@ -73,12 +73,12 @@ def crossed_cells(crossings: Crossings, shape: tuple[int, ...]) -> CrossedCells:
     """Find the cells of a grid around crossed edges."""
     axes, crossed_edges = crossings.axes, np.arange(len(crossings.axes))[:, None]
     around = np.repeat(crossings.nodes[:, None], 4, axis=1)
-    around[crossed_edges, np.arange(4), AFTER[axes, 1][:, None]] -= AROUND[:, 0]
-    around[crossed_edges, np.arange(4), AFTER[axes, 2][:, None]] -= AROUND[:, 1]
+    around[crossed_edges, np.arange(4), AXES_AFTER[axes, 1][:, None]] -= CELLS_AROUND[:, 0]
+    around[crossed_edges, np.arange(4), AXES_AFTER[axes, 2][:, None]] -= CELLS_AROUND[:, 1]
     flat = np.ravel_multi_index(tuple(around.reshape(-1, 3).T), shape)
     cells, rows = np.unique(flat, return_inverse=True)
     rows = rows.reshape(-1, 4)
-    sides = 4 * axes[:, None] + 2 * AROUND[:, 0] + AROUND[:, 1]
+    sides = 4 * axes[:, None] + 2 * CELLS_AROUND[:, 0] + CELLS_AROUND[:, 1]
     edges = np.full((len(cells), 12), -1, dtype=np.int64)
     edges[rows, sides] = crossed_edges
     return CrossedCells(np.stack(np.unravel_index(cells, shape), axis=1).astype(np.int64), edges, rows, sides)
@@ -101,7 +101,7 @@ def dual_cells(
         order = np.argsort(keys, kind="stable").reshape(-1, 2)  # the two cells at each face
         middles = first[order[:, 0]] + 0.5 * (np.arange(3) != across[order[:, 0], None])
         # whether the first corner of the face is inside
-        corner = crossings.rising[edges[cells, 4 * AFTER[across, 1] + side]]
+        corner = crossings.rising[edges[cells, 4 * AXES_AFTER[across, 1] + side]]
         way = inside(middles) == corner[order[:, 0]]
         while True:
             ways[cells[order], faces[order]] = way[:, None]
@@ -128,7 +128,7 @@ def open_cells(edges: Ints) -> Ints:
 def _face_edges(faces: Ints) -> Ints:
     """Return (n, 4) edges of faces of a cell, in order around them."""
     axis, side = faces // 2, faces % 2
-    b, c = 4 * AFTER[axis, 1], 4 * AFTER[axis, 2] + 2 * side
+    b, c = 4 * AXES_AFTER[axis, 1], 4 * AXES_AFTER[axis, 2] + 2 * side
     return np.stack([b + side, c + 1, b + 2 + side, c], axis=1)
 
 
@@ -154,7 +154,7 @@ def _pieces(edges: Ints, ways: Bools) -> Ints:
     return result
 
 
-SLACK = 1e-6
+DIAGONAL_CLEARANCE = 1e-6
 """Distance, in cells, that a diagonal keeps from the sides of the tetrahedra."""
 
 
@@ -169,14 +169,14 @@ def dual_triangles(
     around = vertices[quads] - crossings.nodes[:, None]
     rows, corners = np.arange(len(quads))[:, None], np.arange(4)
     height = around[rows, corners, axes[:, None]]
-    flat = np.stack([around[rows, corners, AFTER[axes, 1 + k][:, None]] for k in range(2)], axis=2)
+    flat = np.stack([around[rows, corners, AXES_AFTER[axes, 1 + k][:, None]] for k in range(2)], axis=2)
     safe, off, length = np.empty((2, len(quads)), dtype=bool), np.empty((2, len(quads))), np.empty((2, len(quads)))
     for k in range(2):
         turned = np.roll(flat, -k, axis=1), np.roll(height, -k, axis=1)
         safe[k], crossed_at = _safe(*turned)
         off[k] = np.abs(crossed_at - shares)
         length[k] = np.linalg.norm(around[:, k] - around[:, k + 2], axis=1)
-    nearer = np.where(np.abs(off[0] - off[1]) > SLACK, off[1] < off[0], length[1] < length[0])
+    nearer = np.where(np.abs(off[0] - off[1]) > DIAGONAL_CLEARANCE, off[1] < off[0], length[1] < length[0])
     second = safe[1] & (nearer | ~safe[0])
     fan = fanned | ~safe.any(axis=0)
     plain, fans = np.flatnonzero(~fan), np.flatnonzero(fan)
@@ -236,8 +236,8 @@ def _safe(flat: Floats, height: Floats) -> tuple[Bools, Floats]:
     reach = (passing * q).sum(axis=1) / np.maximum((q * q).sum(axis=1), 1e-300)
     level = height[:, 0] + share * (height[:, 2] - height[:, 0])
     last = height[rows, left_corner]
-    safe = (crossed_at > SLACK) & (crossed_at < 1 - SLACK) & (reach < 1 - SLACK)
-    safe &= (level > reach * last + SLACK) & (level < (1 - reach) + reach * last - SLACK)
+    safe = (crossed_at > DIAGONAL_CLEARANCE) & (crossed_at < 1 - DIAGONAL_CLEARANCE) & (reach < 1 - DIAGONAL_CLEARANCE)
+    safe &= (level > reach * last + DIAGONAL_CLEARANCE) & (level < (1 - reach) + reach * last - DIAGONAL_CLEARANCE)
     return safe, crossed_at
 
 

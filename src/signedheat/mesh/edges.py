@@ -12,6 +12,9 @@ from ..arrays import Bools, Floats, Frozen, Ints, mask_of, read_only
 from ..compiled import compiled
 from .components import connected_components, first_members, grouped
 
+CLEARANCE = 1e-3
+"""Least distance of crossings from the ends of edges, relative to these, so that no two vertices coincide."""
+
 
 @dataclass(frozen=True, eq=False)
 class HalfedgePairs:

@@ -13,9 +13,9 @@ from .box_tree import BOXES_PER_LEAF, BoxTree, morton_codes
 from .unit_vectors import unit
 from .welding import same_positions
 
-TOUCHING = 1e-10
+TOUCHING_DEPTH = 1e-10
 """Depth, relative to the size of the mesh, up to which triangles only touch."""
-FOLDED = 1e-10
+COVERING_FOLD = 1e-10
 """One minus the cosine between two neighbours, as seen along their edge, up to which one covers the other."""
 CROWD = 64
 """Number of faces around a vertex above which their intersections are found around it, and not in space."""
@@ -23,7 +23,7 @@ CROWD = 64
 
 def self_intersections(vertices: Floats, faces: Ints, asked: Bools | None = None) -> Ints:
     """Return (k, 2) pairs of faces that intersect, overlap, or touch without a common vertex; one is `asked` for."""
-    slack = TOUCHING * float(np.ptp(vertices, axis=0).max(initial=0.0))
+    slack = TOUCHING_DEPTH * float(np.ptp(vertices, axis=0).max(initial=0.0))
     return overlapping_faces(vertices, same_positions(vertices)[faces], slack, -slack, asked)
 
 
@@ -141,7 +141,7 @@ def _is_folded(p: Floats, q: Floats, apex: int, beyond: int) -> bool:
         x = p[3 * apex + d] - p[start + d] - height * along
         y = q[3 * beyond + d] - p[start + d] - other * along
         first, second, product = first + x * x, second + y * y, product + x * y
-    return product > (1.0 - FOLDED) * np.sqrt(first * second)
+    return product > (1.0 - COVERING_FOLD) * np.sqrt(first * second)
 
 
 @compiled

@@ -15,9 +15,9 @@ from ..parallel import in_chunks
 
 # Feature codes of a foot: 0 inside the face; 1, 2, 3 on its edges (corner 0–1, 1–2, 2–0); 4, 5, 6 its corners 0, 1, 2.
 
-HEIGHT = 1e-14
+LEAST_HEIGHT = 1e-14
 """Height of a triangle, relative to its length, up to which it counts as none: rounding would decide its direction."""
-TOGETHER = 8
+POINTS_TOGETHER = 8
 """Number of points that descend a tree together. With 16 a million points take a tenth less time on 20,000 faces, and a
 tenth more on 1.3 million, whose boxes are smaller than the distances between 16 random points; with 4 half as much
 again."""
@@ -42,7 +42,7 @@ def _rows(corners: Floats) -> Floats:
     u = np.where(length > 0.0, u / np.where(length > 0.0, length, 1.0), [[1.0], [0.0], [0.0]])
     across = _dot(v, u)
     w = v - across * u
-    flat = ~(np.sqrt(_dot(w, w)) > HEIGHT * np.abs(across))
+    flat = ~(np.sqrt(_dot(w, w)) > LEAST_HEIGHT * np.abs(across))
     # the plane of flat ones is any through the side
     w = np.where(flat, np.arange(3)[:, None] == np.abs(u).argmin(axis=0), w)
     for _ in range(2):  # twice, since the height of slivers has few accurate digits
@@ -204,7 +204,7 @@ class TriangleTree:
     def nearest(self, points: Floats) -> tuple[Ints, Floats]:
         """Return the triangle nearest to each of (k, 3) points, and barycentric coordinates of its nearest place."""
         points = read_only(np.ascontiguousarray(points))
-        faces, _ = nearest_faces(self.rows, self.tree, self._no_discs, points, TOGETHER * max(len(points), 1))
+        faces, _ = nearest_faces(self.rows, self.tree, self._no_discs, points, POINTS_TOGETHER * max(len(points), 1))
         return faces.astype(np.int64), barycentric_on_triangles(self.rows, faces, points)
 
 
@@ -212,7 +212,7 @@ def nearest_faces(
     rows: Floats, tree: BoxTree, discs: Floats, points: Floats, run: int
 ) -> tuple[NDArray[np.int32], Floats]:
     """Return (n,) the nearest face of each of (n, 3) points, and the squares of their distances: see `_descend`."""
-    return _descend(rows, tree, discs, read_only(points), run, np.empty(min(max(len(points), 1), TOGETHER)))
+    return _descend(rows, tree, discs, read_only(points), run, np.empty(min(max(len(points), 1), POINTS_TOGETHER)))
 
 
 @compiled

@@ -22,14 +22,13 @@ import scipy
 from ..arrays import Bools, Floats, Ints, mask_of
 from ..errors import InexactWarning, MemoryLimitError, OutsideError, warn_user
 from ..field_levels import NodeValues, on_level
-from ..grids.blocks import SIDE, Blocks, BlockValues
+from ..grids.blocks import BLOCK, WINDOW, Blocks, BlockValues
 from ..grids.grid import Grid
-from ..grids.marching import CLEARANCE
 from ..jobs import Progress
 from ..memory import available_memory, libraries
 from ..mesh.components import element_components, sums_of
 from ..mesh.dual_cells import Crossings, DualCells, crossed_cells, dual_cells, open_cells, separate_triangles
-from ..mesh.edges import edge_table
+from ..mesh.edges import CLEARANCE, edge_table
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import MOST_CREASED_FACES, area_vectors, divided_at
 from ..mesh.unit_vectors import unit
@@ -39,7 +38,7 @@ from .node_distances import solved
 from .offsets import Offset
 from .tiles import blocks_where, in_threads, prepared, tiles_of
 
-FLAT = 0.05
+CREASE_TANGENT = 0.05
 """Planes count as one if the tangent of half the angle between them is below this. Creases of 5.7° are cut off by a
 hundredth of a cell at most. With .2 creases of 20° are lost; with .01 facets of smooth surfaces become creases."""
 
@@ -72,7 +71,7 @@ def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats
     it, or is looked for on the wall that it is beyond the farthest.
     """
     values, vectors = np.linalg.eigh(quadrics.products)
-    least = FLAT**2 * np.maximum(values[:, 2], 1e-300)
+    least = CREASE_TANGENT**2 * np.maximum(values[:, 2], 1e-300)
     ranks = (values > least[:, None]).sum(axis=1)
     points = _solved(values, vectors, quadrics.sides, least)
     points += _way_into(points, vectors[:, :, 0], lower, upper) * (ranks > 1)[:, None]
@@ -108,25 +107,25 @@ def _solved(values: Floats, vectors: Floats, sides: Floats, least: Floats) -> Fl
     return np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, sides, optimize=True)
 
 
-MANY = 1 << 17
+PIECES_AT_ONCE = 1 << 17
 """Batch size for pieces of the level."""
-ON = 1e-3
+ON_LEVEL = 1e-3
 """Distance from the level, in cells, above which a vertex is moved onto it."""
-BEYOND = 0.6
+OUTSIDE_CELL = 0.6
 """Distance, in cells, by which a vertex may leave its cell."""
-APART = 0.2
+VERTEX_SPACING = 0.2
 """Least distance, in cells, between vertices that have left their cells."""
-BENT = np.deg2rad(5.0)
+CHECKED_BEND = np.deg2rad(5.0)
 """Angle between two faces above which their edge is checked; it is small where a corner is missing."""
-CHORD = 0.02
+CHORD_ERROR = 0.02
 """Distance from the level, in cells, above which an edge along a crease is divided."""
 DIVISIONS = 6
 """Rounds of division; the largest error on a bracket is .08 cells with three rounds, and .05 with six."""
-NEAR = 4.0
+CROSS_REACH = 4.0
 """Distance, in cells, within which triangles of a new vertex may intersect others."""
-HALVES = np.array(list(np.ndindex(2, 2, 2))) - 0.5
+PROBE_OFFSETS = np.array(list(np.ndindex(2, 2, 2))) - 0.5
 """Offsets, in cells, from a vertex on a crease of probes for further planes."""
-BETWEEN = 0.1, 0.3, 0.6
+PROBE_SHARES = 0.1, 0.3, 0.6
 """Positions of probes, as shares of the way from the middle of an edge to the opposite corner."""
 
 
@@ -152,8 +151,8 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats
     order = np.argsort(pieces, kind="stable")
     pieces, edges = pieces[order], cells.edges[rows, sides][order]
     alone = np.bincount(cells.owners)[cells.owners] == 1
-    for begin in range(0, count, MANY):
-        stop = min(begin + MANY, count)
+    for begin in range(0, count, PIECES_AT_ONCE):
+        stop = min(begin + PIECES_AT_ONCE, count)
         batch = slice(*np.searchsorted(pieces, [begin, stop]))
         used, crossed = np.unique(edges[batch], return_inverse=True)  # each is in four cells
         parts = _vertices(
@@ -179,9 +178,9 @@ def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
     if len(rows):
         rows = rows[np.argsort(away[rows], kind="stable")]
         settled = np.where(in_cell[:, None], wider, vertices)
-        near = scipy.spatial.cKDTree(settled).query_ball_point(wider[rows], APART, workers=-1)
+        near = scipy.spatial.cKDTree(settled).query_ball_point(wider[rows], VERTEX_SPACING, workers=-1)
         rows = rows[[set(others) <= {row} for row, others in zip(rows, near, strict=True)]]
-        first, second = scipy.spatial.cKDTree(wider[rows]).query_pairs(APART, output_type="ndarray").T
+        first, second = scipy.spatial.cKDTree(wider[rows]).query_pairs(VERTEX_SPACING, output_type="ndarray").T
         in_cell[np.delete(rows, np.maximum(first, second))] = True
     return in_cell
 
@@ -189,7 +188,7 @@ def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
 def _vertices(
     offset: ImplicitSurface, grid: Grid, places: Ints, alone: Bools, owners: Ints, crossed: Ints, points: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Vertices of pieces in their cells, their middles, and candidates up to `BEYOND` outside, or NaN.
+    """Vertices of pieces in their cells, their middles, and candidates up to `OUTSIDE_CELL` outside, or NaN.
 
     The `owners`, (k,), are the pieces in which (k,) edges are `crossed`, at (e, 3) points.
     """
@@ -210,18 +209,20 @@ def _vertices(
     creased = np.flatnonzero((ranks > 1) & alone)
     if len(creased):
         # find planes in a cell with a crease that do not cross its edges
-        low, high = lower[creased] - BEYOND * grid.spacing, upper[creased] + BEYOND * grid.spacing
-        on, normals = offset.planes(((middles + minima)[creased, None] + HALVES * grid.spacing).reshape(-1, 3))
-        probed = np.repeat(np.arange(len(creased)), len(HALVES))
+        low, high = lower[creased] - OUTSIDE_CELL * grid.spacing, upper[creased] + OUTSIDE_CELL * grid.spacing
+        on, normals = offset.planes(((middles + minima)[creased, None] + PROBE_OFFSETS * grid.spacing).reshape(-1, 3))
+        probed = np.repeat(np.arange(len(creased)), len(PROBE_OFFSETS))
         on -= middles[creased][probed]
         within = ((on > low[probed]) & (on < high[probed])).all(axis=1)
         more = Quadrics.of(probed[within], on[within], normals[within], len(creased))
         farther, higher = minimizers(quadrics[creased] + more, low, high)
         error = np.abs(offset.distance(middles[creased] + farther))
-        wanted = (error < ON * step) & ((higher > ranks[creased]) | (higher == 3) | (np.abs(off[creased]) > ON * step))
+        wanted = (error < ON_LEVEL * step) & (
+            (higher > ranks[creased]) | (higher == 3) | (np.abs(off[creased]) > ON_LEVEL * step)
+        )
         wider[creased[wanted]] = middles[creased[wanted]] + farther[wanted]
     for _ in range(2):
-        far = np.flatnonzero(np.abs(off) > ON * step)
+        far = np.flatnonzero(np.abs(off) > ON_LEVEL * step)
         minima[far] = np.clip(minima[far] - off[far, None] * gradients[far], lower[far], upper[far])
         off[far], gradients[far] = offset.slopes(middles[far] + minima[far])
     return middles + minima, middles, wider
@@ -236,7 +237,7 @@ def divided_along_creases(
         edges, points = _creases_off(offset, spacing, vertices, faces, new)
         if not len(edges):
             break
-        away, _ = scipy.spatial.cKDTree(points).query(vertices, distance_upper_bound=NEAR * float(spacing.max()))
+        away, _ = scipy.spatial.cKDTree(points).query(vertices, distance_upper_bound=CROSS_REACH * float(spacing.max()))
         while len(edges):
             divided, made = _divided(vertices, faces, edges, points)
             new = np.any(made >= len(vertices), axis=1)
@@ -260,24 +261,24 @@ def _creases_off(
     step = float(spacing.max())
     near = np.flatnonzero(mask_of(len(vertices), faces[new])[faces].any(axis=1))
     normals, edges = unit(area_vectors(vertices[faces[near]])), edge_table(faces[near]).pairs
-    bent = normals[edges // 3].prod(axis=1).sum(axis=1) < np.cos(BENT)
+    bent = normals[edges // 3].prod(axis=1).sum(axis=1) < np.cos(CHECKED_BEND)
     edges = edges[bent & new[near[edges // 3]].any(axis=1)]
     edges = 3 * near[edges // 3] + edges % 3
     tails, heads = faces.ravel()[edges[:, 0]], faces.ravel()[edges[:, 1]]
     middles = 0.5 * (vertices[tails] + vertices[heads])
     off = np.abs(offset.distance(middles))
-    rows = np.flatnonzero(off > CHORD * step)
+    rows = np.flatnonzero(off > CHORD_ERROR * step)
     rows = rows[np.argsort(-off[rows], kind="stable")]
     edges, middles = edges[rows], middles[rows]
     across = vertices[faces[edges // 3, (edges + 2) % 3]]
-    probes = [middles + share * (across[:, side] - middles) for share in BETWEEN for side in range(2)]
+    probes = [middles + share * (across[:, side] - middles) for share in PROBE_SHARES for side in range(2)]
     on, directions = offset.planes(np.concatenate(probes))
     owners = np.tile(np.arange(len(edges)), len(probes))
-    room = np.broadcast_to(BEYOND * spacing, middles.shape)
+    room = np.broadcast_to(OUTSIDE_CELL * spacing, middles.shape)
     moves, _ = minimizers(Quadrics.of(owners, on - middles[owners], directions, len(edges)), -room, room)
     off, gradients = offset.slopes(middles)
     points, nearest = middles + moves, middles - off[:, None] * gradients
-    points = np.where((np.abs(offset.distance(points)) < ON * step)[:, None], points, nearest)
+    points = np.where((np.abs(offset.distance(points)) < ON_LEVEL * step)[:, None], points, nearest)
     first = np.full(len(faces), len(edges))
     np.minimum.at(first, edges // 3, np.arange(len(edges))[:, None])
     alone = (first[edges // 3] == np.arange(len(edges))[:, None]).all(axis=1)
@@ -293,18 +294,16 @@ def _divided(vertices: Floats, faces: Ints, edges: Ints, points: Floats) -> tupl
 
 BYTES_PER_BLOCK = 170_000
 """Measured peak memory of a contour, for each block of the grid near it."""
-WINDOW = 8
-"""Number of blocks along each edge of a window whose crossed edges are found together."""
-AROUND = np.array(list(np.ndindex(3, 3, 3))) - 1
+TOUCHING_CELLS = np.array(list(np.ndindex(3, 3, 3))) - 1
 """(27, 3) offsets of a cell and of those that touch it."""
-IN_BLOCK = np.array(list(np.ndindex(SIDE, SIDE, SIDE)))
+IN_BLOCK = np.array(list(np.ndindex(BLOCK, BLOCK, BLOCK)))
 """(512, 3) offsets of the nodes of a block."""
-SAMPLED = 4096
+CONTOUR_PLACES = 4096
 """Number of places on a surface at which its contour is looked for, besides one for each part."""
-LOST = 0.01
+MISSED_SHARE = 0.01
 """Contours that miss a larger share of the surface are announced. Edges and tips thinner than a cell occur on most
 parts, walls do not."""
-STEEPEST = 2.0
+STEEPEST_HEIGHT = 2.0
 """Largest slope of the height above a surface at which blocks near it are found from coarse to fine. Distance has slope
 1; where a varying distance is steeper, blocks are found by following the surface."""
 
@@ -312,7 +311,7 @@ STEEPEST = 2.0
 def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
     """Heights above a surface at the nodes of blocks; a level of distance is computed for all blocks at once."""
     tree, windings = prepared(offset.solid)
-    values = np.empty((len(blocks), SIDE, SIDE, SIDE), dtype=np.float32)
+    values = np.empty((len(blocks), BLOCK, BLOCK, BLOCK), dtype=np.float32)
     level = offset.level
 
     def solve(rows: Ints) -> Ints:
@@ -320,10 +319,10 @@ def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
         if level is not None:
             values[rows] = solved(tree, windings, grid, places)[0].astype(np.float64) - level
             return rows
-        nodes = (SIDE * places[:, None] + IN_BLOCK).reshape(-1, 3)
+        nodes = (BLOCK * places[:, None] + IN_BLOCK).reshape(-1, 3)
         heights = offset.distance(grid.origin + nodes * grid.spacing)
         heights[(nodes >= grid.shape).any(axis=1)] = np.nan
-        values[rows] = heights.reshape(-1, SIDE, SIDE, SIDE)
+        values[rows] = heights.reshape(-1, BLOCK, BLOCK, BLOCK)
         return rows
 
     for _ in in_threads(solve, tiles_of(blocks)):
@@ -364,7 +363,7 @@ def announce_lost(offset: Offset, grid: Grid, vertices: Floats) -> None:
     parts, lost = _lost(offset, grid, vertices)
     n_parts = len(np.unique(parts))
     gone = n_parts - len(np.unique(parts[~lost]))
-    if gone == 0 and lost.sum() <= LOST * len(lost):
+    if gone == 0 and lost.sum() <= MISSED_SHARE * len(lost):
         return
     missing = f"{gone} of {n_parts} parts" if gone else f"{lost.mean():.0%} of the surface"
     remedy = "make the cells smaller, or keep the faces" if offset.level == 0 else "make the cells smaller"
@@ -379,7 +378,7 @@ def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
     if not len(faces):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool)
     parts = element_components(features.faces[faces].astype(np.int64))
-    chosen, bases = sampled(Pieces(features.corners[faces].reshape(-1, 3, 3), parts), SAMPLED)
+    chosen, bases = sampled(Pieces(features.corners[faces].reshape(-1, 3, 3), parts), CONTOUR_PLACES)
     reach = offset.reach(bases) if callable(offset.reach) else np.full(len(bases), offset.reach)
     moves = reach[:, None] * features.face_normals[faces[chosen]]
     places, parts = np.concatenate([bases + moves, bases - moves]), np.tile(parts[chosen], 2)
@@ -389,27 +388,27 @@ def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
         on_surface &= np.abs(offset.distance(places)) < 1e-3 * float(grid.spacing.min())
     size = np.array(grid.shape) + 2
     filled = np.floor((vertices - grid.origin) / grid.spacing).astype(np.int64) + 1
-    around = (cells[on_surface, None] + AROUND + 1).reshape(-1, 3)
+    around = (cells[on_surface, None] + TOUCHING_CELLS + 1).reshape(-1, 3)
     near = np.isin(*(np.ravel_multi_index(tuple(places.T), size, "clip") for places in (around, filled)))
-    lost = np.asarray(~near.reshape(-1, len(AROUND)).any(axis=1))
+    lost = np.asarray(~near.reshape(-1, len(TOUCHING_CELLS)).any(axis=1))
     return parts[on_surface], lost
 
 
 def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCells]:
     """Heights near a surface, the edges that it crosses, and its pieces in cells; blocks are added as needed."""
     places = blocks_at(offset, grid)
-    done = BlockValues(Blocks.of(places[:0], grid.shape), np.empty((0, SIDE, SIDE, SIDE), dtype=np.float32))
+    done = BlockValues(Blocks.of(places[:0], grid.shape), np.empty((0, BLOCK, BLOCK, BLOCK), dtype=np.float32))
     while True:
         new = block_heights(offset, grid, Blocks.of(places, grid.shape))
         both = Blocks.of(np.concatenate([done.blocks.places, new.blocks.places]), grid.shape)
-        merged = np.empty((len(both), SIDE, SIDE, SIDE), dtype=np.float32)
+        merged = np.empty((len(both), BLOCK, BLOCK, BLOCK), dtype=np.float32)
         for part in (done, new):
             merged[both.rows(part.blocks.places)] = part.values
         done = BlockValues(both, merged)
         crossings = crossed_edges(done)
         cells = crossed_cells(crossings, grid.shape)
         around = cells.places[open_cells(cells.edges)][:, None] + np.array(list(np.ndindex(2, 2, 2)))
-        places = np.unique(around.reshape(-1, 3) // SIDE, axis=0)
+        places = np.unique(around.reshape(-1, 3) // BLOCK, axis=0)
         places = places[both.rows(places) < 0]
         if not len(places):
             break
@@ -422,7 +421,7 @@ def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCe
 
 def blocks_at(offset: Offset, grid: Grid) -> Ints:
     """(n, 3) places of the blocks of a grid near a surface: heights change by no more than one goes."""
-    diagonal = (1.0 if offset.level is not None else STEEPEST) * float(np.linalg.norm(grid.spacing))
+    diagonal = (1.0 if offset.level is not None else STEEPEST_HEIGHT) * float(np.linalg.norm(grid.spacing))
 
     def near(centres: Floats, half: float) -> Bools:
         return np.abs(offset.distance(centres)) <= (half + 1.0) * diagonal
@@ -444,7 +443,7 @@ def crossed_edges(band: BlockValues) -> Crossings:
     """Edges whose ends lie on both sides of a surface, with crossings by linear interpolation."""
     parts = []
     for window in np.unique(band.blocks.places // WINDOW, axis=0).astype(np.int64):
-        first, size = window * WINDOW * SIDE, WINDOW * SIDE
+        first, size = window * WINDOW * BLOCK, WINDOW * BLOCK
         parts += crossings_in(band.window(first, (size + 1,) * 3).astype(np.float64), first)
     return joined_crossings(parts)
 

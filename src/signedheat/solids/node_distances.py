@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..grids.blocks import SIDE
+from ..grids.blocks import BLOCK
 from ..grids.grid import Grid
 from ..mesh.box_tree import BOXES_PER_LEAF, morton_codes
 from ..search.face_tree import FaceTree
@@ -27,7 +27,7 @@ EIGHTHS = np.stack([np.arange(8) >> 2, np.arange(8) >> 1 & 1, np.arange(8) & 1])
 CROWDED_LEAVES = 1500
 """Number of candidate leaves above which the nodes of a block are searched one by one."""
 ALONG_A_CURVE = np.stack(
-    [sum((np.arange(SIDE**3) >> (3 * bit + 2 - axis) & 1) << bit for bit in range(3)) for axis in range(3)], axis=1
+    [sum((np.arange(BLOCK**3) >> (3 * bit + 2 - axis) & 1) << bit for bit in range(3)) for axis in range(3)], axis=1
 )
 """(512, 3) nodes of a block along a space-filling curve."""
 
@@ -36,12 +36,12 @@ def distances_in(
     tree: FaceTree, windings: Windings, grid: Grid, first: Ints, places: Ints
 ) -> tuple[Floats, NDArray[np.float32]]:
     """Compute (a, b, c) signed distances at nodes of blocks, from node `first` on, or NaN; and confidence."""
-    shape = np.minimum((places.max(axis=0) + 1) * SIDE, grid.shape) - first
+    shape = np.minimum((places.max(axis=0) + 1) * BLOCK, grid.shape) - first
     squares, faces = np.full(tuple(shape), np.nan), np.full(tuple(shape), -1, dtype=np.int32)
     boxes = tree.features.rows, tree.tree.bounds, tree.discs, tree.tree.items
     lattice = np.array(grid.origin), np.array(grid.spacing), np.array(grid.shape)
-    firsts = SIDE * places[np.argsort(morton_codes(places.astype(np.float64)), kind="stable")]
-    last = np.minimum(firsts + SIDE, grid.shape) - 1
+    firsts = BLOCK * places[np.argsort(morton_codes(places.astype(np.float64)), kind="stable")]
+    last = np.minimum(firsts + BLOCK, grid.shape) - 1
     near, _ = tree.nearest(grid.origin + 0.5 * (firsts + last) * grid.spacing)
     crowded = _fill(*boxes, *lattice, firsts, near, first, EIGHTHS, squares, faces)
     if crowded.any():
@@ -59,11 +59,11 @@ def solved(
 ) -> tuple[NDArray[np.float32], NDArray[np.float16]]:
     """(n, 8, 8, 8) signed distances at the nodes of nearby blocks, NaN beyond the grid; and confidence."""
     first = places.min(axis=0)
-    distances, trusted = distances_in(tree, windings, grid, SIDE * first, places)
-    values = np.full((len(places), SIDE, SIDE, SIDE), np.nan, dtype=np.float32)
+    distances, trusted = distances_in(tree, windings, grid, BLOCK * first, places)
+    values = np.full((len(places), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
     confidence = np.ones(values.shape, dtype=np.float16)
-    for row, place in enumerate(SIDE * (places - first)):
-        a, b, c = (slice(p, p + SIDE) for p in place)
+    for row, place in enumerate(BLOCK * (places - first)):
+        a, b, c = (slice(p, p + BLOCK) for p in place)
         i, j, k = distances[a, b, c].shape
         values[row, :i, :j, :k], confidence[row, :i, :j, :k] = distances[a, b, c], trusted[a, b, c]
     return values, confidence
@@ -114,7 +114,7 @@ def _fill(
     crowded = np.zeros(len(firsts), dtype=np.bool_)
     for b in range(len(firsts)):
         for d in range(3):
-            half = 0.5 * (min(firsts[b, d] + SIDE, limits[d]) - 1 - firsts[b, d])
+            half = 0.5 * (min(firsts[b, d] + BLOCK, limits[d]) - 1 - firsts[b, d])
             box[d], box[3 + d] = origin[d] + (firsts[b, d] + half) * steps[d], half * steps[d]
         _, _, box[6], box[7], box[8] = foot_on_triangle(rows, np.int64(start[b]), box[0], box[1], box[2])
         n_near = _leaves_of_tree(bounds, discs, box, stack, near)
@@ -134,7 +134,7 @@ def _fill(
         while depth > 0:
             depth -= 1
             i, j, k, level, slot = cubes[depth]
-            side = SIDE >> level + 1
+            side = BLOCK >> level + 1
             for e in range(parts):
                 places[0, e] = origin[0] + (i + side * eighths[0, e] + 0.5 * (side - 1)) * steps[0]
                 places[1, e] = origin[1] + (j + side * eighths[1, e] + 0.5 * (side - 1)) * steps[1]

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints, fingerprint
 from ..diagnostics import Diagnostics, Note
 from ..errors import FileFormatError, MemoryLimitError, OutsideError, SignedHeatError, UnsupportedTypeError
-from ..grids.blocks import NODES, SIDE, Blocks
+from ..grids.blocks import BLOCK, BLOCK_NODES, Blocks
 from ..grids.grid import Grid
 from ..grids.grid_discretization import refuse_large_grid
 from ..grids.grid_field import GridField
@@ -79,7 +79,7 @@ def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Grid
     refuse_plane_grid(grid)
     refuse_large_grid(grid, BYTES_PER_DENSE_NODE, BYTES_AT_WORK)
     values, confidence = np.empty(grid.shape), np.empty(grid.shape, dtype=np.float32)
-    n_blocks = -(-np.array(grid.shape) // SIDE)
+    n_blocks = -(-np.array(grid.shape) // BLOCK)
     firsts = np.stack(np.meshgrid(*(np.arange(0, n, TILE) for n in n_blocks), indexing="ij"), axis=-1).reshape(-1, 3)
     tree, windings = prepared(solid)
 
@@ -87,10 +87,10 @@ def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Grid
         stop = np.minimum(first + TILE, n_blocks)
         axes = (np.arange(*ends) for ends in zip(first, stop, strict=True))
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        return distances_in(tree, windings, grid, SIDE * first, places)
+        return distances_in(tree, windings, grid, BLOCK * first, places)
 
     for done, (first, (distances, trusted)) in enumerate(zip(firsts, in_threads(tile, firsts), strict=True)):
-        window = tuple(slice(f, f + n) for f, n in zip(SIDE * first, distances.shape, strict=True))
+        window = tuple(slice(f, f + n) for f, n in zip(BLOCK * first, distances.shape, strict=True))
         values[window], confidence[window] = distances, trusted
         if progress is not None:
             progress((done + 1) / len(firsts), "distance")
@@ -115,8 +115,8 @@ def band_field(
     places, factor = blocks_near(tree, grid, reach, limit)
     if factor > 1:
         raise MemoryLimitError(
-            f"the band has more than {limit:,} blocks of {NODES} nodes, {limit * NODES * BYTES_IN_BAND / 1e9:.2g} GB, "
-            "for which there is room",
+            f"the band has more than {limit:,} blocks of {BLOCK_NODES} nodes, "
+            f"{limit * BLOCK_NODES * BYTES_IN_BAND / 1e9:.2g} GB, for which there is room",
             remedy=f"use a spacing of {factor * float(grid.spacing.min()):.3g} or more, or a narrower band"
             + ("" if store is not None else ", or keep it on disk (store)"),
         )
@@ -125,7 +125,7 @@ def band_field(
         raise OutsideError("no node of the grid lies within the band", element="grid")
     tiles, diagnostics = tiles_of(blocks), solid.diagnostics
     if store is None:
-        values: NDArray[Any] = np.empty((len(blocks), SIDE, SIDE, SIDE), dtype=np.float32)
+        values: NDArray[Any] = np.empty((len(blocks), BLOCK, BLOCK, BLOCK), dtype=np.float32)
         confidence: NDArray[Any] = np.empty(values.shape, dtype=np.float16)
 
         def solve(rows: Ints) -> Ints:
@@ -163,7 +163,7 @@ def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> tuple[I
 
 def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: float) -> tuple[Ints, int]:
     """(n, 3) places of blocks that `near` wants, and 1; or none, and how many times larger cells would have to be."""
-    if math.prod(-(-n // SIDE) for n in grid.shape) > limit:
+    if math.prod(-(-n // BLOCK) for n in grid.shape) > limit:
         numbers = {side: number for side, _, number in _cubes(grid, near, FOLLOWED_CUBES)}
         if max(numbers.values()) > COUNT_FACTOR * limit:
             return np.zeros((0, 3), dtype=np.int64), 2 * max(s for s in numbers if numbers[s] * COUNT_FACTOR > limit)
@@ -175,12 +175,12 @@ def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: floa
 
 def _cubes(grid: Grid, near: Callable[[Floats, float], Bools], few: int | None) -> Iterator[tuple[int, Ints, float]]:
     """Yield cubes from coarse to fine: blocks along edges, places, and how many, estimated from `few`."""
-    n_blocks = -(-np.array(grid.shape) // SIDE)
+    n_blocks = -(-np.array(grid.shape) // BLOCK)
     side, each, random = 1 << max(0, int(np.ceil(np.log2(n_blocks.max())))), 1.0, np.random.default_rng(0)
     places, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))
     while side and len(places):
-        half = 0.5 * (side * SIDE - 1)
-        places = places[near(grid.origin + (places * side * SIDE + half) * grid.spacing, half)]
+        half = 0.5 * (side * BLOCK - 1)
+        places = places[near(grid.origin + (places * side * BLOCK + half) * grid.spacing, half)]
         yield side, places, each * len(places)
         if few is not None and len(places) > few:
             places, each = random.choice(places, few, replace=False), each * len(places) / few
@@ -194,10 +194,10 @@ def blocks_that_fit(store: str | PathLike[str] | None) -> int:
     if store is not None:
         folder = Path(store).absolute()
         existing = next(place for place in (folder, *folder.parents) if place.exists())
-        return max(blocks_held(folder), int(shutil.disk_usage(existing).free / (NODES * BYTES_IN_BAND)))
+        return max(blocks_held(folder), int(shutil.disk_usage(existing).free / (BLOCK_NODES * BYTES_IN_BAND)))
     available = available_memory()
     left = math.inf if available is None else available - libraries() - BYTES_AT_WORK
-    return int(min(left / (NODES * BYTES_IN_BAND), 2**40))  # the coarse grid has had room
+    return int(min(left / (BLOCK_NODES * BYTES_IN_BAND), 2**40))  # the coarse grid has had room
 
 
 def refuse_plane_grid(grid: Grid) -> None:
@@ -300,7 +300,7 @@ def _begin(folder: Path, key: str, plan: dict[str, NDArray[Any]], n_blocks: int,
                 path=folder,
             )
         return
-    shape = (n_blocks, SIDE, SIDE, SIDE)
+    shape = (n_blocks, BLOCK, BLOCK, BLOCK)
     files = {"values": (np.float32, shape), "confidence": (np.float16, shape), "done": (np.uint8, (n_tiles,))}
     try:
         folder.mkdir(parents=True, exist_ok=True)

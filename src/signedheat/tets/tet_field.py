@@ -17,15 +17,13 @@ from ..exchange import Displayed, with_values
 from ..field_arithmetic import Combinable
 from ..field_levels import refuse_beyond_walls
 from ..mesh.components import connected_components
+from ..mesh.edges import CLEARANCE
 from ..mesh.tet_shapes import TetShapes, face_table
 from ..search.nearest_triangles import TriangleTree
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import contiguous, finite_number, query_points, shaped
 from .tet_clipping import Planes, barycentric, containing_tets
 from .tet_mesh import TetMesh
-
-CLEARANCE = 1e-3
-"""Least distance of crossings from the ends of edges, relative to these, so that no two vertices coincide."""
 
 # By the bits of a mask of the corners below the level: an even permutation that puts these first, and their number.
 BELOW_FIRST = np.zeros((16, 4), dtype=np.int64)
