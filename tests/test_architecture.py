@@ -61,6 +61,27 @@ def graph():
     return import_graph(PACKAGE)
 
 
+def homes_of_constants(package: Path) -> dict[str, set[str]]:
+    """Modules that define each name in capitals, underscores before it aside; type variables are no constants."""
+    homes: dict[str, set[str]] = {}
+    for file in package.rglob("*.py"):
+        for node in ast.parse(file.read_text()).body:
+            if not isinstance(node, ast.Assign | ast.AnnAssign):
+                continue
+            if isinstance(node.value, ast.Call) and ast.unparse(node.value.func) in ("TypeVar", "ParamSpec"):
+                continue
+            for name in ast.walk(node):
+                if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store) and name.id.isupper():
+                    homes.setdefault(name.id.lstrip("_"), set()).add(file.relative_to(package).as_posix())
+    return homes
+
+
+def test_each_constant_is_defined_in_one_module():
+    """So its name says what it is wherever it is read, and no number is given twice."""
+    homes = homes_of_constants(PACKAGE)
+    assert {name: sorted(modules) for name, modules in homes.items() if len(modules) > 1} == {}
+
+
 SLOW_TO_IMPORT = ("numba", "matplotlib", "trimesh", "meshio", "skimage", "nibabel")
 
 
@@ -180,6 +201,15 @@ def test_what_is_in_order_passes(package):
     graph = import_graph(package(cellar__wine="import numpy", cellar__beer="from .wine import x", roof="import house"))
     assert graph["house.cellar.beer"] == {"house.cellar.wine"} and graph["house.cellar.wine"] == set()
     assert circles(graph) == [] and upward_imports(graph, [{"cellar"}, {""}, {"roof"}]) == []
+
+
+def test_constants_of_one_name_are_seen(package):
+    house = package(
+        cellar__wine="FLAT: float = 0.1\nDRY, SWEET = range(2)\nP = ParamSpec('P')",
+        roof="from .cellar.wine import DRY\n_FLAT = {name: 0.2 for name in 'ab'}\nP = TypeVar('P')",
+    )
+    homes = {"FLAT": {"cellar/wine.py", "roof.py"}, "DRY": {"cellar/wine.py"}, "SWEET": {"cellar/wine.py"}}
+    assert homes_of_constants(house) == homes
 
 
 def test_a_folder_without_a_floor_is_refused(package):
