@@ -21,8 +21,6 @@ ROWS_PER_TASK = 1 << 13
 """Rows per task of a thread."""
 CLUSTER_SECONDS = 30.0
 """Seconds to wait for a cluster to answer."""
-MOST_GREETING = 1 << 20
-"""Upper bound of the bytes in the first message of a Dask scheduler."""
 
 
 def n_threads() -> int:
@@ -79,5 +77,5 @@ def _hear_greeting(host: str, port: int) -> None:
             heard = connection.recv(8, socket.MSG_WAITALL)
         except TimeoutError:
             heard = b""
-    if len(heard) < 8 or int.from_bytes(heard, "little") > MOST_GREETING:
+    if len(heard) < 8 or int.from_bytes(heard, "little") > 1 << 20:  # no first message is as long
         raise ConnectionError("the listener there is not a scheduler")

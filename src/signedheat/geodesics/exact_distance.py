@@ -547,10 +547,6 @@ def hit(x0: float, dx: float, dy: float, ax: float, ay: float, bx: float, by: fl
     return min(max((dy * (ax - x0) - dx * ay) / det, 0.0), 1.0)
 
 
-BYTES_PER_WINDOW = 56.0
-"""Size of a row of windows, and of the link to the next."""
-
-
 class Faces(NamedTuple):
     """An intrinsic mesh as plain arrays, with the halfedges of each edge and the corners at each vertex in lists."""
 
@@ -611,7 +607,7 @@ class Search(NamedTuple):
         refuse_beyond_memory(
             "exact distance along the surface",
             room - len(self.windows),
-            lambda number: BYTES_PER_WINDOW * number,
+            lambda number: 56.0 * number,  # bytes of a row of windows, and of the link to the next
             lambda _: "use a coarser mesh, and merge faces that lie on each other",
         )
         for array in (self.windows, self.following):

@@ -189,8 +189,6 @@ PENALTY = 10.0
 """Penalty of the augmented Lagrangian, in 1/h."""
 LEAST_PENALTY, LARGEST_PENALTY = 1e-6, 30.0
 """Least penalty in the preconditioner, and largest penalty, relative to the default."""
-BYTES_PER_EXACT_NODE = 83
-"""Measured peak memory for each node, beyond what is held already, of imposing levels exactly."""
 EQUAL_ROWS = 1e-6
 """Difference below which rows of samples are equal, and their levels contradict each other."""
 
@@ -234,7 +232,7 @@ class GridIntegration(SolvesEach):
         refuse_beyond_memory(
             f"the zero set imposed exactly on {self.grid.n_nodes:,} nodes",
             self.grid.n_nodes,
-            lambda count: BYTES_PER_EXACT_NODE * count,
+            lambda count: 83 * count,  # measured, beyond what is held already
             lambda count: f"leave out hard=True, or use at most {count:,} nodes",
         )
         strength = self.soft_weight

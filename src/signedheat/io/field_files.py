@@ -47,8 +47,6 @@ OF_BANDS = (
     "x, y, z, in the units of the shape; elsewhere coarse_values[i, j, k] at origin + (i, j, k) * coarse_spacing"
 )
 CLIPPED = "signed distance, negative inside, in the units of the shape; beyond the band plus or minus its half width"
-BYTES_PER_WHOLE_NODE = 20.0
-"""Memory per node to write a band as a whole grid."""
 OF_CLOUDS = ("normals", "areas", "n_neighbors")
 """Arrays of the archive of a field on a point cloud, besides its points."""
 _DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}
@@ -253,7 +251,7 @@ def _write_for_vtk(field: GridField, path: Path) -> None:
     grid, convention = field.grid, CONVENTION
     values: dict[str, NDArray[np.floating]] = {VALUES_NAME: field.values}
     if field.blocks is not None:
-        refuse_large_grid(grid, BYTES_PER_WHOLE_NODE, 0.0)
+        refuse_large_grid(grid, 20.0, 0.0)  # bytes for each node
         values, convention = {VALUES_NAME: whole_values(field)}, CLIPPED
     elif field.confidence is not None:
         values[CONFIDENCE] = field.confidence

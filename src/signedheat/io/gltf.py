@@ -23,10 +23,8 @@ COMPONENT_COUNTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MA
 SUPPORTED = ("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp", "EXT_texture_")
 """Prefixes of extensions that are supported or do not affect shapes."""
 INSTANCES = "EXT_mesh_gpu_instancing"
-TRIANGLE_MODE, STRIP_MODE, FAN_MODE = 4, 5, 6
-"""Modes of primitives with faces; smaller numbers are points and lines."""
-BYTES_PER_GLTF_TRIANGLE = 200
-"""Measured memory to read a triangle of a scene with its vertices."""
+TRIANGLE_MODE, FAN_MODE = 4, 6
+"""Modes of primitives with faces, between them that of strips; smaller numbers are points and lines."""
 
 
 def read_bodies(path: PathLike) -> list[Body]:
@@ -44,7 +42,7 @@ def read_bodies(path: PathLike) -> list[Body]:
     places = list(_places(scene.tree))
     meshes = scene.tree.get("meshes", [])
     counts = {mesh: _corner_count(scene.tree, meshes[mesh]) for mesh in {mesh for mesh, _ in places}}
-    ensure_fits(BYTES_PER_GLTF_TRIANGLE * sum(counts[mesh] for mesh, _ in places), path)
+    ensure_fits(200 * sum(counts[mesh] for mesh, _ in places), path)  # measured, for a triangle and its vertices
     bodies = {mesh: [scene.body(primitive) for primitive in meshes[mesh]["primitives"]] for mesh in counts}
     return [placed(body, matrix) for mesh, matrix in places for body in bodies[mesh] if len(body[1])]
 

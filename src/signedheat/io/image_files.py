@@ -45,8 +45,6 @@ SPACE_NAMES = {"RAS": "right-anterior-superior", "LPS": "left-posterior-superior
 """Spaces by their short names in NRRD files."""
 JOINED = {"datafile": "data file", "lineskip": "line skip", "byteskip": "byte skip", "centerings": "centers"}
 """Synonyms of fields of NRRD files."""
-NIFTI_BYTES_PER_BYTE = 4000
-"""Memory limit for a NIfTI file per byte, since gzip may pack a thousand bytes into one."""
 _CODES = {
     name: code
     for names, code in (
@@ -226,7 +224,7 @@ def _nrrd_vector(numbers: list[float]) -> str:
 
 
 def _read_nifti(path: PathLike) -> Image:
-    parts = parsed("nifti", path, *NIBABEL, bytes_per_byte=NIFTI_BYTES_PER_BYTE)
+    parts = parsed("nifti", path, *NIBABEL, bytes_per_byte=4000)  # gzip may pack a thousand bytes into one
     values, affine = parts["values"], parts["affine"]
     while values.ndim > 3 and values.shape[-1] == 1:
         values = values[..., 0]

@@ -27,8 +27,6 @@ KEYWORDS = frozenset(
 """Keywords of lines of OBJ files."""
 NUMBER_LINE = re.compile(r"[-+.eE\d/ ]+")
 """Matches lines of numbers with any keyword."""
-BYTES_PER_OBJ_LINE = 400
-"""Measured memory to read a line of an OBJ file."""
 ANNOUNCED_ROUNDING = 1e-4
 """Rounding error, relative to the size of a shape, above which a warning is issued."""
 _HEADER = 84  # of STL, in bytes: 80 of comment, 4 that count the facets
@@ -169,7 +167,7 @@ def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
     """Split lines by keyword; each keyword is replaced by the number of vertices so far."""
     lines: dict[str, list[list[Any]]] = {"v": [], "vn": [], "f": [], "l": [], "p": []}
     content = text(path)
-    ensure_fits(BYTES_PER_OBJ_LINE * sum(content.count(f"\n{keyword} ") for keyword in lines), path)
+    ensure_fits(400 * sum(content.count(f"\n{keyword} ") for keyword in lines), path)  # measured, for each line
     for number, line in enumerate(re.sub(r"\\[ \t]*\n", " ", content).split("\n"), start=1):
         words: list[Any] = line.partition("#")[0].split()
         if words and words[0] in lines:

@@ -20,8 +20,6 @@ NEW_NETWORK, NEW_USER = 0x40000000, 0x10000000
 """Linux flags for a network namespace without interfaces, and for the user namespace that permits it."""
 FORBIDDEN = ("socket.", "subprocess.", "os.exec", "os.fork", "os.posix_spawn", "os.spawn", "os.system", "urllib.")
 """Audit events of Python that are refused."""
-MOST_WRITTEN = 1 << 20
-"""Bytes that a parser may write to a file, such as its messages."""
 
 
 class Refused(Exception):
@@ -133,7 +131,8 @@ def confine(memory: int, seconds: int) -> None:
     with contextlib.suppress(ImportError):
         import resource
 
-        kinds = {resource.RLIMIT_CPU: seconds, resource.RLIMIT_FSIZE: MOST_WRITTEN, resource.RLIMIT_CORE: 0}
+        # files may be as large as messages are
+        kinds = {resource.RLIMIT_CPU: seconds, resource.RLIMIT_FSIZE: 1 << 20, resource.RLIMIT_CORE: 0}
         for kind, most in (kinds | {resource.RLIMIT_DATA: memory}).items():
             _, bound = resource.getrlimit(kind)
             least = most if bound == resource.RLIM_INFINITY else min(most, bound)

@@ -23,8 +23,6 @@ SEPARATORS, DECIMAL_COMMAS = str.maketrans(",;", "  "), str.maketrans(",;", ". "
 WITH_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 FIELD_TYPES = {"F": "f", "I": "i", "U": "u"}
 """Types of fields, with their letters in NumPy."""
-LAZ_BYTES_PER_BYTE = 1000
-"""Memory limit for a LAZ file per byte."""
 SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance "
 """Namespace of the attributes by which XML names schemas."""
 
@@ -169,7 +167,7 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
 
 def read_las(path: PathLike) -> PointCloud:
     """Read the points of a LAS or LAZ file, with its scale and offset; it has no normals."""
-    parts = parsed("las", path, "laspy", f"{extension(path)} files", bytes_per_byte=LAZ_BYTES_PER_BYTE)
+    parts = parsed("las", path, "laspy", f"{extension(path)} files", bytes_per_byte=1000)
     return _cloud(parts["points"], path)
 
 

@@ -35,8 +35,6 @@ LEAST_MEMORY, MEMORY_PER_BYTE = 1 << 29, 100
 LEAST_SECONDS, BYTES_PER_SECOND = 10, 20_000
 """Limit of processor time: a constant, and the bytes of a file for each further second."""
 ARRAY_TYPE = re.compile(r"[<>|][biuf][1248]")
-MOST_ANSWERED = 1 << 24
-"""Upper bound of the bytes of an answer, without its arrays."""
 ALONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 """Environment variables that limit threads to one, since idle threads take memory."""
 
@@ -95,7 +93,7 @@ def parsed(
 def _answer(stream: BinaryIO, path: PathLike) -> dict[str, Any] | None:
     """Read the answer of a parser, arrays of numbers that fit in memory; None if it is incomplete."""
     try:
-        about = json.loads(stream.readline(MOST_ANSWERED))
+        about = json.loads(stream.readline(1 << 24))  # longer than any answer without its arrays
         if "values" not in about:
             return dict(about)
         values = dict(about["values"])

@@ -21,8 +21,6 @@ from . import gltf
 from .files import PathLike, contents, damaged, ensure_fits, extension, reading
 from .sandbox import parsed
 
-BYTES_PER_3MF_TRIANGLE = 100
-"""Memory per triangle of a 3MF package, with its vertices."""
 METRES = {
     "micron": 1e-6,
     "mm": 1e-3,
@@ -42,10 +40,6 @@ MOST_COMPONENT_DEPTH = 32
 
 Key = tuple[str, str]
 """A part of the package, and the id of an object in it."""
-STEP_BYTES = 10_000
-"""Memory limit for a STEP file per byte: one line may describe a sphere, of any number of triangles."""
-STEP_SECONDS = 300
-"""Limit of processor time for any STEP file: a single line may be slow to triangulate."""
 FACET_DEFLECTION = 1e-3
 """Default distance of triangles from the surface, relative to the diagonal of the box around it."""
 FACET_ANGLE = 0.3
@@ -91,7 +85,7 @@ def read_3mf(path: PathLike) -> TriangleMesh:
         if not items:  # nothing is said about what to build: everything that is a mesh
             own = [_key(element, package.root, "id") for element in _all(root, "object")]
             items = [(key, np.eye(4, 3)) for key in own if len(package.object(key).faces)]
-        ensure_fits(BYTES_PER_3MF_TRIANGLE * sum(package.count(key)[0] for key, _ in items), path)
+        ensure_fits(100 * sum(package.count(key)[0] for key, _ in items), path)  # for a triangle and its vertices
         return _joined([body for key, matrix in items for body in package.placed(key, matrix)])
 
 
@@ -252,9 +246,8 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
     >>> cad_faces[signedheat.complete(mesh).closest(points).faces]  # doctest: +SKIP
     """
     fineness = {"deflection": deflection, "fineness": FACET_DEFLECTION, "angle": FACET_ANGLE}
-    parts = parsed(
-        "step", path, "OCP", ".step files", bytes_per_byte=STEP_BYTES, least_seconds=STEP_SECONDS, **fineness
-    )
+    # one line may describe a sphere, of any number of triangles, or be slow to triangulate
+    parts = parsed("step", path, "OCP", ".step files", bytes_per_byte=10_000, least_seconds=300, **fineness)
     counts = parts["triangle_counts"]
     if not counts.sum():
         raise FileFormatError("it has no surface", path=path)

@@ -79,8 +79,8 @@ WRITERS: dict[str, Callable[[Elements, PathLike], bytes]] = {
 
 SHAPE_FORMATS = frozenset(WRITERS)
 
-CHECKED_FACES, LEAST_BYTES_PER_FACE = 100_000, 250
-"""Memory is checked for this many faces or more; and a lower bound of what each face takes."""
+CHECKED_FACES = 100_000
+"""Memory is checked for this many faces or more."""
 
 
 def read(path: PathLike) -> Shape | Solid:
@@ -136,7 +136,7 @@ def read(path: PathLike) -> Shape | Solid:
             refuse_beyond_memory(
                 f"a surface of {faces:,} faces",
                 faces,
-                lambda n: float(LEAST_BYTES_PER_FACE * n),
+                lambda n: float(250 * n),  # a lower bound of what each face takes
                 lambda n: f"use at most {n:,} faces, coarsened or in parts",
             )
         return shape

@@ -153,7 +153,7 @@ def cut_into_ears(polygon: Floats, normal: Floats, allowed: Callable[[int, int],
 
 
 CREASE_ANGLE = np.deg2rad(25.0)
-"""Angle between two faces above which the edge between them is a candidate."""
+"""Angle between two faces above which the edge between them may be a crease: below, the surface is smooth there."""
 MOST_CREASED_FACES = 4_000_000
 """Number of faces above which creases stay as they are: the search for them would take more memory than the surface."""
 

@@ -27,8 +27,6 @@ EQUALLY_NEAR = 1e-9
 """Relative difference of distances, or of sines, below which two faces or segments are equally near."""
 FOLDED_EDGE = 0.02
 """Length of the sum of two unit normals below which the edge between them is a fold, and decides no side."""
-POINTS_PER_SEARCH = 512
-"""Number of points after which a search starts again: a part of the points that a thread takes at a time."""
 DISC_THICKNESS = 0.5
 """Thickness over radius up to which a disc is used besides the box."""
 FARTHEST_SEARCH = 1e7
@@ -179,7 +177,8 @@ class FaceTree:
 
     def nearest(self, points: Floats) -> tuple[NDArray[np.int32], Floats]:
         """Return the nearest faces of points, and the squares of their distances."""
-        return nearest_faces(self.features.rows, self.tree, self.discs, points, POINTS_PER_SEARCH)
+        # a search starts again after 512 points: a part of those that a thread takes at a time
+        return nearest_faces(self.features.rows, self.tree, self.discs, points, 512)
 
 
 @compiled

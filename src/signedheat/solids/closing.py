@@ -147,7 +147,8 @@ def _within(samples: RimSamples, loop: Floats, patches: Ints, reach: float) -> t
 
 
 LOST_FACE_SIDES = 16
-"""Holes with more sides may have lost vertices as well as faces."""
+"""Holes with up to this many sides are closed by triangles between their vertices: larger ones may have lost vertices,
+too."""
 LARGEST_BEND = np.deg2rad(70.0)
 """A lid continues the surface if the root mean square of the angles at the rim is below this. At the end of a tube it
 is 90°."""

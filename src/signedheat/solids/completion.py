@@ -31,7 +31,7 @@ from ..transforms import joined_shape
 from ..validation import flag
 from .bounding import Bounding, bounding
 from .chain import Chain
-from .closing import closed_by, fan, small_lids
+from .closing import LOST_FACE_SIDES, closed_by, fan, small_lids
 from .heat_surfaces import Heat, heat_surface
 from .mesh_orientation import oriented_as, owners_of
 from .overlaps import Nesting
@@ -39,9 +39,6 @@ from .point_orientation import mean_gap, orient_points
 from .rims import boundary, loops
 from .solid import Solid
 from .union import TriangleGroup, united
-
-GAP_SIDES = 16
-"""Gaps between a rim and a border with up to this many sides are closed by triangles between their vertices."""
 
 
 def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Floats, Ints]:
@@ -69,7 +66,7 @@ def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) ->
 
 def small_gaps(vertices: Floats, faces: Ints) -> Ints:
     """(k, 3) triangles that fill the small gaps that seams leave."""
-    around = [loop for loop in loops(vertices, faces, boundary(faces)) if len(loop) <= GAP_SIDES]
+    around = [loop for loop in loops(vertices, faces, boundary(faces)) if len(loop) <= LOST_FACE_SIDES]
     return np.concatenate([np.empty((0, 3), dtype=np.int64), *map(fan, around)])
 
 

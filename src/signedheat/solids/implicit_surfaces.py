@@ -26,8 +26,6 @@ Function: TypeAlias = Callable[[Floats], ArrayLike]
 """Returns one number for each of (n, 3) points; gradients are three."""
 NODES_AT_ONCE = 1 << 17
 """Batch size for calls of the function."""
-BYTES_PER_FUNCTION_NODE = 40.0
-"""Measured memory per node."""
 LEAST_WEIGHT = 1e-9
 """Nodes with a smaller weight do not count for a point: on an edge of the grid only its ends do."""
 EDGE_COSINE = np.cos(np.deg2rad(15.0))
@@ -204,7 +202,7 @@ def contour(
     else:
         refuse_beside("an array, which has its own cells", spacing=spacing, resolution=resolution)
         surface, grid = _of_array(f, gradient, box, height)
-    refuse_large_grid(grid, BYTES_PER_FUNCTION_NODE)
+    refuse_large_grid(grid, 40.0)  # measured bytes for each node
     parts = []
     for begin in range(0, grid.n_nodes, NODES_AT_ONCE):
         nodes = np.unravel_index(np.arange(begin, min(begin + NODES_AT_ONCE, grid.n_nodes)), grid.shape)

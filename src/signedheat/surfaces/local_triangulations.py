@@ -39,8 +39,8 @@ NORMAL_DISTANCE = 2.0
 points on the other side of a plate are four spacings farther. 72 thin clouds have 2,750 edges at holes, at 1 4,400, at
 3 2,030; but then 6 of 12 balls of 200 random points have a hole, at 2 none."""
 OPPOSITE_SIDES = -0.5
-"""Cosine between the normals of two points below which they lie on different sides of a plate. At -0.8 and at 0 edges
-at holes are 4 and 8 % more."""
+"""Cosine between the normals of two places below which they lie on different sides of a plate or wall. At -0.8 and at 0
+edges at holes of point clouds are 4 and 8 % more."""
 SAME_SIDE_HEIGHT = 0.03
 """Height over a point's tangent plane, in spacings, up to which another point lies on the same side, whatever its
 normal. At 0.01 edges at holes are 3 % fewer, at 0.1 51 % more."""
