@@ -48,6 +48,27 @@ def curve_along_an_edge(n: int) -> Callable[[], object]:
     return lambda: sh.SignedHeatSolver(mesh).discretization.adapt([curve])
 
 
+def circle(mesh: sh.TriangleMesh, begin: float, end: float) -> sh.Curve:
+    """A part of a circle on the unit sphere, between shares of it."""
+    angle = 2 * np.pi * np.linspace(begin, end, 60)
+    return mesh.polyline(np.stack([np.cos(angle), np.sin(angle), np.full(60, 0.2)], axis=1))
+
+
+def broken_curve(n: int) -> Callable[[], object]:
+    """The distance to a circle with a gap, on a sphere of n vertices."""
+    ball = hull_of(spiral(n))
+    curve = circle(ball, 0.0, 0.9)
+    return lambda: sh.signed_distance(curve, ball)
+
+
+def strokes(n: int) -> Callable[[], object]:
+    """The distance to n strokes along a circle on a sphere, every third of which is turned."""
+    ball = samples.sphere(5)
+    pieces = [circle(ball, k / n, (k + 0.8) / n) for k in range(n)]
+    pieces = [piece.reversed() if k % 3 == 0 else piece for k, piece in enumerate(pieces)]
+    return lambda: sh.signed_distance(pieces, ball)
+
+
 def piecewise_on_many_parts(n: int) -> Callable[[], object]:
     """Piecewise distance on n octahedra, each with a curve of its own."""
     corners = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)
@@ -206,6 +227,8 @@ CASES = {
     fine_curve_in_a_face: 1000,
     curve_along_an_edge: 1000,
     many_curves: 640,
+    broken_curve: 10000,
+    strokes: 10,
     piecewise_on_many_parts: 200,
     groups_on_tets: 16,
     open_boxes: 250,

@@ -26,13 +26,14 @@ def test_no_signs_cost_less_than_the_minimum_cut(seed):
     n = 8
     edges = np.array(list(itertools.combinations(range(n), 2)))[random.permutation(28)[:14]]
     falling, rising = random.random((2, 14)) * (random.random((2, 14)) < 0.7)
-    pull = random.normal(size=n)
+    pull, ties = random.normal(size=n), (-1) ** seed * 0.01 * random.random(n)
 
     def cost(signs):
         first, second = signs[edges].T
-        return falling[(first > 0) & (second < 0)].sum() + rising[(first < 0) & (second > 0)].sum() - pull @ signs
+        cut = falling[(first > 0) & (second < 0)].sum() + rising[(first < 0) & (second > 0)].sum()
+        return cut - (pull + ties) @ signs
 
-    found = CutGraph.of(edges, n).cut(falling, rising, pull)
+    found = CutGraph.of(edges, n).cut(falling, rising, pull, ties)
     assert set(found) <= {-1.0, 1.0}
     least = min(cost(np.array(signs)) for signs in itertools.product([-1.0, 1.0], repeat=n))
     assert cost(found) <= least + 1e-6

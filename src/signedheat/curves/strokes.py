@@ -15,7 +15,7 @@ from ..compiled import compiled
 from ..geodesics.exact_distance import shortest_arcs
 from ..geodesics.geodesic_sources import PlacedSegments, nearest_shares
 from ..linear import factorize
-from ..mesh.components import grouped, members_of
+from ..mesh.components import grouped, members_of, sums_of
 from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..surfaces.surface_discretization import SurfaceDiscretization
@@ -42,18 +42,30 @@ class CutGraph:
         place[order] = np.arange(len(order))
         return cls(starts, np.ascontiguousarray(heads[order]), place[(order + len(edges)) % len(order)], order)
 
-    def cut(self, falling: Floats, rising: Floats, pull: Floats) -> Floats:
-        """(n,) signs s = ±1 of nodes with the least cost of edges that are cut, less Σ pull s.
+    def cut(self, falling: Floats, rising: Floats, pull: Floats, ties: Floats) -> Floats:
+        """(n,) signs s = ±1 of nodes with the least cost of edges that are cut, less Σ (pull + ties) s.
 
         Of several such signs, those with the fewest positive. An edge whose first node is positive and whose second is
-        negative costs `falling`, (e,), the reverse `rising`.
+        negative costs `falling`, (e,), the reverse `rising`. The ties, (n,), are small, and are all of one sign.
         """
-        total = 2 * max(float(pull[pull > 0].sum()), -float(pull[pull < 0].sum()))
+        both = pull + ties
+        total = 2 * max(float(both[both > 0].sum()), -float(both[both < 0].sum()))
         if total == 0:
             return np.ones(len(pull))
-        costs = np.minimum(np.concatenate([falling, rising])[self.order] / total, 1.0)
-        residual, pulls = (np.rint(PULL_UNITS * amounts).astype(np.int64) for amounts in (costs, 2 * pull / total))
-        return np.where(source_side(self.starts, self.heads, self.reverse, residual, pulls), 1.0, -1.0)
+        costs = np.minimum(np.concatenate([falling, rising])[self.order], total)
+        residual, pulls, small = (np.rint(PULL_UNITS / total * x).astype(np.int64) for x in (costs, 2 * pull, 2 * ties))
+        source_side(self.starts, self.heads, self.reverse, residual, pulls)
+        # What is strongly connected by more than all ties lies on one side: few parts are left to be cut by these.
+        tied = (residual > np.abs(small).sum()).astype(np.int8)
+        strong = sparse.csr_matrix((tied, self.heads, self.starts), shape=(len(pull), len(pull)))
+        strong.eliminate_zeros()
+        count, part = sparse.csgraph.connected_components(strong, connection="strong")
+        tails = np.repeat(np.arange(len(pull)), np.diff(self.starts))
+        between = np.flatnonzero((part[tails] != part[self.heads]) & (tails < self.heads))
+        rest = CutGraph.of(np.stack([part[tails[between]], part[self.heads[between]]], axis=1), count)
+        residual = np.concatenate([residual[between], residual[self.reverse[between]]])[rest.order]
+        pulls = sums_of(pulls + small, part, count).astype(np.int64)
+        return np.where(source_side(rest.starts, rest.heads, rest.reverse, residual, pulls)[part], 1.0, -1.0)
 
 
 Ids = Ints
@@ -347,8 +359,8 @@ class Strokes:
         covered = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
         falling, rising = (np.where(mask, 0.0, self.costs) for mask in covered)
         pull = self.means.T @ (REWARD * self.lengths * signs)
-        pull += larger * EQUAL_COSTS * self.lengths.sum() / self.areas.sum() * self.areas
-        sides = self.graph.cut(falling, rising, pull)
+        ties = larger * EQUAL_COSTS * self.lengths.sum() / self.areas.sum() * self.areas
+        sides = self.graph.cut(falling, rising, pull, ties)
         first, second = sides[self.surface.triangles.edges.vertices].T
         boundary = np.where(first > second, falling, np.where(first < second, rising, 0.0))
         return sides, float(boundary.sum())
