@@ -24,7 +24,7 @@ from .grids.node_sources import NodeSources, merge_in_cells
 from .grids.polyline import Polyline
 from .grids.stencil import padded_shape
 from .mesh.components import element_components
-from .mesh.triangles import area_vectors
+from .mesh.triangles import AREA_ROUNDING, area_vectors
 from .mesh.unit_vectors import unit
 from .mesh.welding import same_positions
 from .surfaces.point_cloud import PointCloud
@@ -34,8 +34,6 @@ from .tets.tet_mesh import TetMesh
 
 AREA_NEIGHBORS = 8
 """Neighbours from which the area of an oriented point is estimated."""
-NET_AREA_ROUNDING = 1e-9
-"""Where normals cancel up to less than this fraction of the area, what is left is rounding error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +183,7 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid) -> AreaSamples:
             remedy="choose a smaller spacing, or scale the shape",
         )
     left = float(np.linalg.norm(vectors, axis=1).sum() / weights.sum())
-    if left < NET_AREA_ROUNDING:
+    if left < AREA_ROUNDING:
         raise CancellingNormalsError(
             "the normals of the source cancel each other everywhere, so that nothing separates inside from outside",
             remedy="remove or turn one of its coinciding sides",

@@ -19,8 +19,6 @@ from .errors import ConstraintError
 from .linear import Factor, PardisoFactor, factorize, upper_triangle, whole
 from .linear.conjugate_gradients import conjugate_gradients
 
-CONTRADICTORY_GROWTH = 10.0
-"""Growth of φ in one round above which rows contradict each other."""
 SOFTEST_SPRING, STIFFEST_SPRING = 1e-10, 1e10
 """Strengths of springs, relative to C, below and above which their strength makes no difference beyond rounding."""
 COLUMNS_AT_ONCE = 32
@@ -125,7 +123,7 @@ class DirectIntegration(Frozen):
             if slow:  # roughly: what remains is left to the next round
                 displacements = conjugate_gradients(lambda d: rows @ pull(d), gap, tolerance=1e-3, limit=30)
             step = factor.solve(forces - stiffness @ values - rows.T @ multipliers) + pull(displacements)
-            if worst < np.inf and np.abs(step).max() > CONTRADICTORY_GROWTH * np.abs(values).max():
+            if worst < np.inf and np.abs(step).max() > 10.0 * np.abs(values).max():  # the rows contradict each other
                 break
             values += step
             multipliers -= spring * (displacements - rows @ step)

@@ -12,8 +12,8 @@ from .errors import OutsideError
 from .grids.grid import Grid
 from .mesh.edges import CLEARANCE
 
-LEVEL_ACCURACY = 1e-3
-"""Distance from a level, in cells, at which a point is close enough."""
+ON_LEVEL = 1e-3
+"""Distance from a level, in cells, up to which a point is on it."""
 
 
 class NodeValues(Protocol):
@@ -53,7 +53,7 @@ def on_level(
     crossed = (low < 0) != (high < 0)
     movable, low, high = movable[crossed], low[crossed], high[crossed]
     moved = np.array(points, dtype=np.float64)
-    base, axis, far = base[movable], axis[movable], LEVEL_ACCURACY * float(grid.spacing.min())
+    base, axis, far = base[movable], axis[movable], ON_LEVEL * float(grid.spacing.min())
     start, stop, last = np.zeros(len(base)), np.ones(len(base)), np.zeros(len(base), dtype=np.int8)
     active = np.arange(len(base))
     for _ in range(10):  # few points need more than 4

@@ -58,8 +58,6 @@ __all__ = [
     "smooth_union", "thicken",
 ]  # fmt: skip
 
-OFFSET_PADDING = 0.15
-"""Padding of a shape in addition to its offsets, relative to its longest side."""
 MITRE_LIMITS = {"round": 1.0, "mitre": 2.0, "sharp": 10.0}
 """Largest length of mitres, relative to the distance. With 2, edges and corners of boxes stay whole, and edges between
 faces less than 60° apart are cut off; with 10, those of less than 12°."""
@@ -593,7 +591,7 @@ def _given_or_room(domain: Domain | None, shape: Sources, reach: float, resoluti
         raise SourceError("a Curve lies on a surface", remedy="pass that surface as the domain")
     bounds = bounds_around(shapes)
     nodes = RESOLUTION if resolution is None else resolution
-    return Grid.around(bounds, nodes, room_around(bounds, reach, OFFSET_PADDING))
+    return Grid.around(bounds, nodes, room_around(bounds, reach, share=0.15))
 
 
 def _grid(domain: object) -> Grid[Literal[3]]:

@@ -18,10 +18,6 @@ if TYPE_CHECKING:
 
 torch: Any = lazy_module("torch", "tensors")
 
-UNMOVED = 1e-5
-"""Difference between vertices and those of the solid, over the greatest coordinate: what single precision rounds off,
-and no step of an optimiser."""
-
 
 def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Tensor:
     """Signed distances of points, negative inside, that PyTorch differentiates.
@@ -84,7 +80,8 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
             )
         vertices = torch.as_tensor(vertices)
         now, then = vertices.detach().cpu().double().numpy(), solid.source.vertices
-        if now.shape != then.shape or not np.abs(now - then).max() <= UNMOVED * np.abs(then).max():
+        # single precision rounds off less, and steps of an optimiser are larger
+        if now.shape != then.shape or not np.abs(now - then).max() <= 1e-5 * np.abs(then).max():
             raise SourceError(
                 "the vertices differ from those of the completed mesh",
                 remedy="complete the mesh again after each step",

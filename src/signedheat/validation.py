@@ -20,8 +20,6 @@ LARGEST_COORDINATE = 1e40
 """Largest coordinate. Squared volumes, the largest powers of lengths that are computed, then stay finite."""
 SMALLEST_EXTENT = 1e-40
 """Smallest extent of a shape."""
-LEAST_SPACING = 1e-13
-"""Least spacing, relative to coordinates, so that nodes are more than a few digits apart."""
 INT64_END = 2**63
 
 
@@ -151,7 +149,7 @@ def shaped(values: NDArray[Scalar], shape: tuple[int, ...]) -> NDArray[Scalar]:
 
 def refuse_lost_spacing(steps: Floats, first: Floats, last: Floats) -> None:
     """Refuse a lattice whose nodes are few digits apart."""
-    if (steps < LEAST_SPACING * np.maximum(np.abs(first), np.abs(last))).any():
+    if (steps < 1e-13 * np.maximum(np.abs(first), np.abs(last))).any():
         raise GeometryError(
             f"the spacing {steps.tolist()} is lost in the rounding of coordinates from {first.tolist()} on",
             remedy="move the shape to the origin, or choose a larger spacing",

@@ -30,8 +30,6 @@ from .curve_distance import RepairedMesh, distance_to_pieces, warn_of_gaps
 from .resolution import flattened, on_resolving_triangles
 from .stroke_directions import pieces_for_all
 
-ZERO_ON_RIM = 1e-7
-"""φ is zero at a vertex of the rim if its size is at most this, in mean edge lengths."""
 LEAST_LOOP = 0.5
 """Loops that are shorter than this, or farther from the curves, relative to the shortest curve, complete nothing: there
 φ has the wrong sign."""
@@ -172,7 +170,7 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
 
 def beyond_the_rim(triangles: IntrinsicMesh, values: Floats) -> None:
     """Give zeros in rows along the rim the sign of the rim beyond both ends; else the one that neighbours lack."""
-    least = ZERO_ON_RIM * float(triangles.lengths_of_edges.mean())
+    least = 1e-7 * float(triangles.lengths_of_edges.mean())
     zero, ends = np.abs(values) <= least, triangles.edges.vertices
     rim = ends[triangles.edges.face_counts == 1]
     row = connected_components(len(values), *rim[zero[rim].all(axis=1)].T)

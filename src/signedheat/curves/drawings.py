@@ -24,7 +24,8 @@ from ..grids.solid_queries import Closest
 from ..jobs import Progress, within
 from ..kinds import Sources
 from ..mesh.components import sums_of
-from ..mesh.polylines import EQUAL_AREAS, FillRule, filled_outlines, without_seams
+from ..mesh.polylines import FillRule, filled_outlines, without_seams
+from ..mesh.triangles import AREA_ROUNDING
 from ..mesh.unit_vectors import unit
 from ..search.face_tree import FaceTree
 from ..solver import SignedHeatSolver
@@ -114,7 +115,7 @@ class OutlinesFilled(Note):
 
     @property
     def important(self) -> bool:
-        return self.length_inside > EQUAL_AREAS
+        return self.length_inside > AREA_ROUNDING
 
 
 def outlines_filled(

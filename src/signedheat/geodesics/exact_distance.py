@@ -32,12 +32,6 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 from .geodesic_sources import GeodesicSources, PlacedSegments, as_curve, nearest_shares, through_vertices, zero_line
 from .heap_kernels import Queue, pop, push
 
-WINDOWS_PER_EDGE, FEW_WINDOWS, WINDOWS_IF_SMALL = 100, 4_000_000, 1000
-"""Average number of windows per edge, and numbers on small meshes, above which a search is cut short; ten per edge are
-usual on smooth surfaces. Small meshes of many sheets make more, which is little in all."""
-MANY_PER_EDGE, MANY_WINDOWS = 30, 50_000
-"""Number of windows above which a search goes on in Delaunay triangles: through the long edges of slivers every segment
-of a curve is seen."""
 Report: TypeAlias = Callable[[], None]
 """Function that is called about every tenth of a second; an exception that it raises ends the search."""
 
@@ -59,7 +53,8 @@ def distance_to_segments(
     """Return the distance of every vertex to segments and points as `distance_to_zero_line` does."""
     limit = window_limit(triangles)
     placed = through_vertices(triangles, placed)
-    many = min(MANY_PER_EDGE * triangles.n_edges + MANY_WINDOWS, limit)
+    # with more windows, in Delaunay triangles: through the long edges of slivers every segment of a curve is seen
+    many = min(30 * triangles.n_edges + 50_000, limit)
     search = PausedSearch.start(triangles, placed, tolerance).until(many, report)
     better = None if search.has_ended else in_delaunay_triangles(triangles, placed)
     if better is not None:
@@ -89,8 +84,11 @@ def is_pseudosource(triangles: IntrinsicMesh) -> Bools:
 
 
 def window_limit(triangles: IntrinsicMesh) -> int:
-    """Return the number of windows at which a search is cut short."""
-    return min(WINDOWS_IF_SMALL * 3 * triangles.n_faces, WINDOWS_PER_EDGE * triangles.n_edges + FEW_WINDOWS)
+    """Return the number of windows at which a search is cut short.
+
+    Ten per edge are usual on smooth surfaces. Small meshes of many sheets make more, which is little in all.
+    """
+    return min(3000 * triangles.n_faces, 100 * triangles.n_edges + 4_000_000)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,15 +172,11 @@ def shortest_arcs(tails: Ints, heads: Ints, lengths: Floats, n: int) -> csr_matr
     return csr_matrix(entries, shape=(n, n))
 
 
-NOT_DELAUNAY = 0.05
-"""Share of edges that are not Delaunay above which the search makes Delaunay triangles."""
-
-
 def in_delaunay_triangles(
     triangles: IntrinsicMesh, placed: PlacedSegments
 ) -> tuple[IntrinsicMesh, PlacedSegments] | None:
     """Return the surface in Delaunay triangles, with sources along edges; None if there is nothing to gain."""
-    if not triangles.agree_on_lengths or share_to_flip(triangles) < NOT_DELAUNAY:
+    if not triangles.agree_on_lengths or share_to_flip(triangles) < 0.05:
         return None
     curve = as_curve(triangles, placed)
     if curve is None:
@@ -201,8 +195,6 @@ def share_to_flip(triangles: IntrinsicMesh) -> float:
 
 DISTANCE_ROUNDING = 1e-10
 """Rounding error of distances, relative to the length of an edge."""
-COMPARED_WINDOWS = 4
-"""Number of windows on a halfedge whose comparison with each other is as much work as making one."""
 
 
 @compiled
@@ -227,7 +219,8 @@ def _collect(
         search.counts,
     )
     count, before = list_length(following, queued[halfedge]), list_length(following, settled[halfedge])
-    counts[WINDOWS_MADE] += count * (count + before) // COMPARED_WINDOWS**2  # each is compared with all others
+    # each is compared with all others: with four windows that is as much work as making one
+    counts[WINDOWS_MADE] += count * (count + before) // 16
     chosen = np.empty((count, 6))
     count, row = 0, queued[halfedge]
     while row >= 0:

@@ -33,8 +33,6 @@ from .polyline import Polyline
 
 RESOLUTION = 128
 """Default number of nodes along the longest side of a grid."""
-PADDING_SHARE = 0.2
-"""Padding on every side of a shape, relative to its longest side."""
 if TYPE_CHECKING:
     import pyvista
     from typing_extensions import TypeVar
@@ -248,8 +246,8 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         return f"Grid(origin={short(self.origin)}, spacing={short(step)}, shape={self.shape})"
 
 
-def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = PADDING_SHARE) -> float:
-    """Return the padding of a box that leaves room for its completion, and for offsets up to `reach`."""
+def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = 0.2) -> float:
+    """Return the padding of a box: a share of its longest side for its completion, and room for offsets to `reach`."""
     lower, upper = np.asarray(bounds, dtype=np.float64)
     return share * float((upper - lower).max()) + 1.05 * reach
 

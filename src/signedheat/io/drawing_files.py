@@ -26,8 +26,6 @@ FLAG = re.compile(r"[\s,]*([01])")
 COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])")
 ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 """Number of arguments of each command of a path."""
-FLAG_ARGUMENTS = (3, 4)
-"""Arguments of an arc that are flags, which need no space after them."""
 SVG_UNITS = {"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "q": 96 / 101.6, "in": 96.0}
 """User units per unit of length; ems are those of the default font."""
 SVG_UNITS |= {"em": 16.0, "ex": 8.0}
@@ -36,8 +34,6 @@ PLACED = {"svg": ("viewBox", "x", "y"), "symbol": ("viewBox",)}
 """Attributes of drawings within a drawing that give them coordinates of their own."""
 AXES = {"x": 0, "x1": 0, "x2": 0, "cx": 0, "rx": 0, "width": 0, "y": 1, "y1": 1, "y2": 1, "cy": 1, "ry": 1, "height": 1}
 """Axes of attributes that are lengths along an axis."""
-MOST_NESTED, MOST_USES = 100, 10**5
-"""Limits on nested groups, and on elements drawn, including repeated uses."""
 FILL_RULE = re.compile(r"fill-rule\s*:\s*(\w+)")
 TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
 
@@ -69,7 +65,7 @@ class _Drawing:
     ) -> Iterator[list[tuple[Floats, bool]]]:
         """Subpaths of an element and its children; those with the evenodd rule as outlines of their fill."""
         self.n_used += is_used
-        if depth > MOST_NESTED or self.n_used > MOST_USES:
+        if depth > 100 or self.n_used > 10**5:
             raise damaged("its elements contain themselves or too many others")
         kind = str(element.tag).rpartition("}")[2]
         if element.get("display") == "none" or "display:none" in element.get("style", "").replace(" ", ""):
@@ -195,7 +191,7 @@ def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
             raise damaged(f"a path goes on with '{data[position : position + 20].strip()}', which is not a command")
         numbers = []
         for place in range(ARGUMENTS[command.upper()]):
-            pattern = FLAG if command in "Aa" and place in FLAG_ARGUMENTS else NUMBER
+            pattern = FLAG if command in "Aa" and place in (3, 4) else NUMBER  # no space need follow flags of arcs
             number = pattern.match(data, position)
             if number is None:
                 raise damaged(

@@ -32,8 +32,8 @@ PARSER_PROGRAM = (
 """Program of the process: it starts isolated from the current folder, then takes over the import path."""
 LEAST_MEMORY, MEMORY_PER_BYTE = 1 << 29, 100
 """Memory limit of a parser: a constant, and a factor for the size of the file."""
-LEAST_SECONDS, BYTES_PER_SECOND = 10, 20_000
-"""Limit of processor time: a constant, and the bytes of a file for each further second."""
+LEAST_SECONDS = 10
+"""Limit of processor time of a parser, and one second more for every 20,000 bytes of the file."""
 ARRAY_TYPE = re.compile(r"[<>|][biuf][1248]")
 ALONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 """Environment variables that limit threads to one, since idle threads take memory."""
@@ -59,7 +59,7 @@ def parsed(
     free = available_memory()
     memory = LEAST_MEMORY + bytes_per_byte * size
     memory = memory if free is None else min(memory, free)
-    seconds = (least_seconds or LEAST_SECONDS) + size // BYTES_PER_SECOND
+    seconds = (least_seconds or LEAST_SECONDS) + size // 20_000
     folders = json.dumps([os.path.abspath(folder) for folder in sys.path if folder])
     order = [function, os.path.abspath(path), json.dumps(options), str(memory), str(seconds)]
     with tempfile.TemporaryFile() as messages:

@@ -44,8 +44,6 @@ FACET_DEFLECTION = 1e-3
 """Default distance of triangles from the surface, relative to the diagonal of the box around it."""
 FACET_ANGLE = 0.3
 """Approximate angle between neighbouring triangles of curved faces, in radians: 20 of them around a cylinder."""
-STEP_SEAM = 1e-6
-"""Corners of neighbouring faces within this distance, relative to the diagonal, are one: Open CASCADE's precision."""
 
 
 def _joined(bodies: Sequence[Body]) -> TriangleMesh:
@@ -253,7 +251,8 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
         raise FileFormatError("it has no surface", path=path)
     starts = np.cumsum([0, *parts["point_counts"][:-1]])
     faces = parts["triangles"] + np.repeat(starts, counts)[:, None]
-    kept, numbers = np.unique(welded(parts["points"], STEP_SEAM * parts["diagonal"]), return_inverse=True)
+    # corners of neighbouring faces are one within the precision of Open CASCADE
+    kept, numbers = np.unique(welded(parts["points"], 1e-6 * parts["diagonal"]), return_inverse=True)
     return TriangleMesh(parts["points"][kept], numbers.ravel()[faces]), np.repeat(np.arange(len(counts)), counts)
 
 

@@ -29,8 +29,6 @@ Mesh = TypeVar("Mesh", TriangleMesh, PolygonMesh)
 
 VOLUME_FORMATS = (".npy", ".nrrd", ".vti")
 LABEL_FORMATS = (*VOLUME_FORMATS, *NIFTI)
-SQUARE_COSINE = 1e-4
-"""Axes are at right angles if their cosine is at most this. NIfTI files hold them in single precision."""
 SPACES = {
     "right-anterior-superior": (1, 1, 1),
     "left-posterior-superior": (-1, -1, 1),
@@ -93,7 +91,7 @@ class LabelImage(Represented, Frozen):
         if not (np.isfinite(axes).all() and (lengths > 0).all() and np.isfinite(origin).all()):
             raise GeometryError("its axes have no directions", remedy="write it again", element="axes")
         cosine = float(np.abs((axes / lengths).T @ (axes / lengths) - np.eye(3)).max())
-        if cosine > SQUARE_COSINE:
+        if cosine > 1e-4:  # NIfTI files hold axes in single precision
             raise GeometryError(
                 f"its axes are not at right angles, but off by {np.degrees(np.arcsin(min(cosine, 1.0))):.3g}°",
                 remedy="resample the image along right angles",

@@ -11,9 +11,6 @@ from scipy import sparse
 
 from ..arrays import Bools, Floats
 
-UNDERFLOWN = 2.0**-900
-"""Size of rows, relative to the largest, below which they are computed anew: terms may have underflowed on the way
-there."""
 Solve = Callable[[NDArray[Any]], NDArray[Any]]
 """From right-hand sides (n, k) or (n,) to the solutions."""
 Forces = Callable[[NDArray[Any], Bools], tuple[Bools, NDArray[Any]]]
@@ -43,7 +40,7 @@ def restart(solve: Solve, border_forces: Forces, loads: NDArray[Any], first: Sta
     while True:
         values, logarithm = stages[-1]
         sizes = np.where(unknown, largest_components(values), 0.0)
-        faint = unknown & (sizes < UNDERFLOWN * sizes.max(initial=0.0))
+        faint = unknown & (sizes < 2.0**-900 * sizes.max(initial=0.0))  # terms may have underflowed
         if not faint.any():
             return stages
         inside = _rows(faint, values)

@@ -26,11 +26,7 @@ from .surface_points import (
     incident_faces,
     unique_points,
 )
-from .unit_vectors import unit
-
-STRAIGHT_NORMALS = 1e-6
-"""Change of the unit normal between segments up to which a line may be straight: short segments have rounded ends.
-`ZERO_COORDINATE` then decides, by how far all points are from the line between the outer ones."""
+from .unit_vectors import ANGLE_ROUNDING, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +183,9 @@ def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
     places_between = np.flatnonzero((np.bincount(index.ravel()) == 2) & (into >= 0) & (out >= 0))
     before, after = into[places_between], out[places_between]
     normals = merged.vectors / np.abs(merged.vectors)
-    alike = np.abs(normals[before] - normals[after]) <= STRAIGHT_NORMALS
+    # short segments have rounded ends; `ZERO_COORDINATE` then decides, by how far all points are from the line between
+    # the outer ones
+    alike = np.abs(normals[before] - normals[after]) <= ANGLE_ROUNDING
     for elements in (merged.edges, np.where(merged.edges < 0, merged.faces, -1)):
         alike &= elements[before] == elements[after]
     places_between, before, after = places_between[alike], before[alike], after[alike]

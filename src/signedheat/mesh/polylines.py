@@ -11,15 +11,12 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import SignedHeatError
 from ..packages import lazy_module
 from .box_tree import BoxTree
+from .triangles import AREA_ROUNDING
 
 manifold3d: Any = lazy_module("manifold3d", "drawings of closed outlines")
 
 FillRule: TypeAlias = Literal["nonzero", "evenodd"]
 """Rule for the places that outlines fill: those around which they wind a number of times that is not zero, or odd."""
-MANIFOLD_SIZE = 2.0**30
-"""Size to which outlines are scaled for manifold3d, which rounds coordinates to 1e-8."""
-EQUAL_AREAS = 1e-9
-"""Relative difference of areas below which it is rounding."""
 
 
 def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[tuple[Ints, Bools, bool]]:
@@ -83,7 +80,8 @@ def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
         return []
     lower, upper = points.min(axis=0), points.max(axis=0)
     center = 0.5 * (lower + upper)
-    scale = float(np.ldexp(MANIFOLD_SIZE, -int(np.frexp((upper - lower).max())[1])))
+    # manifold3d rounds coordinates to 1e-8
+    scale = float(np.ldexp(2.0**30, -int(np.frexp((upper - lower).max())[1])))
     scaled = [scale * (outline - center) for outline in outlines]
     if rule == "evenodd":
         region = manifold3d.CrossSection(scaled, manifold3d.FillRule.EvenOdd)
@@ -126,10 +124,10 @@ def _united(outlines: list[Floats]) -> Any:
     areas, outermost = np.array([part.area() for part in parts]), np.arange(len(parts))
     by_size = np.argsort(-areas, kind="stable")
     for place, inner in enumerate(by_size) if runs_back.any() and not runs_back.all() else ():
-        larger = by_size[:place][areas[by_size[:place]] > (1 + EQUAL_AREAS) * areas[inner]]
+        larger = by_size[:place][areas[by_size[:place]] > (1 + AREA_ROUNDING) * areas[inner]]
         around = ((boxes[larger, 0] <= boxes[inner, 0]) & (boxes[larger, 1] >= boxes[inner, 1])).all(axis=1)
         for outer in larger[around]:
-            if (parts[inner] - parts[outer]).area() <= EQUAL_AREAS * areas[inner]:
+            if (parts[inner] - parts[outer]).area() <= AREA_ROUNDING * areas[inner]:
                 outermost[inner] = outermost[outer]
                 break
     turned = runs_back != runs_back[outermost]

@@ -152,6 +152,8 @@ def cut_into_ears(polygon: Floats, normal: Floats, allowed: Callable[[int, int],
     return np.array([*triangles, left])
 
 
+AREA_ROUNDING = 1e-9
+"""Areas that differ by less than this share, or cancel up to it, are equal but for rounding."""
 CREASE_ANGLE = np.deg2rad(25.0)
 """Angle between two faces above which the edge between them may be a crease: below, the surface is smooth there."""
 MOST_CREASED_FACES = 4_000_000

@@ -13,7 +13,7 @@ from ..arrays import Floats
 from ..parallel import n_threads
 
 ANGLE_ROUNDING = 1e-6
-"""Angles up to this, in radians, are rounding errors."""
+"""Angles up to this, in radians, and differences of unit vectors, are rounding errors."""
 
 
 def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:

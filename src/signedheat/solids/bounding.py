@@ -33,12 +33,6 @@ PARTLY_INSIDE = 0.25
 """Loose pieces lie along the surface of closed ones if the share of them inside differs from a whole number by more."""
 GAP_REACH = 1.5
 """Largest distance between faces of two pieces that belong together, relative to the size of the smaller piece."""
-COMPARED_FACES = 9
-"""Number of nearest sampled faces that each face is compared with, itself included."""
-SAMPLED_FACES = 100_000
-"""Number of sampled faces, spread evenly, besides one for each piece."""
-NESTED_PROBES = 16
-"""Number of triangles of a closed piece, spread evenly, all of which lie within other pieces if it is nested."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +155,7 @@ def _nested(
     if len(np.unique(owners)) == 1:
         return outward, 0, 0
     names, labels = np.unique(owners, return_inverse=True)
-    faces, places = sampled(Pieces(triangles, labels), NESTED_PROBES * len(names))
+    faces, places = sampled(Pieces(triangles, labels), 16 * len(names))
     probes, own = owners[faces], np.abs(counts[counted[faces]])
     normals = unit(area_vectors(triangles[faces]))
     tree = WindingTree.of(directed(chain.triangles, counts * outward[pieces]))
@@ -283,9 +277,9 @@ def clusters_of(pieces: Pieces) -> Ints:
     np.maximum.at(high, pieces.labels, pieces.triangles.max(axis=1))
     radii = 0.5 * np.linalg.norm(high - low, axis=1)
     elements = without_slender(pieces)
-    faces, places = sampled(elements, min(len(elements.labels), SAMPLED_FACES))
+    faces, places = sampled(elements, min(len(elements.labels), 100_000))
     owners = elements.labels[faces]
-    away, near = scipy.spatial.cKDTree(places).query(places, min(COMPARED_FACES, len(places)), workers=-1)
+    away, near = scipy.spatial.cKDTree(places).query(places, min(9, len(places)), workers=-1)  # itself and 8
     away, others = away.reshape(len(places), -1), owners[near].reshape(len(places), -1)
     joined = away < 2 * GAP_REACH * np.minimum(radii[owners][:, None], radii[others])
     return connected_components(n, np.repeat(owners, joined.sum(axis=1)), others[joined])

@@ -41,8 +41,6 @@ HALF_BENDING_DEPTH = 0.03
 BEND_RATIO = 0.35
 """Ratio between how far a surface bends and how far it would have to bend. A lid does not bend below this ratio, and is
 clamped above twice this ratio. On a ball the ratio is 1."""
-NARROWEST_OPENING = 1e-9
-"""Least width of an opening, relative to the length of its rim: narrower ones are rounding error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +57,8 @@ def width_of(lid: Lid) -> float:
     """Width of an opening: four areas over the length of its rim, the diameter of a circle; never zero."""
     rim = lid.vertices[: lid.n_rim]
     length = float(side_lengths(rim).sum())
-    return max(4.0 * float(face_areas(lid.vertices[lid.faces]).sum()) / length, NARROWEST_OPENING * length)
+    # less than 1e-9 of its length is rounding error
+    return max(4.0 * float(face_areas(lid.vertices[lid.faces]).sum()) / length, 1e-9 * length)
 
 
 def samples_near(

@@ -21,7 +21,7 @@ import scipy
 
 from ..arrays import Bools, Floats, Ints, mask_of
 from ..errors import InexactWarning, MemoryLimitError, OutsideError, warn_user
-from ..field_levels import NodeValues, on_level
+from ..field_levels import ON_LEVEL, NodeValues, on_level
 from ..grids.blocks import BLOCK, WINDOW, Blocks, BlockValues
 from ..grids.grid import Grid
 from ..jobs import Progress
@@ -109,8 +109,6 @@ def _solved(values: Floats, vectors: Floats, sides: Floats, least: Floats) -> Fl
 
 PIECES_AT_ONCE = 1 << 17
 """Batch size for pieces of the level."""
-ON_LEVEL = 1e-3
-"""Distance from the level, in cells, above which a vertex is moved onto it."""
 OUTSIDE_CELL = 0.6
 """Distance, in cells, by which a vertex may leave its cell."""
 VERTEX_SPACING = 0.2

@@ -33,8 +33,6 @@ pictures: Any = lazy_module("signedheat.view.surface_pictures", "pictures")
 
 SUMMARY_PERCENTILES = (0.0, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 100.0)
 """Percentiles of deviations in summaries."""
-EXTREME_PERCENTILE = 99.0
-"""Percentile of absolute deviations at which colour scales and histograms end, so that outliers do not dominate."""
 HISTOGRAM_BINS = 40
 """Default number of bins of histograms."""
 OPEN_SHARE = 0.25
@@ -103,8 +101,8 @@ class Deviation(Frozen):
 
     @property
     def extreme(self) -> float:
-        """The 99th percentile of the absolute deviations."""
-        return float(np.percentile(np.abs(self.of_surface), EXTREME_PERCENTILE))
+        """The 99th percentile of the absolute deviations: colour scales end there, so that outliers do not dominate."""
+        return float(np.percentile(np.abs(self.of_surface), 99.0))
 
     def within(self, tolerance: float) -> float:
         """Compute the share of points within a tolerance of the part, on either side.

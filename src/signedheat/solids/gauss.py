@@ -40,22 +40,16 @@ PLANE_AGREEMENT = 1.0
 """μ: weight of neighbours that lie in one plane."""
 PLANE_NEIGHBORS = 12
 """Number of neighbours that an element is compared with."""
-MATRIX_PIECES = 3000
-"""Up to this many pieces W is a matrix; with more, each face is a dipole, and W is applied through a tree."""
-MATRIX_ENTRIES = 5_000_000
-"""Largest number of entries of W. It limits at how many places the level is asked for, besides one for each piece."""
 LEVEL_PLACES = 10_000
-"""Largest number of such places."""
+"""Largest number of places at which the level is asked for, besides one for each piece."""
 LOOSE_DIPOLES = 64
 """This many loose triangles or more become dipoles; fewer get exact solid angles, which tell noise for what it is."""
-GRADIENT_STEPS = 10
-"""Number of steps of conjugate gradients. They give the signs of the direct solution."""
 TREE_FACES = 256
 """A piece of this many faces or more has a tree of its own, which sums their solid angles."""
 PIECE_RADII, NODE_RADII = 4.0, 2.0
 """Pieces, and nodes of the tree, are dipoles beyond this distance, relative to their radius."""
-SLENDER_TRIANGLE, SLENDER_HALVINGS = 12.0, 6
-"""Triangles are halved, so many times at most, if the square of their longest side over their area exceeds this: one
+SLENDER_TRIANGLE = 12.0
+"""Triangles are halved if the square of their longest side over their area exceeds this: one
 dipole must not stand for a strip. An equilateral triangle has 2.3, a strip six times as long as wide 12."""
 MOST_DIPOLES = 200_000
 """Largest number of dipoles; of more faces, this many are drawn evenly."""
@@ -83,7 +77,8 @@ def system_of(pieces: Pieces) -> Matrix | Dipoles:
     """Make the system of some pieces: dipoles for many loose triangles, exact solid angles for the rest."""
     sizes, areas = np.bincount(pieces.labels), pieces.areas
     many = areas.sum() ** 2 > LOOSE_DIPOLES * (areas**2).sum() and areas[sizes == 1].sum() > 0.5 * areas.sum()
-    return Dipoles.of_triangles(pieces) if many or len(areas) > MATRIX_PIECES else Matrix.of(pieces)
+    # of many pieces each face is a dipole, and W is applied through a tree
+    return Dipoles.of_triangles(pieces) if many or len(areas) > 3000 else Matrix.of(pieces)
 
 
 def means(values: Floats, groups: Ints, weights: Floats, n: int) -> Floats:
@@ -106,7 +101,7 @@ class Matrix:
     @classmethod
     def of(cls, pieces: Pieces) -> Matrix:
         """Sample places on the pieces, and compute their winding numbers there."""
-        faces, places = sampled(pieces, min(LEVEL_PLACES, MATRIX_ENTRIES // len(pieces.areas)))
+        faces, places = sampled(pieces, min(LEVEL_PLACES, 5_000_000 // len(pieces.areas)))  # W has no more entries
         order = np.argsort(pieces.labels, kind="stable")
         starts = np.concatenate([[0], np.cumsum(np.bincount(pieces.labels))])
         triangles = pieces.triangles[order]
@@ -164,7 +159,7 @@ class Matrix:
 def without_slender(pieces: Pieces) -> Pieces:
     """Halve slender triangles."""
     triangles, labels = pieces.triangles, pieces.labels
-    for _ in range(SLENDER_HALVINGS):
+    for _ in range(6):
         lengths = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
         slender = lengths.max(axis=1) ** 2 > SLENDER_TRIANGLE * face_areas(triangles)
         if not slender.any() or len(triangles) + slender.sum() > MOST_DIPOLES:
@@ -286,7 +281,8 @@ class Dipoles:
 
         inverse = 1.0 / np.maximum(smooth.diagonal() + held, np.finfo(float).tiny)
         wanted = self._adjoint((0.5 + self.within) * shares)
-        return conjugate_gradients(system, wanted, lambda rest: inverse * rest, tolerance=0.0, limit=GRADIENT_STEPS)
+        # ten steps give the signs of the direct solution
+        return conjugate_gradients(system, wanted, lambda rest: inverse * rest, tolerance=0.0, limit=10)
 
     def levels(self, signs: Floats) -> Floats:
         """(n,) levels at the places, without the bodies ignored there."""

@@ -30,8 +30,6 @@ PLATE_AT_REST, PLATE_MOVES = 1e-3, 64
 most. Nearly all plates rest after 5 to 40 moves."""
 RIM_CLEARANCE = 0.5
 """Points of the smooth lid nearer to the rim than this are left out, relative to the mean distance of its points."""
-FILM_AT_REST = 1e-12
-"""A film is at rest when it moves by less, relative to its size. One in a plane is at rest from the start."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +168,7 @@ def film(pattern: Film) -> Film:
         weights = np.bincount(sides.ravel(), _cotangents(shape, faces).ravel())
         matrix = _laplacian(*np.divmod(edges, len(plane)), np.maximum(weights, 1e-6), len(plane))
         shape = _extended(matrix, vertices[:n])
-        if np.abs(shape - vertices).max() <= FILM_AT_REST * size:
+        if np.abs(shape - vertices).max() <= 1e-12 * size:  # at rest, as a film in a plane is from the start
             break
         vertices = shape
     return replace(pattern, vertices=vertices)

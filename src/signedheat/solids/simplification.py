@@ -19,10 +19,6 @@ manifold3d: Any = lazy_module("manifold3d", "simplified surfaces")
 TOLERANCE_ATTEMPTS = 8
 """Number of attempts, each with half the tolerance for manifold3d, until its result is acceptable. Of 51 surfaces at
 .02 to .5 cells 48 took seven or fewer. In the others manifold3d removed a spike or a body larger than the tolerance."""
-CUT_WIDTH = 1e-3
-"""Least width on both sides of a cut, relative to the tolerance."""
-LARGE_PIECE = 3.0
-"""Pieces are halved if their longest side exceeds that of the nearest triangle by this factor."""
 
 
 def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
@@ -70,7 +66,7 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
         rest = of_corners.reshape(-1, 3).max(axis=1) > distance
         if not rest.any():
             return True
-        pieces = _divided(pieces[rest], tree.features.rows[faces[rest]], CUT_WIDTH * distance)
+        pieces = _divided(pieces[rest], tree.features.rows[faces[rest]], 1e-3 * distance)
     return False
 
 
@@ -85,7 +81,7 @@ def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
     shorter = np.minimum(beyond.max(axis=2), -beyond.min(axis=2))
     side = shorter.argmax(axis=1)
     row = np.arange(len(pieces))
-    large = sides.max(axis=1) > LARGE_PIECE * rows[:, [9, 12, 15]].max(axis=1)
+    large = sides.max(axis=1) > 3.0 * rows[:, [9, 12, 15]].max(axis=1)
     cut = ~large & (shorter[row, side] > least)
     return np.concatenate([_cut(pieces[cut], beyond[row, side][cut]), halved(pieces[~cut], sides[~cut].argmax(axis=1))])
 

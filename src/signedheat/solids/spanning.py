@@ -15,8 +15,6 @@ LAYER_GROWTH = 0.35
 """Growth of triangles with their distance from the rim, relative to that distance."""
 MOST_TIES = 128
 """Largest number of equally distant points of a loop that are compared, and of places where they are."""
-TIE_MOVE = 1e-9
-"""Points are moved by this, relative to the size of the loop, to choose among equal triangles; rounding is 1e-15."""
 Frame = tuple[Floats, Floats]
 """Origin and (3, 2) axes of a plane."""
 
@@ -142,7 +140,7 @@ def counterclockwise(points: Floats) -> Ints:
     numbers = np.arange(len(points))[:, None]
     moves = (numbers * 0.5 * (5**0.5 - 1) * np.array([1.0, 2**0.5])) % 1.0 - 0.5
     size = float(np.ptp(points, axis=0).max())
-    moved = points + TIE_MOVE * size * moves
+    moved = points + 1e-9 * size * moves  # to choose among equal triangles; rounding is 1e-15
     faces = scipy.spatial.Delaunay(moved).simplices.astype(np.int64)
     a, b, c = moved[faces].transpose(1, 0, 2)
     clockwise = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) < (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])

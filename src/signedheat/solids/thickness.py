@@ -40,8 +40,6 @@ from .sampling import evenly_on
 
 pictures: Any = lazy_module("signedheat.view.surface_pictures", "pictures")
 
-WIDTH_PLACES = 10_000
-"""Number of places at which walls and gaps of a shape are measured."""
 WIDTH_QUANTILE = 0.01
 """Quantile of the widths of walls, or gaps, that is reported."""
 COINCIDENT_FACES = 1e-6
@@ -256,7 +254,7 @@ def widths(shape: Mesh) -> Widths:
     triangles = triangles[face_areas(triangles) > 0]
     if not len(triangles):
         return Widths(None, None, None, None, None, None)
-    places, faces = evenly_on(triangles, WIDTH_PLACES, np.random.default_rng(0))
+    places, faces = evenly_on(triangles, 10_000, np.random.default_rng(0))
     normals, tree = _normals_at(triangles, faces, places), FaceTree.of_triangles(triangles)
     facing = tree.features.face_normals
     names, ids = indexed(triangles)[1], tree.features.ids

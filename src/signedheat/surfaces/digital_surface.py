@@ -182,10 +182,6 @@ axes, whose sides bend outwards, 5.5°, 4.4°, 6.5°."""
 LARGEST_MOVE = 0.49
 """Largest move of a vertex along each axis, in voxels: below a half, so that no two coincide, in single precision
 either."""
-DESCENT_STEP = 0.24
-"""Step of the gradient descent, at which every bending mode decays: below 2 / (2² + `STAYING`)."""
-LAST_MOVE = 1e-4
-"""Largest move of a vertex in the last step, in voxels."""
 
 
 def surface_net(volume: Bools) -> tuple[Floats, Ints]:
@@ -230,13 +226,14 @@ def _relaxed(quads: Ints, middles: Floats, room: Floats) -> Floats:
     places, ahead, pace = middles, middles, 1.0
     for _ in range(200):  # the slowest modes that `STAYING` allows need about 4 / √STAYING, 73
         slope = back @ (bending @ ahead) + STAYING * (ahead - middles)
-        new = np.clip(ahead - DESCENT_STEP * slope, middles - room, middles + room)
+        # every bending mode decays with a step below 2 / (2² + `STAYING`)
+        new = np.clip(ahead - 0.24 * slope, middles - room, middles + room)
         returning = ((ahead - new) * (new - places)).sum() > 0
         faster = 1.0 if returning else 0.5 * (1 + np.sqrt(1 + 4 * pace**2))
         ahead = new + (0.0 if returning else (pace - 1) / faster) * (new - places)
         moved = float(np.abs(new - places).max())
         places, pace = new, faster
-        if moved < LAST_MOVE:
+        if moved < 1e-4:  # voxels
             break
     return places
 

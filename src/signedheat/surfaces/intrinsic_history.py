@@ -31,6 +31,7 @@ from ..mesh.gluing import (
 )
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import ZERO_COORDINATE
+from ..mesh.unit_vectors import ANGLE_ROUNDING
 
 
 class Lines(NamedTuple):
@@ -186,8 +187,6 @@ BEFORE_STEP[FLIP_STEP, :2], AFTER_STEP[FLIP_STEP, :2] = [[0, 1, 2], [1, 0, 3]], 
 BEFORE_STEP[SPLIT_EDGE, 0], AFTER_STEP[SPLIT_EDGE, :2] = [0, 1, 2], [[0, 3, 2], [3, 1, 2]]
 BEFORE_STEP[SPLIT_FACE, 0], AFTER_STEP[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
 
-OUTWARD_SINE = 1e-6
-"""A line that leaves the surface at an angle with less than this sine runs along its boundary."""
 SQUARE_LENGTH_ROUNDING = 1e-10
 """Rounding error of squared lengths, relative to the size of their terms."""
 
@@ -315,7 +314,8 @@ def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, s
         if t == h or g.sibling[t] != h:  # where no single face goes on; only rounding leads out: go along the edge
             top, base = apex(g, h), g.length[g.edge[h]]
             x, y = top.real, top.imag
-            if slides == 2 or y * abs(v[0, a]) > OUTWARD_SINE * abs(base * v[0, j] + x * v[0, a]):
+            # at a smaller angle the line runs along the boundary
+            if slides == 2 or y * abs(v[0, a]) > ANGLE_ROUNDING * abs(base * v[0, j] + x * v[0, a]):
                 break
             slides += 1
             v[0, i] += v[0, a] * (1.0 - x / base)

@@ -40,8 +40,6 @@ from .triangle_mesh import TriangleMesh
 if TYPE_CHECKING:
     import pyvista
 
-AREA_ERROR = 1e-4
-"""Largest relative change of the area of a mesh. It is 1e-7 at most where some faces are degenerate."""
 LARGEST_ANGLE = 30.0
 """Degrees; for larger minimum angles refinement need not terminate."""
 GENERIC_DIRECTION = (np.pi / 4) ** np.arange(3)
@@ -466,7 +464,8 @@ def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
     """Refuse faces so thin that rounded edge lengths do not determine their area."""
     before, after = float(mesh.face_areas.sum()), float(triangles.face_areas.sum())
     longest, most = float(triangles.lengths_of_edges.max(initial=0.0)), float(mesh.edge_lengths.sum())
-    lost = "" if abs(after - before) <= AREA_ERROR * before else f"area would be {after:.6g}, and it is {before:.6g}"
+    # where some faces are degenerate, the area changes by 1e-7 at most
+    lost = "" if abs(after - before) <= 1e-4 * before else f"area would be {after:.6g}, and it is {before:.6g}"
     if not longest <= most:
         lost = f"longest edge would be {longest:.6g}, and all edges together are {most:.6g}"
     if lost:
