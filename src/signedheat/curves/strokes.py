@@ -62,7 +62,8 @@ class CutGraph:
         count, part = sparse.csgraph.connected_components(strong, connection="strong")
         tails = np.repeat(np.arange(len(pull)), np.diff(self.starts))
         between = np.flatnonzero((part[tails] != part[self.heads]) & (tails < self.heads))
-        rest = CutGraph.of(np.stack([part[tails[between]], part[self.heads[between]]], axis=1), count)
+        ends = np.stack([part[tails[between]], part[self.heads[between]]], axis=1)
+        rest = CutGraph.of(ends.astype(np.int64), count)
         residual = np.concatenate([residual[between], residual[self.reverse[between]]])[rest.order]
         pulls = sums_of(pulls + small, part, count).astype(np.int64)
         return np.where(source_side(rest.starts, rest.heads, rest.reverse, residual, pulls)[part], 1.0, -1.0)
@@ -81,15 +82,14 @@ def source_side(starts: Ids, heads: Ids, reverse: Ids, residual: Ids, pull: Ids)
     Arcs of node i are those from starts[i] to starts[i + 1]; `reverse` is the arc back. A pull is the capacity from the
     source to a node, or, if negative, from it to the sink.
     """
-    n = len(pull)
+    n, now = len(pull), 1
     tree = np.sign(pull).astype(np.int8)  # 1 in the source's tree, −1 in the sink's
-    parent = np.where(tree == 0, FREE, TERMINAL)
-    far, stamp, now = np.where(tree == 0, 0, 1), np.zeros(n, dtype=np.int64), 1
-    queue, orphans, waiting = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), tree != 0
+    parent, far, stamp = np.full(n, FREE), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    queue, orphans, waiting = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
     first = count = 0  # of the queue, which is a ring
     for i in range(n):
-        if waiting[i]:
-            queue[count] = i
+        if tree[i] != 0:
+            parent[i], far[i], waiting[i], queue[count] = TERMINAL, 1, True, i
             count += 1
     while count > 0:
         i = queue[first]
