@@ -1,44 +1,13 @@
-"""What hangs on the numbers that lids are decided by: each halved and doubled, over shapes of its own.
-
-    python benchmarks/lids_sensitivity.py
-
-For each shape, the volume that is closed over that of what it was cut from; then, for each number, the shapes whose
-volume changes by more than half a per cent when it is halved or doubled, and by how much.
-"""
+"""Damaged shapes that lids close, and the volumes of what they were cut from."""
 
 from __future__ import annotations
-
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from signedheat import samples
-from signedheat.solids import closing, lids, rims, spanning, walls
 from signedheat.solids.closing import closed_by
 
-NUMBERS: list[tuple[ModuleType, str]] = [
-    (closing, "LOST_FACE_SIDES"),
-    (closing, "LARGEST_BEND"),
-    (rims, "ALONG_EDGE"),
-    (rims, "OPPOSITE_EDGES"),
-    (rims, "STRAIGHT_RIM"),
-    (walls, "NARROW"),
-    (walls, "LARGE_OPENING"),
-    (lids, "COPLANAR"),
-    (lids, "FOLDED_LID"),
-    (lids, "MOST_PLANAR_RUNS"),
-    (closing, "STRIP_WIDTH"),
-    (closing, "SMOOTH_COSINE"),
-    (closing, "MOST_RIM_SAMPLES"),
-    (closing, "HALF_BENDING_DEPTH"),
-    (closing, "BEND_RATIO"),
-    (lids, "RIM_SMOOTHING"),
-    (lids, "LOOP_POINTS"),
-    (lids, "RIM_CLEARANCE"),
-    (lids, "EVEN_SHARE"),
-    (spanning, "LAYER_GROWTH"),
-]
 Shape = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
@@ -104,22 +73,3 @@ def shapes() -> dict[str, tuple[Shape, float]]:
         cup = np.pi * (2 / 3 + 0.1 - 0.1**3 / 3) - np.pi * (2 / 3 * inner**3 + 0.1 * inner**2 - 0.1**3 / 3)
         made[f"bowl, inside {inner}"] = (np.concatenate([cups[0][0], cups[1][0]]), chain), cup
     return made
-
-
-def main() -> None:
-    """Print what changes."""
-    every = shapes()
-    now = {name: volume(shape) / whole for name, (shape, whole) in every.items()}
-    print(*(f"{name:22s} {value:7.3f}" for name, value in now.items()), sep="\n", flush=True)
-    for module, name in NUMBERS:
-        value = getattr(module, name)
-        for factor in (0.5, 2.0):
-            setattr(module, name, type(value)(value * factor))
-            changes = [(key, volume(shape) / whole / now[key] - 1) for key, (shape, whole) in every.items()]
-            large = [f"{key} {100 * change:+.1f} %" for key, change in changes if abs(change) > 0.005]
-            print(f"{name} {value:.3g} x {factor}: {'; '.join(large) or 'nothing'}", flush=True)
-        setattr(module, name, value)
-
-
-if __name__ == "__main__":
-    main()
