@@ -17,13 +17,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from every_number import changed_to, set_everywhere
 from numpy.typing import NDArray
 
 from signedheat import TriangleMesh, complete, orientation, samples
 from signedheat.mesh import welding
 from signedheat.mesh.components import element_components
 from signedheat.mesh.triangles import area_vectors
-from signedheat.solids import bounding, chain, completion, gauss, overlaps, regions
+from signedheat.solids import bounding, completion, gauss, overlaps, regions
 
 MODULES = (bounding, gauss, overlaps)
 NUMBERS = (
@@ -308,22 +309,19 @@ def main(seeds: int = 2) -> None:
     for name, share in usual.items():
         print(f"{name:36s} {share:6.3f}")
     for number in NUMBERS:
-        modules = [module for module in MODULES if hasattr(module, number)]
-        value = getattr(modules[0], number)
-        for changed in (value / 2, (1 + value) / 2 if 0.5 < value < 1 else 2 * value):
-            for module in modules:
-                setattr(module, number, type(value)(changed))
+        value = next(getattr(module, number) for module in MODULES if hasattr(module, number))
+        for changed in changed_to(value):
+            set_everywhere(number, changed)
             other = table(seeds)
-            for module in modules:
-                setattr(module, number, value)
+            set_everywhere(number, value)
             moved = [f"{scene} {other[scene]:.3f}" for scene in usual if abs(other[scene] - usual[scene]) > CHANGED]
             print(f"{number} {value:g} → {changed:g}: {'; '.join(moved) or 'nothing'}", flush=True)
 
     value, errors = completion.TORN_LEVEL, {}
     for changed in (value / 2, value, 2 * value):
-        completion.TORN_LEVEL = changed
+        set_everywhere("TORN_LEVEL", changed)
         errors[changed] = enclosed(seeds)
-    completion.TORN_LEVEL = value
+    set_everywhere("TORN_LEVEL", value)
     print("error of the volume with completion.TORN_LEVEL " + ", ".join(f"{changed:g}" for changed in errors))
     for name in errors[value]:
         print(f"{name:36s} " + " ".join(f"{row[name]:6.4f}" for row in errors.values()))
@@ -341,9 +339,8 @@ def main(seeds: int = 2) -> None:
         regions.TOLERANCES = tolerances[:most]
         print(f"assemblies wrong with {most} of regions.TOLERANCES, by rounding: {listed(parted(seeds))}", flush=True)
     for units in (welding.ONE_PLACE / 4, welding.ONE_PLACE, 4 * welding.ONE_PLACE):
-        chain.ONE_PLACE = units
+        set_everywhere("ONE_PLACE", units)
         print(f"with sides apart and welding.ONE_PLACE {units:g}: {listed(parted(seeds, apart=True))}", flush=True)
-    chain.ONE_PLACE = welding.ONE_PLACE
 
 
 def listed(shares: dict[str, float]) -> str:

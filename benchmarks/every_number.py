@@ -214,6 +214,13 @@ def changed_to(value: float) -> tuple[float, float]:
     return (max(value // 2, 1), 2 * value) if isinstance(value, int) else (value / 2, twice)
 
 
+def set_everywhere(name: str, value: float) -> None:
+    """Change a number in all modules that are imported and hold it."""
+    for module in [module for key, module in sys.modules.items() if key.startswith("signedheat.")]:
+        if name in vars(module):
+            setattr(module, name, type(vars(module)[name])(value))
+
+
 def run() -> None:
     """Write the values of all cases to standard output, with a number changed if its module, name and value follow."""
     importlib.import_module("signedheat.public")
@@ -222,10 +229,7 @@ def run() -> None:
             if not path.stem.startswith("__"):
                 importlib.import_module(".".join(path.relative_to(ROOT.parent).with_suffix("").parts))
     if len(sys.argv) > 2:
-        *_, name, text = sys.argv
-        for module in [module for key, module in sys.modules.items() if key.startswith("signedheat.")]:
-            if name in vars(module):
-                setattr(module, name, type(vars(module)[name])(float(text)))
+        set_everywhere(sys.argv[-2], float(sys.argv[-1]))
     warnings.simplefilter("ignore")
     found: dict[str, Any] = {}
     for case, make in CASES.items():

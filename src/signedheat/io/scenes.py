@@ -245,7 +245,7 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
     """
     fineness = {"deflection": deflection, "fineness": FACET_DEFLECTION, "angle": FACET_ANGLE}
     # one line may describe a sphere, of any number of triangles, or be slow to triangulate
-    parts = parsed("step", path, "OCP", ".step files", bytes_per_byte=10_000, least_seconds=300, **fineness)
+    parts = parsed("step", path, "OCP", ".step files", bytes_per_byte=10_000, least_seconds=60, **fineness)
     counts = parts["triangle_counts"]
     if not counts.sum():
         raise FileFormatError("it has no surface", path=path)
