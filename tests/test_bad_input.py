@@ -176,6 +176,20 @@ def test_numbers_are_not_missing_or_text():
             sh.GridField(sh.Grid(0.0, 1.0, 2), np.array([0.0, value], dtype=object))
 
 
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        (lambda: sh.complete(BALL, lids="round"), "lids"),
+        (lambda: sh.sample(BALL, 10).save("samples.npz", layout="columns"), "layout"),
+        (lambda: sh.signed_distance(sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True), PLANE, fill="odd"), "fill"),
+    ],
+)
+def test_words_are_those_of_a_list(call, name):
+    with refused(sh.errors.SignedHeatError) as caught:
+        call()
+    assert caught.value.element == name and " or " in str(caught.value)
+
+
 @pytest.mark.parametrize("value", ["yes", 2**70, 1.0, None, np.zeros(3)], ids=lambda value: type(value).__name__)
 @pytest.mark.parametrize(
     ("call", "name"),

@@ -13,6 +13,7 @@ from .grids.grid_field import GridField
 from .surfaces.point_cloud import PointCloud
 from .surfaces.triangle_mesh import TriangleMesh
 from .transforms import joined_triangles
+from .validation import whole_number
 
 
 def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0, 0)) -> TriangleMesh:
@@ -23,6 +24,7 @@ def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0
     >>> sphere(2)
     TriangleMesh(162 vertices, 320 faces)
     """
+    subdivisions = whole_number(subdivisions, "subdivisions", 0)
     golden = (1 + 5**0.5) / 2
     points = np.array([[s, t * golden, 0] for s in (-1, 1) for t in (-1, 1)], dtype=float)
     points = np.concatenate([np.roll(points, k, axis=1) for k in range(3)])

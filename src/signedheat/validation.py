@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from numbers import Integral, Real
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -207,6 +207,14 @@ def flag(value: object, name: str) -> bool:
     if not isinstance(value, bool | np.bool_):
         raise SignedHeatError(f"{name} must be True or False, not {value!r:.50}", element=name)
     return bool(value)
+
+
+def chosen(value: object, choices: object, name: str) -> None:
+    """Refuse what is none of the words of a ``Literal``."""
+    allowed = get_args(choices)
+    if value not in allowed:
+        listed = " or ".join(f'"{choice}"' for choice in allowed)
+        raise SignedHeatError(f"{name} must be {listed}, not {value!r:.50}", element=name)
 
 
 def refuse_beside(given: str, **options: object) -> None:

@@ -18,6 +18,7 @@ from ..solids.solid import Solid
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
+from ..validation import chosen
 from .drawing_files import POLYLINE_FORMATS
 from .field_files import CONVENTION, load_field
 from .files import PathLike, ensure_writable, extension, format_for, reading, replacing
@@ -195,6 +196,7 @@ def save_solid(solid: Solid, path: PathLike) -> None:
 
 def save_samples(samples: Samples, path: PathLike, layout: Layout) -> None:
     """Write samples."""
+    chosen(layout, Layout, "layout")
     format_for(path, dict.fromkeys(SAMPLE_FORMATS), "samples")
     if layout == "deepsdf":  # (k, 4) in single precision: x, y, z and distance of the points outside and inside
         rows = np.column_stack([samples.points, samples.distances]).astype(np.float32)

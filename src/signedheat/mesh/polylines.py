@@ -8,8 +8,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..errors import SignedHeatError
 from ..packages import lazy_module
+from ..validation import chosen
 from .box_tree import BoxTree
 from .triangles import AREA_ROUNDING
 
@@ -73,8 +73,7 @@ def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
 
     By "nonzero" one within another is a hole where it runs the other way; directions do not matter otherwise.
     """
-    if rule not in ("nonzero", "evenodd"):
-        raise SignedHeatError(f'fill must be "nonzero" or "evenodd", not {rule!r}', element="fill")
+    chosen(rule, FillRule, "fill")
     points = np.concatenate([np.empty((0, 2)), *outlines])
     if not len(points):
         return []

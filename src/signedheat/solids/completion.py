@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 import scipy
@@ -16,7 +16,7 @@ import scipy
 from ..arrays import Floats, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..diagnostics import Diagnostics, FacesRestored, Note
-from ..errors import ConstraintError, SignedHeatError, SourceError
+from ..errors import ConstraintError, SourceError
 from ..foreign import SurfaceShape
 from ..jobs import Progress, Stopwatch
 from ..kinds import ShapeLike
@@ -28,7 +28,7 @@ from ..search.face_tree import FaceTree
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import joined_shape
-from ..validation import flag
+from ..validation import chosen, flag
 from .bounding import Bounding, bounding
 from .chain import Chain
 from .closing import LOST_FACE_SIDES, closed_by, fan, small_lids
@@ -101,10 +101,7 @@ class Completion:
 
     def __post_init__(self) -> None:
         for name, choices in (("completion", Completing), ("lids", Lids), ("nested", Nesting)):
-            value, allowed = getattr(self, name), get_args(choices)
-            if value not in allowed:
-                listed = " or ".join(f'"{choice}"' for choice in allowed)
-                raise SignedHeatError(f"{name} must be {listed}, not {value!r}", element=name)
+            chosen(getattr(self, name), choices, name)
         for name in ("as_oriented", "keep_overlaps"):
             flag(getattr(self, name), name)
 
