@@ -106,7 +106,7 @@ def place(coordinates: Iterable[float]) -> str:
 
 
 def solid_of(arguments: Namespace, path: str) -> Any:
-    """Complete the shape in a file as the options say, and print important notes on standard error."""
+    """Read a file and complete its shape to a solid, as the options say; print important notes on standard error."""
     with prefix_errors(path), ProgressBar(is_quiet(arguments)) as progress:
         solid = completed(read_shape(arguments, path), *method_of(arguments), progress)
     say_important(arguments, solid.diagnostics, path)

@@ -269,10 +269,10 @@ def sheet_faces(mesh: TriangleMesh, crossed: Ints) -> Bools:
 def reason_for_doubt(
     decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints], numbers: Ints
 ) -> str:
-    """Return a warning that says why the region that the curves bound is a guess, and what to do; "" if it is none.
+    """Return, as a warning, why the region that the curves bound is a guess, and what to do; "" if it is no guess.
 
-    `field` is the distance to those that were taken, completed by heat; `curves` are all that were given, and
-    `numbers`, (n,), name them.
+    `field` is the distance, completed by heat, to the curves that were not left out. `curves` are all curves given,
+    which the warning calls by their `numbers`, (n,).
     """
     as_given = "as_oriented=True takes curves as they are"
     if decision.bounds_nothing:
@@ -291,19 +291,19 @@ def reason_for_doubt(
             "the curves bound something else as well: which of the two is meant is a guess. Draw what is missing, or "
             f"turn curves that face the wrong way; {as_given}"
         )
-    hinges = numbers[decision.worth_little(field.values)]
-    if len(hinges):
+    doubtful = numbers[decision.worth_little(field.values)]
+    if len(doubtful):
         return (
-            f"the region depends on {named(hinges)}, and closing the gaps takes lines more than half as long: that "
+            f"the region depends on {named(doubtful)}, and closing the gaps takes lines more than half as long: that "
             "is a guess. Remove what belongs to no curve, turn what faces the wrong way, or draw what is missing; "
             f"{as_given}"
         )
     strokes = decision.pieces.strokes
     if not decision.all_bound or not all(isinstance(curve, Curve) and curve.oriented for curve in curves):
-        return ""  # other curves and points have sides of their own
-    # the shortest completion against that by heat
-    own = strokes.surface.restriction
-    areas, sides = strokes.areas[own], decision.best.sides[own]
+        return ""  # what does not bound the region changes the sign of the field, too
+    # compare the sides of the shortest completion with those of the completion by heat
+    vertices = strokes.surface.restriction
+    areas, sides = strokes.areas[vertices], decision.best.sides[vertices]
     near = np.abs(field.values) <= strokes.surface.triangles.lengths_of_edges.mean()
     apart = areas[(np.sign(field.values) != sides) & ~near & ~np.isnan(field.values)].sum() / areas.sum()
     if apart > UNTRUSTWORTHY:

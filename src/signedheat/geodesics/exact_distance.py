@@ -163,12 +163,12 @@ def distances_along_edges(triangles: IntrinsicMesh, vertices: Ints, offsets: Flo
 
 
 def shortest_arcs(tails: Ints, heads: Ints, lengths: Floats, n: int) -> csr_matrix:
-    """Return the lengths of arcs between n nodes, (n, n): of those between the same two nodes the shortest counts."""
+    """Return lengths of arcs in an (n, n) matrix; where several lead from one node to another, the shortest counts."""
     order = np.lexsort([lengths, heads, tails])
     tails, heads, lengths = tails[order], heads[order], lengths[order]
     first = np.ones(len(order), dtype=bool)
     first[1:] = (np.diff(tails) != 0) | (np.diff(heads) != 0)
-    entries = lengths[first] + 1e-300, (tails[first], heads[first])  # SciPy drops arcs of length 0
+    entries = lengths[first] + 1e-300, (tails[first], heads[first])  # so that arcs of length 0 are not taken for none
     return csr_matrix(entries, shape=(n, n))
 
 

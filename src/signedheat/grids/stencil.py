@@ -80,8 +80,8 @@ def interpolation_stencil(positions: Floats, shape: tuple[int, ...]) -> tuple[In
 
 
 def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: Any) -> None:
-    """Call ``kernel(*arguments, axis, start, stop)`` for slabs of the first long axis, each on a thread."""
-    axis = 0 if shape[0] > 1 else 1
+    """Call ``kernel(*arguments, axis, start, stop)`` for slabs of a grid of four axes, in threads if it is large."""
+    axis = 0 if shape[0] > 1 else 1  # both have one node in the plane: its grids are one slab
     n = shape[axis]
     if np.prod(shape) < FEW_NODES:
         kernel(*arguments, axis, 0, n)

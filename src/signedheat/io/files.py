@@ -81,9 +81,9 @@ def refuse_kind(kind: str, path: PathLike, holds: str, instead: str) -> FileForm
 
 @contextmanager
 def reading(path: PathLike) -> Iterator[None]:
-    """Convert exceptions of parsers, but not of other code of this package, to errors that name the file."""
+    """Turn exceptions of parsers into errors that name the file; unexpected ones of other code of this package pass."""
     try:
-        with np.errstate(all="ignore"):  # shapes and fields check their values
+        with np.errstate(all="ignore"):  # no warnings: shapes and fields check their values themselves
             yield
     except SignedHeatError as error:
         if error.path is not None:

@@ -55,7 +55,7 @@ class _Scene:
     buffers: list[bytes]
 
     def body(self, primitive: dict[str, Any]) -> Body:
-        """Return the vertices and triangles of a primitive, without unused vertices."""
+        """Return the vertices and triangles of a primitive, without unused vertices; points and lines have none."""
         mode = primitive.get("mode", TRIANGLE_MODE)
         if mode not in range(FAN_MODE + 1):
             raise damaged(f"primitives have the mode {mode}, which is not defined in glTF")
@@ -64,8 +64,8 @@ class _Scene:
         points = self.numbers(primitive["attributes"]["POSITION"]).astype(np.float64)
         if points.shape[1] != 3:
             raise damaged(f"positions have {points.shape[1]} coordinates")
-        named = primitive.get("indices")
-        corners = np.arange(len(points)) if named is None else self.numbers(named).ravel().astype(np.int64)
+        accessor = primitive.get("indices")
+        corners = np.arange(len(points)) if accessor is None else self.numbers(accessor).ravel().astype(np.int64)
         faces = _triangles(corners, mode)
         if len(faces) and faces.max() >= len(points):
             raise damaged(f"a face names vertex {faces.max()}, and there are {len(points)}")

@@ -75,14 +75,14 @@ class _Object:
 
 
 def read_3mf(path: PathLike) -> TriangleMesh:
-    """Read all that a package builds, placed, object after object, in the units of the file (`unit_of`)."""
+    """Read the objects that a 3MF package builds, each in its place, as one mesh in the unit of the file, `unit_of`."""
     with reading(path):
         package = _Package(path)
         root = package.model(package.root)
         items = [(_key(item, package.root), _matrix(item)) for item in _all(root, "item")]
-        if not items:  # nothing is said about what to build: everything that is a mesh
-            own = [_key(element, package.root, "id") for element in _all(root, "object")]
-            items = [(key, np.eye(4, 3)) for key in own if len(package.object(key).faces)]
+        if not items:  # nothing says what to build: take each object that has a mesh
+            keys = [_key(element, package.root, "id") for element in _all(root, "object")]
+            items = [(key, np.eye(4, 3)) for key in keys if len(package.object(key).faces)]
         ensure_fits(100 * sum(package.count(key)[0] for key, _ in items), path)  # for a triangle and its vertices
         return _joined([body for key, matrix in items for body in package.placed(key, matrix)])
 

@@ -213,7 +213,7 @@ def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
 
 @compiled
 def look_at(g: Gluing, stack: Ints, stacked: Bools, e: int) -> None:
-    """Push an edge on the stack of edges to be checked."""
+    """Push an edge on the stack of edges that may have to be flipped, unless it is there already."""
     if not stacked[e]:
         stack[g.counts[N_STACKED]] = e
         stacked[e] = True

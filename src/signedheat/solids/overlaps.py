@@ -179,16 +179,17 @@ def bodies_around(
 
 
 def _windings(places: Floats, normals: Floats, sizes: Floats, parts: list[Floats]) -> tuple[Ints, Ints, Floats]:
-    """Places, the bodies whose boxes contain them, and their winding numbers there, as means of both sides."""
+    """For each body and place in its box: (k,) places, bodies, and winding numbers, as means of both sides."""
     boxes = np.array([(corners.min(axis=(0, 1)), corners.max(axis=(0, 1))) for corners in parts])
-    starts, others = BoxTree.of(boxes[:, 0], boxes[:, 1]).meeting(np.repeat(places[:, None], 3, axis=1))
+    # a point is a triangle whose corners are equal
+    starts, bodies = BoxTree.of(boxes[:, 0], boxes[:, 1]).meeting(np.repeat(places[:, None], 3, axis=1))
     rows = np.repeat(np.arange(len(places)), np.diff(starts))
-    inside_box = (places[rows] >= boxes[others, 0]) & (places[rows] <= boxes[others, 1])
+    inside_box = (places[rows] >= boxes[bodies, 0]) & (places[rows] <= boxes[bodies, 1])
     kept = np.flatnonzero(inside_box.all(axis=1))
-    kept = kept[np.argsort(others[kept], kind="stable")]
-    rows, others, numbers = rows[kept], others[kept], np.zeros(len(kept))
-    for body, (begin, end) in enumerate(pairwise(np.searchsorted(others, np.arange(len(parts) + 1)))):
+    kept = kept[np.argsort(bodies[kept], kind="stable")]
+    rows, bodies, windings = rows[kept], bodies[kept], np.zeros(len(kept))
+    for body, (begin, end) in enumerate(pairwise(np.searchsorted(bodies, np.arange(len(parts) + 1)))):
         if end > begin:
             batch = rows[begin:end]
-            numbers[begin:end] = WindingTree.of(parts[body]).levels(places[batch], normals[batch], sizes[batch])
-    return rows, others, numbers
+            windings[begin:end] = WindingTree.of(parts[body]).levels(places[batch], normals[batch], sizes[batch])
+    return rows, bodies, windings
