@@ -41,7 +41,8 @@ def distance_to_zero_line(
 ) -> tuple[Floats, int]:
     """Return the distance of every vertex to the zero set of a function linear in faces, and the number of windows.
 
-    Merging windows changes distances by less than `tolerance` of the edge; `window_limit` cuts the search short.
+    Each merge of windows changes distances by less than `tolerance` times the length of their edge. A search that makes
+    `window_limit` windows is cut short, and that is then the number returned.
     """
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
     return distance_to_segments(triangles, zero_line(triangles, values), tolerance, report)
@@ -53,7 +54,7 @@ def distance_to_segments(
     """Return the distance of every vertex to segments and points as `distance_to_zero_line` does."""
     limit = window_limit(triangles)
     placed = through_vertices(triangles, placed)
-    # with more windows, in Delaunay triangles: through the long edges of slivers every segment of a curve is seen
+    # a longer search is started anew in Delaunay triangles: the long edges of slivers see every segment of a curve
     many = min(30 * triangles.n_edges + 50_000, limit)
     search = PausedSearch.start(triangles, placed, tolerance).until(many, report)
     better = None if search.has_ended else in_delaunay_triangles(triangles, placed)
@@ -66,7 +67,10 @@ def distance_to_segments(
 
 
 def cleared(triangles: IntrinsicMesh, values: Floats, least: float) -> Floats:
-    """Move values near zero to ±`least`, whichever fewer neighbours have, so that the zero set passes no vertex."""
+    """Return values, (n,), with those near zero moved to ±`least`, so that the zero set passes no vertex.
+
+    Their sign is the one that fewer of their neighbours have.
+    """
     near = np.abs(values) < least
     signs = np.where(near | np.isnan(values), 0.0, np.sign(values))
     tail, head = triangles.edges.vertices.T
@@ -93,11 +97,11 @@ def window_limit(triangles: IntrinsicMesh) -> int:
 
 @dataclass(frozen=True, eq=False)
 class PausedSearch:
-    """A search on some triangles, in short calls of kernels between which it can be ended."""
+    """A search for distances that runs in short calls of compiled kernels, so that it can be ended between them."""
 
     triangles: IntrinsicMesh
-    faces: Faces  # the same as plain arrays
-    search: Search  # its state, which changes as it goes on
+    faces: Faces  # the triangles as plain arrays
+    search: Search  # the state of the search, which is changed in place
     tolerance: float  # see `distance_to_zero_line`
 
     @classmethod
@@ -105,7 +109,7 @@ class PausedSearch:
         """Start with the waves that leave the sources."""
         sources, pseudosources = placed.sources(triangles), is_pseudosource(triangles)
         pseudosources[sources.vertices] = True
-        with np.errstate(all="ignore"):  # on faces of no size
+        with np.errstate(all="ignore"):  # on faces of no size: `propagate_across` drops NaN
             waves = first_waves(triangles, sources)
         beyond = triangles.edges.face_counts[triangles.edges.face_edges.ravel()[waves.halfedges]]
         search = Search.start(triangles, pseudosources, 1024 + int(beyond.sum()))
@@ -117,12 +121,12 @@ class PausedSearch:
 
     @property
     def slack(self) -> float:
-        """By how much a path must be longer than another, in lengths of an edge, to be dropped for it."""
+        """How much longer than another a path must be to be dropped, relative to the length of the edge."""
         return DISTANCE_ROUNDING + 2.0 * self.tolerance
 
     @property
     def has_ended(self) -> bool:
-        """Whether no window is left that could go on."""
+        """Whether nothing is left to propagate."""
         return bool(self.search.queue.size[0] == 0)
 
     @property
@@ -131,7 +135,7 @@ class PausedSearch:
         return int(self.search.counts[WINDOWS_MADE])
 
     def until(self, limit: int, report: Report | None) -> PausedSearch:
-        """Go on to the end, or until this many windows have been made; return the same search."""
+        """Continue this search to its end, or until `limit` windows have been made, and return it."""
         search = self.search
         while search.queue.size[0] > 0 and search.counts[WINDOWS_MADE] < limit:
             if report is not None:
@@ -143,19 +147,19 @@ class PausedSearch:
         return self
 
     def distance(self) -> Floats:
-        """Return (n,) distances of all vertices; of those not reached, along edges from those that were."""
+        """Return (n,) distances of all vertices; those that the search has not found go along edges."""
         distance = self.search.distance
         if self.has_ended and np.isfinite(distance).all():
             return distance
         reached = np.flatnonzero(np.isfinite(distance))
-        # merged windows may miss zero by their tolerance, and Dijkstra needs it
+        # merging windows can make distances slightly negative, which Dijkstra's algorithm does not allow
         along = distances_along_edges(self.triangles, reached, np.maximum(distance[reached], 0.0))
-        # a search that has ended misses other parts, and what is past edges as short as rounding
+        # a search that has ended has not reached other components, nor what lies beyond edges as short as rounding
         return np.where(np.isinf(distance), along, distance) if self.has_ended else along
 
 
 def distances_along_edges(triangles: IntrinsicMesh, vertices: Ints, offsets: Floats) -> Floats:
-    """Return (n,) distances along edges from vertices (k,) with distances of their own; inf if unconnected."""
+    """Return (n,) distances along edges if those of (k,) vertices are at most `offsets`; inf where no path leads."""
     n = triangles.n_vertices
     tails, heads = np.concatenate([triangles.edges.vertices, np.stack([np.full(len(vertices), n), vertices], axis=1)]).T
     graph = shortest_arcs(tails, heads, np.concatenate([triangles.lengths_of_edges, offsets]), n + 1)
@@ -175,7 +179,7 @@ def shortest_arcs(tails: Ints, heads: Ints, lengths: Floats, n: int) -> csr_matr
 def in_delaunay_triangles(
     triangles: IntrinsicMesh, placed: PlacedSegments
 ) -> tuple[IntrinsicMesh, PlacedSegments] | None:
-    """Return the surface in Delaunay triangles, with sources along edges; None if there is nothing to gain."""
+    """Return the surface in Delaunay triangles, and sources along their edges; None if that gains nothing or fails."""
     if not triangles.agree_on_lengths or share_to_flip(triangles) < 0.05:
         return None
     curve = as_curve(triangles, placed)
@@ -187,7 +191,7 @@ def in_delaunay_triangles(
 
 
 def share_to_flip(triangles: IntrinsicMesh) -> float:
-    """Return the share of the edges that have two faces, with opposite angles that sum to more than π."""
+    """Return the share of edges that are not Delaunay: their opposite angles, in two faces, sum to more than π."""
     opposite = np.roll(triangles.corner_cotangents, 1, axis=1)  # the corner facing edge k is k + 2
     sums = np.bincount(triangles.edges.face_edges.ravel(), opposite.ravel(), triangles.n_edges)
     return float(((sums < -1e-9) & (triangles.edges.face_counts == 2)).mean())
@@ -199,7 +203,7 @@ DISTANCE_ROUNDING = 1e-10
 
 @compiled
 def _reach(search: Search, v: int, length: float) -> None:
-    """Record a path of this length to a vertex; if paths can bend around it (a pseudosource), queue it."""
+    """Record a path to a vertex if none so far is as short, and queue the vertex if paths bend around it."""
     if length < search.distance[v] * (1.0 - 1e-14):
         search.distance[v] = length
         if search.pseudosources[v]:
@@ -210,7 +214,7 @@ def _reach(search: Search, v: int, length: float) -> None:
 def _collect(
     search: Search, halfedge: int, at_tail: float, at_head: float, length: float, slack: float, tolerance: float
 ) -> tuple[Floats, int]:
-    """Return the windows queued for a halfedge, in order, without what is behind others, and merged if possible."""
+    """Take the windows queued for a halfedge; return what is nearest of them, in order and merged, and their number."""
     queued, settled, windows, following, counts = (
         search.queued,
         search.settled,
@@ -219,7 +223,7 @@ def _collect(
         search.counts,
     )
     count, before = list_length(following, queued[halfedge]), list_length(following, settled[halfedge])
-    # each is compared with all others: with four windows that is as much work as making one
+    # each window is compared with all others: for four windows, this counts as the work of making one
     counts[WINDOWS_MADE] += count * (count + before) // 16
     chosen = np.empty((count, 6))
     count, row = 0, queued[halfedge]
@@ -257,7 +261,7 @@ def _collect(
 
 @compiled
 def _settle(search: Search, halfedge: int, chosen: Floats, count: int) -> None:
-    """Add windows to those that have crossed a halfedge, in place of those that they outdo."""
+    """Add `count` rows of `chosen` to the windows that have crossed a halfedge, and drop those that they outdo."""
     settled, windows, following, counts = search.settled, search.windows, search.following, search.counts
     row, before = settled[halfedge], -1
     while row >= 0:
@@ -282,7 +286,7 @@ def _settle(search: Search, halfedge: int, chosen: Floats, count: int) -> None:
 
 @compiled
 def list_length(following: Ints, row: int) -> int:
-    """Return the number of windows of a list."""
+    """Return the number of windows in the linked list that begins with a row, or −1 if it is empty."""
     count = 0
     while row >= 0:
         count += 1
@@ -292,7 +296,7 @@ def list_length(following: Ints, row: int) -> int:
 
 @compiled
 def continue_search(faces: Faces, search: Search, slack: float, tolerance: float, limit: int) -> None:
-    """Propagate in order of distance until nothing is queued, room is wanted, or `limit` windows have been made."""
+    """Propagate in order of distance until nothing is queued, rows are missing, or `limit` windows have been made."""
     queue, counts = search.queue, search.counts
     while queue.size[0] > 0 and counts[WINDOWS_MADE] < limit:
         item = queue.items[0]
@@ -334,7 +338,7 @@ def _cross_face(faces: Faces, search: Search, halfedge: int, slack: float, toler
     front, n_front = _collect(search, halfedge, at_tail, at_head, length, slack * length, tolerance)
     _settle(search, halfedge, front, n_front)
 
-    # the frame of the edge, in the layout of the face, and the corner across, the apex, in that frame
+    # the frame of the edge in the layout of the face, and the position in that frame of the corner across, the apex
     a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
     ahead = faces.forward[face, side]
     origin, unit = (a, (b - a) / length) if ahead else (b, (a - b) / length)
@@ -352,7 +356,7 @@ def _cross_face(faces: Faces, search: Search, halfedge: int, slack: float, toler
         d1x, d1y = ray(w, s1)
         left = d0x * y - d0y * (x - s0)  # negative: the first ray leaves the apex to its right
         right = d1x * y - d1y * (x - s1)
-        # an apex that no ray meets, perhaps in a gap between windows, is reached by way of a window's end
+        # if no ray meets the apex, which may be in a gap between windows, the path goes by way of an end of the window
         if left > 0.0:
             to_apex = arrival(w, s0, 0.0) + np.hypot(x - s0, y)
         elif right < 0.0:
@@ -395,7 +399,7 @@ def arrival(w: Floats, x: float, y: float) -> float:
 
 @compiled
 def ray(w: Floats, x: float) -> tuple[float, float]:
-    """Return the direction of propagation at a point of the edge, of any length."""
+    """Return a vector, of any length, in the direction in which the wave of a window crosses point x of its edge."""
     if w[KIND] == BEAM:
         return w[P], w[Q]
     return w[KIND] * (x - w[P]), -w[KIND] * w[Q]
@@ -403,7 +407,7 @@ def ray(w: Floats, x: float) -> tuple[float, float]:
 
 @compiled
 def outrun(w: Floats, at_tail: float, at_head: float, length: float, slack: float) -> bool:
-    """Return whether paths through an end of the edge are shorter everywhere in the window."""
+    """Return whether paths through one end of the edge are shorter, by more than `slack`, everywhere in a window."""
     if at_tail + w[S1] < arrival(w, w[S1], 0.0) - slack:
         return True
     return at_head + length - w[S0] < arrival(w, w[S0], 0.0) - slack
@@ -441,7 +445,7 @@ def trim(a: Floats, b: Floats) -> None:
 
 @compiled
 def trim_by(old: Floats, w: Floats, slack: float) -> None:
-    """Trim a window to where it is nearer than an older one by more than `slack`; its middle is not cut out."""
+    """Trim window w to where it is nearer than an older one by more than `slack`, but cut no gap into its middle."""
     low, high = max(old[S0], w[S0]), min(old[S1], w[S1])
     if not high > low:
         return
@@ -522,7 +526,7 @@ def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
 
 @compiled
 def straighten(w: Floats) -> None:
-    """Replace a wave that would pass its focus in the face ahead by a straight one, nowhere nearer at the edge."""
+    """Replace a wave that would pass its focus in the face ahead by a straight one, not nearer at the window's ends."""
     x, y = ray(w, 0.5 * (w[S0] + w[S1]))
     norm = np.sqrt(x * x + y * y)
     begin, end = arrival(w, w[S0], 0.0), arrival(w, w[S1], 0.0)
@@ -543,16 +547,16 @@ def hit(x0: float, dx: float, dy: float, ax: float, ay: float, bx: float, by: fl
 class Faces(NamedTuple):
     """An intrinsic mesh as plain arrays, with the halfedges of each edge and the corners at each vertex in lists."""
 
-    vertices: Ints
-    positions: Complexes
-    edges: Ints
-    forward: Bools
-    edge_vertices: Ints
-    lengths: Floats
-    halfedges: Ints
-    first_halfedge: Ints
-    corners: Ints
-    first_corner: Ints
+    vertices: Ints  # (m, 3) vertex at each corner
+    positions: Complexes  # (m, 3) position of each corner in the layout of the face
+    edges: Ints  # (m, 3) edge along each side
+    forward: Bools  # (m, 3) whether the side runs along that edge from tail to head
+    edge_vertices: Ints  # (e, 2) tail and head of each edge
+    lengths: Floats  # (e,)
+    halfedges: Ints  # (3m,) those of edge e are halfedges[first_halfedge[e] : first_halfedge[e + 1]]
+    first_halfedge: Ints  # (e + 1,)
+    corners: Ints  # (3m,) corners 3 f + k, by vertex in the same way
+    first_corner: Ints  # (n + 1,)
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh) -> Faces:
@@ -566,25 +570,25 @@ class Faces(NamedTuple):
 
 
 class Search(NamedTuple):
-    """The state of a search: distances so far, and windows in lists by halfedge, queued to go on or settled.
+    """The state of a search: distances so far, and for each halfedge lists of windows, queued to go on or settled.
 
-    Windows are rows of one array; `following` links those of a list, and the free ones. Row 0 is for scratch. The queue
-    holds halfedges, then vertices that paths bend around; `counts` are those at `USED_ROWS`, `FIRST_FREE`, ….
+    Windows are rows of one array, in linked lists; one more list has the free rows. Row 0 is for scratch. Items of the
+    queue are the 3m halfedges, and then the n vertices that paths bend around.
     """
 
-    distance: Floats
-    pseudosources: Bools
+    distance: Floats  # (n,)
+    pseudosources: Bools  # (n,) whether paths can bend around each vertex
     queue: Queue
-    queued: Ints
-    settled: Ints
-    windows: Floats
-    following: Ints
-    counts: Ints
-    most: Ints  # windows that each item of the queue can make: each window of a halfedge, or a vertex
+    queued: Ints  # (3m,) first row of the windows that wait at each halfedge, or −1
+    settled: Ints  # (3m,) first row of the windows that have crossed it, or −1
+    windows: Floats  # (r, 6)
+    following: Ints  # (r,) the next row of the same list, or −1
+    counts: Ints  # (4,) see `USED_ROWS`
+    most: Ints  # (3m + n,) most windows that an item of the queue makes; for a halfedge, from each of its windows
 
     @classmethod
     def start(cls, triangles: IntrinsicMesh, pseudosources: Bools, room: int) -> Search:
-        """Start with nothing known, and room for this many windows."""
+        """Return the state before the first wave, with room for this many windows."""
         n, m = triangles.n_vertices, triangles.n_faces
         queue, lists = Queue.empty(3 * m + n), (np.full(3 * m, -1), np.full(3 * m, -1))
         windows, following = np.empty((room, 6)), np.empty(room, dtype=np.int64)
@@ -595,7 +599,7 @@ class Search(NamedTuple):
         return cls(np.full(n, np.inf), pseudosources, queue, *lists, windows, following, counts, most)
 
     def larger(self) -> Search:
-        """Enlarge this search to at least the room that was wanted, in place: a copy would need twice the memory."""
+        """Add at least the rows that were missing, in place: a copy would need twice the memory."""
         room = len(self.windows) + max(len(self.windows) // 2, int(self.counts[MISSING_ROWS]))
         refuse_beyond_memory(
             "exact distance along the surface",
@@ -609,12 +613,12 @@ class Search(NamedTuple):
 
 
 USED_ROWS, FIRST_FREE, WINDOWS_MADE, MISSING_ROWS = range(4)
-"""Rows ever used, the first free row among them, windows made so far, and rows that were missing."""
+"""Places in `Search.counts` of the rows ever used, the first free one of these, windows made, and rows missing."""
 
 
 @compiled
 def take_row(counts: Ints, following: Ints) -> int:
-    """Take a row for a window; there must be room."""
+    """Return a row for a new window; there must be room."""
     row = counts[FIRST_FREE]
     if row >= 0:
         counts[FIRST_FREE] = following[row]
@@ -626,7 +630,7 @@ def take_row(counts: Ints, following: Ints) -> int:
 
 @compiled
 def free_row(counts: Ints, following: Ints, row: int) -> None:
-    """Give a row back."""
+    """Add a row to the list of free rows."""
     following[row] = counts[FIRST_FREE]
     counts[FIRST_FREE] = row
 
@@ -647,7 +651,7 @@ def propagate_across(
 ) -> None:
     """Propagate a wave across fractions t0 to t1 of a side of a face to the faces beyond.
 
-    σ is the distance of the `point` that it comes from, or, of a beam along a `normal`, the distance at that point.
+    A circular wave comes from `point`, or contracts to it; a beam passes it along `normal`. There the distance is σ.
     """
     edge = faces.edges[face, side]
     length = faces.lengths[edge]
@@ -695,7 +699,7 @@ def propagate_across(
 
 @compiled
 def start_search(faces: Faces, waves: Waves, search: Search, slack: float) -> None:
-    """Make the first windows, and queue the vertices around which paths from sources in their faces bend."""
+    """Make the first windows, and queue the vertices with known distances around which paths can bend."""
     for i in range(len(waves.halfedges)):
         face, side = waves.halfedges[i] // 3, waves.halfedges[i] % 3
         kind, t0, t1 = waves.kinds[i], waves.begins[i], waves.ends[i]
@@ -710,7 +714,7 @@ class Waves(NamedTuple):
 
     halfedges: Ints  # 3 f + k, for side k of face f
     kinds: Floats
-    # fractions of the side
+    # fractions of the side between which they pass
     begins: Floats
     ends: Floats
     points: Complexes
@@ -727,16 +731,16 @@ def reach_corners(triangles: IntrinsicMesh, sources: GeodesicSources, distance: 
 
 
 def first_waves(triangles: IntrinsicMesh, sources: GeodesicSources) -> Waves:
-    """Send parallel beams to the left of segments, and circular waves from points, to the sides that they meet.
+    """Return where parallel beams to the left of segments, and circular waves from points, meet sides of their faces.
 
-    A beam is between the ends of its segment and to the left of it; a fan is behind its two directions.
+    A beam is as wide as its segment; a fan has the directions that are more than 90° from both of its own.
     """
     faces, starts = sources.beam_faces, sources.beam_starts[:, None]
     lengths = np.abs(sources.beam_stops[:, None] - starts)
     along = (sources.beam_stops[:, None] - starts) / lengths
     tails, steps = triangles.corner_positions[faces] - starts, triangles.edge_vectors[faces]
     foot, rate, height, climb = (dot(v, way) for way in (along, 1j * along) for v in (tails, steps))
-    apart = np.abs(height) + np.abs(climb) > 1e-9 * np.abs(steps)  # from segments on this side beams leave the face
+    apart = np.abs(height) + np.abs(climb) > 1e-9 * np.abs(steps)  # from a segment on this side no beam crosses it
     beams = parts_within(apart, (-foot, -rate), (foot - lengths, rate), (-height, -climb))
 
     points = sources.fan_points[:, None]
@@ -760,7 +764,7 @@ def dot(a: Complexes, b: Complexes) -> Floats:
 
 
 def parts_within(chosen: Bools, *bounds: tuple[Floats, Floats]) -> tuple[Ints, Ints, Floats, Floats]:
-    """Return where on sides s = 0 … 1, (n, 3), ``a + b s ≤ 0`` for all bounds a and b: rows, sides, begins, ends."""
+    """Return where 0 ≤ s ≤ 1 and ``a + b s ≤ 0`` for all bounds (a, b) on chosen sides: row, side, first and last s."""
     begins, ends = np.zeros(chosen.shape), np.ones(chosen.shape)
     for at_tail, slope in bounds:
         zero = -at_tail / np.where(slope != 0, slope, 1.0)

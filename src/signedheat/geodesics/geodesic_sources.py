@@ -40,7 +40,7 @@ class GeodesicSources(NamedTuple):
     beam_faces: Ints
     beam_starts: Complexes
     beam_stops: Complexes
-    # (a,) points from which circular waves leave, in directions of more than 90° from the first and second; 0 for none
+    # (a,) points from which circular waves leave, in directions more than 90° from both given ones; these may be 0
     fan_faces: Ints
     fan_points: Complexes
     fan_firsts: Complexes
@@ -49,7 +49,7 @@ class GeodesicSources(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PlacedSegments:
-    """Segments with the positions of their ends in the layouts of faces; unlike nodes, these are never ambiguous."""
+    """Segments with the positions of their ends in faces, which are unique even where a node is in a face twice."""
 
     nodes: LocatedPoints  # (s,) distinct points
     ends: Ints  # (k, 2) the nodes that each segment joins
@@ -125,7 +125,7 @@ class PlacedSegments:
         return GeodesicSources(self.nodes.elements[at_vertex], faces, starts, stops, *self._fans(triangles))
 
     def _fans(self, triangles: IntrinsicMesh) -> tuple[Ints, Complexes, Complexes, Complexes]:
-        """Return fans at nodes inside faces and on edges, at the latter one in every face at the edge."""
+        """Return the fans at nodes inside faces and on edges; for a node on an edge, one in every face at the edge."""
         nodes = self.nodes
         first, second = self._directions(triangles)
         inside, on_edge = np.flatnonzero(nodes.kinds == FACE), np.flatnonzero(nodes.kinds == EDGE)
@@ -140,8 +140,9 @@ class PlacedSegments:
         return np.concatenate([home, faces]), np.concatenate([points, across]), firsts, seconds
 
     def _directions(self, triangles: IntrinsicMesh) -> tuple[Complexes, Complexes]:
-        """(s,) directions, or 0, along the first and last segment at nodes, in their faces or the frames of their
-        edges.
+        """Return (s,) directions along the first and along the last segment at each node, 0 if there is none.
+
+        They are in the layout of the node's face, or, for a node on an edge, in the frame of the edge.
         """
         nodes, kinds = self.nodes, self.nodes.kinds
         steps = self.positions[:, 1] - self.positions[:, 0]
@@ -166,7 +167,7 @@ class PlacedSegments:
 
 
 def zero_line(triangles: IntrinsicMesh, values: Floats, among: Bools | None = None) -> PlacedSegments:
-    """Return the zero set, within faces `among`, of a function linear in faces: 0 at no vertex, NaN if unknown."""
+    """Return the zero set, in faces `among`, of a function linear in faces: 0 at no vertex, NaN where unknown."""
     corner_values = values[triangles.corner_vertices]
     faces, sides = crossed_sides(
         corner_values > 0, ~np.isnan(corner_values).any(axis=1) & (True if among is None else among)
@@ -192,7 +193,7 @@ def zero_line(triangles: IntrinsicMesh, values: Floats, among: Bools | None = No
 
 
 def nearest_shares(points: Complexes, steps: Complexes) -> tuple[Floats, Floats]:
-    """Return at which fractions of the way from the origin along steps the nearest places are, and how far away."""
+    """Return the fractions of steps from the origin at which they are nearest to points, and the distances there."""
     squares = np.abs(steps) ** 2
     shares = np.clip((points * np.conj(steps)).real / np.where(squares > 0, squares, 1.0), 0.0, 1.0)
     return shares, np.abs(points - shares * steps)
@@ -217,7 +218,7 @@ def fractions_along_edges(triangles: IntrinsicMesh, located: LocatedPoints, edge
 
 
 def best_match(triangles: IntrinsicMesh, face: int, nodes: LocatedPoints, ends: Ints, length: float) -> Complexes:
-    """Return (2,) the positions of two nodes in a face, which may have several, nearest to a length apart."""
+    """Return (2,) positions of two nodes in a face; where they have several, those nearest to `length` apart."""
     places = []
     for node in ends:
         kind, element = nodes.kinds[node], nodes.elements[node]
@@ -239,7 +240,7 @@ SNAP = 1e-6
 
 
 def through_vertices(triangles: IntrinsicMesh, placed: PlacedSegments) -> PlacedSegments:
-    """Move segments to vertices and edges that they all but pass; moved ones lose their sides."""
+    """Move segments to vertices and edges that they all but pass; if any is moved, all segments lose their sides."""
     nodes = placed.nodes
     on_edge, inside = nodes.kinds == EDGE, nodes.kinds == FACE
     near = on_edge & (np.minimum(nodes.along, 1 - nodes.along) < SNAP) | inside & (nodes.barycentric < SNAP).any(axis=1)

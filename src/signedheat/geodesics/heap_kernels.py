@@ -13,10 +13,10 @@ from ..compiled import compiled
 class Queue(NamedTuple):
     """A binary heap: items by position, the position of each item (−1 outside), their keys, and how many are in it."""
 
-    items: Ints
-    places: Ints
-    keys: Floats
-    size: Ints
+    items: Ints  # (n,) the first `size` are in the heap
+    places: Ints  # (n,)
+    keys: Floats  # (n,) by item
+    size: Ints  # (1,)
 
     @classmethod
     def empty(cls, n_items: int) -> Queue:
@@ -52,7 +52,7 @@ def push(queue: Queue, item: int, key: float) -> None:
 
 @compiled
 def pop(queue: Queue) -> int:
-    """Take out the item with the smallest key."""
+    """Remove the item with the smallest key, and return it."""
     items, places, keys, size = queue
     first = items[0]
     places[first] = -1

@@ -35,7 +35,8 @@ def join(
 ) -> tuple[LocatedPoints, Ints, Ints, Ints]:
     """Join pairs of points by segments in one face each, along geodesic paths where the two share no face.
 
-    Returns all points, the given ones first; the two ends of each segment (s,), in order; and the pair it belongs to.
+    Returns all points, the given ones first; the start and the end of each segment, (s,) indices of points, pair after
+    pair; and the pair that it belongs to.
     """
     apart = np.flatnonzero(shared_faces(triangles, located[start], located[end]) < 0)
     added = np.zeros(len(start), dtype=np.int64)
@@ -57,7 +58,7 @@ def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> Ints
 def geodesic_paths(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
 ) -> tuple[LocatedPoints, Ints]:
-    """Return the points at which locally shortest paths cross edges or pass vertices, and how many each path has."""
+    """Return the points at which locally shortest paths cross edges or pass vertices, and their number on each path."""
     starts, ends = Places.of(triangles, start), Places.of(triangles, end)
     sides, fractions, counts = _shortest_lines(Faces.of(triangles), Routes.on(triangles), starts, ends)
     located = locate_points(triangles, sides // 3, barycentric_on_sides(sides % 3, fractions), name)
@@ -76,7 +77,7 @@ def geodesic_paths(
 
 
 class Places(NamedTuple):
-    """Points by the faces that contain them: those at point i are ``faces[first[i] : first[i + 1]]``."""
+    """The faces that contain each of some points: for point i, ``faces[first[i] : first[i + 1]]``."""
 
     faces: Ints
     points: Complexes  # the position of the point in the layout of each face
@@ -94,7 +95,7 @@ class Places(NamedTuple):
 
 
 class Routes(NamedTuple):
-    """Work space of Dijkstra's method on edges, restored after each use."""
+    """Arrays for Dijkstra's algorithm on the midpoints of edges, reset after each search."""
 
     cost: Floats  # (e,) length of the path to the middle of each edge
     # (e,) halfedge through which the last face of that path is left, and the one through which it was entered
@@ -102,11 +103,11 @@ class Routes(NamedTuple):
     enter: Ints
     queue: Queue  # of edges
     middles: Complexes  # (3m,) midpoint of each halfedge, in the layout of its face
-    tolls: Floats  # (e,) factor that makes paths through each edge more expensive: evenly spread, by the golden ratio
+    tolls: Floats  # (e,) factor of the cost of paths to each edge, from 1 up; spread evenly, by the golden ratio
 
     @classmethod
     def on(cls, triangles: IntrinsicMesh) -> Routes:
-        """Make work space for a mesh."""
+        """Make the arrays for a mesh."""
         n, corners = triangles.n_edges, triangles.corner_positions
         sides = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
         middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
@@ -150,12 +151,12 @@ def path_through_vertices(
 
 TOLL_RANGE = 1e-9
 """Relative range of extra costs of edges: of paths around a symmetric peak, whose lengths differ by 1e-16, the same one
-is then always found. Any number from 1e-12 to 1e-6 does."""
+is then always found. Any number from 1e-12 to 1e-6 works."""
 
 
 @compiled
 def _find_sleeve(faces: Faces, routes: Routes, starts: Places, ends: Places, pair: int) -> tuple[Ints, Ints]:
-    """Find halfedges by which faces are left and entered on the shortest path through midpoints (Dijkstra)."""
+    """Return halfedges by which the shortest path through midpoints of edges leaves and enters faces; empty if none."""
     cost, leave, enter, queue, middles, tolls = routes
     edge_of, touched = faces.edges.ravel(), [0]
     touched.pop()
@@ -205,7 +206,10 @@ def _find_sleeve(faces: Faces, routes: Routes, starts: Places, ends: Places, pai
 
 @compiled
 def unfold(faces: Faces, left: Ints, entered: Ints) -> tuple[Complexes, Ints, Complexes]:
-    """Unfold a sleeve: return its portals in the plane of its first face, which faces are turned over, and the last."""
+    """Unfold a sleeve of k + 1 faces into the plane of its first face.
+
+    Returns the ends of its portals (k, 2), which faces are turned over (k + 1,), and corners of the last one (3,).
+    """
     portals, over = np.empty((len(left), 2), np.complex128), np.zeros(len(left) + 1, np.int64)
     placed = faces.positions[left[0] // 3].copy()
     for i in range(len(left)):
@@ -223,7 +227,7 @@ def unfold(faces: Faces, left: Ints, entered: Ints) -> tuple[Complexes, Ints, Co
 
 @compiled
 def on_base(corners: Complexes, side: int, over: int, point: complex, a: complex, b: complex) -> complex:
-    """Return where a point of a face is if a side of the face is from a to b, and the face perhaps turned over."""
+    """Return where a point of a face is if one of its sides is placed from a to b, and it is turned over if `over`."""
     base = corners[(side + 1) % 3] - corners[side]
     ratio = (point - corners[side]) / base if abs(base) > 0 else 0j
     return a + (np.conj(ratio) if over else ratio) * (b - a)
@@ -231,7 +235,7 @@ def on_base(corners: Complexes, side: int, over: int, point: complex, a: complex
 
 @compiled
 def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tuple[list[int], list[int], float]:
-    """Return the portals at which the shortest path in a sleeve bends, at which end (0: tail), and its length."""
+    """Return the portals at which the shortest path in a sleeve bends, at which of their ends, and its length."""
     bends, ends = [0], [0]
     bends.pop()
     ends.pop()
@@ -269,8 +273,8 @@ def other_way(
     while last + 1 < len(left) and (portals[last + 1, 0] == point or portals[last + 1, 1] == point):
         last += 1
     goal, at_tail = entered[last] // 3, portals[first, 0] == point
-    # walk around the vertex in all directions, breadth first: of each face reached, the two halfedges at the vertex, by
-    # which it is entered and left; whether the vertex is the tail of the second; and the face before it
+    # Walk around the vertex in all directions, breadth first. Known of each face reached are its two halfedges at the
+    # vertex, by which it is entered and left; whether the vertex is the tail of the second; and the face before it.
     way_out = preceding(left[first]) if at_tail else following(left[first])
     ways_in, ways_out, tail_there, before = [left[first]], [way_out], [not at_tail], [-1]
     k = 0
@@ -326,7 +330,7 @@ def _path_in(
 def _straighten(
     faces: Faces, left: Ints, entered: Ints, starts: Places, ends: Places, pair: int
 ) -> tuple[Ints, Floats]:
-    """Return the halfedges that a shortest path crosses, and where; bends try the other side of their vertex."""
+    """Return the halfedges that the shortest path crosses, and where, after trying the other side of each bend."""
     portals, begin, end, bends, bend_ends, length = _path_in(faces, left, entered, starts, ends, pair)
     k = 0
     while k < len(bends):
@@ -358,7 +362,7 @@ def _straighten(
 
 @compiled
 def _shortest_lines(faces: Faces, routes: Routes, starts: Places, ends: Places) -> tuple[Ints, Floats, Ints]:
-    """Return halfedges that shortest paths cross, fractions along them, and their number for each pair; or −1."""
+    """Return halfedges that shortest paths cross, fractions along them, and their number by pair, −1 if not joined."""
     counts = np.empty(len(starts.first) - 1, np.int64)
     sides, fractions = [0], [0.0]
     sides.pop()
