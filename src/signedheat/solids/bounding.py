@@ -1,8 +1,9 @@
 """Which triangles of a shape bound a solid, and which way they face.
 
-What closes is kept whole: a complex whose directed edges cancel as given, or a piece whose edges cancel once its faces
-agree. It faces outwards as a whole; within another body it stays to that as it was given. All other pieces are open,
-and Gauss's formula (`gauss`) decides for them together; it is told of bodies that overlap (`overlaps`).
+Closed parts are kept whole: complexes whose directed edges cancel as given, and pieces whose edges cancel once their
+faces agree. Each is turned outwards as a whole; within another body it keeps the orientation it was given relative to
+that body. All other pieces are open, and Gauss's formula (`gauss`) decides for all of them together; it takes bodies
+that overlap into account (`overlaps`).
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, directed, level
 from .rims import meeting_edges, open_edges
 
 COHERENT_LEVELS = 0.7
-"""Least coherence of the levels of loose pieces that are the remains of a body. Bodies have .81 to 1, however little is
-left of them; leaves, cards and strips have .3 to .6, however many there are."""
+"""Loose pieces are the remains of a body if the squared mean of their levels over the mean square is at least this.
+Bodies have .81 to 1, however little is left; leaves, cards and strips have .3 to .6, however many there are."""
 CHANCE_LEVEL = 0.42
-"""n loose pieces bound nothing if their level times √(n + 1) is at most this: choosing their signs explains as much.
+"""n loose pieces bound nothing if their level times √(n + 1) is below this: the choice of signs alone explains that.
 Two sheets a quarter of their width apart have .38, three sides of a box .2, a side that four others lack .47, and a
 ball that has lost 85 % of its faces .95."""
 PARTLY_INSIDE = 0.25
-"""Loose pieces lie along the surface of closed ones if the share of them inside differs from a whole number by more."""
+"""Loose pieces lie along closed ones if the mean winding number of these there is farther from all whole numbers."""
 GAP_REACH = 1.5
 """Largest distance between faces of two pieces that belong together, relative to the size of the smaller piece."""
 
@@ -40,19 +41,19 @@ class Bounding(Frozen):
     """Decision which triangles of a chain bound something, and which way they face."""
 
     pieces: Ints  # (m,) piece that each triangle is of
-    turned: Bools  # (m,) which must turn from the direction in which they were given first
-    counts: Ints  # (m,) how often each bounds, negative if reversed; 0 of sheets, walls between cells, and what cancels
-    closed: Bools  # (m,) which are of pieces that close
-    # (m,) cluster of pieces most of which are sheets by themselves and bound together only; −1 of all others
+    turned: Bools  # (m,) which must turn from the way in which they were given first
+    counts: Ints  # (m,) how often each bounds, negative if reversed; 0 for sheets, inner walls and faces that cancel
+    closed: Bools  # (m,) which belong to closed pieces
+    # (m,) cluster of loose pieces, which are sheets by themselves and bound only together; −1 for all other triangles
     loose: Ints
-    # (m,) mean level of these pieces of a cluster: half of the share of the body that is left. ½ of all others
+    # (m,) mean level of the cluster, which is half of the share of the body that is left; ½ for all other triangles
     levels: Floats
-    as_given: Bools  # (m,) which are of complexes that close as they were given, copies and all
+    as_given: Bools  # (m,) which are in complexes that close as given, with all copies
     inner: Bools  # (m,) walls between closed cells
-    orientable: Bools  # (p,) which pieces can agree
-    disagreeing: int  # edges across which two faces disagreed
-    bodies: int  # closed pieces within others, those that face outwards and those that face inwards
-    cavities: int
+    orientable: Bools  # (p,) pieces whose faces can be oriented consistently
+    disagreeing: int  # number of edges across which two faces disagreed
+    bodies: int  # number of closed pieces within others that face outwards
+    cavities: int  # number of those that face inwards
 
     def to_turn(self, chain: Chain) -> Bools:
         """(k,) whether each given triangle must turn; triangles on fewer than three places need not."""
@@ -65,7 +66,7 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     counts, whole = whole_complexes(chain)
     inner = inner_walls(chain) & ~whole
     agreed = chain.pieces_as_given() if as_oriented else chain.pieces(~inner)
-    # complexes that are whole are pieces, and so are all others' pieces
+    # a whole complex is one piece; other complexes are divided into pieces
     pieces = np.where(whole, len(agreed.orientable) + chain.complexes, agreed.parts)
     pieces = np.unique(pieces, return_inverse=True)[1]
     orientable = np.ones(int(pieces.max(initial=-1)) + 1, dtype=bool)
@@ -121,7 +122,10 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
 
 
 def whole_complexes(chain: Chain) -> tuple[Ints, Bools]:
-    """(m,) how often triangles count, and whether they are in complexes that close as given, at one sign."""
+    """Find complexes that close as given and face one way; return how often triangles count, and which are in them.
+
+    If the directed edges of a complex cancel only without copies, its triangles count once. Both results are (m,).
+    """
     counts, complexes = chain.multiplicities, chain.complexes
     once = np.sign(counts)
     off = chain.unbalanced(counts, complexes)
@@ -132,7 +136,7 @@ def whole_complexes(chain: Chain) -> tuple[Ints, Bools]:
     if not balanced.any():
         return counts, np.zeros(len(counts), dtype=bool)
     chosen = np.flatnonzero(balanced[complexes] & (counts != 0))
-    # of each piece the largest triangle
+    # the largest triangle of each piece
     parts = chain.pieces(counts != 0).parts[chosen]
     order = np.lexsort((-chain.areas[chosen], parts))
     largest = order[np.unique(parts[order], return_index=True)[1]]
@@ -145,7 +149,10 @@ def whole_complexes(chain: Chain) -> tuple[Ints, Bools]:
 def _nested(
     chain: Chain, pieces: Ints, counts: Ints, closed: Bools, flips: Floats, nested: Nesting
 ) -> tuple[Floats, int, int]:
-    """(p,) signs that turn closed pieces outwards; pieces within others stay as given, if that is clear."""
+    """Return (p,) signs that turn closed pieces outwards, and the numbers of bodies and of cavities within others.
+
+    Those within others face as `nested` says: with "given" as they were given, or by depth if that is unclear.
+    """
     n = len(closed)
     counted = np.flatnonzero(counts != 0)
     triangles, owners = chain.triangles[counted], pieces[counted]
@@ -188,11 +195,10 @@ def open_bounding(
     nested: Nesting = "given",
     as_oriented: bool = False,
 ) -> tuple[Floats, Bools, Ints, Floats]:
-    """Decide for open pieces, (p,) each: signs, whether they bound something, clusters of loose ones (else −1), and
-    levels.
+    """Find for open pieces, (p,) each: signs, whether they bound something, clusters of loose ones or −1, and levels.
 
-    A piece is loose if neither it nor its group is a body by itself. Those that fail their level, and leave at least
-    half as much unexplained as the worst, are left out, round by round.
+    A piece is loose if neither it nor its group is a body by itself. In each round, pieces whose level is too low are
+    left out if they leave at least half as much unexplained as the worst one.
     """
     n, areas = len(pieces.areas), pieces.areas
     shared = np.bincount(groups, minlength=n)[groups] > 1
@@ -210,7 +216,7 @@ def open_bounding(
         values = system.levels(signs[names])
         rows, levels = names[system.owners], np.zeros(n)
         levels[names] = means(values, system.owners, system.areas, len(names))
-        # groups that are bodies by themselves; loose pieces are so cluster by cluster
+        # whether groups are bodies by themselves; loose pieces are judged cluster by cluster
         together = means(system.levels_within(signs[names], groups[names]), groups[rows], system.areas, n)[groups]
         by_itself = np.where(shared, together, alone)
         own = by_itself >= SHEET
@@ -240,7 +246,7 @@ def signs_of(system: Matrix | Dipoles) -> Floats:
 
 
 def _counted(areas: Floats, groups: Ints, clusters: Ints) -> Floats:
-    """(p,) number of groups in each piece's cluster, as if all groups were alike."""
+    """(p,) effective number of groups in each piece's cluster: (Σ a)² / Σ a², with a the areas of groups."""
     n = len(areas)
     keys, inverse = np.unique(clusters * n + groups, return_inverse=True)
     sums, owners = np.bincount(inverse, areas), keys // n
@@ -270,7 +276,7 @@ def _along(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | Ints) ->
 
 
 def clusters_of(pieces: Pieces) -> Ints:
-    """(p,) cluster of each piece. Pieces are joined if they are within `GAP_REACH` sizes of the smaller one."""
+    """(p,) cluster of each piece. Two pieces are joined if they are within `GAP_REACH` sizes of the smaller one."""
     n = len(pieces.areas)
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     np.minimum.at(low, pieces.labels, pieces.triangles.min(axis=1))

@@ -1,11 +1,12 @@
 """Chains: the distinct triangles of a shape, how often each is there, and which are connected and closed.
 
-Triangles on the same corners are one. It is there as often as it is given one way, less how often the other way, and
-that may be never. A chain whose directed edges all cancel is a *cycle*: it has an integer winding number off its faces.
+Triangles on the same corners are one. Its multiplicity is how often it is given one way minus how often it is given
+the other way, which may be 0. A chain whose directed edges all cancel is a *cycle*: it has an integer winding number
+off its faces.
 
 Walls of a complex of cells bound nothing where closed cells lie on both sides of them. Each face has two sides. Around
 an edge, in order of angle, the sides of neighbouring faces that look at each other bound the same region of space; so
-all sides fall into shells, the whole boundary of a region each. Which way the faces run does not matter.
+all sides fall into shells, each the whole boundary of a region. Which way the faces run does not matter.
 """
 
 from __future__ import annotations
@@ -27,17 +28,17 @@ from .overlaps import OUTSIDE
 from .winding import INSIDE_WINDING
 
 CAVITY_SHARE = 0.9
-"""Least share of its area that faces into a cell that is a cavity, and of the outside that faces outwards. By chance
-all six walls of a cell face inwards once in 64 times."""
+"""A cell is a cavity if at least this share of its walls' area faces into it, and as much of the outside outwards. By
+chance all six walls of a cell face inwards once in 64 times."""
 
 
 def inner_walls(chain: Chain) -> Bools:
     """(m,) whether a closed cell lies on both sides of each face, where some edges have three or more faces.
 
-    A complex is what is connected by edges; a cell that lacks a wall is part of the outside. In three cases faces with
-    a cell on both sides are not inner: if along each edge of the complex as many faces run one way as the other, since
-    it is then the boundary of a solid as it is; if the outside of the complex faces outwards and the walls of one of
-    the two cells face into it, since that cell is then a cavity; and if they go on through the walls of the cells.
+    A complex is a set of faces connected by edges; a cell that lacks a wall is part of the outside. In three cases
+    faces with a cell on both sides are not inner: if along each edge of the complex as many faces run one way as the
+    other, since it is then the boundary of a solid; if the outside of the complex faces outwards and the walls of one
+    of the two cells face into it, since that cell is then a cavity; and if they go on beyond the walls of the cells.
     """
     n, table = len(chain.faces), chain.edges
     if not (table.face_counts > 2).any():
@@ -52,11 +53,11 @@ def inner_walls(chain: Chain) -> Bools:
     following = next_in_groups(np.append(0, np.cumsum(table.face_counts)))
     last = following <= np.arange(len(edges))
 
-    # complexes that have inner walls at all
+    # complexes that can have inner walls
     complexes = chain.complexes
     gaps = np.where(last, 2 * np.pi, 0.0) + angles[following] - angles
     many = table.face_counts[edges] > 2
-    unclear = many & ~(gaps > ANGLE_ROUNDING)  # also where an angle is no number
+    unclear = many & ~(gaps > ANGLE_ROUNDING)  # also where an angle is NaN
     balance = np.bincount(edges, np.where(forward, 1, -1), len(table.vertices))
     nonmanifold, unbalanced = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     nonmanifold[complexes[faces[many]]] = unbalanced[complexes[faces[balance[edges] != 0]]] = True
@@ -69,7 +70,7 @@ def inner_walls(chain: Chain) -> Bools:
     front, back = shells.T
     a, b, c = chain.triangles.transpose(1, 0, 2)
     volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
-    volumes = np.where(front != back, volumes, 0.0)  # surface that is open has one shell around it
+    volumes = np.where(front != back, volumes, 0.0)  # an open surface has one shell around it
     inside = np.bincount(shells.ravel(), np.stack([-volumes, volumes], axis=1).ravel()) > 0
     cavities = _cavities(shells, inside, np.where(chosen, chain.areas, 0.0))
     inner = chosen & inside[front] & inside[back] & (cavities[front] == cavities[back])
@@ -77,7 +78,7 @@ def inner_walls(chain: Chain) -> Bools:
 
 
 def _reaching_out(chain: Chain, inner: Bools, outer: Bools, turned: Bools) -> Bools:
-    """(m,) whether the inner faces that each is connected with lie outside the cells, by more than `OUTSIDE`.
+    """(m,) whether each face is in a component of inner faces of which more than `OUTSIDE` lies outside the cells.
 
     `outer`, (m,), are the faces around all cells; those that are `turned` face into them.
     """
@@ -114,12 +115,12 @@ def _cavities(shells: Ints, inside: Bools, areas: Floats) -> Bools:
 class Chain(Frozen):
     """Distinct triangles between welded vertices."""
 
-    # (n, 3) of the vertices, about the middle of the shape and scaled so that no product leaves the range of numbers
+    # (n, 3) of the vertices, relative to the middle of the shape and scaled so that products do not overflow
     positions: Floats
     faces: Ints  # (m, 3) vertices of each distinct triangle, in the direction in which it was given first
-    firsts: Ints  # (m,) triangle of the mesh that each was given by first
-    numbers: Ints  # (k,) distinct triangle of each that was given; −1 of those on fewer than three places
-    reversed: Bools  # (k,) which of them run the other way
+    firsts: Ints  # (m,) first triangle of the mesh on the same corners as each
+    numbers: Ints  # (k,) distinct triangle of each given one; −1 for those on fewer than three places
+    reversed: Bools  # (k,) which given triangles run the other way than their distinct one
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Chain:

@@ -1,9 +1,9 @@
 """Close the boundary of a chain of triangles by lids.
 
-Only the diagonals of a small hole that lost no vertices are unknown. Of all triangulations of its loop, the one whose
+Of a small hole that lost no vertices, only the diagonals are unknown. Of all triangulations of its loop, the one whose
 edges bend least, ``Σ length · angle`` with the rim's edges included (twice the total absolute mean curvature),
 continues the faces around it; dynamic programming over the loop finds it (Barequet and Sharir 1995, Liepa 2003).
-Larger ones get lids that bend as the surface does towards its rim (`continuation`).
+Larger holes get lids that bend as the surface does towards its rim (`continuation`).
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ STRIP_WIDTH = 0.25
 SMOOTH_COSINE = 0.7
 """Edges are sharp if the cosine between the normals of their faces is below this."""
 STRIP_SAMPLES = 16
-"""Number of samples across that strip."""
+"""Number of samples across the strip around an opening."""
 MOST_RIM_SAMPLES = 16384
-"""Number of samples around a rim: where faces would be divided into more, they are not; where more were given, every
-second, third or so is taken."""
+"""Faces around a rim are divided into no more samples than this. If there are more faces, only every second, third and
+so on is sampled."""
 HALF_BENDING_DEPTH = 0.03
-"""The bending of a wall of this depth, relative to the strip's, counts half."""
+"""The bend of a wall counts half if this is its depth, relative to the width of the strip."""
 BEND_RATIO = 0.35
-"""Ratio between how far a surface bends and how far it would have to bend. A lid does not bend below this ratio, and is
-clamped above twice this ratio. On a ball the ratio is 1."""
+"""Ratio between how far a surface bends and how far it must bend to close its opening. A lid does not bend below this
+ratio, and is clamped above twice this ratio. On a ball the ratio is 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class RimSamples:
 
 
 def width_of(lid: Lid) -> float:
-    """Width of an opening: four areas over the length of its rim, the diameter of a circle; never zero."""
+    """Return the width of an opening, never 0: four times its area over the length of its rim, as of a circle."""
     rim = lid.vertices[: lid.n_rim]
     length = float(side_lengths(rim).sum())
     # less than 1e-9 of its length is rounding error
@@ -93,10 +93,10 @@ def samples_near(
 
 
 def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> tuple[Floats, Floats, Floats]:
-    """(n, 3) normals and (n,) curvatures with which a surface continues beyond its rim, and (n,) their weights.
+    """Estimate how a surface continues beyond its rim: (n, 3) normals, (n,) curvatures, and (n,) weights of both.
 
-    Across an opening of width W it must turn by 2 sin β to meet the flat lid at angle β, and would by its curvature k
-    turn by k W: on a ball these are the same, on a box k is 0.
+    A surface that meets the flat lid of an opening of width W at angle β must turn by 2 sin β to cross the opening.
+    With its curvature k it would turn by k W. On a ball the two are equal, on a box k is 0.
     """
     n, loop = lid.n_rim, lid.vertices[: lid.n_rim]
     reach = STRIP_WIDTH * width
@@ -106,11 +106,11 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     rows, near = _within(samples, loop, patches, reach)
 
     def means(values: Floats) -> Floats:
-        """Over the samples near each place."""
+        """Average over the samples near each place."""
         return sums_of(np.einsum("k,k...->k...", weights, values), rows, n)
 
     x, normals, areas = samples.positions[near] - loop[rows], samples.normals[near], samples.areas[near]
-    weights = areas * (1.0 - (x * x).sum(axis=1) / reach**2)  # what comes into reach weighs nothing yet
+    weights = areas * (1.0 - (x * x).sum(axis=1) / reach**2)  # falls to 0 at the reach
     weights /= np.maximum(np.bincount(rows, weights, n), 1e-300)[rows]
     middle = means(normals)
     way = np.cross(middle, along)
@@ -128,7 +128,7 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     least, most = np.minimum(np.abs(bends), np.abs(must)), np.maximum(np.abs(bends), np.abs(must))
     ratio = np.sign(bends * must) * least / np.maximum(most, ANGLE_ROUNDING)
     held = enough * np.clip(ratio / BEND_RATIO - 1.0, 0.0, 1.0)
-    # more curved, it would not come round
+    # no more curvature than the lid needs to cross the opening
     fits = np.minimum(1.0, np.abs(must) / np.maximum(np.abs(bends), ANGLE_ROUNDING))
     curvatures = np.where(enough, fits * (slopes * frame).sum(axis=(1, 2)), 0.0)
     return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(held, m), 0.0)
@@ -154,9 +154,10 @@ is 90°."""
 
 
 def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints, most: float) -> list[Ints]:
-    """(n − 2, 3) triangles that fill each loop of n vertices with bends at the rim below `most`, or none.
+    """Fill each loop of n vertices by the (n − 2, 3) triangles that bend least, or none if the rim bends over `most`.
 
-    Loops are counterclockwise from outside; `normals` are those behind their edges; `taken` sorted `edge_keys`.
+    Loops run counterclockwise as seen from outside. `normals` are those of the faces behind their edges, loop by loop.
+    No diagonal is one of the edges whose sorted `edge_keys` are `taken`.
     """
     starts = np.concatenate([[0], np.cumsum([len(loop) for loop in loops], dtype=np.int64)])
     if not len(loops):
@@ -174,10 +175,10 @@ def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints
 def _least_bent(
     corners: Floats, ids: Ints, normals: Floats, starts: Ints, taken: Ints, most: float
 ) -> tuple[Ints, Bools]:
-    """Triangles, as places in their loops, and whether each loop bends at the rim within an angle.
+    """Return triangles, as positions in their loops, and whether the bend at each rim is at most `most`.
 
-    `cost[i, j]` is the bend of the best lid between corners i and j; `rims` sums lengths times squared angles at the
-    rim.
+    `cost[i, j]` is the bend of the best lid between corners i and j, and `rims[i, j]` the sum of lengths times squared
+    angles where this lid meets the rim.
     """
     n_loops = len(starts) - 1
     faces, closed = np.empty((len(corners) - 2 * n_loops, 3), dtype=np.int64), np.zeros(n_loops, dtype=np.bool_)
@@ -211,7 +212,7 @@ def _least_bent(
                     before, behind = _angle(normal, across[i, k]), _angle(normal, across[k, j])
                     length_before, length_behind = _length(points[i], points[k]), _length(points[k], points[j])
                     total = cost[i, k] + cost[k, j] + length_before * before + length_behind * behind
-                    if not normal.any():  # without area, which others have if there are any
+                    if not normal.any():  # triangles without area are the last choice
                         total += np.pi * (length_before + length_behind)
                     if total < cost[i, j]:
                         cost[i, j], split[i, j], across[i, j] = total, k, normal
@@ -265,11 +266,11 @@ NO_EDGES = np.empty((0, 2), dtype=np.int64)
 
 
 def closed_by(vertices: Floats, faces: Ints, *, bent: bool = True, outlines: Ints = NO_EDGES) -> tuple[Floats, Ints]:
-    """Close the boundary of (m, 3) triangles: (n + k, 3) vertices, and (p, 3) triangles that balance each edge.
+    """Close the boundary of (m, 3) triangles; return all vertices, and (p, 3) new triangles, which balance each edge.
 
-    Small holes get triangles between corners, rims that run along each other strips, other loops lids: `bent` ones, or
-    flat faces in creases, or films. Whole loops of `outlines`, (k, 2), stay open. Where lids are finer, triangles
-    without area lie between.
+    Small holes are filled by triangles between their corners, and rims that run along each other are joined by strips.
+    Other loops get lids: `bent` ones, flat faces that meet in creases, or films. Loops that consist of `outlines`,
+    (k, 2) edges, stay open. Where a lid is finer than its rim, triangles without area lie between them.
     """
     faces = np.asarray(faces, dtype=np.int64)
     if len(boundary(faces)) == len(outlines):
@@ -357,14 +358,14 @@ class _Surface(Frozen):
         return keys[order], order
 
     def behind(self, loop: Ints) -> tuple[Ints, Ints]:
-        """(n,) the face behind each edge of a loop, preferably of a piece that is open; and its third vertex."""
+        """Return the (n,) faces behind the edges of a loop, of open pieces if possible, and their third vertices."""
         keys, order = self._sides
         face, side = np.divmod(order[np.searchsorted(keys, np.roll(loop, -1) * len(self.vertices) + loop)], 3)
         return face, self.faces[face, (side + 2) % 3]
 
 
 def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints:
-    """(k, 3) triangles between the vertices of small holes and of gaps without area."""
+    """Fill small holes, and gaps without area, by (k, 3) triangles between their vertices."""
     surface = _Surface(vertices, faces, outlines)
     triangles, chosen, corners = [np.empty((0, 3), dtype=np.int64)], [], []
     for loop in surface.loops:
@@ -395,7 +396,7 @@ def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints
 
 
 def _with_sides(loop: Ints, places: Ints, lid: Ints) -> Ints:
-    """Divide triangles between the corners of a loop at the points of the loop's straight sides."""
+    """Divide the triangles of a lid, which join the corners of a loop, at the other points of the loop."""
     for begin, end in zip(places, [*places[1:], places[0] + len(loop)], strict=True):
         side = loop[np.arange(begin, end + 1) % len(loop)]
         if len(side) > 2:
@@ -411,7 +412,7 @@ def fan(points: Ints) -> Ints:
 
 
 def strips(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints:
-    """(k, 3) triangles between rims that run along each other, in part or all around."""
+    """Join rims that run along each other, in part or all around, by (k, 3) triangles."""
     surface = _Surface(vertices, faces, outlines)
     chain = np.concatenate([faces, *walls.seams(_rims(surface))])
     surface = _Surface(vertices, chain, outlines)

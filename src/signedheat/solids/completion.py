@@ -42,7 +42,10 @@ from .union import TriangleGroup, united
 
 
 def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Floats, Ints]:
-    """(k, 3) points on rims, at most a step apart, and (m, 3) triangles from them to the borders of patches."""
+    """Divide the rims of faces by (k, 3) points, at most a step apart, and join them to the borders of patches.
+
+    Returns these points and the (m, 3) triangles of the seams.
+    """
     rim, (tails, heads) = boundary(faces), boundary(patches).T
     starts, ways = vertices[rim[:, 0]], vertices[rim[:, 1]] - vertices[rim[:, 0]]
     counts = np.maximum(np.ceil(np.linalg.norm(ways, axis=1) / step), 1).astype(np.int64) - 1
@@ -77,13 +80,13 @@ BYTES_PER_LOOSE_FACE, BYTES_OF_HEAT = 3400, 150_000_000
 CELLS_PER_POINT_GAP = 2.0
 """Number of cells between neighbouring points of a cloud."""
 NOISE_RANGE = (1e-6, 0.75)
-"""Distances between corners that noise has separated lie in this range, relative to the size of pieces."""
+"""Distances between corners that noise has separated, relative to the square root of their triangle's area."""
 TORN_LEVEL = 0.2
-"""Heat completes loose pieces up to this level, which a fifth to two fifths of a body have; beyond, lids do, which keep
-to the faces. For balls, tori and a cow without 45 % of their triangles, lids enclose .1 % too little and heat .3 % too
-much; without 65 %, lids miss 1 to 12 % and heat 1 %."""
+"""Loose pieces are completed by heat below this level, where a fifth to two fifths of a body are left, else by lids,
+which keep to the faces. For balls, tori and a cow without 45 % of their triangles, lids enclose .1 % too little and
+heat .3 % too much; without 65 %, lids miss 1 to 12 % and heat 1 %."""
 ZERO_SET_FACES = 0.75
-"""The zero set of φ stands for the faces within this distance of them, in cells."""
+"""Triangles of the zero set of φ are left out within this distance of faces, in cells: they stand for these faces."""
 
 Completing = Literal["lids", "heat"]
 Lids = Literal["bent", "flat"]
@@ -142,8 +145,8 @@ def complete(
     keep_overlaps : bool
         Keep surfaces that lie inside other bodies.
     nested : {"given", "cavities", "bodies"}
-        Meaning of bodies within others: by their orientation; cavities, with bodies inside those, as in slicers; or
-        bodies.
+        What bodies within others are: bodies or cavities, by their orientation; cavities, with bodies inside those, as
+        in slicers; or always bodies.
     constraint, diffusion : Constraint, float
         Options of the signed heat method, where that completes.
     progress : callable, optional
@@ -211,7 +214,7 @@ def completed(
             notes = [] if options.as_oriented else [oriented_as(joined, chain, decided).note]
         if not chain.areas.any():
             raise SourceError("all faces of the shape have zero area", element="shape")
-        chain = replace(chain)  # without what deciding needed
+        chain = replace(chain)  # drops the cached properties that only `bounding` needs
         with stopwatch("complete") as run:
             solid = run(partial(_from_mesh, joined.triangulation, chain, decided, options, method))
             owners = owners_of(joined)
@@ -232,7 +235,7 @@ def bytes_to_complete(shape: SurfaceShape, count: int) -> float:
 
 
 def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
-    """Make the solid of a mesh from its distinct triangles and what they bound: torn bodies by heat, others by lids."""
+    """Make the solid of a mesh, given what its distinct triangles bound: heat completes torn bodies, lids others."""
     vertices = mesh.vertices
     counts = np.abs(decided.counts)
     faces = np.where((decided.counts < 0)[:, None], chain.faces[:, ::-1], chain.faces)
@@ -256,7 +259,7 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
 
 
 def _closed_by_lids(vertices: Floats, faces: Ints, origins: Ints, bent: bool) -> tuple[TriangleGroup, list[Note]]:
-    """Close (m, 3) faces, of (m,) origins, by lids; note the faces that were lost between given vertices."""
+    """Close (m, 3) faces with (m,) origins by lids; note how many lost faces between given vertices were restored."""
     lost = small_lids(vertices, faces)
     restored = np.concatenate([faces, lost])
     places, added = closed_by(vertices, restored, bent=bent)
@@ -276,7 +279,7 @@ def _made_from(places: Floats, faces: Ints, added: Ints, origins: Ints) -> Trian
 def _completed_by_heat(
     vertices: Floats, faces: Ints, origins: Ints, scatter: float, method: Heat
 ) -> list[TriangleGroup]:
-    """Complete a torn body by the zero set of φ, which replaces faces that scatter around it."""
+    """Complete a torn body by the zero set of φ, which replaces the faces if they scatter (`scatter` > 0)."""
     triangles = vertices[faces]
     given = TriangleGroup(triangles, faces, origins, False)
     names, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
@@ -301,7 +304,7 @@ def _completed_by_heat(
 
 
 def scatter_of(triangles: Floats, labels: Ints) -> float:
-    """Distance between corners that noise has separated; 0 if it has not separated most of them."""
+    """Return the median distance between corners that noise has separated; 0 if it has not separated most of them."""
     points = triangles.reshape(-1, 3)
     owners = np.repeat(labels, 3)
     near, neighbours = scipy.spatial.cKDTree(points).query(points, min(8, len(points)), workers=-1)

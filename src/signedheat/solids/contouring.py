@@ -1,8 +1,8 @@
 """Offsets of solids as closed surfaces with sharp edges: dual contouring with exact distances.
 
 Vertices lie within cells of a grid, not on its edges, where the planes of the surface meet (Ju, Losasso, Schaefer &
-Warren 2002). Each connected piece within a cell has one (Schaefer, Ju & Warren 2007), and triangles do not pass through
-each other (Ju & Udeshi 2006). Only blocks of the grid through which the level passes are computed.
+Warren 2002). Each connected piece of it within a cell has one (Schaefer, Ju & Warren 2007), and triangles do not pass
+through each other (Ju & Udeshi 2006). Only blocks of the grid through which the level passes are computed.
 
 Vertices minimise quadratic error functions within boxes: around a centre m the error is
 ``E(y) = Σ (nᵢ · (y − pᵢ))² = yᵀ A y − 2 bᵀ y + c``, with ``A = Σ nᵢ nᵢᵀ`` and ``b = Σ nᵢ (nᵢ · pᵢ)``. Along directions
@@ -45,14 +45,14 @@ hundredth of a cell at most. With .2 creases of 20° are lost; with .01 facets o
 
 @dataclass(frozen=True, eq=False)
 class Quadrics:
-    """Sums over planes, for each of n points."""
+    """Quadratic error functions of n points, as sums over the planes of each."""
 
     products: Floats  # (n, 3, 3) A
     sides: Floats  # (n, 3) b
 
     @classmethod
     def of(cls, owners: Ints, places: Floats, normals: Floats, count: int) -> Quadrics:
-        """Sum planes, given by places relative to the centres of their owners and by unit normals."""
+        """Sum the planes of each owner, given by unit normals and by places on them, relative to the owner's centre."""
         along = (normals * places).sum(axis=1)[:, None]
         products = sums_of(normals[:, :, None] * normals[:, None, :], owners, count)
         return cls(products, sums_of(normals * along, owners, count))
@@ -65,10 +65,10 @@ class Quadrics:
 
 
 def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats, Ints]:
-    """(n, 3) points of least error of quadrics in boxes, and (n,) ranks of the planes.
+    """Return the (n, 3) points at which quadrics are least within boxes, and the (n,) ranks of their matrices A.
 
-    A minimum outside of its box moves along the direction in which the error grows the least, that of a crease, into
-    it, or is looked for on the wall that it is beyond the farthest.
+    A minimum outside of its box moves into it along the direction in which the error grows least, that of a crease. If
+    it cannot, the minimum on a wall is taken: on the wall that it is farthest beyond.
     """
     values, vectors = np.linalg.eigh(quadrics.products)
     least = CREASE_TANGENT**2 * np.maximum(values[:, 2], 1e-300)
@@ -102,7 +102,7 @@ def _way_into(points: Floats, along: Floats, lower: Floats, upper: Floats) -> Fl
 
 
 def _solved(values: Floats, vectors: Floats, sides: Floats, least: Floats) -> Floats:
-    """Solve A x = b without eigenvalues below `least`."""
+    """Solve A x = b, given the eigenvalues and eigenvectors of A, without eigenvalues of at most `least`."""
     inverse = np.where(values > least[:, None], 1.0 / np.where(values > least[:, None], values, 1.0), 0.0)
     return np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, sides, optimize=True)
 
@@ -118,13 +118,13 @@ CHECKED_BEND = np.deg2rad(5.0)
 CHORD_ERROR = 0.02
 """Distance from the level, in cells, above which an edge along a crease is divided."""
 DIVISIONS = 6
-"""Rounds of division; the largest error on a bracket is .08 cells with three rounds, and .05 with six."""
+"""Number of rounds in which edges are divided: the largest error on a bracket is .08 cells with three, .05 with six."""
 CROSS_REACH = 4.0
-"""Distance, in cells, within which triangles of a new vertex may intersect others."""
+"""Distance from new vertices, in cells, within which triangles are checked for intersections."""
 PROBE_OFFSETS = np.array(list(np.ndindex(2, 2, 2))) - 0.5
-"""Offsets, in cells, from a vertex on a crease of probes for further planes."""
+"""Offsets, in cells, of the points around a vertex on a crease at which further planes are looked for."""
 PROBE_SHARES = 0.1, 0.3, 0.6
-"""Positions of probes, as shares of the way from the middle of an edge to the opposite corner."""
+"""Points at which planes beside an edge are looked for, as shares of the way from its middle to the opposite corner."""
 
 
 class ImplicitSurface(Protocol):
@@ -141,7 +141,7 @@ class ImplicitSurface(Protocol):
 
 
 def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats) -> Floats:
-    """(3, v, 3) candidates for the vertex of each piece of a level: best overall, best in its cell, middle."""
+    """Return (3, v, 3) candidates for the vertex of each piece, in cells: the best, the best in its cell, a middle."""
     count = len(cells.owners)
     vertices, middles, wider = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
     rows, sides = np.nonzero(cells.edges >= 0)
@@ -152,7 +152,7 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats
     for begin in range(0, count, PIECES_AT_ONCE):
         stop = min(begin + PIECES_AT_ONCE, count)
         batch = slice(*np.searchsorted(pieces, [begin, stop]))
-        used, crossed = np.unique(edges[batch], return_inverse=True)  # each is in four cells
+        used, crossed = np.unique(edges[batch], return_inverse=True)  # each edge is in four cells
         parts = _vertices(
             offset,
             grid,
@@ -169,7 +169,7 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats
 
 
 def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
-    """(v,) whether to take the wider candidate; among vertices near each other, the one that moves least may."""
+    """Decide which (v,) vertices take the wider candidate: of those close together, only the one that moves least."""
     away = np.where(np.isnan(wider[:, 0]), np.inf, np.linalg.norm(wider - vertices, axis=1))
     in_cell: Bools = (np.floor(wider) == cells.places[cells.owners]).all(axis=1)
     rows = np.flatnonzero(np.isfinite(away) & ~in_cell)
@@ -186,9 +186,10 @@ def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
 def _vertices(
     offset: ImplicitSurface, grid: Grid, places: Ints, alone: Bools, owners: Ints, crossed: Ints, points: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Vertices of pieces in their cells, their middles, and candidates up to `OUTSIDE_CELL` outside, or NaN.
+    """Return the (p, 3) vertices of pieces in their cells, the middles of pieces, and wider candidates or NaN.
 
-    The `owners`, (k,), are the pieces in which (k,) edges are `crossed`, at (e, 3) points.
+    Wider candidates lie up to `OUTSIDE_CELL` outside of their cells. The surface passes through edge `crossed[i]` in
+    piece `owners[i]`; `points`, (e, 3), are where it passes through each edge.
     """
     count = len(places)
     step = float(grid.spacing.max())
@@ -229,7 +230,7 @@ def _vertices(
 def divided_along_creases(
     offset: ImplicitSurface, spacing: Floats, vertices: Floats, faces: Ints
 ) -> tuple[Floats, Ints]:
-    """Divide bent edges off the level at creases without a vertex, unless triangles would intersect."""
+    """Divide edges that cut off a crease of the level at points on it, unless triangles would then intersect."""
     new = np.ones(len(faces), dtype=bool)
     for _ in range(DIVISIONS if len(faces) <= MOST_CREASED_FACES else 0):
         edges, points = _creases_off(offset, spacing, vertices, faces, new)
@@ -255,7 +256,10 @@ def divided_along_creases(
 def _creases_off(
     offset: ImplicitSurface, spacing: Floats, vertices: Floats, faces: Ints, new: Bools
 ) -> tuple[Ints, Floats]:
-    """Return (k, 2) halfedges of bent edges off the level, one in a `new` face (m,), and (k, 3) points on it."""
+    """Find bent edges that are off the level: their (k, 2) halfedges, and a point on the level for each, (k, 3).
+
+    Only edges of faces that are `new`, (m,), are checked. No two of the edges found share a face.
+    """
     step = float(spacing.max())
     near = np.flatnonzero(mask_of(len(vertices), faces[new])[faces].any(axis=1))
     normals, edges = unit(area_vectors(vertices[faces[near]])), edge_table(faces[near]).pairs
@@ -299,15 +303,15 @@ IN_BLOCK = np.array(list(np.ndindex(BLOCK, BLOCK, BLOCK)))
 CONTOUR_PLACES = 4096
 """Number of places on a surface at which its contour is looked for, besides one for each part."""
 MISSED_SHARE = 0.01
-"""Contours that miss a larger share of the surface are announced. Edges and tips thinner than a cell occur on most
-parts, walls do not."""
+"""A warning is given if a contour misses a larger share of the surface. Most parts have edges and tips thinner than a
+cell, but no such walls."""
 STEEPEST_HEIGHT = 2.0
 """Largest slope of the height above a surface at which blocks near it are found from coarse to fine. Distance has slope
 1; where a varying distance is steeper, blocks are found by following the surface."""
 
 
 def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
-    """Heights above a surface at the nodes of blocks; a level of distance is computed for all blocks at once."""
+    """Compute the heights above a surface at the nodes of blocks, many blocks at a time and in several threads."""
     tree, windings = prepared(offset.solid)
     values = np.empty((len(blocks), BLOCK, BLOCK, BLOCK), dtype=np.float32)
     level = offset.level
@@ -329,7 +333,7 @@ def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
 
 
 def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) -> TriangleMesh:
-    """Return a surface at a distance from a solid, closed and manifold, with its edges and corners."""
+    """Extract the closed, manifold surface at a distance from a solid, with sharp edges and corners."""
     report = progress or (lambda fraction, step: None)
     values, crossings, cells = _crossed(offset, grid)
     vertices, faces = traced(offset, grid, values, crossings, cells, report)
@@ -341,7 +345,7 @@ def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) 
 def traced(
     offset: ImplicitSurface, grid: Grid, values: NodeValues, crossings: Crossings, cells: DualCells, report: Progress
 ) -> tuple[Floats, Ints]:
-    """Vertices and faces of a surface, given the crossed edges of a grid and the pieces in its cells."""
+    """Return the vertices and faces of a surface, given the edges of a grid that it crosses and its pieces in cells."""
     report(0.4, "edges")
     nodes, axes = crossings.nodes, crossings.axes
     guesses = nodes.astype(np.float64)
@@ -369,7 +373,7 @@ def announce_lost(offset: Offset, grid: Grid, vertices: Floats) -> None:
 
 
 def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
-    """Sample a surface: the part of the solid for each place, and whether the contour has no vertex nearby."""
+    """Sample a surface; return the part of the solid at each sample, and whether the contour has no vertex nearby."""
     features = offset.solid.tree.features
     moved = callable(offset.reach) or offset.reach != 0
     faces = np.arange(len(features.faces)) if moved else np.flatnonzero(offset.solid.bounding[features.ids])
@@ -393,7 +397,7 @@ def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
 
 
 def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCells]:
-    """Heights near a surface, the edges that it crosses, and its pieces in cells; blocks are added as needed."""
+    """Compute heights near a surface, the edges that it crosses and its pieces in cells, adding blocks as needed."""
     places = blocks_at(offset, grid)
     done = BlockValues(Blocks.of(places[:0], grid.shape), np.empty((0, BLOCK, BLOCK, BLOCK), dtype=np.float32))
     while True:
@@ -418,7 +422,7 @@ def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCe
 
 
 def blocks_at(offset: Offset, grid: Grid) -> Ints:
-    """(n, 3) places of the blocks of a grid near a surface: heights change by no more than one goes."""
+    """Find the (n, 3) blocks of a grid near a surface, by the largest slope that heights can have."""
     diagonal = (1.0 if offset.level is not None else STEEPEST_HEIGHT) * float(np.linalg.norm(grid.spacing))
 
     def near(centres: Floats, half: float) -> Bools:
@@ -438,7 +442,7 @@ def blocks_at(offset: Offset, grid: Grid) -> Ints:
 
 
 def crossed_edges(band: BlockValues) -> Crossings:
-    """Edges whose ends lie on both sides of a surface, with crossings by linear interpolation."""
+    """Find the edges whose ends lie on both sides of a surface, and where it crosses them, by linear interpolation."""
     parts = []
     for window in np.unique(band.blocks.places // WINDOW, axis=0).astype(np.int64):
         first, size = window * WINDOW * BLOCK, WINDOW * BLOCK
@@ -447,7 +451,7 @@ def crossed_edges(band: BlockValues) -> Crossings:
 
 
 def crossings_in(heights: Floats, first: Ints) -> list[Crossings]:
-    """Crossed edges between the nodes of a window of a grid, along each axis."""
+    """Find the crossed edges between the nodes of a window of a grid, along each axis; nodes at NaN have none."""
     below, held, parts = heights < 0, ~np.isnan(heights), []
     for axis in range(3):
         ahead = tuple(slice(1, None) if k == axis else slice(0, -1) for k in range(3))

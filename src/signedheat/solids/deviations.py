@@ -58,7 +58,7 @@ class Deviation(Frozen):
     nearest : (n, 3) float
         The nearest places of the part.
     completed : (n,) bool
-        Whether these lie on the completion of the nominal part.
+        Whether the nearest places lie on the completion of the nominal part.
     beyond_rim : (n,) bool
         Whether points lie beyond the rim of an open part, such as a panel or a terrain. Their sign is that of the
         continued surface.
@@ -316,7 +316,7 @@ def deviation(
 
 
 def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, FaceFeatures | None]:
-    """Whether a part is open as a whole; and, turned to agree, its faces that have two sides: all, or sheets only."""
+    """Return whether a part is open as a whole, and its two-sided faces, turned to agree: all then, else its sheets."""
     if isinstance(given, PointCloud):
         return False, None
     areas, was_given = face_areas(solid.triangles), solid.origins >= 0

@@ -5,8 +5,8 @@ sides, the *level*, is ½ on every face. Each piece gets an unknown weight s, an
 
     E(s) = Σ A_i (½ − Σ_j W_ij s_j)² + μ Σ c_ij (s_i − sign(n_i · n_j) s_j)² + λ Σ A_i s_i²
 
-W_ij is the mean winding number of piece j at piece i, its own taken between its two sides. The sign of s orients. The
-second term, between neighbours in one plane, is for points and small pieces, of which each knows little.
+W_ij is the mean winding number of piece j at piece i, for i = j the mean of both sides. The sign of s orients.
+The second term, between neighbours in one plane, helps points and small pieces, each of which alone tells little.
 
 For points: Lin et al., Surface reconstruction from point clouds without normals by parametrizing the Gauss formula (TOG
 2022); Lin, Shi and Liu, Fast and globally consistent normal orientation based on the winding number normal consistency
@@ -43,9 +43,9 @@ PLANE_NEIGHBORS = 12
 LEVEL_PLACES = 10_000
 """Largest number of places at which the level is asked for, besides one for each piece."""
 LOOSE_DIPOLES = 64
-"""This many loose triangles or more become dipoles; fewer get exact solid angles, which tell noise for what it is."""
+"""More loose triangles than this become dipoles; fewer get exact solid angles, by which noise is recognized."""
 TREE_FACES = 256
-"""A piece of this many faces or more has a tree of its own, which sums their solid angles."""
+"""A piece of more faces than this has a tree of its own, which sums their solid angles."""
 PIECE_RADII, NODE_RADII = 4.0, 2.0
 """Pieces, and nodes of the tree, are dipoles beyond this distance, relative to their radius."""
 SLENDER_TRIANGLE = 12.0
@@ -77,7 +77,7 @@ def system_of(pieces: Pieces) -> Matrix | Dipoles:
     """Make the system of some pieces: dipoles for many loose triangles, exact solid angles for the rest."""
     sizes, areas = np.bincount(pieces.labels), pieces.areas
     many = areas.sum() ** 2 > LOOSE_DIPOLES * (areas**2).sum() and areas[sizes == 1].sum() > 0.5 * areas.sum()
-    # of many pieces each face is a dipole, and W is applied through a tree
+    # each face becomes a dipole, and a tree replaces the matrix W
     return Dipoles.of_triangles(pieces) if many or len(areas) > 3000 else Matrix.of(pieces)
 
 
@@ -91,17 +91,17 @@ def means(values: Floats, groups: Ints, weights: Floats, n: int) -> Floats:
 class Matrix:
     """Matrix W of few pieces, by exact solid angles, at sampled places."""
 
-    matrix: Floats  # (n, k) winding number of each piece at each place, of the place's own piece between its two sides
-    places: Floats  # (n, 3) each: where they are, and unit normals
-    normals: Floats
-    owners: Ints  # (n,) pieces that they are on
+    matrix: Floats  # (n, k) winding number of each piece at each place; of the place's own piece the mean of both sides
+    places: Floats  # (n, 3) positions
+    normals: Floats  # (n, 3) unit normals at the places
+    owners: Ints  # (n,) piece that each place is on
     areas: Floats  # (n,) part of the area of its piece that each stands for
-    within: Floats  # (n,) winding numbers of the bodies that do not matter at each place
+    within: Floats  # (n,) winding numbers of the bodies that each place ignores
 
     @classmethod
     def of(cls, pieces: Pieces) -> Matrix:
         """Sample places on the pieces, and compute their winding numbers there."""
-        faces, places = sampled(pieces, min(LEVEL_PLACES, 5_000_000 // len(pieces.areas)))  # W has no more entries
+        faces, places = sampled(pieces, min(LEVEL_PLACES, 5_000_000 // len(pieces.areas)))  # limits the size of W
         order = np.argsort(pieces.labels, kind="stable")
         starts = np.concatenate([[0], np.cumsum(np.bincount(pieces.labels))])
         triangles = pieces.triangles[order]
@@ -148,7 +148,7 @@ class Matrix:
         return np.asarray(self.matrix @ signs - self.within)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
-        """(n,) levels at the samples, due to the pieces of the same group, (k,)."""
+        """(n,) levels at the samples due to the pieces of their own group only, given the (k,) groups of pieces."""
         result = np.empty(len(self.owners))
         for group in np.unique(groups):
             members, rows = groups == group, groups[self.owners] == group
@@ -157,7 +157,7 @@ class Matrix:
 
 
 def without_slender(pieces: Pieces) -> Pieces:
-    """Halve slender triangles."""
+    """Halve slender triangles, up to six times and to `MOST_DIPOLES`."""
     triangles, labels = pieces.triangles, pieces.labels
     for _ in range(6):
         lengths = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
@@ -171,7 +171,7 @@ def without_slender(pieces: Pieces) -> Pieces:
 
 
 def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
-    """Sample faces, and (n, 3) places on them: one for each piece and `count` more, half by area, half by number."""
+    """Sample faces, (n,), and (n, 3) places on them: one on each piece and `count` more, half by area, half evenly."""
     areas, k = pieces.face_areas, len(pieces.areas)
     order = np.lexsort((morton_codes(pieces.triangles.mean(axis=1)), pieces.labels))
     shares = pieces.areas / max(pieces.areas.sum(), np.finfo(float).tiny)
@@ -184,13 +184,13 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
     rows = np.searchsorted(ends, begins[owners] + share * (ends[lasts] - begins)[owners])
     firsts = np.concatenate([[0], lasts[:-1] + 1])
     faces = order[np.clip(rows, firsts[owners], lasts[owners])]
-    # several on one face are spread over it; a single one is at its centre
+    # several places on one face are spread over it; a single one is at its centre
     same = np.concatenate([[False], faces[1:] == faces[:-1]])
     run = np.arange(len(faces)) - np.maximum.accumulate(np.where(same, 0, np.arange(len(faces))))
     u, v = (1 / 3 + run * 0.7548776662466927) % 1.0, (1 / 3 + run * 0.5698402909980532) % 1.0
     fold = u + v > 1
     u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
-    # whichever comes first: in order of the lengths of the sides across, or of their places if these are equal
+    # corners in an order that is the same however they are given: by opposite sides' lengths, then by position
     corners = pieces.triangles[faces]
     across = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1), axis=2)
     across = np.round(across / np.maximum(across.max(axis=1, keepdims=True), np.finfo(float).tiny), 9)
@@ -203,7 +203,7 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
 def _small_pieces(
     corners: Floats, starts: Ints, vectors: Floats, balls: Floats, places: Floats, own: Ints, matrix: Floats
 ) -> None:
-    """Winding numbers of small pieces at places on faces; beyond `PIECE_RADII` radii they are dipoles."""
+    """Write the winding numbers of small pieces at places on faces; pieces beyond `PIECE_RADII` radii are dipoles."""
     for piece in range(len(starts) - 1):
         begin, end = starts[piece], starts[piece + 1]
         if end - begin > TREE_FACES:
@@ -225,14 +225,14 @@ def _small_pieces(
 
 @dataclass(frozen=True, eq=False)
 class Dipoles:
-    """W of many small faces, or points, as dipoles softened at the scale of the distance to neighbours."""
+    """The map W of many small faces or points, as dipoles softened at the scale of the distance to neighbours."""
 
-    places: Floats  # (n, 3) each: where they are, and unit normals
-    normals: Floats
-    areas: Floats  # (n,) of each
-    owners: Ints  # (n,) pieces that they are of
+    places: Floats  # (n, 3) positions
+    normals: Floats  # (n, 3) unit normals
+    areas: Floats  # (n,) area of each dipole
+    owners: Ints  # (n,) piece that each is part of
     softening: Floats  # (n,) distance below which the field of a dipole levels off
-    within: Floats  # (n,) winding numbers of the bodies that do not matter at each place
+    within: Floats  # (n,) winding numbers of the bodies that each place ignores
 
     @classmethod
     def of_triangles(cls, pieces: Pieces) -> Dipoles:
@@ -257,7 +257,7 @@ class Dipoles:
     def balls(self) -> Floats:
         """(2 · leaves, 4) middle of each node's box, and the squared distance beyond which the node is one dipole."""
         low, high = self.tree.bounds[:, :3], self.tree.bounds[:, 3:]
-        with np.errstate(invalid="ignore"):  # of nothing
+        with np.errstate(invalid="ignore"):  # nodes without places have infinite bounds
             radii = 0.5 * np.linalg.norm(high - low, axis=1) + float(np.median(self.softening))
             balls = np.concatenate([0.5 * (low + high), (NODE_RADII * radii[:, None]) ** 2], axis=1)
         return np.where(np.isfinite(balls), balls, 0.0)
@@ -299,11 +299,11 @@ class Dipoles:
         return sums / (4.0 * np.pi)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
-        """(n,) levels at the places, due to pieces of the same group, (k,); loose triangles have none."""
+        """(n,) zeros, for the levels at the places due to their own group only: loose triangles have none."""
         return np.zeros(len(self.owners))
 
     def _adjoint(self, charges: Floats) -> Floats:
-        """(k,) product of the transpose of W with values at the places: the field of charges there, at each dipole."""
+        """Multiply charges at the places by the transpose of W: the (k,) fluxes of their field through the pieces."""
         away = self.places - self.balls[1, :3]
         nodes = self._sums(np.c_[charges, charges[:, None] * away])
         nodes[:, 1:] -= nodes[:, :1] * (self.balls[:, :3] - self.balls[1, :3])  # moments about the middles of nodes
@@ -328,7 +328,7 @@ class Dipoles:
 
 
 def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> sparse.csr_array:
-    """(k, k) signed Laplacian, times μ, of pieces whose neighbours lie roughly in one plane, but not of many places."""
+    """(k, k) signed Laplacian, times μ, of pieces with neighbours roughly in a plane; weak if they have many places."""
     n, k = len(places), min(PLANE_NEIGHBORS, len(places) - 1)
     near = scipy.spatial.cKDTree(places).query(places, k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), near.ravel()
@@ -360,7 +360,7 @@ def spacing(places: Floats) -> Floats:
 def _potentials(
     places: Floats, softening: Floats, vectors: Floats, items: Ints, balls: Floats, nodes: Floats, at: Ints
 ) -> Floats:
-    """Sum ``v · d / (|d|² + ε²)^(3/2)`` at places over all others, d pointing to these."""
+    """Sum ``v · d / (|d|² + ε²)^(3/2)`` at places over all other dipoles v, where d points from the place to v."""
     leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.zeros(len(at))
     for row in range(len(at)):
         p = at[row]
@@ -394,7 +394,7 @@ def _potentials(
 def _fields(
     places: Floats, softening: Floats, charges: Floats, items: Ints, balls: Floats, nodes: Floats, at: Ints
 ) -> Floats:
-    """Sum ``c d / (|d|² + ε²)^(3/2)`` at places over all others, d pointing from these, with the place's own ε."""
+    """Sum ``c d / (|d|² + ε²)^(3/2)`` at places over all other charges c; d points from c to the place, which has ε."""
     leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.zeros((len(at), 3))
     for row in range(len(at)):
         p = at[row]

@@ -32,7 +32,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from .point_orientation import fitted_to_points
 
 DIPOLE_CELLS = 4
-"""Edge, in cells, of the blocks whose area vectors are one dipole for the walls."""
+"""Edge, in cells, of the blocks whose area vectors are summed to one dipole for the far field at the walls."""
 DIPOLE_CORE = 2.0
 """Within this distance, in cells, the field of a dipole is that of a ball."""
 FAR_FIELD = 10
@@ -40,7 +40,7 @@ FAR_FIELD = 10
 
 
 def winding_numbers(samples: AreaSamples) -> Floats:
-    """Winding numbers around the nodes of a grid in space, of a shape sampled there, smoothed over two cells."""
+    """Compute winding numbers at the nodes of a grid in space, of a shape sampled on it, smoothed over two cells."""
     shape, spacing = np.array(samples.nodes.shape[1:]), samples.nodes.steps[1:]
     nodes, vectors = samples.nodes.nonzero()
     nodes = nodes[:, 1:]
@@ -73,7 +73,7 @@ def winding_numbers(samples: AreaSamples) -> Floats:
 
 
 def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Floats]:
-    """Mean positions and sums of the area vectors in blocks of `DIPOLE_CELLS` cells."""
+    """Return the mean positions and the sums of the area vectors in each block of `DIPOLE_CELLS` cells."""
     blocks = np.floor(positions / DIPOLE_CELLS).astype(np.int64)
     blocks -= blocks.min(axis=0)
     owners = blocks[:, 0]
@@ -101,7 +101,7 @@ def _divergence(nodes: Ints, vectors: NDArray[np.float32], shape: tuple[int, ...
 
 
 def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, Floats]:
-    """Lattice of places, in cells, 8 cells apart, on a wall half a cell beyond the last nodes of the box."""
+    """Return a wall's axis, its end, and a lattice of places on it, in cells, half a cell beyond the last nodes."""
     lines = [np.linspace(-0.5, n - 0.5, max(2, 1 + -(-n // 8))) for n in shape]
     lines[axis] = lines[axis][[-1 if end else 0]]
     lattice = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
@@ -109,7 +109,7 @@ def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, Floats
 
 
 def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
-    """Interpolate values on a wall's lattice to its nodes."""
+    """Interpolate values on a wall's lattice to the nodes next to the wall."""
     for d, n in enumerate(m for k, m in enumerate(shape) if k != axis):
         place = (np.arange(n) + 0.5) / n * (values.shape[d] - 1)
         below = np.minimum(place.astype(np.int64), values.shape[d] - 2)
@@ -120,7 +120,7 @@ def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
 
 @compiled
 def _far_field(places: Floats, dipoles: Floats, strengths: Floats, axis: int, core: float) -> tuple[Floats, Floats]:
-    """Winding number at places, and its derivative along an axis."""
+    """Sum the winding numbers due to dipoles at places, and their derivatives along an axis."""
     value, slope = np.zeros(len(places)), np.zeros(len(places))
     for i in range(len(places)):
         for j in range(len(dipoles)):
@@ -145,7 +145,7 @@ SURE_WINDING = 0.4
 """The winding number, relative to that inside, decides instead of φ where it is nearer to 0 or 1 than this. φ bulges
 towards the corners of the box: of half a cow as points 11 % are wrong (20 % with .25, 32 % without the rule)."""
 FRAGMENT_LEVEL = 0.06
-"""A whole shape of at most this level bounds nothing. An eighth of the faces of a ball has .0625, 400 leaves anywhere
+"""A shape with a mean level below this bounds nothing. An eighth of the faces of a ball has .0625, 400 leaves anywhere
 up to .034, 40 on a stem .043."""
 
 
@@ -158,7 +158,7 @@ class Heat:
 
 
 def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0.0) -> tuple[Floats, Ints] | None:
-    """Extract the closed zero set of φ around a shape, in cells as wide as noise; None if it bounds nothing."""
+    """Extract the closed zero set of φ around a shape, with a given width of cells; None if it bounds nothing."""
     bounds = shape.bounds
     side = float(np.ptp(bounds, axis=0).max())
     nodes = int(np.clip((1 + 2 * HEAT_PADDING) * side / cell, *HEAT_NODES)) if cell > 0 else HEAT_NODES[1]

@@ -36,11 +36,11 @@ class Filled:
     Attributes
     ----------
     origins : (m,) int
-        The face that was given of each face, −1 of new ones: ``values[origins]`` carries values of faces over.
+        Number of each face in the given mesh, −1 for new ones: ``values[origins]`` carries values of faces over.
     filled : sequence of (k,) int
         Vertices around each hole that was closed.
     left : sequence of (k,) int
-        Vertices around each rim that is open still: holes that are larger, outlines of sheets.
+        Vertices around each rim that is still open: larger holes, and outlines of sheets.
     """
 
     origins: Ints
@@ -80,7 +80,7 @@ def fill_holes(
 ) -> FilledMesh | FilledPolygonMesh:
     """Close holes of a mesh, and leave everything else as it is.
 
-    Vertices and faces stay, in their order, whichever way they face, broken or not; new ones follow, and face as their
+    Vertices and faces stay in their order, whichever way they face, broken or not. New ones follow, and face as their
     neighbours do. Every rim of a part that bounds something is a hole. Sheets stay sheets: the longest rim of each is
     its outline. To make a solid of a broken shape, use `complete`.
 
@@ -99,9 +99,9 @@ def fill_holes(
     -------
     FilledMesh or FilledPolygonMesh
         A `TriangleMesh`, or a `PolygonMesh` of a mesh of polygons, with three more attributes: ``origins``, (m,) int,
-        the face that was given of each face, −1 of new ones; ``filled`` and ``left``, the vertices around each rim that
-        was closed, and that is open still. Where a lid is finer than the edges around it, triangles without area lie
-        between.
+        the number of each face in the given mesh, −1 for new ones; ``filled`` and ``left``, the vertices around each
+        rim that was closed, and that is still open. Where a lid is finer than the edges around it, triangles without
+        area lie between.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def fill_holes(
     points, added = closed_by(
         vertices, faces, bent=options.lids == "bent", outlines=np.concatenate([NO_EDGES, *outlines])
     )
-    virtual = len(vertices) - given.n_vertices  # within polygons, which no lid touches
+    virtual = len(vertices) - given.n_vertices  # vertices added within polygons, which no lid touches
     added = _as_neighbours(faces, turned, added)
     added = np.where(added < given.n_vertices, added, added - virtual)
     points = np.concatenate([given.vertices, points[len(vertices) :]])
@@ -158,7 +158,7 @@ def fill_holes(
 
 
 def _holes(around: Rims, lengths: Floats, faces: Ints, decided: Bounding, used: Ints) -> Bools:
-    """(l,) whether loops are holes: those along bounding faces, and all of a sheet but its longest."""
+    """(l,) whether loops are holes: those along bounding faces, and all loops of a sheet but the longest."""
     keys = (faces << 32 | np.roll(faces, -1, axis=1)).ravel()
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
@@ -189,7 +189,7 @@ def _through(around: Rims, vertices: Floats, named: Ints) -> Bools:
 
 
 def _as_neighbours(faces: Ints, turned: Bools, added: Ints) -> Ints:
-    """Turn new faces where most of the faces along their edges were turned from the way that they were given."""
+    """Turn new faces where most of the given faces next to them had been turned."""
     if not len(added):
         return added
     table = edge_table(np.concatenate([faces, added]))

@@ -23,7 +23,7 @@ from ..validation import array_of, finite_number, flag, positive_steps, refuse_b
 from .contouring import crossings_in, joined_crossings, traced
 
 Function: TypeAlias = Callable[[Floats], ArrayLike]
-"""Returns one number for each of (n, 3) points; gradients are three."""
+"""A function that returns one number for each of (n, 3) points; a gradient returns three."""
 NODES_AT_ONCE = 1 << 17
 """Batch size for calls of the function."""
 LEAST_WEIGHT = 1e-9
@@ -31,9 +31,9 @@ LEAST_WEIGHT = 1e-9
 EDGE_COSINE = np.cos(np.deg2rad(15.0))
 """An edge passes between nodes if the cosine between the slope at a node and the mean around it is below this."""
 KNOWN_SLOPE = 0.1
-"""Slopes that change by a larger share from node to node are not known well."""
+"""The slope at a node is not known well if it changes by a larger share of itself from node to node."""
 CLEAR_ERRORS = 0.25
-"""The maximum or the minimum of planes counts if the ratio of their errors at nodes is below this."""
+"""Planes are joined by their maximum, or minimum, if its error at nodes is below this share of that of the other."""
 CELL_CORNERS = np.array(list(np.ndindex(2, 2, 2)))
 """Corners of a cell."""
 
@@ -74,20 +74,20 @@ class Implicit:
 
 @dataclass(frozen=True, eq=False)
 class NodePlanes:
-    """Planes through values and slopes at nodes, mixed linearly, but at convex or concave edges their extremes."""
+    """A function that mixes planes at the nodes of a grid linearly; at sharp edges it is their maximum or minimum."""
 
     origin: Floats
     spacing: Floats
     values: Floats
     gradients: Floats
-    known: Bools  # nodes whose slopes are known well; others take those of their neighbours that are
+    known: Bools  # nodes whose slopes are known well; others take the mean slope of such neighbours
 
     def function(self, points: Floats) -> Floats:
         """(n,) values."""
         return self._values_and_slopes(points)[0]
 
     def gradient(self, points: Floats) -> Floats:
-        """(n, 3) slopes of the plane that counts, or of a mixture."""
+        """(n, 3) slopes: of the plane that is the extreme, or mixed."""
         return self._values_and_slopes(points)[1]
 
     def _values_and_slopes(self, points: Floats) -> tuple[Floats, Floats]:
@@ -139,8 +139,8 @@ def contour(
     """Extract the closed, manifold surface on which a function, or an array, takes a level.
 
     Normals point to greater values. Sharp surfaces have the edges and corners of the function, as those of
-    `Solid.surface` do, and do not intersect themselves. Where less than the level is left at the walls of the box, they
-    close it.
+    `Solid.surface` do, and do not intersect themselves. Where the function is less than the level at the walls of the
+    box, these close the surface.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def contour(
     bounds : (2, 3) float
         Lower and upper corner of the box; of an array, the places of its first and of its last node.
     spacing : float or (3,) float, optional
-        Size of the cells in which a function is looked at. Arrays have their own.
+        Size of the cells in which a function is sampled. Arrays have their own.
     level : float
         The level.
     sharp : bool
@@ -158,13 +158,12 @@ def contour(
         Gradients: of a function at (n, 3) points; of an array at its nodes, or a function that gives those.
         Differences by default.
     resolution : int, optional
-        Cells along the longest side of the box in which a function is looked at, unless there is a `spacing`; 128 by
-        default.
+        Number of cells along the longest side of the box, for a function without `spacing`; 128 by default.
 
     Returns
     -------
     TriangleMesh
-        Of functions with flat sides, edges and corners are exact to rounding where cells see them; surfaces that bend
+        Of functions with flat sides, edges and corners are exact to rounding where cells resolve them; those that bend
         are off by the square of the cells. Edges of arrays are exact where gradients are given; with differences they
         are off by up to a quarter of a cell, and corners and rims of holes by more.
 
@@ -223,7 +222,7 @@ def contour(
 
 
 def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats, grid: Grid, level: float) -> Implicit:
-    """Make the level set of a function; steps of differences balance rounding and curvature."""
+    """Make the level set of a function. By default, slopes are differences over steps that fit its precision."""
 
     def values(points: Floats) -> Floats:
         return _called(f, points, ())[..., 0] - level
@@ -246,7 +245,7 @@ def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats
 
 
 def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
-    """Call a function on points, and check its (n, 1) or (n, 3) finite numbers."""
+    """Call a function on points in batches, and check that it returns (n, 1) or (n, 3) finite numbers."""
     parts = [np.empty((0, *(shape or (1,))))]
     for begin in range(0, len(points), NODES_AT_ONCE):
         asked = points[begin : begin + NODES_AT_ONCE]
@@ -269,7 +268,7 @@ def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
 def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, level: float) -> tuple[Implicit, Grid]:
     """Make the level set of values f, (nx, ny, nz), in a box, and the grid to contour on, with walls outside.
 
-    `gradient` is slopes at nodes, (nx, ny, nz, 3), or a function; by default differences, unknown where they change.
+    `gradient` is (nx, ny, nz, 3) slopes at nodes, or a function; by default differences, unknown where they jump.
     """
     values = array_of(f, "f").astype(np.float64)
     if values.ndim != 3 or min(values.shape) < 2 or not np.isfinite(values).all():
@@ -308,7 +307,7 @@ def _slopes(values: Floats, axis: int) -> tuple[Floats, Floats]:
         return np.broadcast_to(np.moveaxis(v[1:] - v[:1], 0, axis), values.shape), np.zeros(values.shape)
     bends, middle = v[2:] - 2 * v[1:-1] + v[:-2], 0.5 * (v[2:] - v[:-2])
     least, sides, slopes = np.full(v.shape, np.inf), np.zeros(v.shape), np.empty_like(v)
-    for shift in (0, -1, 1):  # of the middle of the parabola; the one around the node if none bends less
+    for shift in (0, -1, 1):  # shift of the parabola's middle node; 0 unless another parabola bends less
         nodes = slice(1 - shift, len(v) - 1 - shift)
         bent = np.abs(bends) * (1.0 if shift else 0.5)
         better = bent < least[nodes]
@@ -316,6 +315,6 @@ def _slopes(values: Floats, axis: int) -> tuple[Floats, Floats]:
         least[nodes] = np.where(better, bent, least[nodes])
         if shift:
             sides[nodes] = np.fmax(sides[nodes], bent)
-    through = sides[1:-1] < CLEAR_ERRORS * np.abs(bends)  # both sides bend less by far: an edge runs through the node
+    through = sides[1:-1] < CLEAR_ERRORS * np.abs(bends)  # both sides bend far less: an edge runs through the node
     least[1:-1] = np.where(through, np.abs(bends), least[1:-1])
     return np.moveaxis(slopes, 0, axis), np.moveaxis(least, 0, axis)

@@ -1,7 +1,7 @@
 """The boundary of a solid as one closed mesh of the faces that were given and of what completes them.
 
-Where they do not join, the surface is contoured: within boxes around these places it is a contour, elsewhere the faces,
-and between them walls of the boxes where only one of them has the inside.
+Where they do not join, a contour replaces them within boxes around these places. Where only one of the two has its
+inside at a wall of a box, the wall closes the step between them.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ class Joined:
 
     points: Floats  # (n, 3)
     faces: Ints  # (m, 3)
-    bad: Ints  # (k, 2) ends of edges that do not cancel, and of those of faces that meet
-    open: bool  # whether there are any of the former
+    bad: Ints  # (k, 2) ends of unbalanced edges, and of edges of faces that pass through each other
+    open: bool  # whether any edges are unbalanced
 
     @classmethod
     def of(cls, points: Floats, faces: Ints) -> Joined:
@@ -60,7 +60,7 @@ class Joined:
 
 
 def given_surface(solid: Evaluated, contour: Callable[[], TriangleMesh], cell: float) -> tuple[TriangleMesh, Floats]:
-    """Triangles of a solid with the inside behind only, joined into a closed mesh, and (k, 3) where by a contour."""
+    """Join the bounding triangles of a solid into a closed mesh; return it, and (k, 3) places where it is a contour."""
     windings = solid.windings
     bounding = solid.triangles[solid.bounding]
     if not len(bounding):
@@ -96,14 +96,14 @@ def given_surface(solid: Evaluated, contour: Callable[[], TriangleMesh], cell: f
 
 
 def _conforming(whole: Joined, windings: Windings) -> Joined:
-    """Triangles divided where they end on each other or cross, without those that are inside then or there twice."""
+    """Divide triangles where they cross or end on each other, and drop parts that lie inside or cancel in pairs."""
     cut = partial(arranged, whole.points, whole.faces, None)
     pieces, regions = cut_and_sided(cut, np.ones(len(whole.faces), dtype=bool), windings)
     return Joined.of(pieces.points, _without_doubles(pieces.faces[regions.bounds]))
 
 
 def _without_doubles(faces: Ints) -> Ints:
-    """Faces without pairs on the same vertices that face opposite ways, and without those on fewer than three."""
+    """Drop pairs of faces on the same vertices that face opposite ways, and faces on fewer than three vertices."""
     first, reverse = coincident_faces(faces.ravel(), np.arange(0, faces.size + 1, 3))
     proper = first >= 0
     forth, back = (np.bincount(first[proper & (reverse == way)], minlength=len(faces)) for way in (False, True))
@@ -111,28 +111,28 @@ def _without_doubles(faces: Ints) -> Ints:
 
 
 def unjoined(places: Floats) -> str:
-    """Where a contour was taken, for messages."""
+    """Say where a contour was taken, for messages."""
     x, y, z = places[0]
     around = "one place" if len(places) == 1 else f"{len(places)} places, the first"
     return f"around {around} at ({x:.4g}, {y:.4g}, {z:.4g}), where they do not join: contoured there"
 
 
 def _along(edges: Floats, step: float) -> Floats:
-    """(n, 3) points on edges, (m, 2, 3), as far apart as that at most."""
+    """Return (n, 3) points on (m, 2, 3) edges, both ends among them, at most a step apart."""
     pieces = np.maximum(np.ceil(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1) / step), 1).astype(np.int64)
     row, number = numbered(pieces + 1)
     return edges[row, 0] + (number / pieces[row])[:, None] * (edges[row, 1] - edges[row, 0])
 
 
 def _far(surface: TriangleMesh, triangles: Floats, distance: float) -> Floats:
-    """(n, 3) vertices and centres of a surface that are that far from all triangles."""
+    """Return the (n, 3) vertices and face centres of a surface that are farther than a distance from all triangles."""
     points = np.concatenate([surface.vertices, surface.vertices[surface.faces].mean(axis=1)])
     tree = FaceTree.of_triangles(triangles)
     return points[tree.distances(points) > distance]
 
 
 def _exchanged(whole: Joined, windings: Windings, surface: TriangleMesh, boxes: Boxes) -> Joined:
-    """Triangles outside of boxes, those of a surface within, and walls of the boxes where one of them is inside."""
+    """Replace what is in boxes by a surface, and add walls of the boxes where only one of the two has its inside."""
     contour = surface.vertices[surface.faces]
     points, faces = indexed(np.concatenate([whole.points[whole.faces], contour, boxes.walls]))
     sets = np.repeat(np.arange(3), [len(whole.faces), len(contour), len(boxes.walls)])
@@ -163,7 +163,7 @@ def _without_crumbs(mesh: TriangleMesh, boxes: Boxes) -> TriangleMesh:
 class Boxes:
     """Cells of a grid."""
 
-    places: Ints  # (n, 3) their numbers along each axis
+    places: Ints  # (n, 3) indices of the cells along each axis
     cell: float  # length of their edges
     shift: Floats  # (3,) position of the grid's origin, in cells
 
@@ -213,7 +213,7 @@ def _among(places: Ints, others: Ints) -> Bools:
 
 
 def split_at_pinches(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
-    """Give parts of a closed mesh that touch along edges or at vertices their own: what is inside stays apart."""
+    """Double the edges and vertices at which parts of a closed mesh touch, so that the insides of parts do not meet."""
     points, faces = _split(points, faces)
     while True:
         table = edge_table(faces)
@@ -230,10 +230,11 @@ def split_at_pinches(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
 
 
 def _split(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
+    """Give each fan of faces around a vertex a vertex of its own."""
     table = edge_table(faces)
     starts, halfedges = table.halfedges
     edges = table.face_edges.ravel()
-    crowded = np.flatnonzero(table.face_counts[edges[halfedges]] > 2)  # which alone have more than one order
+    crowded = np.flatnonzero(table.face_counts[edges[halfedges]] > 2)  # two faces have only one order
     around = halfedges.copy()
     around[crowded] = _in_turn(points, faces, table.vertices[edges[halfedges[crowded]]], halfedges[crowded])
     previous = np.arange(len(around)) - 1
@@ -252,7 +253,7 @@ def _split(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
 
 
 def _in_turn(points: Floats, faces: Ints, ends: Ints, halfedges: Ints) -> Ints:
-    """Return (k,) halfedges in the order of their faces around edges, given the (k, 2) ends of these, edge by edge."""
+    """Sort (k,) halfedges, given edge by edge with (k, 2) ends of their edges, by the angles of faces around edges."""
     tails, heads = points[ends].swapaxes(0, 1)
     away = points[faces.ravel()[3 * (halfedges // 3) + (halfedges + 2) % 3]] - tails
     angles = angles_around(heads - tails, away)
