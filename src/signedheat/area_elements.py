@@ -1,8 +1,8 @@
 """Oriented area elements, the form in which the method takes every shape in space (Eq. 11 in space).
 
-Triangles, fans of polygons, segments of a polyline and oriented points are simplices with a vector: area times normal.
-They are bisected until they are no larger than a cell, and merged per cell and connected component, so that neither
-huge faces nor millions of tiny ones cost more than the cells that they pass through.
+Every shape is split into simplices with a vector, area times normal: triangles (polygons are split), segments of a
+polyline or oriented points. They are bisected until they are no larger than a cell, and merged per cell and connected
+component, so that neither huge faces nor millions of tiny ones cost more than the cells that they pass through.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
 
 AREA_NEIGHBORS = 8
-"""Neighbours from which the area of an oriented point is estimated."""
+"""Number of neighbours from which the area of an oriented point is estimated."""
 
 
 @dataclass(frozen=True, eq=False)
 class AreaElements:
     """Simplices with area vectors."""
 
-    corners: Floats  # (m, c, d): three for triangles, two for segments, one for points
+    corners: Floats  # (m, c, d) positions of c corners: three for triangles, two for segments, one for points
     vectors: Floats  # (m, d) area times unit normal
     weights: Floats  # (m,) area; negative for the parts of a nonconvex polygon's fan that lie outside it
     components: Ints  # (m,) connected component of the shape, from 0
@@ -51,7 +51,7 @@ class AreaElements:
 class AreaSamples:
     """Area elements merged per cell of a grid and per connected component."""
 
-    positions: Floats  # (s, d) mean position, in cells from the grid's origin
+    positions: Floats  # (s, d) mean position, from the grid's origin in units of its spacing
     vectors: Floats  # (s, d) sum of area times unit normal
     weights: Floats  # (s,) sum of areas
     components: Ints  # (s,) connected component of each sample
@@ -64,14 +64,14 @@ class AreaSamples:
     nodes: NodeSources  # X₀: the vectors spread to the nodes by linear interpolation, up to a common factor
 
     def chosen(self, rows: Ints) -> AreaSamples:
-        """Choose samples; what holds for all of them together stays."""
+        """Return some of the samples only; the values that describe all of them together stay as they are."""
         by_sample = ("positions", "vectors", "weights", "components", "source_ids")
         return replace(self, **{name: getattr(self, name)[rows] for name in by_sample})
 
 
 @singledispatch
 def area_elements(shape: Any) -> AreaElements:
-    """Lower a shape in space or in the plane to simplices with area vectors; further kinds of shapes register here."""
+    """Split a shape in space or in the plane into simplices with area vectors; every kind of shape registers here."""
     raise SourceError(
         f"distance in space is measured to a TriangleMesh, PolygonMesh or PointCloud with normals, in the plane to a "
         f"Polyline, not to a {type(shape).__name__}",
@@ -94,7 +94,7 @@ def _(shape: TetMesh) -> AreaElements:
 
 @area_elements.register
 def _(shape: PolygonMesh) -> AreaElements:
-    """Fans around centroids, whose area vectors add up to that of the polygon, planar and convex or not."""
+    """Split polygons into fans around centroids: their area vectors sum to the polygon's, planar and convex or not."""
     polygon = shape.corner_polygons
     fans = np.stack([shape.corners, shape.next_corners], axis=1)
     corners = np.concatenate([shape.polygon_centroids[polygon][:, None], shape.vertices[fans]], axis=1)
@@ -112,13 +112,13 @@ def _(shape: PointCloud) -> AreaElements:
         )
     areas = point_areas(shape.points) if shape.areas is None else shape.areas
     components = np.zeros(shape.n_points, dtype=np.int64)
-    sides = shape.points.shape[1] - 1  # dimension of the boundary; on a line single points bound, and have no spacing
+    sides = shape.points.shape[1] - 1  # dimension of the boundary; that of an interval is points without a spacing
     spacing = float(np.mean(areas)) ** (1.0 / sides) if sides else 0.0
     return AreaElements(shape.points[:, None], areas[:, None] * shape.normals, areas, components, spacing)
 
 
 def bounds_around(shapes: Sequence[Any]) -> Floats:
-    """(2, d) lower and upper corner of the box around shapes that have area elements."""
+    """Return the (2, d) lower and upper corner of the box around shapes; refuse shapes without area elements."""
     for shape in shapes:
         if area_elements.dispatch(type(shape)) is area_elements.dispatch(object):
             area_elements(shape)  # which raises
@@ -127,7 +127,7 @@ def bounds_around(shapes: Sequence[Any]) -> Floats:
 
 
 def point_areas(points: Floats) -> Floats:
-    """(n,) area, or volume in d − 1, of the disk up to the k-th neighbour over k; coinciding points share one."""
+    """Estimate (n,) areas of points: that of the disk up to the k-th neighbour, over k; coinciding points share one."""
     places, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     dimension = points.shape[1] - 1
     k = min(AREA_NEIGHBORS, len(places) - 1)
@@ -140,7 +140,7 @@ def point_areas(points: Floats) -> Floats:
 
 
 def components_of(vertices: Floats, faces: Ints) -> Ints:
-    """(m,) connected component of each face; vertices at the same position are one vertex."""
+    """Return the (m,) connected component of each face; vertices at the same position count as one."""
     return element_components(same_positions(vertices)[faces])
 
 

@@ -1,4 +1,4 @@
-"""Types of arrays with short names, frozen dataclasses that hold arrays, and a small cache for what they derive."""
+"""Short names for types of arrays, frozen dataclasses that hold arrays, and a small cache for what they derive."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def mask_of(n: int, ids: NDArray[np.integer] | list[int]) -> Bools:
 
 Number = TypeVar("Number", bound=np.generic)
 MOST_WRITTEN_OUT = 6
-"""Arrays and sequences of up to this many numbers are written out."""
+"""Largest number of entries of an array or a sequence that `short` writes out."""
 
 
 class Frozen:
     """A frozen dataclass whose copies and pickles hold only its fields; read-only arrays stay read-only.
 
-    Cached properties are computed again, since they are often larger than the fields, or in memory of other libraries.
+    Cached properties are computed again: they are often larger than the fields, or lie in memory of other libraries.
     """
 
     def __getstate__(self) -> tuple[dict[str, object], frozenset[str]]:
@@ -65,7 +65,7 @@ class ShortRepr:
 
 
 def short(value: object) -> str:
-    """Write a value as a short text: four digits of numbers, the size of arrays."""
+    """Write a value as a short text: numbers with four digits, large arrays as their shape."""
     if isinstance(value, np.ndarray):
         if value.ndim == 1 and value.size <= MOST_WRITTEN_OUT and value.dtype.kind in "biuf":
             return f"[{', '.join(short(entry) for entry in value.tolist())}]"
@@ -88,7 +88,7 @@ V = TypeVar("V")
 
 
 class LastUsed(Generic[K, V]):
-    """A few values by key, for what a frozen object derives from an argument; copies and pickles are empty."""
+    """A cache of the last few values that a frozen object derives from an argument; copies and pickles are empty."""
 
     def __init__(self, size: int = 1) -> None:
         self.size = size
@@ -96,7 +96,7 @@ class LastUsed(Generic[K, V]):
         self._lock = RLock()
 
     def __call__(self, key: K, make: Callable[[], V]) -> V:
-        """Return the value for a key, and make it unless it is kept."""
+        """Return the cached value for a key, or make it and cache it."""
         with self._lock:
             if key in self._values:
                 value = self._values.pop(key)
@@ -112,7 +112,7 @@ class LastUsed(Generic[K, V]):
 
 
 def fingerprint(*arrays: NDArray[Any]) -> bytes:
-    """Make a key of arrays, which only arrays with equal types, shapes and bits share."""
+    """Return a key that only arrays with equal types, shapes and bits share."""
     digest = hashlib.blake2b(digest_size=32)
     for array in arrays:
         digest.update(f"{array.dtype.str}{array.shape}".encode())

@@ -2,7 +2,7 @@
 
 Numba's own cache keeps compiled code on disk, and recognises a kernel by the text of its file. But a kernel also
 contains the kernels that it calls, and constants of other files. Therefore the cache's folder is named by a digest of
-them all: of the code as it was imported, since files may have been edited before a kernel is first called.
+all of these. It is made of the imported code, since files may have been edited before a kernel is first called.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ extending: Any = lazy_module("numba.extending", "compiled kernels")
 
 logger: logging.Logger = logging.getLogger("signedheat")
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-"""Division by zero raises nothing; and since C does not call kernels, no wrapper for it is compiled."""
+"""Options of ``numba.njit``: division by zero raises nothing, and no wrapper for calls from C is compiled."""
 WORD = re.compile(r"\w+")
 DAMAGE = OSError, EOFError, UnpicklingError
 """Errors of a cache whose files are damaged or cannot be written. Kernels raise none of them."""
@@ -48,7 +48,7 @@ class Kernel(Generic[Parameters, Returned]):
     """A function that Numba compiles at its first call, with a cache on disk. Kernels may call kernels."""
 
     is_kept: bool = True
-    """Whether compiled code is kept on disk: no longer once the cache is damaged, or the disk is full."""
+    """Whether compiled code is kept on disk: False once the cache is damaged or the disk is full."""
 
     def __init__(self, function: Callable[Parameters, Returned], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
@@ -59,7 +59,7 @@ class Kernel(Generic[Parameters, Returned]):
         try:
             return self.dispatcher(*arguments, **named)
         except Exception as error:
-            if isinstance(error.__cause__, KeyboardInterrupt):  # which Numba makes a SystemError of
+            if isinstance(error.__cause__, KeyboardInterrupt):  # Numba raises a SystemError from it
                 raise error.__cause__ from None
             if not Kernel.is_kept or not any(isinstance(each, DAMAGE) for each in _chain(error)):
                 raise
@@ -78,7 +78,7 @@ class Kernel(Generic[Parameters, Returned]):
             made.append(self)
             if numba.config.DISABLE_JIT:
                 return self.function
-            if Kernel.is_kept and Path(self.function.__code__.co_filename).is_file():  # not what was typed in
+            if Kernel.is_kept and Path(self.function.__code__.co_filename).is_file():  # not code typed into a console
                 folder = cache_folder() / _digest(self)
                 if not any(folder.glob("*/*.nbi")):
                     announce()
@@ -93,7 +93,7 @@ class Kernel(Generic[Parameters, Returned]):
 
 
 def _of_numbers(dispatcher: Any) -> Any:
-    """Compile a kernel that others call with a literal number for all numbers of its type, not for that one alone."""
+    """Make a dispatcher compile for all numbers of a type when another kernel calls it with a literal number."""
     compile_for = dispatcher.compile
 
     def compile_once(signature: Any) -> Any:
@@ -118,11 +118,11 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 
 def cache_folder() -> Path:
-    """Return the folder of compiled code; if it cannot be written, Numba uses that of the source, or its own."""
+    """Return the folder for compiled code; if it is not writable, Numba uses that of the source, or its own cache."""
     wanted = os.environ.get("NUMBA_CACHE_DIR")
     if wanted:
         return Path(wanted) / "signedheat"
-    with suppress(RuntimeError):  # no home
+    with suppress(RuntimeError):  # if there is no home folder
         base = {
             "win32": os.environ.get("LOCALAPPDATA") or Path.home() / "AppData/Local",
             "darwin": Path.home() / "Library/Caches",
@@ -134,7 +134,7 @@ def cache_folder() -> Path:
 def _digest(kernel: Kernel[..., Any]) -> str:
     """Digest Numba's version and the code, options, constants and classes of a kernel and of those that it calls.
 
-    Numba's cache knows named tuples by their modules, and does not find those that have moved.
+    Named tuples count since Numba's cache holds them by their modules, and fails if they have moved.
     """
     digest, seen, waiting = hashlib.sha256(repr(numba.version_info).encode()), set(), [kernel]
     while waiting:
@@ -159,7 +159,7 @@ def _digest(kernel: Kernel[..., Any]) -> str:
 
 
 def _named_tuples(mentioned: Iterable[Any], names: dict[str, Any]) -> Iterator[str]:
-    """Yield the module, name and fields of each named tuple that annotations mention, and of those within them."""
+    """Yield the module, name and fields of each named tuple that is mentioned, and of those that it contains."""
     for word in WORD.findall(" ".join(map(str, mentioned))):
         value = names.get(word)
         if isinstance(value, type) and hasattr(value, "_fields"):
@@ -168,7 +168,7 @@ def _named_tuples(mentioned: Iterable[Any], names: dict[str, Any]) -> Iterator[s
 
 
 def _spelled(value: Any) -> Any:
-    """Return code and constants as values whose text is the same in every process: sets have no order of their own."""
+    """Return code and constants as values whose text is the same in every process; sort sets, which have no order."""
     if isinstance(value, CodeType):
         return value.co_code, value.co_names, [_spelled(constant) for constant in value.co_consts]
     return sorted(map(repr, value)) if isinstance(value, frozenset) else value
@@ -182,7 +182,7 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
 
 @cache
 def _prepare() -> None:
-    """Make kernels types of Numba, so that compiled code can call them."""
+    """Register kernels as a type of Numba, so that compiled code can call them; check the number of threads."""
     threads = os.environ.get("NUMBA_NUM_THREADS")
     if threads is not None and not (threads.isdecimal() and 0 < int(threads) <= MOST_THREADS):
         raise SignedHeatError(

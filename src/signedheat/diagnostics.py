@@ -18,8 +18,8 @@ SMALL_SHARE = 0.005
 class Note(Frozen, ShortRepr):
     """A note on a computation, whose values are numbers and lists; ``str(note)`` is its text.
 
-    `text` is a format string in which ``{0.name}`` is a value of the note. `limits` are the greatest values, by name,
-    with which a note need not be read.
+    `text` is a format string in which ``{0.name}`` is a value of the note. A note is important if any of its values
+    exceeds the one of the same name in `limits`.
     """
 
     text: ClassVar[str] = ""
@@ -30,7 +30,7 @@ class Note(Frozen, ShortRepr):
 
     @property
     def important(self) -> bool:
-        """Whether it should be read before the result is trusted: commands print it."""
+        """Whether the note should be read before the result is trusted; commands print it if so."""
         return any(getattr(self, name) > limit for name, limit in self.limits.items())
 
     def __post_init__(self) -> None:
@@ -92,7 +92,7 @@ class Diagnostics(ShortRepr):
         Returns
         -------
         Note or None
-            The one of this type among `notes`.
+            The note of this type among `notes`.
 
         Examples
         --------
@@ -125,7 +125,7 @@ class Diagnostics(ShortRepr):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SampledSource(Note):
-    """The source on a grid, merged in its cells: number of samples, fractions of the area outside and cancelled."""
+    """How a source was merged in the cells of a grid: its samples, and the area lost outside and by cancellation."""
 
     samples: int
     area_outside: float
@@ -138,7 +138,7 @@ class SampledSource(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OutsideMesh(Note):
-    """Sources that leave the tet mesh: their indices, and the fraction of the area of each that is dropped."""
+    """Sources that leave the tet mesh: their indices, and the fraction of the area of each that is left out."""
 
     sources_outside: list[int]
     area_left_out: list[float]
@@ -150,7 +150,7 @@ class OutsideMesh(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShapeOriented(Note):
-    """How the faces of a shape were oriented; fractions are of its area. The values are those of `Orientation`."""
+    """How the faces of a shape were oriented; the values are those of `Orientation`, areas as fractions of the area."""
 
     turned_faces: int
     turned_area: float
@@ -176,7 +176,7 @@ class ShapeOriented(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OrientedPoints(Note):
-    """Number of normals of a point cloud that were fitted, and that were turned."""
+    """Numbers of the normals of a point cloud that were fitted, and of those that were turned."""
 
     normals_fitted: int
     normals_turned: int
@@ -189,7 +189,7 @@ class LeftOut(Note):
     """Faces that a union leaves out of a shape."""
 
     covered_faces: int = 0  # faces, or points, that lie inside other bodies, wholly or in part
-    covered_area: float = 0.0  # fraction of the area that does
+    covered_area: float = 0.0  # their fraction of the area
     cut_faces: int = 0  # faces that lie inside in part, and were cut
     limits: ClassVar[Mapping[str, float]] = {"covered_faces": 0}
     text: ClassVar[str] = (
@@ -200,7 +200,7 @@ class LeftOut(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FacesRestored(Note):
-    """Number of faces that were lost between vertices which are there, and are put back; their share of the area."""
+    """Number of missing faces that were restored between existing vertices, and their share of the area."""
 
     restored_faces: int
     restored_area: float
@@ -210,7 +210,7 @@ class FacesRestored(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SharpenedToShape(Note):
-    """Fraction of the zero set's triangles that distance is measured to, where the shape has no faces."""
+    """Fraction of the zero set's triangles to which distance is measured, in places where the shape has no faces."""
 
     completed_zero_set: float
     text: ClassVar[str] = "{0.completed_zero_set:.1%} of the zero set completes the shape"
@@ -218,11 +218,11 @@ class SharpenedToShape(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CompletedArea(Note):
-    """How much of the surface of a solid is its completion, not a face that was given."""
+    """How much of the surface of a solid was added by completion, and where."""
 
     completed_area: float  # in squared units of length
-    completed_share: float  # over the area of the whole surface
-    where: list[list[list[float]]]  # (k, 2, d) lower and upper corners of boxes around it
+    completed_share: float  # fraction of the area of the whole surface
+    where: list[list[list[float]]]  # (k, 2, d) lower and upper corners of boxes around the completion
     limits: ClassVar[Mapping[str, float]] = {"completed_share": SMALL_SHARE}
 
     def __str__(self) -> str:
@@ -268,7 +268,7 @@ class LargeAngles(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class WithoutLength(Note):
-    """Curves that were left out, by number, since all points of each coincide: a click where a stroke was meant."""
+    """Numbers of curves that were left out since their points coincide, as when a stroke has become a mere click."""
 
     without_length: list[int]
 
@@ -286,7 +286,7 @@ class SmallLoops(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class VerticesJoined(Note):
-    """Number of vertices of seams that are one with others at their place."""
+    """Number of vertices on seams that were joined with others at the same place."""
 
     vertices_joined: int
     text: ClassVar[str] = "vertices joined at seams: {0.vertices_joined}"
@@ -302,7 +302,7 @@ class VerticesAdded(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class IntrinsicTriangles(Note):
-    """The intrinsic triangulation on which distance was computed: summary of its angles."""
+    """Summary of the angles of the intrinsic triangulation on which distance was computed."""
 
     intrinsic_triangulation: str
     text: ClassVar[str] = "intrinsic triangulation: {0.intrinsic_triangulation}"
@@ -310,7 +310,7 @@ class IntrinsicTriangles(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PointsLeftOut(Note):
-    """Points of a cloud that coincide with earlier ones, and points without a triangle."""
+    """Number of points of a cloud that coincide with earlier ones, and the indices of points without a triangle."""
 
     duplicate_points: int
     points_without_triangles: list[int]
@@ -325,8 +325,8 @@ class SlopeErrors(Note):
 
     slope_error_before: float
     slope_error_after: float
-    # whether the slopes of most of the domain became worse, so that the field before is the better distance; cells
-    # without height and the kinks of a distance, which may raise the root mean square, do not count
+    # whether the slopes of most of the domain became worse, so that the field before is the better distance; flat cells
+    # and the kinks of a distance, which may raise the root mean square, hardly count
     worse: bool = False
 
     def __str__(self) -> str:
@@ -336,11 +336,11 @@ class SlopeErrors(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SharpenedToCurves(Note):
-    """To what distance of a field sharpened to curves is measured, and what decided its sign."""
+    """What a field that was sharpened to curves measures distance to, and what decides its sign."""
 
-    completed_length: float  # fraction of the length, given or completed, that is zero set of φ, where curve is missing
+    completed_length: float  # fraction of the length measured to that is zero set of φ, in place of missing curves
     free_ends: int  # ends of oriented curves inside the surface, and points where curves run head to head
-    sides_by_curves: float  # fraction of the vertices whose sign the curves decide; φ decides that of the others
+    sides_by_curves: float  # fraction of the vertices whose sign the curves decide; φ decides the others
     text: ClassVar[str] = (
         "{0.completed_length:.1%} of the curve completed between {0.free_ends} free ends; curves decide the sign of "
         "{0.sides_by_curves:.1%} of the vertices"
@@ -352,7 +352,7 @@ class GeodesicWindows(Note):
     """Number of windows in the exact polyhedral distance, a measure of the work."""
 
     windows: int
-    cut_short: bool = False  # whether some distances are lengths of paths along edges instead of shortest ones
+    cut_short: bool = False  # whether some distances are lengths of paths along edges instead of shortest paths
 
     def __str__(self) -> str:
         return f"windows: {self.windows}" + ("; some distances are along edges, too long" if self.cut_short else "")

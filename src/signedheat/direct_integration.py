@@ -26,12 +26,12 @@ COLUMNS_AT_ONCE = 32
 PIN_STIFFNESS = 1e6
 """Stiffness of the springs at vertices on the source, relative to the largest diagonal entry of C."""
 LEAST_STIFFNESS = 10.0
-"""Least stiffness of all springs together that hold φ, relative to the same."""
+"""Least total stiffness of the springs that hold φ in `anchored`, relative to the largest diagonal entry of C."""
 
 
 @dataclass(frozen=True, eq=False)
 class DirectIntegration(Frozen):
-    """``C φ = b`` on vertices, under the constraints of Sec. 7.1 except `fit`, which derived classes define."""
+    """Solver of ``C φ = b`` on vertices, with the constraints of Sec. 7.1; derived classes define `fit`."""
 
     stiffness: sparse.csr_matrix  # (n, n) upper triangle of C, whose kernel are the constants on each component
     factorize: Callable[..., Factor] = factorize  # of an upper triangle; takes the last `PardisoFactor` as `like`
@@ -104,10 +104,10 @@ class DirectIntegration(Frozen):
         return np.full(len(source.weights), self.spring * self.stiffness.diagonal().max())
 
     def _interpolate(self, rows: sparse.csr_matrix, forces: Floats, levels: Floats) -> tuple[Floats, Floats]:
-        """Minimise ``½ φᵀ C φ − fᵀ φ`` where ``A φ = l``; also the multipliers μ of ``C φ + Aᵀ μ = f`` (Eq. 14).
+        """Minimise ``½ φᵀ C φ − fᵀ φ`` where ``A φ = l``: φ, and the multipliers μ of ``C φ + Aᵀ μ = f`` (Eq. 14).
 
         ``C + ρ Aᵀ A`` is definite even if rows of A are dependent, and two or three rounds from the true residuals
-        suffice. Along nearly dependent rows conjugate gradients close the gaps, unless these contradict each other.
+        suffice. If rows are nearly dependent, conjugate gradients close the gaps, unless the levels contradict.
         """
         stiffness = whole(self.stiffness)
         spring = self.spring * self.stiffness.diagonal().max()
@@ -120,7 +120,7 @@ class DirectIntegration(Frozen):
         gap, worst, slow = levels, np.inf, False
         for _ in range(12):
             displacements = gap
-            if slow:  # roughly: what remains is left to the next round
+            if slow:  # a rough solution is enough, as the next round corrects it
                 displacements = conjugate_gradients(lambda d: rows @ pull(d), gap, tolerance=1e-3, limit=30)
             step = factor.solve(forces - stiffness @ values - rows.T @ multipliers) + pull(displacements)
             if worst < np.inf and np.abs(step).max() > 10.0 * np.abs(values).max():  # the rows contradict each other
@@ -135,7 +135,7 @@ class DirectIntegration(Frozen):
         return values, multipliers
 
     def _pulled_factor(self, rows: sparse.csr_matrix, springs: Floats) -> Factor:
-        """Factor of ``C + Aᵀ S A``; the last one is kept."""
+        """Return the factor of ``C + Aᵀ S A``, A the rows and S the springs; the last one is kept."""
         key = fingerprint(rows.indptr, rows.indices, rows.data, springs)
         return self._pulled(key, lambda: self._factorize_pulled(rows, springs))
 
@@ -172,7 +172,7 @@ class DirectIntegration(Frozen):
         return values - mean[self.components]
 
     def _at_samples(self, values: Floats, source: SourceTerm) -> Floats:
-        """(s,) φ on the source."""
+        """Interpolate φ at the (s,) samples of the source."""
         return source.interpolation @ values
 
 
@@ -185,7 +185,7 @@ def _grounded(matrix: sparse.csr_matrix, vertices: Ints) -> sparse.csr_matrix:
 
 
 def refuse_contradictions(rows: sparse.csr_matrix, levels: Floats, values: Floats, allowed: float) -> None:
-    """Refuse levels that some sample misses by more than is allowed, unless all are the same."""
+    """Refuse levels that φ misses at some sample by more than is allowed, unless all levels are the same."""
     gap = np.abs(levels - rows @ values)
     worst = int(gap.argmax())
     if np.ptp(levels) > 0 and gap[worst] > allowed:
@@ -198,7 +198,7 @@ def refuse_contradictions(rows: sparse.csr_matrix, levels: Floats, values: Float
 
 @dataclass(frozen=True, eq=False)
 class SpringIntegration(DirectIntegration):
-    """`DirectIntegration` with a `fit` by springs: across cells, exact levels make φ constant around the source."""
+    """`DirectIntegration` with a `fit` by springs: exact levels inside cells would make φ constant near the source."""
 
     strength: float = 0.0  # of the springs, in 1/length
 
@@ -241,7 +241,7 @@ class SpringIntegration(DirectIntegration):
         return self._pulled_factor(source.interpolation, springs * max(1.0, least / float(springs.sum())))
 
     def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, Floats]:
-        """(r, s) where springs of `fit` hold φ, as means of samples, and (r,) their stiffness."""
+        """Return an (r, s) matrix that averages samples to the places of the springs of `fit`, and (r,) stiffnesses."""
         return sparse.eye_array(len(source.weights), format="csr"), self.springs(source)
 
     def springs(self, source: SourceTerm) -> Floats:
@@ -250,5 +250,5 @@ class SpringIntegration(DirectIntegration):
         return np.where(at_vertex, PIN_STIFFNESS * self.stiffness.diagonal().max(), self.strength * source.weights)
 
     def corrected(self, levels: Floats, solve: Callable[[Floats], Floats], source: SourceTerm) -> tuple[Floats, Floats]:
-        """Return the levels that the linear interpolant of φ is given, and φ."""
+        """Return the levels imposed on the linear interpolant of φ, and the φ that `solve` finds for them."""
         return levels, solve(levels)

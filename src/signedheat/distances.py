@@ -147,12 +147,12 @@ def signed_distance(
         object of trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces). On a surface, `Curve` and
         `SurfacePoints`, or lists of (element, barycentric coordinates), as in potpourri3d. In the plane, `Polyline`.
     domain : Grid, TetMesh or surface, optional
-        Domain of the distance. By default, a grid of cubic cells around the shape or drawing. Curves need their
+        Where distance is computed. By default, a grid of cubic cells around the shape or drawing. Curves need their
         surface: a `TriangleMesh`, `PolygonMesh`, `PointCloud`, `DigitalSurface` or `IntrinsicTriangulation`.
     resolution : int
         Nodes along the longest side of the default grid; 128 by default.
     spacing : float or (d,) float, optional
-        Distance between its nodes, in place of `resolution`.
+        Distance between nodes of the default grid, in place of `resolution`.
     padding : float, optional
         Room around the shape, in its units; by default a fifth of its longest side.
     band : float, optional
@@ -179,8 +179,8 @@ def signed_distance(
     Returns
     -------
     GridField, TetField or VertexField
-        Negative inside shapes and filled outlines, and to the right of curves and strokes; positive on both sides of
-        sheets that bound nothing. ``diagnostics.notes`` say what was turned, left out and completed.
+        φ is negative inside shapes and filled outlines, and to the right of curves and strokes; positive on both sides
+        of sheets that bound nothing. ``diagnostics.notes`` say what was turned, left out and completed.
 
     Raises
     ------
@@ -251,7 +251,7 @@ def distance_to_solid(
 
 
 def is_plain(plain: bool, method: Heat) -> bool:
-    """Whether a field is the method's own: distance is zero on the whole shape, which some constraints deny."""
+    """Whether the method runs alone: if `plain`, or if the constraint allows levels other than zero on the shape."""
     return plain or isinstance(method.constraint, EachComponent | LevelValues)
 
 
@@ -264,7 +264,7 @@ def measured_distance(
     progress: Progress | None = None,
     **in_band: Any,
 ) -> Any:
-    """Measure distance to a shape or to lines; or run the method alone on the oriented shape, and sharpen nothing."""
+    """Measure distance to a shape or to lines; if `is_plain`, by the method alone, on the oriented shape."""
     if is_plain(plain, method):
         if isinstance(shape, TriangleMesh | PolygonMesh) and not options.as_oriented:
             shape = orient(shape)
@@ -352,7 +352,7 @@ def completed_distance(
     progress: Progress | None = None,
     **tiles: Any,
 ) -> GridField | TetField:
-    """Complete a shape, then measure the distance to it: on a grid in space as `Solid.field` does, or on tets."""
+    """Complete a shape, then measure distance to the solid: on a grid by `Solid.field`, or at the vertices of tets."""
     if band is not None and not isinstance(domain, Grid):
         raise UnsupportedTypeError("a band is computed around solids, on a grid in space", remedy="leave out the band")
     solid = completed(shape, options, method, within(progress, 0.0, 0.5))

@@ -22,7 +22,7 @@ from .packages import lazy_module
 from .validation import array_of, coordinates, element_ids
 
 ACCEPTED_SHAPES = "a shape of signedheat, trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces)"
-"""What functions accept as a shape, for messages."""
+"""What functions accept as a shape, in the words of error messages."""
 
 if TYPE_CHECKING:
     import meshio
@@ -43,12 +43,12 @@ Trimesh = TypeVar("Trimesh")
 VALUES_NAME = "signed_distance"
 """Name of the values of a field in objects of PyVista and in files."""
 CELL_SIDES = {"triangle": 3, "quad": 4}
-"""Number of sides of faces, by the type of cell of meshio; other polygons are ``polygon``."""
+"""Number of sides of faces by meshio's type of cell; other polygons have the type ``polygon``."""
 _VTK_FACES = (5, 7, 9)
-"""Types of cells of VTK that are faces: triangles, polygons and quadrilaterals; `_VTK_TETRA` is that of tets."""
+"""VTK's types of cells that are faces: triangle, polygon and quadrilateral; `_VTK_TETRA` is its type of tets."""
 _VTK_TETRA = 10
 FLAT_CELLS = ("vertex", "line", "triangle", "quad", "polygon")
-"""Beginnings of the names that meshio gives to cells without a volume; beside tets these are left out."""
+"""Prefixes of meshio's names for cells without volume. A mesh of tets may hold such cells, which are left out."""
 
 
 def with_values(thing: Any, values: NDArray[np.floating]) -> Any:
@@ -141,7 +141,7 @@ def _no_ids() -> Ints:
 
 @dataclass(frozen=True)
 class Elements:
-    """The elements of a shape, in this package and in the others."""
+    """The elements of a shape, the form in which it passes from one package to another."""
 
     points: NDArray[Any]  # (n, 3) vertices, or the points of a cloud
     corners: Ints = field(default_factory=_no_ids)  # vertex ids of all faces, one face after another
@@ -153,7 +153,7 @@ class Elements:
 
     @classmethod
     def of_triangles(cls, points: NDArray[Any], faces: Any, normals: NDArray[Any] | None = None) -> Elements:
-        """With faces as rows of three vertex ids."""
+        """Make the elements of a cloud, or of a mesh whose faces are rows of three vertex ids."""
         rows = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
         return cls(points, rows.ravel(), np.full(len(rows), 3), normals)
 
@@ -168,14 +168,14 @@ class Elements:
 
     @property
     def faces(self) -> list[Ints]:
-        """Vertex ids of each face; of tets without faces, of the outer ones."""
+        """Vertex ids of each face; for tets, of their outer faces."""
         if self.tets is not None:
             return list(outer_faces(self.points, self.tets))
         return np.split(self.corners, np.cumsum(self.counts)[:-1]) if len(self.counts) else []
 
     @property
     def triangles(self) -> Ints:
-        """(m, 3) vertex ids of the faces, which must be triangles; of tets without faces, the outer ones."""
+        """(m, 3) vertex ids of the faces, which must be triangles; for tets, of their outer faces."""
         if self.tets is not None:
             return outer_faces(self.points, self.tets)
         wrong = np.flatnonzero(self.counts != 3)
@@ -189,7 +189,7 @@ class Elements:
 
 
 def outer_faces(points: NDArray[Any], tets: Ints) -> Ints:
-    """(m, 3) vertex ids of the faces of tets that have a single tet, oriented outward."""
+    """Return the (m, 3) vertex ids of the faces that belong to one tet only, oriented outward."""
     ids = element_ids(tets, "tets", 4, len(points))
     turned = np.where(signed_volumes(coordinates(points, "vertices", 3), ids)[:, None] < 0, ids[:, [0, 1, 3, 2]], ids)
     table = face_table(turned)
@@ -368,7 +368,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
             )
             return meshio.Mesh(points, [("vertex", np.arange(len(points))[:, None])], point_data=normals)
         starts = np.cumsum(counts) - counts
-        change = np.flatnonzero(np.diff(counts, prepend=-1))  # a block has faces of one kind; the order is kept
+        change = np.flatnonzero(np.diff(counts, prepend=-1))  # one block for each run of equal faces keeps the order
         cells = []
         for first, last in zip(change, [*change[1:], len(counts)], strict=True):
             sides = int(counts[first])
@@ -422,7 +422,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
 
 
 def from_trimesh(thing: Any) -> Elements:
-    """From a `trimesh.Trimesh`, `trimesh.PointCloud`, or all meshes of a `trimesh.Scene`, each in its place."""
+    """Convert a `trimesh.Trimesh`, a `trimesh.PointCloud`, or all meshes of a `trimesh.Scene`, each in its place."""
     if hasattr(thing, "geometry") and hasattr(thing, "graph"):
         thing = thing.to_mesh()
         if not len(thing.faces):
@@ -433,7 +433,7 @@ def from_trimesh(thing: Any) -> Elements:
 
 
 def from_pyvista(thing: Any) -> Elements:
-    """From a `pyvista.PolyData`, `pyvista.UnstructuredGrid` or `pyvista.MultiBlock`."""
+    """Convert a `pyvista.PolyData`, `pyvista.UnstructuredGrid` or `pyvista.MultiBlock`."""
     if hasattr(thing, "n_blocks") and hasattr(thing, "combine"):
         thing = thing.combine()
     if hasattr(thing, "celltypes"):
@@ -454,7 +454,7 @@ def from_pyvista(thing: Any) -> Elements:
 
 
 def _from_cells(thing: Any) -> Elements:
-    """Take the faces of an unstructured grid; if there is none, its tets; else its points."""
+    """Convert the faces of an unstructured grid; without faces, its tets; without either, its points."""
     types = np.asarray(thing.celltypes)
     offsets = np.asarray(thing.cell_offsets if hasattr(thing, "cell_offsets") else thing.offset, dtype=np.int64)
     corners = np.asarray(thing.cell_connectivity, dtype=np.int64)
@@ -472,7 +472,7 @@ def _from_cells(thing: Any) -> Elements:
 
 
 def tets_of_pyvista(grid: Any) -> Ints:
-    """(t, 4) the tets of a `pyvista.UnstructuredGrid`; no other part of a volume may be left out."""
+    """Return the (t, 4) tets of a `pyvista.UnstructuredGrid`; refuse a grid that has other cells with volume."""
     cells = {int(kind): ids for kind, ids in grid.cells_dict.items()}
     if _VTK_TETRA not in cells or max(cells) > _VTK_TETRA:
         held = ", ".join(map(str, sorted(cells))) or "none"
@@ -481,7 +481,7 @@ def tets_of_pyvista(grid: Any) -> Ints:
 
 
 def from_meshio(thing: Any, as_points: bool = False) -> Elements:
-    """From a `meshio.Mesh`: its polygons, else its tets; `as_points`, a mesh of other cells alone is a cloud."""
+    """Convert the polygons of a `meshio.Mesh`, or else its tets or points; `as_points` ignores cells of other types."""
     if not hasattr(thing, "cells") or not hasattr(thing, "points"):
         raise _no_shape(thing, "a Mesh", "read it with meshio.read")
     blocks = [block.data for block in thing.cells if block.type in CELL_SIDES or block.type.startswith("polygon")]
@@ -498,7 +498,7 @@ def from_meshio(thing: Any, as_points: bool = False) -> Elements:
 
 
 def tets_of_meshio(mesh: Any) -> Ints:
-    """(t, 4) the tets of a `meshio.Mesh`; no other part of a volume may be left out."""
+    """Return the (t, 4) tets of a `meshio.Mesh`; refuse a mesh that has other cells with volume."""
     kinds = sorted({block.type for block in mesh.cells})
     if "tetra" not in kinds or not all(kind == "tetra" or kind.startswith(FLAT_CELLS) for kind in kinds):
         held = ", ".join(kinds) or "no cells"
@@ -511,7 +511,7 @@ def tets_of_meshio(mesh: Any) -> Ints:
 
 
 def from_open3d(thing: Any) -> Elements:
-    """From a `TriangleMesh` or `PointCloud` of ``open3d.geometry`` or ``open3d.t.geometry``."""
+    """Convert a `TriangleMesh` or `PointCloud` of ``open3d.geometry`` or ``open3d.t.geometry``."""
     tensors = getattr(thing, "vertex", None) or getattr(thing, "point", None)
     if tensors is not None:
         normals = tensors.normals.numpy() if "normals" in tensors else None
@@ -525,7 +525,7 @@ def from_open3d(thing: Any) -> Elements:
 
 
 def from_arrays(pair: Any) -> Elements:
-    """From a pair (vertices, faces): rows of positions, and rows of vertex ids of equal length or not."""
+    """Convert a pair (vertices, faces): rows of positions, and rows of vertex ids, which may differ in length."""
     points, faces = (array_of(part, "vertices and faces") if np.ma.isMaskedArray(part) else part for part in pair)
     if getattr(faces, "ndim", 0) == 2 and faces.dtype != object:
         flat = np.asarray(faces).astype(np.int64).ravel()
@@ -558,4 +558,4 @@ ELEMENTS_OF: dict[str, Callable[[Any], Elements]] = {
     "pyvista": from_pyvista,
     "trimesh": from_trimesh,
 }
-"""What an object of a package is made of, by the package; a pair (vertices, faces) is one of NumPy."""
+"""Function that converts an object to `Elements`, by the package of the object; for NumPy, a pair (vertices, faces)."""

@@ -1,4 +1,4 @@
-"""Fields as arrays, arithmetic of fields with numbers, and unions, intersections and differences of their solids."""
+"""Fields as arrays, arithmetic of fields and numbers, and unions, intersections and differences of fields of solids."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ Solid = TypeVar("Solid", bound=SolidField)
 
 
 class Arithmetic:
-    """A field of which ``-field``, ``2 * field``, ``field / 2`` and ``field + 1`` are fields, and ``numpy.asarray`` φ.
+    """A field with arithmetic: ``-field``, ``2 * field``, ``field / 2`` and ``field + 1`` are fields again.
 
-    So ``field - 0.1`` is the offset by 0.1, and ``-field`` the field of the other side. NumPy's functions take fields
-    for arrays of their values. A `GridField` that is exact between its nodes, as it holds its solid, stays so when it
-    is negated or multiplied, and when 0 is added; sums with other numbers are interpolated.
+    So ``field - 0.1`` is the offset by 0.1, and ``-field`` the field of the other side. NumPy's functions treat a field
+    as the array of its values. A `GridField` that is exact between its nodes, since it holds its solid, stays so when
+    it is negated or multiplied, and when 0 is added; sums with other numbers are interpolated.
 
     Examples
     --------
@@ -71,7 +71,7 @@ class Arithmetic:
     (array([ 1., -0., -1.]), 1.0, array([1., 0., 1.]))
     """
 
-    __array_priority__: float = 1000.0  # numbers of NumPy leave operators to the field
+    __array_priority__: float = 1000.0  # so that NumPy's numbers leave operators to the field
 
     def __array__(self: HasValues, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.values, dtype=dtype, copy=copy)
@@ -108,10 +108,10 @@ class Arithmetic:
 class Combinable(Arithmetic):
     """A field that is negative inside a solid or a region: ``a | b``, ``a & b``, ``a - b`` and ``~a`` are fields again.
 
-    If both fields hold their solids, the result is the distance to what those make, and exact like them. Otherwise it
-    has the right sign and zero set, but is a bound of the distance, not distance itself, on one side of the boundary
-    (inside a union, outside an intersection or a difference); `sharpen` turns it into distance. The confidence of
-    fields that were sharpened to a shape is not carried on.
+    If both fields hold their solids, the result is the exact distance to the combined solid. Otherwise it has the right
+    sign and zero set, but on one side of the boundary (inside a union, outside an intersection or a difference) it is
+    a bound of the distance, not distance itself; `sharpen` turns it into distance. The result does not have the
+    confidence of fields that were sharpened to a shape.
 
     Examples
     --------
@@ -124,17 +124,17 @@ class Combinable(Arithmetic):
     """
 
     def __or__(self: Solid, other: Solid) -> Solid:
-        """Union: inside where one of the two is."""
+        """Union: inside where at least one of the two fields is."""
         exact = _of_solids(self, other, operator.or_)
         return combined(self, other, np.less_equal, 0.0) if exact is None else exact
 
     def __and__(self: Solid, other: Solid) -> Solid:
-        """Intersection: inside where both are."""
+        """Intersection: inside where both fields are."""
         exact = _of_solids(self, other, operator.and_)
         return combined(self, other, np.greater_equal, 0.0) if exact is None else exact
 
     def __sub__(self: Solid, other: Solid | Number) -> Solid:
-        """Difference: inside where this is and the other is not. Of a number, it is taken from the values."""
+        """Difference: inside where this field is and the other is not; a number is subtracted from the values."""
         if isinstance(other, NUMBER_TYPES):
             return Arithmetic.__sub__(self, other)
         exact = _of_solids(self, other, operator.sub)
@@ -147,7 +147,7 @@ class Combinable(Arithmetic):
         return self._scaled(-1.0)
 
     def with_values(self: Solid, values: Floats) -> Solid:
-        """Return other values on the same domain, without what belongs to the present ones.
+        """Return a field of other values on the same domain.
 
         Parameters
         ----------
@@ -181,12 +181,12 @@ class Combinable(Arithmetic):
         Returns
         -------
         GridField, TetField or VertexField
-            With the values of the rule.
+            A field with the values that the rule returns.
 
         Raises
         ------
         GeometryError
-            If they are fields in different bands.
+            If the fields lie in different bands.
 
         Examples
         --------
@@ -227,23 +227,23 @@ class Combinable(Arithmetic):
         files.write_field(self, path)
 
     def _mapped(self: Solid, change: Change) -> Solid:
-        """Change the values, and drop the diagnostics."""
+        """Return a field of changed values, without the diagnostics."""
         return self.combined_with(self, lambda phi, _: change(phi))
 
 
 def smooth_union(a: Solid, b: Solid, width: float) -> Solid:
     """Unite two solids, with a round transition where they meet.
 
-    Where the two differ by less than w, the width, φ is the polynomial smooth minimum
-    ``min(a, b) − (w − |a − b|)² / 4w``; elsewhere it is the smaller of the two. The concave edge where they meet
-    becomes a fillet of about that size.
+    Where the two fields differ by less than the width w, φ is the polynomial smooth minimum
+    ``min(a, b) − (w − |a − b|)² / 4w``; elsewhere it is the smaller of the two. The concave edge where the solids meet
+    becomes a fillet of about that width.
 
     Parameters
     ----------
     a, b : GridField, TetField or VertexField
         On the same domain.
     width : float
-        Of the transition, in the units of the domain; 0 gives the smaller of the two everywhere.
+        Width of the transition, in the units of the domain; 0 gives the smaller of the two everywhere.
 
     Returns
     -------
@@ -298,7 +298,7 @@ def smooth_difference(a: Solid, b: Solid, width: float) -> Solid:
 
 
 def combined(a: Solid, b: Solid, takes_first: Callable[[Floats, Floats], Bools], bulge: float) -> Solid:
-    """Take `a` where `takes_first(a, b)`, else `b`, and blend over `bulge`, negative inwards; NaN where one is."""
+    """Take `a` where `takes_first(a, b)`, else `b`; a blend of width |bulge| raises φ, or lowers it if `bulge` < 0."""
     b = _checked(a, b)
 
     def rule(one: Floats, other: Floats) -> Floats:
@@ -313,7 +313,7 @@ def combined(a: Solid, b: Solid, takes_first: Callable[[Floats, Floats], Bools],
 
 
 def _of_solids(a: Solid, b: Solid, operation: Callable[[Any, Any], Any]) -> Any:
-    """Combine the solids of two fields, and compute the field of the result; None unless both have one that remains."""
+    """Compute the field of two fields' combined solids; None if one has no solid, or nothing is inside the result."""
     solids = [field if isinstance(field, HasFields) else getattr(field, "solid", None) for field in (a, b)]
     if not all(isinstance(solid, HasFields) for solid in solids):
         return None
@@ -327,7 +327,7 @@ def _of_solids(a: Solid, b: Solid, operation: Callable[[Any, Any], Any]) -> Any:
 
 
 def _checked(a: Solid, b: Solid) -> Solid:
-    """Return the second field if it can be combined with the first."""
+    """Return the second field, computed on the domain of the first if it is a solid; refuse what does not fit."""
     if not (hasattr(a, "with_values") and hasattr(a, "domain")):
         raise UnsupportedTypeError(
             f"fields of type {type(a).__name__} are not combined",
@@ -352,7 +352,7 @@ def _checked(a: Solid, b: Solid) -> Solid:
 
 
 def _same_domain(one: object, other: object) -> bool:
-    """Whether two domains have the same unknowns at the same places; grids may differ by rounding."""
+    """Whether two domains have the same unknowns at the same places, which on grids may differ by rounding."""
     if one is other:
         return True
     if isinstance(one, Grid) and isinstance(other, Grid):

@@ -25,7 +25,7 @@ One = TypeVar("One")
 Thing = TypeVar("Thing")
 
 PACKAGES = frozenset({"meshio", "open3d", "pyvista", "trimesh"})
-"""Packages whose objects are taken, by the name with which the modules of their classes begin."""
+"""Packages whose objects are accepted, by their names in imports."""
 
 
 class Represented(ABC):
@@ -34,7 +34,7 @@ class Represented(ABC):
     @property
     @abstractmethod
     def boundary(self) -> TriangleMesh:
-        """Its surface."""
+        """The surface of this."""
 
 
 class HasVertices(Protocol):
@@ -95,7 +95,7 @@ def what_to_pass(thing: object) -> str:
 
 
 def package_of(thing: object) -> str | None:
-    """Return which of the `PACKAGES` made an object, whose class may be derived from theirs; None for others."""
+    """Return the one of `PACKAGES` that defines an object's class or a base class of it; None for other objects."""
     roots = (kind.__module__.partition(".")[0] for kind in type(thing).__mro__)
     return next((root for root in roots if root in PACKAGES), None)
 
@@ -159,7 +159,7 @@ def converted(thing: Thing) -> Thing:
 
 
 def shape_of(elements: Elements) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh:
-    """Make a shape of the kind that fits."""
+    """Make a shape of these elements, of the kind that fits them."""
     if elements.tets is not None:
         return TetMesh(elements.points, elements.tets)
     kinds = {kind.__name__: kind for kind in (TriangleMesh, PolygonMesh, PointCloud)}
@@ -189,7 +189,7 @@ def refuse_arrays(things: Sequence[object]) -> None:
 
 
 def as_shapes(things: Thing | Sequence[Thing]) -> list[Thing]:
-    """List one argument or several, with every shape of another package among them converted (see `as_shape`)."""
+    """Return one argument or several as a list, with every shape of another package converted (see `as_shape`)."""
     several = isinstance(things, Sequence) and not isinstance(things, str)
     if is_pair(things) or package_of(things) is not None:
         several = False
@@ -221,7 +221,7 @@ def elements(shape: SurfaceShape, values: Mapping[str, NDArray[np.floating]] = M
 
 
 def as_list(sources: One | Sequence[One]) -> list[One]:
-    """List one source or several, with those of other packages as shapes; refuse an empty list."""
+    """Return one source or several as a list, with every shape of another package converted; refuse an empty list."""
     listed: list[One] = as_shapes(sources)
     if not listed:
         raise SourceError("no source was given", remedy="pass at least one curve, point or shape")

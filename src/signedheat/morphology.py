@@ -123,7 +123,7 @@ def dilate(
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh, PointCloud; in the plane Polyline; on a surface Curve; or a sequence of them
-        The shape, which may be broken. What is inside is what `signedheat.signed_distance` says.
+        The shape, which may be broken; inside is where `signedheat.signed_distance` is negative.
     distance : float
         The offset, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
@@ -241,14 +241,14 @@ def offset(
     distance : float, (n,) float or callable
         Positive outside, negative inside. An array has a distance for each vertex of a mesh or point of a cloud, and is
         interpolated linearly; a function maps (n, 3) places on the shape to distances. The grid has room for its values
-        at vertices and at some thousand places between them.
+        at the vertices and at some thousand places between them.
     corners : {"round", "mitre", "sharp"}
-        Shape of edges that the surface moves away from: round at the distance; or the offset planes of the faces,
-        extended up to two distances ("mitre", which keeps boxes) or ten ("sharp").
+        Shape of edges where offset faces move apart: rounded at the distance ("round"), or mitred: the offset planes
+        of the faces are extended up to two distances ("mitre", which keeps boxes) or ten ("sharp").
     resolution : int
         Nodes along the longest side of a grid around the surface.
     spacing : float or (3,) float, optional
-        Size of its cells, in place of `resolution`.
+        Size of the grid's cells, in place of `resolution`.
     progress : callable, optional
         Called as ``progress(fraction, step)``. An exception that it raises cancels.
 
@@ -260,9 +260,9 @@ def offset(
     Raises
     ------
     OutsideError
-        If no cell of the grid has the surface.
+        If the surface passes through no cell of the grid.
     SignedHeatError
-        If a distance is not finite, or an array does not have one for each vertex.
+        If a distance is not finite, or an array does not have one distance for each vertex.
 
     Examples
     --------
@@ -292,7 +292,7 @@ def offset(
 
 
 def offset_of(field: Any, distance: float) -> Any:
-    """Return the boundary at a distance from what a field measures, with edges if it holds all of its solid."""
+    """Extract the level set of a field at a distance, with sharp edges if the field holds its solid and is no band."""
     if isinstance(field, GridField) and isinstance(field.solid, Solid) and field.blocks is None:
         distance = finite_number(distance, "the distance")
         if np.nanmin(field.values) < distance < np.nanmin(values_at_walls(field)):
@@ -314,8 +314,8 @@ def shell(
 ) -> TriangleMesh:
     """Make a wall: the solid between two offsets of a shape, ``inner ≤ φ ≤ outer``, in which holes are closed.
 
-    Cavities smaller than a ball whose diameter is the thickness of the wall are filled. If no place of the shape is as
-    deep as the wall, the shape is not hollowed, with an `InexactWarning`.
+    Cavities smaller than a ball whose diameter is the thickness of the wall are filled. If nothing of the shape lies
+    deeper than the inner side, the shape is not hollowed, and an `InexactWarning` is issued.
 
     Parameters
     ----------
@@ -408,15 +408,15 @@ def thicken(
     Parameters
     ----------
     sheet : TriangleMesh or PolygonMesh
-        A surface with boundary, or any other; to both sides alike its orientation does not matter.
+        A surface, with boundary or not. If both sides get the same thickness, its orientation does not matter.
     above : float
         Thickness on each side.
     below : float, optional
-        Thickness behind the faces, if it differs; `above` is then that on the side of their normals.
+        Thickness behind the faces, if it differs; `above` is then the thickness on the side of their normals.
     domain : Grid, optional
         By default a grid around the sheet with room for the result.
     side : {"outside", "inside", "both"}
-        On which side, where `below` is left out: that of the normals, behind them, or both.
+        Where to thicken if `below` is left out: on the side of the normals, behind the faces, or on both sides.
     faces : (k,) int or (m,) bool, optional
         Thicken these faces only. ``complete(part) | complete(thicken(part, 0.2, side="outside", faces=chosen))`` adds
         to a part.
@@ -462,7 +462,7 @@ def thicken(
 
 
 def _chosen(sheet: object, faces: ArrayLike) -> TriangleMesh | PolygonMesh:
-    """Return the mesh of some faces."""
+    """Return the mesh of the faces with some numbers, or of those for which a boolean array is True."""
     sheet = converted(sheet)
     if not isinstance(sheet, TriangleMesh | PolygonMesh):
         raise SourceError("faces can be chosen for a single mesh only", element="faces", remedy="pass it alone")
@@ -480,7 +480,7 @@ def _chosen(sheet: object, faces: ArrayLike) -> TriangleMesh | PolygonMesh:
 
 
 def _linear(shape: Shapes, values: Floats) -> Reach:
-    """Interpolate values linearly between the vertices of a mesh, or take that of the nearest point of a cloud."""
+    """Return a function that interpolates values at the vertices of a mesh, or at the nearest point of a cloud."""
     mesh = shape.source if isinstance(shape, Solid) else as_shape(shape)  # type: ignore[arg-type]
     if not isinstance(mesh, TriangleMesh | PolygonMesh | DigitalSurface | PointCloud):
         raise UnsupportedTypeError(
@@ -572,7 +572,7 @@ def _offsets(
     resolution: int | None,
     measure: Measure,
 ) -> Boundary:
-    """Offset successively, outward for a sign of 1 and inward for −1, and compute the distance again each time."""
+    """Offset a shape once for each sign, outward for 1 and inward for −1; compute the distance again each time."""
     distance = finite_number(distance, "the distance", least=0)
     domain = _given_or_room(domain, shape, distance if 1 in signs else 0.0, resolution)
     for sign in signs:
@@ -582,7 +582,7 @@ def _offsets(
 
 
 def _given_or_room(domain: Domain | None, shape: Sources, reach: float, resolution: int | None) -> Domain:
-    """Return the domain; by default, a grid around a shape, with room for offsets."""
+    """Return the domain, or if it is None, a grid around the shape with room for offsets up to `reach`."""
     if domain is not None:
         refuse_beside("a domain", resolution=resolution)
         return domain

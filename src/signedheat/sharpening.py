@@ -49,18 +49,18 @@ def sharpen(
 
     This is Section 7.3 of the paper.
 
-    On grids: the distance of every node to the zero set, second order, with the signs of the field. A field that holds
-    the solid of `complete` is exact already, and stays so.
+    On grids: the distance of every node to the zero set, with second-order accuracy and the signs of the field. A field
+    that holds the solid of `complete` is exact already, and stays so.
 
     On surfaces: exact geodesic distance on the polyhedral surface, up to a tolerance (`Geodesic`, the default). For
     smooth curves on good triangles, such as a circle at ``t = h²``, mainly the largest errors become smaller. With a
     `source`: exact distance to the curves and points themselves, however they cross the faces. In regions that curves
-    bound, these decide the side; elsewhere the field does, and its zero set replaces missing curve where it is
-    farther from any curve than the triangles are large, or begins at the free end of one.
+    bound, the curves decide the sign; elsewhere the field does, and its zero set replaces missing curves where it is
+    farther from all curves than the size of a triangle, or begins at a free end of a curve.
 
     On tets: distance along straight lines in space, which bend around the boundary of the mesh, to the zero set. With a
     `source`: to the faces of the shape, exactly, and to the zero set where it is farther than one and a half edges
-    from any. Within two edges of a face the face decides the side, where the surface is closed there.
+    from all faces. Within two edges of a face the face decides the sign, if the surface is closed there.
 
     On surfaces and tets ``method=Convex()`` is the method of the paper, which is less accurate but can correct wrong
     signs. On tets it usually increases the error: gradients of length at most one in every tet make the field too
@@ -91,11 +91,12 @@ def sharpen(
     UnsupportedTypeError
         If this kind of field cannot be sharpened, or not by this method.
     OutsideError
-        If the field has the same sign everywhere, or is NaN everywhere; with a source, if that has no faces besides.
+        If the field has the same sign everywhere, and no source with faces or curves is given; or if it is NaN
+        everywhere.
     GeometryError
         If a value is infinite.
     SourceError
-        If the source is none that the field can be sharpened to.
+        If the field cannot be sharpened to a source of this kind.
 
     Examples
     --------

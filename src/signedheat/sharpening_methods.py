@@ -1,4 +1,4 @@
-"""Methods of sharpening (Sec. 7.3): distance to the nearest of a source and the zero set of φ, and a convex problem.
+"""Methods of sharpening (Sec. 7.3): distance to the nearer of a source and the zero set of φ, and a convex problem.
 
 The error of the heat method is smooth and decreases slowly under refinement. Both methods remove most of it.
 """
@@ -39,9 +39,9 @@ from .tets.tet_field import TetField
 from .validation import finite_number, positive_number
 
 ADDED_SLOPE_ERROR = 0.1
-"""Mean deviation of slopes from 1, each counted as 1 at most, that sharpening may add; .08 on triangles."""
+"""Increase of `LinearElements.bounded_slope_error` that sharpening may cause without a warning; .08 on triangles."""
 CURVE_TOLERANCE = 1e-5
-"""Tolerance of distance to curves. At a tenth of that of `Geodesic`, distance depends on the order of faces by less
+"""Tolerance of distance to curves, a tenth of that of `Geodesic`: the order of faces then changes distance by less
 than 1e-6 of its range."""
 
 
@@ -55,7 +55,7 @@ class LinearElements:
 
     @classmethod
     def of(cls, corners: Ints, sizes: Floats, hats: Floats, n: int) -> LinearElements:
-        """Make elements of the gradients (m, d + 1, d) of the hat functions of each cell."""
+        """Make elements from (m, d + 1, d) gradients, those of the hat functions of each cell."""
         m, k = corners.shape
         d = hats.shape[2]
         columns = np.repeat(corners[:, None], d, axis=1)
@@ -64,14 +64,14 @@ class LinearElements:
 
     @classmethod
     def on_triangles(cls, triangles: IntrinsicMesh) -> LinearElements:
-        """Elements of a surface; gradients are in the layout of each face."""
+        """Make the elements of a surface, with the gradients of each face in the face's own planar layout."""
         slopes = 1j * np.roll(triangles.edge_vectors, -1, axis=1) / (2.0 * triangles.face_areas)[:, None]
         hats = np.stack([slopes.real, slopes.imag], axis=2)
         return cls.of(triangles.corner_vertices, triangles.face_areas, hats, triangles.n_vertices)
 
     @classmethod
     def on_tets(cls, tets: Tetrahedra, corners: Ints, n: int) -> LinearElements:
-        """Elements of a tet mesh; thin tets have a reduced weight, as they have in C, and flat ones none."""
+        """Make the elements of a tet mesh; thin tets have a reduced weight, as they have in C, and flat ones none."""
         flat = tets.thickness < 1e-10
         hats = tets.area_vectors / np.where(flat, -np.inf, -3.0 * tets.volumes)[:, None, None]
         return cls.of(corners, np.where(flat, 0.0, tets.weights * tets.volumes), hats, n)
@@ -95,7 +95,7 @@ class LinearElements:
         return float(np.sqrt(self._mean((np.linalg.norm(self.slopes(values), axis=1) - 1.0) ** 2)))
 
     def bounded_slope_error(self, values: Floats) -> float:
-        """Mean of ``min(| |∇φ| − 1 |, 1)``: hardly moved by cells without height, nor by the kinks of a distance."""
+        """Mean of ``min(| |∇φ| − 1 |, 1)``, which depends little on flat cells and on the kinks of a distance."""
         return self._mean(np.minimum(np.abs(np.linalg.norm(self.slopes(values), axis=1) - 1.0), 1.0))
 
     def _mean(self, errors: Floats) -> float:
@@ -105,9 +105,9 @@ class LinearElements:
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """The nearest of a source and of the zero set of φ, for each unknown."""
+    """Distance from each unknown to the nearer of a source and the zero set of φ."""
 
-    distances: Floats  # (n,) unsigned; inf where neither is in the same component of the domain
+    distances: Floats  # (n,) unsigned; inf where the component of the domain has neither
     sides: Ints  # (n,) 1 or −1 where the source decides the sign; 0 where φ does
     notes: tuple[Note, ...] = ()  # for the diagnostics
 
@@ -116,10 +116,10 @@ class Nearest:
 def nearest(
     domain: Any, values: Floats, source: SourceTerm | None, given: Any, tolerance: float, report: Report | None
 ) -> Nearest:
-    """Measure to the nearest of a source and the zero set of φ; every kind of domain registers a function of its own.
+    """Measure to the nearer of a source and the zero set of φ; every kind of domain registers a function of its own.
 
-    `source` is what φ was computed from; distance is exact to what is `given`, which the zero set completes. `report`
-    is called now and then, and may raise.
+    `source` is what φ was computed from. `given`, if not None, are curves or shapes to which distance is exact, and
+    which the zero set completes. `report` is called now and then, and may raise to cancel.
     """
     raise UnsupportedTypeError(f"there are no straight lines on a {type(domain).__name__}", element="method")
 
@@ -127,7 +127,7 @@ def nearest(
 def distance_to_nearest(
     domain: Any, values: Floats, source: SourceTerm | None, given: Any, tolerance: float, progress: Progress | None
 ) -> tuple[Floats, tuple[Note, ...]]:
-    """Measure signed distance to the nearest of a source, which decides signs, and the zero set; also return notes."""
+    """Measure signed distance to the nearer of a source and the zero set; also return notes for the diagnostics."""
     report = None if progress is None else lambda: progress(0.0, "sharpen")
     places = nearest(domain, values, source, given, tolerance, report)
     reached = np.isfinite(places.distances)
@@ -159,7 +159,7 @@ class Method(Protocol):
         Parameters
         ----------
         discretization : Discretization
-            That of the domain.
+            The discretisation of the domain.
         elements : LinearElements
             Elements on which φ is linear.
         values : (n,) float
@@ -246,7 +246,7 @@ class Convex(Method):
     Parameters
     ----------
     tolerance : float
-        Stop when the root mean squares of primal and dual residual, which are slopes, are below this.
+        Stop when the root mean squares of the primal and the dual residual, both slopes, are below this.
     max_rounds : int
         Largest number of iterations; the residuals are in the diagnostics.
     relaxation : float
@@ -287,14 +287,14 @@ class Convex(Method):
                 "intrinsic_delaunay(mesh) if need be instead of with intrinsic=True",
             )
         integration = discretization.integration
-        assert isinstance(integration, DirectIntegration)  # of surfaces and tets, whose elements these are
+        assert isinstance(integration, DirectIntegration)  # as on surfaces and tets, which have linear elements
         sizes, total = elements.sizes, elements.sizes.sum()
         with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they gain
             factor = integration.anchored(source)
             phi = np.nan_to_num(values)
             reach = max(float(np.ptp(phi)), typical_size(sizes, elements.slopes(phi).shape[1]))
             pull = elements.masses * np.sign(phi) / reach
-            start = at_most_one(elements.slopes(phi))  # which may be the slopes of rounding alone
+            start = at_most_one(elements.slopes(phi))  # not normalised, since they may be mere rounding errors
 
             def solve(target: Floats) -> Floats:
                 return factor.solve(pull + elements.divergence(target))
@@ -317,7 +317,7 @@ def at_most_one(vectors: Floats) -> Floats:
 
 
 def typical_size(sizes: Floats, dimension: int) -> float:
-    """Return the typical size of cells as a length: a field that varies by less is constant, and has no scale."""
+    """Return the typical size of cells as a length: a field that varies by less counts as constant."""
     return float(sizes.mean() ** (1 / dimension))
 
 
@@ -338,7 +338,7 @@ def sharpened(
     method: Method | None,
     progress: Progress | None,
 ) -> tuple[Floats, Diagnostics]:
-    """Sharpen the values of a field on a surface or on tets; note the slope errors before and after."""
+    """Return the sharpened values of a field on a surface or on tets, and diagnostics with the slope errors."""
     if source is not None and method is not None:
         raise UnsupportedTypeError(
             "a method measures to the zero set alone", remedy="leave out the method or the source", element="method"
@@ -367,7 +367,7 @@ def sharpened(
 def timed(
     run: Callable[[], tuple[Floats, tuple[Note, ...]]], before: Diagnostics, progress: Progress | None
 ) -> tuple[Floats, Diagnostics]:
-    """Run a function that makes values and notes; return the values, and diagnostics with the notes and its seconds."""
+    """Run a function that returns values and notes; return the values, and diagnostics with the notes and its time."""
     begin = time.perf_counter()
     if progress is not None:
         progress(0.0, "sharpen")

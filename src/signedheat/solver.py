@@ -60,7 +60,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     Parameters
     ----------
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Grid
-        Where distance is measured. Vertices of the rims of a mesh at one place, as along seams, are one.
+        Where distance is measured. Vertices on rims of a mesh that coincide, as along seams, are treated as one.
     diffusion : float or Extrapolated, optional
         τ in ``t = τ h²``, h the mean distance between unknowns; the paper's is 1. Larger values close gaps in broken
         sources along rounder lines. By default 1 in space and, on surfaces, `Extrapolated`.
@@ -69,9 +69,9 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     intrinsic : "auto", True or False
         Whether the method runs on an intrinsic Delaunay refinement of a triangle mesh. "auto": where large angles or
         needles would make distance inaccurate, the mesh is refined once, and all sources share it and its factors.
-        True: a refinement for every set of sources, along whose edges they run, for curves smaller than triangles. On
-        CAD it has .3 to .9 of the error of "auto", for a factorisation for every set. False: the triangles as they
-        are. For more control use `intrinsic_delaunay` as the domain.
+        True: every set of sources gets its own refinement, with edges along the sources, for curves smaller than
+        triangles. On CAD models its error is .3 to .9 times that of "auto", at the cost of a factorisation for every
+        set. False: the triangles as they are. For more control, pass the result of `intrinsic_delaunay` as the domain.
 
     Raises
     ------
@@ -204,7 +204,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         return to_field(discretization, values, source, diagnostics)
 
     def _prepared(self, sources: Sources, constraint: Constraint) -> _Prepared:
-        """Prepare sources for diffusion; warn of curves with one side only."""
+        """Prepare sources for diffusion, and warn of curves that have one side only."""
         listed, left_out = given_curves(self.domain, as_list(sources))
         kept = numbers_kept(len(listed), left_out)
         _warn_of_one_sided_curves(self.domain, listed, kept)
@@ -212,7 +212,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         terms = lowered_for_times(discretization, adapted, self._times(discretization))
         if isinstance(constraint, LevelValues):
             if len(constraint.values) == len(kept) + (0 if left_out is None else len(left_out.without_length)):
-                last = int(terms[0].source_ids.max())  # the others lie outside the domain
+                last = int(terms[0].source_ids.max())  # later sources lie outside the domain
                 constraint = replace(constraint, values=[constraint.values[k] for k in kept[: last + 1]])
         return _Prepared(discretization, terms, () if left_out is None else (left_out,), constraint)
 
@@ -296,7 +296,7 @@ def distance_unwarned(
 @overload
 def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constraint: Constraint | None) -> Field: ...
 def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constraint: Constraint | None) -> Field:
-    """Compute `SignedHeatSolver.distance` without its warning, for callers that then measure to the curves exactly."""
+    """Compute `SignedHeatSolver.distance` without warning of small curves, for callers that then measure exactly."""
     return solver._distance(sources, constraint)
 
 

@@ -32,15 +32,15 @@ def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
 
 @within_memory
 def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Floats:
-    """`values` as a new float64 array of any shape; whatever holds anything but real numbers is refused."""
+    """Return `values` as a new float64 array of any shape; refuse anything but real numbers."""
     array = array_of(values, name, error)
     try:
         if array.dtype.kind not in "biufO":
             raise TypeError
         if array.dtype.kind == "O" and any(value is None or isinstance(value, str | bytes) for value in array.flat):
-            raise TypeError  # NumPy makes NaN of nothing, and reads texts
+            raise TypeError  # NumPy would convert None to NaN, and parse text
         with warnings.catch_warnings():
-            warnings.simplefilter("error")  # whatever is lost in converting
+            warnings.simplefilter("error")  # refuse what would lose something in the conversion
             return np.array(array, dtype=np.float64)
     except (TypeError, ValueError, OverflowError, RuntimeWarning):
         raise error(f"{name} must be real numbers, not {_described(array)}", element=name) from None
@@ -48,7 +48,7 @@ def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryEr
 
 @within_memory
 def contiguous(values: object, name: str) -> Floats:
-    """`values` as a float64 array of any shape, copied only if it is none yet."""
+    """Return `values` as a contiguous float64 array of any shape, copied only if necessary."""
     if isinstance(values, np.ndarray) and values.dtype == np.float64 and not np.ma.isMaskedArray(values):
         return np.ascontiguousarray(values)
     return numbers(values, name)
@@ -56,7 +56,7 @@ def contiguous(values: object, name: str) -> Floats:
 
 @within_memory
 def whole_numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Ints:
-    """`values` as a new int64 array of any shape; whatever holds anything but integers is refused."""
+    """Return `values` as a new int64 array of any shape; refuse anything but integers."""
     array = array_of(values, name, error)
     if array.dtype.kind == "O" and array.size and all(isinstance(value, Integral) for value in array.ravel()):
         array = array.astype(np.int64) if all(abs(int(value)) < INT64_END for value in array.ravel()) else array
@@ -66,7 +66,7 @@ def whole_numbers(values: object, name: str, error: type[SignedHeatError] = Geom
 
 
 def array_of(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[Any]:
-    """`values`, rows of numbers or an array of any library that NumPy can read or that speaks DLPack, as an array."""
+    """Return `values` as an array: rows of numbers, or an array of a library that NumPy can read or with DLPack."""
     if np.ma.isMaskedArray(values):
         raise error(f"{name} are a masked array", remedy="drop what is masked, or fill it in", element=name)
     try:
@@ -83,7 +83,7 @@ def _described(array: NDArray[Any]) -> str:
 def finite_rows(
     values: object, name: str, columns: int | None = None, error: type[SignedHeatError] = GeometryError
 ) -> Floats:
-    """`values` as a read-only float64 array of shape (n, columns), without NaN or infinity."""
+    """Return `values` as a read-only float64 array of shape (n, columns); refuse NaN and infinity."""
     array = numbers(values, name, error)
     if array.ndim != 2 or (columns is not None and array.shape[1] != columns) or array.shape[1] == 0:
         wanted = f"(n, {columns})" if columns is not None else "(n, d)"
@@ -109,8 +109,8 @@ def coordinates(
 
 
 def refuse_extreme(lower: Floats, upper: Floats, name: str, error: type[SignedHeatError] = GeometryError) -> None:
-    """Refuse a box that reaches beyond `LARGEST_COORDINATE`, or is smaller than `SMALLEST_EXTENT` but no point."""
-    with np.errstate(over="ignore"):  # from one end of what can be written to the other
+    """Refuse a box that reaches beyond `LARGEST_COORDINATE`, or is smaller than `SMALLEST_EXTENT` but not a point."""
+    with np.errstate(over="ignore"):  # the extent overflows if the box spans most of the range of floats
         farthest, extent = float(max(-lower.min(), upper.max())), float((upper - lower).max())
     if farthest > LARGEST_COORDINATE or 0 < extent < SMALLEST_EXTENT:
         what = f"reach as far as {farthest:.3g}" if farthest > LARGEST_COORDINATE else f"extend over {extent:.3g} only"
@@ -122,7 +122,7 @@ def refuse_extreme(lower: Floats, upper: Floats, name: str, error: type[SignedHe
 
 
 def query_points(values: object, columns: int) -> tuple[Floats, tuple[int, ...]]:
-    """`values`, of shape (..., columns), as (n, columns) positions up to `LARGEST_COORDINATE`; the leading shape."""
+    """Return `values` of shape (..., columns) as (n, columns), and the leading shape; refuse extreme coordinates."""
     points = contiguous(values, "points")
     if points.shape[-1:] != (columns,):
         raise GeometryError(
@@ -143,12 +143,12 @@ def query_points(values: object, columns: int) -> tuple[Floats, tuple[int, ...]]
 
 
 def shaped(values: NDArray[Scalar], shape: tuple[int, ...]) -> NDArray[Scalar]:
-    """(n, ...) values in the leading shape of the points that they belong to; () is that of a single point."""
+    """Return (n, ...) values in the leading shape of their n points, which is () for a single point."""
     return values.reshape((*shape, *values.shape[1:]))[()]
 
 
 def refuse_lost_spacing(steps: Floats, first: Floats, last: Floats) -> None:
-    """Refuse a lattice whose nodes are few digits apart."""
+    """Refuse a lattice from `first` to `last` whose spacing is lost in the rounding of coordinates."""
     if (steps < 1e-13 * np.maximum(np.abs(first), np.abs(last))).any():
         raise GeometryError(
             f"the spacing {steps.tolist()} is lost in the rounding of coordinates from {first.tolist()} on",
@@ -160,7 +160,7 @@ def refuse_lost_spacing(steps: Floats, first: Floats, last: Floats) -> None:
 def finite_number(
     value: object, name: str, least: float = -np.inf, error: type[SignedHeatError] = SignedHeatError
 ) -> float:
-    """`value` as a finite float, at least `least`."""
+    """Return `value` as a finite float; refuse anything else, and numbers below `least`."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool) or not isinstance(value, Real):
@@ -177,7 +177,7 @@ def finite_number(
 
 
 def positive_number(value: object, name: str, error: type[SignedHeatError] = SignedHeatError) -> float:
-    """`value` as a finite positive float."""
+    """Return `value` as a finite positive float; refuse anything else."""
     number = finite_number(value, name, error=error)
     if number <= 0:
         raise error(f"{name} must be positive and finite, not {number:g}", element=name)
@@ -185,7 +185,7 @@ def positive_number(value: object, name: str, error: type[SignedHeatError] = Sig
 
 
 def whole_number(value: object, name: str, least: int, error: type[SignedHeatError] = GeometryError) -> int:
-    """`value` as an integer, at least `least`."""
+    """Return `value` as an integer; refuse anything else, and numbers below `least`."""
     number = finite_number(value, name, error=error)
     if number % 1 or number < least:
         raise error(f"{name} must be a whole number of at least {least}, not {number:g}", element=name)
@@ -193,7 +193,7 @@ def whole_number(value: object, name: str, least: int, error: type[SignedHeatErr
 
 
 def boolean(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Bools:
-    """`values` as a boolean array of any shape, not copied; other types than booleans are refused."""
+    """Return `values` as a boolean array of any shape, not copied; refuse other types than booleans."""
     array = array_of(values, name, error)
     if array.dtype != np.bool_:
         raise error(
@@ -203,14 +203,14 @@ def boolean(values: object, name: str, error: type[SignedHeatError] = GeometryEr
 
 
 def flag(value: object, name: str) -> bool:
-    """`value` as True or False."""
+    """Return `value` as a bool; refuse anything but True and False."""
     if not isinstance(value, bool | np.bool_):
         raise SignedHeatError(f"{name} must be True or False, not {value!r:.50}", element=name)
     return bool(value)
 
 
 def chosen(value: object, choices: object, name: str) -> None:
-    """Refuse what is none of the words of a ``Literal``."""
+    """Refuse a value that is not one of the words of the ``Literal`` `choices`."""
     allowed = get_args(choices)
     if value not in allowed:
         listed = " or ".join(f'"{choice}"' for choice in allowed)
@@ -227,7 +227,7 @@ def refuse_beside(given: str, **options: object) -> None:
 
 
 def percentages(values: object) -> Floats:
-    """`values` as numbers from 0 to 100."""
+    """Return `values` as an array of numbers from 0 to 100; refuse others."""
     percents = numbers(values, "percents", SignedHeatError)
     if not ((percents >= 0) & (percents <= 100)).all():
         raise SignedHeatError("percents must be from 0 to 100", element="percents")
@@ -235,7 +235,7 @@ def percentages(values: object) -> Floats:
 
 
 def positive_steps(values: object, count: int) -> Floats:
-    """Return a spacing, one positive number for all axes or one for each, as one for each."""
+    """Return a spacing, one positive number for all axes or one for each, as a (count,) array."""
     steps = numbers(values, "spacing")
     if steps.shape not in ((), (count,)) or not (np.isfinite(steps).all() and (steps > 0).all()):
         raise GeometryError(
@@ -246,7 +246,7 @@ def positive_steps(values: object, count: int) -> Floats:
 
 
 def element_ids(values: object, name: str, corners: int, n_vertices: int) -> Ints:
-    """`values` as a read-only int64 array of shape (m, corners), with all ids within 0 … n_vertices − 1."""
+    """Return `values` as a read-only int64 array of shape (m, corners); refuse ids outside 0 … n_vertices − 1."""
     array = array_of(values, name, GeometryError)
     if array.size == 0:
         raise GeometryError(f"there are no {name}: the shape is empty", element=name)
@@ -267,7 +267,7 @@ def element_ids(values: object, name: str, corners: int, n_vertices: int) -> Int
 
 
 def used_bounds(points: Floats, ids: Ints) -> Floats:
-    """(2, d) lower and upper corner of the box around the points with some ids; columns one by one, which is fast."""
+    """Return the (2, d) lower and upper corner of the box around the points with the given ids."""
     used = mask_of(len(points), ids.ravel())
     columns = (points if used.all() else points[used]).T
     return np.array([[column.min() for column in columns], [column.max() for column in columns]])
