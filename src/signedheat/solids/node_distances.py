@@ -1,6 +1,6 @@
 """Exact distance to faces at the nodes of blocks of a grid, with one search for each block.
 
-For any place q of the surface and nodes x of a box, ``|x − y|² − |x − q|²`` is linear in x: where it is positive at the
+For places q and y of the surface and nodes x of a box, ``|x − y|² − |x − q|²`` is linear in x: if it is positive at the
 corner of the box that favours y, no node of the box has y as its nearest place. Few faces remain for a block, and fewer
 for each eighth of it, down to single nodes.
 """
@@ -35,7 +35,7 @@ ALONG_A_CURVE = np.stack(
 def distances_in(
     tree: FaceTree, windings: Windings, grid: Grid, first: Ints, places: Ints
 ) -> tuple[Floats, NDArray[np.float32]]:
-    """Compute (a, b, c) signed distances at nodes of blocks, from node `first` on, or NaN; and confidence."""
+    """Compute signed distances at nodes of blocks, in an (a, b, c) window from `first` on, or NaN; and confidence."""
     shape = np.minimum((places.max(axis=0) + 1) * BLOCK, grid.shape) - first
     squares, faces = np.full(tuple(shape), np.nan), np.full(tuple(shape), -1, dtype=np.int32)
     boxes = tree.features.rows, tree.tree.bounds, tree.discs, tree.tree.items
@@ -57,7 +57,7 @@ def distances_in(
 def solved(
     tree: FaceTree, windings: Windings, grid: Grid, places: Ints
 ) -> tuple[NDArray[np.float32], NDArray[np.float16]]:
-    """(n, 8, 8, 8) signed distances at the nodes of nearby blocks, NaN beyond the grid; and confidence."""
+    """(n, 8, 8, 8) signed distances at the nodes of blocks near each other, NaN beyond the grid; and confidence."""
     first = places.min(axis=0)
     distances, trusted = distances_in(tree, windings, grid, BLOCK * first, places)
     values = np.full((len(places), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
@@ -104,7 +104,7 @@ def _fill(
     out_squares: Floats,
     out_faces: NDArray[np.int32],
 ) -> Bools:
-    """Write nearest faces of nodes, and squared distances; return blocks too crowded. `eighths` is `EIGHTHS`."""
+    """Write nearest faces and squared distances of nodes; return which blocks are too crowded. `eighths`: `EIGHTHS`."""
     leaves, parts = len(bounds) // 2, eighths.shape[1]
     most = BOXES_PER_LEAF * min(CROWDED_LEAVES, leaves) + 1
     faces, counts = np.empty((3, parts, most), dtype=np.int32), np.empty((3, parts), dtype=np.int64)
@@ -160,7 +160,7 @@ def _fill(
 def _nearest(
     rows: Floats, faces: NDArray[np.int32], count: int, places: Floats, away: Floats, best: Floats, which: Ints
 ) -> None:
-    """Find the nearest of some faces to each place, and write the ways, least squares and faces."""
+    """Write the squares of distances and vectors from all faces to places, and the least square and its face."""
     for e in range(len(best)):
         best[e], which[e] = np.inf, 0
     for c in range(count):
@@ -182,7 +182,7 @@ def _divide(
     out: NDArray[np.int32],
     counts: Ints,
 ) -> None:
-    """Find faces that can be nearest in each of eight boxes: squared distance lies above its tangent plane."""
+    """Write the faces that can be nearest in each of eight boxes: squared distance is above its tangent planes."""
     ways, can = np.empty((4, len(best))), np.empty(len(best), dtype=np.int64)
     for e in range(len(best)):
         counts[e] = 0
@@ -205,7 +205,7 @@ def _divide(
 
 @compiled
 def _leaves_of_tree(bounds: Floats, discs: Floats, box: Floats, stack: Ints, out: Ints) -> int:
-    """Write the leaves that can be nearest to a node of a box; return their number, one more if there is no room."""
+    """Write the leaves that can be nearest to a node of a box; return their number, or one more than have room."""
     leaves = len(bounds) // 2
     kept, depth = 0, 1
     stack[0] = 1
@@ -226,10 +226,10 @@ def _leaves_of_tree(bounds: Floats, discs: Floats, box: Floats, stack: Ints, out
 
 @compiled
 def _can_be_nearest(bounds: Floats, discs: Floats, node: int, box: Floats) -> bool:
-    """Whether a place y in the box or disc of a node is as near to some x of a box as the foot q of its centre.
+    """Whether a place y in the bounds of a tree's node can be as near to some x of a box as the foot q of its centre.
 
-    ``|x − y|² − |x − q|²`` at the worst x is the sum over axes of ``y² − q² − 2 e |y − q|``, e half the box, least at
-    ±e or an end.
+    ``|x − y|² − |x − q|²`` at the worst x is the sum over axes of ``y² − q² − 2 e |y − q|``, where e is half the width
+    of the box; it is least at ±e, at q or at an end of the bounds.
     """
     total, scale = 0.0, 0.0
     for d in range(3):

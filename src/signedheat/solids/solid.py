@@ -49,11 +49,11 @@ if TYPE_CHECKING:
 POINTS_SORTED = 1 << 18
 """Batch size for sorting points."""
 CLEAR_DISTANCE = 1e-9
-"""Relative distance above which the side of a point is reliable."""
+"""Distance from the surface above which the side of a point is reliable, relative to the largest coordinate."""
 CLEAR_COSINE = 1e-3
 """Cosine between the normal and the direction from the surface above which the side is reliable."""
 ON_SURFACE = 1e-12
-"""Relative distance up to which a point is on the surface: the gradient there is the normal."""
+"""Distance up to which a point is on the surface, relative to the largest coordinate: its gradient is the normal."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -107,7 +107,7 @@ class Solid(Displayed, Represented, Frozen):
 
     @cached_property
     def features(self) -> FaceFeatures:
-        """The triangles with their neighbourhoods; no edge or vertex of one that bounds nothing is regular there."""
+        """The triangles with their neighbourhoods; edges and vertices of those that bound nothing are not regular."""
         faces = np.arange(3 * len(self.triangles)).reshape(-1, 3)
         features = FaceFeatures.of(self.triangles.reshape(-1, 3), faces, self.confidence)
         bounds_nothing = ~self.bounding[features.ids]
@@ -172,8 +172,8 @@ class Solid(Displayed, Represented, Frozen):
     def distance(self, points: ArrayLike, *, signed: bool = True) -> Floats:
         """Compute exact signed distances of points, negative inside, in time O(n log m) on all threads.
 
-        Unsigned ones are to the same surface, and positive inside, too: for sheets, for clearances, and for networks
-        that learn surfaces with a boundary.
+        Unsigned distances are to the same surface, but positive inside, too: for sheets, for clearances, and for
+        networks that learn surfaces with a boundary.
 
         Parameters
         ----------
@@ -372,7 +372,7 @@ class Solid(Displayed, Represented, Frozen):
             Simplify the surface with manifold3d: no point of either surface is farther than this from the other. If
             manifold3d finds no such surface, it is not simplified, with an `InexactWarning`.
         resolution : int
-            Nodes along the longest side of a grid around the solid, and around the surface.
+            Nodes along the longest side of a grid that contains the solid and the surface.
         spacing : float or (3,) float, optional
             Size of the cells, in place of `resolution`.
         progress : callable, optional
@@ -381,16 +381,16 @@ class Solid(Displayed, Represented, Frozen):
         Returns
         -------
         TriangleMesh
-            Has the corners and edges of the level: of turned boxes, 98 % of the length of edges to a thousandth of a
-            cell, and the rest to a tenth.
+            A sharp surface has the corners and edges of the level: on rotated boxes, 98 % of the length of edges is
+            exact to a thousandth of a cell, and the rest to a tenth.
 
         Raises
         ------
         OutsideError
-            If the distance has the level nowhere, or only in parts thinner than a cell.
+            If the distance takes this value nowhere, or only in parts thinner than a cell.
         GeometryError
-            If faces are to be kept but do not join with a contour either, with the place; or if a surface whose bodies
-            touch along edges is to be simplified.
+            If faces are to be kept but do not join even with a contour (the message says where); or if a surface whose
+            bodies touch along edges is to be simplified.
         SignedHeatError
             If faces are to be kept at another level than 0.
         MemoryLimitError
@@ -614,7 +614,7 @@ class Solid(Displayed, Represented, Frozen):
         signs = np.where(self._inside(points, nearest), -1.0, 1.0)
         away = points - nearest.places
         lengths = nearest.distances
-        off = lengths > ON_SURFACE * np.abs(points).max(initial=1e-290)  # which is above 0, also for points at 0
+        off = lengths > ON_SURFACE * np.abs(points).max(initial=1e-290)  # `initial` keeps this above 0 for points at 0
         normals = self.features.face_normals[nearest.faces]
         gradients = np.where(off[:, None], away * (signs / np.where(off, lengths, 1.0))[:, None], normals)
         origins = self.origins[ids]
@@ -626,17 +626,17 @@ class Solid(Displayed, Represented, Frozen):
 
 
 def completed_area(triangles: Floats, made: Bools) -> list[Note]:
-    """Note how much of the area of (m, 3, 3) triangles was made, (m,), to complete others, and where; or nothing."""
+    """Return a note on how much of the area of (m, 3, 3) triangles was made by the completion, and where, if any."""
     if not made.any():
         return []
     areas, corners = face_areas(triangles), triangles[made].reshape(-1, 3)
     area, box = float(areas[made].sum()), np.stack([corners.min(axis=0), corners.max(axis=0)])
-    total = max(float(areas.sum()), np.finfo(float).tiny)  # of points alone, nothing
+    total = max(float(areas.sum()), np.finfo(float).tiny)  # avoids a division by 0
     return [CompletedArea(area, area / total, [box.tolist()])]
 
 
 def still_true(notes: Sequence[Note], triangles: Floats, made: Bools) -> tuple[Note, ...]:
-    """Return the notes on solids that were moved or combined, the one on their completion made anew."""
+    """Return the notes on solids that were moved or combined, with a new note on the completed area."""
     others = [note for note in notes if not isinstance(note, CompletedArea)]
     return (*others, *completed_area(triangles, made))
 
@@ -653,7 +653,7 @@ def _(shape: Solid, linear: Floats, move: Floats) -> Solid:
     corners = slice(None, None, 1 if np.linalg.det(linear) > 0 else -1)
 
     def moved(triangles: Floats) -> Floats:
-        """Each corner by itself, so that corners at the same place stay at the same one to the last bit."""
+        """Transform each corner by itself, so that corners at one place stay equal to the last bit."""
         places = sum((triangles[..., k, None] * linear[:, k] for k in range(3)), start=np.zeros(3)) + move
         return np.ascontiguousarray(places[:, corners])
 

@@ -1,9 +1,9 @@
 """Thickness of walls and width of gaps: diameters of the largest balls that touch a surface without crossing a wall.
 
-At a point of the surface, that ball is tangent from within; it is the local thickness of Hildebrand & Rüegsegger (1997)
-there. Only faces that look the other way count as walls, so that edges and rough faces do not make the ball small. The
-ball through a place q is tangent at p if its diameter is |p − q|² / ((p − q) · n); the least of these is found by
-Dinkelbach's method (1967), each step of which asks for the nearest place to the middle of a ball.
+At a point of the surface, that ball is tangent from within; its diameter is the local thickness there (Hildebrand &
+Rüegsegger 1997). Only faces that point the other way count as walls, so that edges and rough faces do not make the ball
+small. The ball through a place q is tangent at p if its diameter is |p − q|² / ((p − q) · n); the least of these is
+found by Dinkelbach's method (1967), each step of which asks for the nearest place to the middle of a ball.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ pictures: Any = lazy_module("signedheat.view.surface_pictures", "pictures")
 WIDTH_QUANTILE = 0.01
 """Quantile of the widths of walls, or gaps, that is reported."""
 COINCIDENT_FACES = 1e-6
-"""Faces at this distance or less coincide, to single precision, relative to the largest coordinate."""
+"""Faces at most this far apart coincide (in single precision), relative to the largest coordinate."""
 ROUND_WALL = 4e-3
-"""A round wall may reach into a ball by this share of the square of its radius."""
+"""A round wall of flat faces may reach into a ball by this share of the square of its radius."""
 FINER = 1e-2
-"""Around the place that the ball touches the share becomes smaller by this factor, again and again."""
+"""Factor by which that share shrinks in each further round of the search, around the place that the ball touches."""
 SETTLED = 1e-12
-"""That share for flat walls."""
+"""Share at which the search ends: that for flat walls."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Thickness(Frozen):
     Attributes
     ----------
     mesh : TriangleMesh
-        What bounds the solid, facing outwards; large faces are cut.
+        The boundary of the solid, facing outwards; large faces are cut.
     values : (m,) float
         Thickness behind each face, NaN where no wall is opposite.
     origins : (m,) int
@@ -98,7 +98,7 @@ class Thickness(Frozen):
 
     @cached_property
     def _from_thin_to_thick(self) -> Ints:
-        """(k,) faces whose thickness is known, in order."""
+        """(k,) faces whose thickness is known, the thinnest first."""
         if np.isnan(self.values).all():
             raise SourceError("no wall has two opposite sides", remedy="measure a solid", element="thickness")
         return np.argsort(self.values, kind="stable")[: np.count_nonzero(~np.isnan(self.values))]  # NaN comes last
@@ -196,14 +196,14 @@ def thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
 
     It is the diameter of the largest ball that touches the face from within and crosses no wall: the thickness of slabs
     and tubes, the diameter of balls and rods. Walls are faces whose normals are more than 120° apart, so that a box has
-    its whole width up to its edges, and what tapers by less than 60° is as thin as it is there.
+    its whole width up to its edges, but a wedge of less than 60° becomes thinner towards its edge.
 
     Parameters
     ----------
     shape : shape or Solid
         A shape, broken or not; completed here unless it is a solid.
     resolution : int
-        Faces larger than squares are cut, so many of which are as long as the box around the solid.
+        Squares along the longest side of the box around the solid; faces larger than half of one are cut.
 
     Returns
     -------
@@ -276,7 +276,10 @@ def widths(shape: Mesh) -> Widths:
 
 
 def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) -> tuple[Floats, Ints]:
-    """(n,) diameters of largest balls behind places, or NaN, and the face each touches; `facing` 0 is no wall."""
+    """(n,) diameter of the largest ball behind each place, or NaN, and (n,) the face that it touches.
+
+    Faces whose normal in `facing` is 0 are no walls.
+    """
     lower, upper = tree.tree.bounds[1, :3], tree.tree.bounds[1, 3:]
     extent = float(np.linalg.norm(upper - lower))
     least = COINCIDENT_FACES * float(np.abs(tree.tree.bounds[1]).max())
@@ -285,7 +288,7 @@ def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) 
     ways = BoxTree.in_order(facing, facing, tree.tree.items[: len(facing)]).bounds
 
     def measured(rays: Floats) -> tuple[Floats, Ints]:
-        """At places, with their normals."""
+        """Measure at (k, 6) places and their normals."""
         diameters, touched = np.full(len(rays), extent), np.zeros(len(rays), dtype=np.int64)
         rows, boxes = tree.features.rows, tree.tree
         _descend(rows, facing, boxes.bounds, tree.discs, ways, boxes.items, rays, least, diameters, touched)
@@ -296,7 +299,7 @@ def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) 
 
 
 def _normals_at(triangles: Floats, faces: Ints, places: Floats) -> Floats:
-    """(n, 3) unit normals at places, mixed of means at corners: others would tilt balls, and make them small."""
+    """(n, 3) unit normals at places, interpolated from means at corners: face normals would tilt and shrink balls."""
     ids = indexed(triangles)[1]
     flat, pairs = unit(area_vectors(triangles)), edge_table(ids).pairs
     pairs = pairs[np.einsum("ij,ij->i", *flat[pairs // 3].swapaxes(0, 1)) > np.cos(CREASE_ANGLE)]
@@ -308,13 +311,13 @@ def _normals_at(triangles: Floats, faces: Ints, places: Floats) -> Floats:
 
 
 def _quantile(widths: Floats, share: float) -> float | None:
-    """Return a quantile of what is known; None if nothing is."""
+    """Return a quantile of the widths that are not NaN; None if there are none."""
     known = np.sort(widths[~np.isnan(widths)])
     return float(known[int(share * len(known))]) if len(known) else None
 
 
 def _cut(triangles: Floats, longest: float) -> tuple[Floats, Ints]:
-    """Triangles, cut across their longest sides until half a square has their area, and which each is part of."""
+    """Halve triangles at their longest sides until none exceeds half a square; return them, and their originals."""
     owners, kept, whose = np.arange(len(triangles)), [], []
     while len(triangles):
         sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
@@ -339,9 +342,10 @@ def _descend(
     out: Floats,
     touched: Ints,
 ) -> None:
-    """Diameters, no more than in `out`, at (n, 6) places and their normals: what reaches into a ball makes it smaller.
+    """Shrink the diameters in `out` at (n, 6) places and their normals until no wall reaches into a ball.
 
-    Less than `ROUND_WALL` is left out first: a ball that fits a round wall touches all of it; then `FINER`, and so on.
+    In the first round walls may reach in by `ROUND_WALL`, since a ball that fits a round wall touches all of it. In
+    each further round, near the place that the ball touches, they may do so by `FINER` times as much.
     """
     leaves, stack = len(bounds) // 2, np.empty(66, dtype=np.int64)
     for p in range(len(places)):
@@ -371,7 +375,7 @@ def _descend(
                     outside = max(across - discs[node, 6], 0.0)
                     if not height * height + outside * outside < limit:
                         continue
-                if node < leaves:  # that which is nearer to the place is the first
+                if node < leaves:  # visit the child nearer to the place first
                     first = _square(bounds, 2 * node, x, y, z) <= _square(bounds, 2 * node + 1, x, y, z)
                     stack[depth] = 2 * node + 1 if first else 2 * node
                     stack[depth + 1] = stack[depth] ^ 1

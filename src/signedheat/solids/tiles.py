@@ -1,4 +1,4 @@
-"""Distance to solids at the nodes of grids, in independent tiles; bands on disk, whose runs can be resumed.
+"""Distance to solids at the nodes of grids, in independent tiles; and bands on disk, which can be resumed.
 
 A folder holds the input of the tiles, values and confidence of all blocks in memory-mapped files, and a mark for each
 finished tile. Tiles are computed by threads, processes or a Dask cluster, which write to different rows.
@@ -51,9 +51,9 @@ BYTES_AT_WORK = 40e6
 BYTES_IN_BAND = 6.5
 """Memory per node of a band, including its share of the tables of blocks."""
 COARSE_NODES = 65
-"""About the most nodes along the longest side of the coarse grid of a band, whose cells are 2, 4, 8, … fine ones."""
+"""Approximate maximum of nodes along the coarse grid of a band, whose cells are 2, 4, 8, … times as long."""
 FOLLOWED_CUBES, COUNT_FACTOR = 1024, 1.5
-"""Cubes of each size that are followed to estimate the number of blocks, and by what factor it may be wrong."""
+"""Number of cubes of each size followed to estimate the number of blocks, and factor by which this may be wrong."""
 Result = TypeVar("Result")
 
 
@@ -143,7 +143,7 @@ def band_field(
 
 
 def tiles_of(blocks: Blocks) -> list[Ints]:
-    """Rows of the blocks of each tile."""
+    """Group blocks into tiles: return the row numbers of the blocks of each."""
     tiles = blocks.places.astype(np.int64) // TILE
     _, owners = np.unique(tiles, axis=0, return_inverse=True)
     order = np.argsort(owners.ravel(), kind="stable")
@@ -162,7 +162,7 @@ def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> tuple[I
 
 
 def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: float) -> tuple[Ints, int]:
-    """(n, 3) places of blocks that `near` wants, and 1; or none, and how many times larger cells would have to be."""
+    """(n, 3) places of blocks that `near` accepts, and 1; over the limit, none, and how much larger cells must be."""
     if math.prod(-(-n // BLOCK) for n in grid.shape) > limit:
         numbers = {side: number for side, _, number in _cubes(grid, near, FOLLOWED_CUBES)}
         if max(numbers.values()) > COUNT_FACTOR * limit:
@@ -174,7 +174,7 @@ def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: floa
 
 
 def _cubes(grid: Grid, near: Callable[[Floats, float], Bools], few: int | None) -> Iterator[tuple[int, Ints, float]]:
-    """Yield cubes from coarse to fine: blocks along edges, places, and how many, estimated from `few`."""
+    """Yield cubes from coarse to fine: blocks per edge, places, and their number, estimated if more than `few`."""
     n_blocks = -(-np.array(grid.shape) // BLOCK)
     side, each, random = 1 << max(0, int(np.ceil(np.log2(n_blocks.max())))), 1.0, np.random.default_rng(0)
     places, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))
@@ -197,11 +197,11 @@ def blocks_that_fit(store: str | PathLike[str] | None) -> int:
         return max(blocks_held(folder), int(shutil.disk_usage(existing).free / (BLOCK_NODES * BYTES_IN_BAND)))
     available = available_memory()
     left = math.inf if available is None else available - libraries() - BYTES_AT_WORK
-    return int(min(left / (BLOCK_NODES * BYTES_IN_BAND), 2**40))  # the coarse grid has had room
+    return int(min(left / (BLOCK_NODES * BYTES_IN_BAND), 2**40))  # the coarse grid is allocated already
 
 
 def refuse_plane_grid(grid: Grid) -> None:
-    """Raise if a grid is not in space."""
+    """Raise an error if a grid is not three-dimensional."""
     if grid.dimension != 3:
         raise UnsupportedTypeError(
             "distance to a solid is measured on grids in space", remedy="give it three axes", element="grid"
@@ -209,7 +209,7 @@ def refuse_plane_grid(grid: Grid) -> None:
 
 
 def prepared(solid: Evaluated) -> tuple[FaceTree, Windings]:
-    """Compute what tiles need of a solid, before threads would do so twice."""
+    """Return the search tree and windings of a solid, with caches filled so that threads do not fill them twice."""
     tree, windings = solid.tree, solid.windings
     _ = tree.discs
     windings.inside(np.zeros((1, 3)))
@@ -217,7 +217,7 @@ def prepared(solid: Evaluated) -> tuple[FaceTree, Windings]:
 
 
 def in_threads(solve: Callable[[Ints], Result], places: Iterable[Ints]) -> Iterator[Result]:
-    """Yield results in order, and hold few at a time."""
+    """Yield the results of `solve` in the order of `places`, from threads, and hold few at a time."""
     with ThreadPoolExecutor(n_threads()) as pool:
         jobs: deque[Future[Result]] = deque()
         try:
@@ -266,7 +266,7 @@ def in_store(
     scheduler: Scheduler,
     progress: Progress | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float16], TilesComputed]:
-    """Values and confidence of blocks, mapped from files of a folder; rows of `tiles` that are done stay."""
+    """Compute the unfinished tiles in files of a folder; return values and confidence, memory-mapped, and a note."""
     folder = folder.absolute()
     plan: dict[str, NDArray[Any]] = {
         "corners": tree.features.vertices[tree.features.faces],
@@ -290,7 +290,7 @@ def in_store(
 
 
 def _begin(folder: Path, key: str, plan: dict[str, NDArray[Any]], n_blocks: int, n_tiles: int) -> None:
-    """Make the files of a folder, unless they are there."""
+    """Create the files of a folder, unless it has them; raise an error if they are of another band."""
     name = folder / "key.txt"
     if name.exists():
         if name.read_text() != key:
@@ -361,7 +361,7 @@ def solve_into(folder: str, key: str, number: int) -> int:
 
 
 def _computed(folder: str, key: str, missing: list[int], scheduler: Scheduler) -> Iterator[int]:
-    """Yield numbers of tiles as they are done."""
+    """Compute the missing tiles, and yield their numbers as they are done."""
     if not missing:
         return
     if isinstance(scheduler, ThreadPoolExecutor):
