@@ -24,10 +24,10 @@ LOOP_POINTS = 128
 RIM_SMOOTHING = 1 / 48
 """Zigzags of a rim are averaged over this share of its length."""
 FILM_ROUNDS = 3
-"""Number of times that a film is solved for, each time with the lengths of the last."""
+"""Number of times that a film is solved for again, with the cotangents of the solution before."""
 PLATE_AT_REST, PLATE_MOVES = 1e-3, 64
-"""A plate is at rest once it will move by at most this share of the diagonal of its rim, and after so many moves at the
-most. Nearly all plates rest after 5 to 40 moves."""
+"""A plate is at rest once it is expected to move by at most this share of the diagonal of its rim; it makes at most
+this number of moves. Nearly all plates rest after 5 to 40 moves."""
 RIM_CLEARANCE = 0.5
 """Points of the smooth lid nearer to the rim than this are left out, relative to the mean distance of its points."""
 
@@ -45,19 +45,19 @@ class Lid:
 class Film(Lid):
     """A lid that was triangulated in a plane, or over a disc."""
 
-    plane: Floats  # (n, 2) its vertices there
-    places: Floats  # (n_rim,) share of the loop's length at which each point of its rim comes
+    plane: Floats  # (n, 2) its vertices in the plane or disc
+    places: Floats  # (n_rim,) share of the loop's length at which each point of its rim lies
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothRim:
     """A closed loop without zigzags, whatever the number of corners on its straight parts."""
 
-    length: float  # that of the loop
-    starts: Floats  # (n + 1,) share of it at which each corner of the loop comes; the last is 1
+    length: float  # length of the loop
+    starts: Floats  # (n + 1,) share of the length at which each corner of the loop lies; the last is 1
     points: Floats  # (k, 3) means over parts of the loop of `RIM_SMOOTHING` of its length
-    # (k + 1,) share of its length at which the middle of each part comes, from the corner that is farthest from the
-    # loop's centre on, once around
+    # (k + 1,) shares of the length at which the middles of these parts lie: once around the loop, from the corner
+    # farthest from its centre
     places: Floats
 
     @classmethod
@@ -69,7 +69,7 @@ class SmoothRim:
         sums = np.concatenate([np.zeros((1, 3)), np.cumsum(steps * (corners + 0.5 * sides), axis=0)])
 
         def integral(shares: Floats) -> Floats:
-            """Return that of positions along the loop, from its first corner."""
+            """Integrate positions along the loop, from its first corner to each share of its length."""
             turns, rest = np.divmod(shares, 1.0)
             k = np.minimum(np.searchsorted(starts, rest, side="right") - 1, len(starts) - 2)
             onward = (rest - starts[k])[:, None]
@@ -83,12 +83,12 @@ class SmoothRim:
         return cls(length, starts, (ends[0] - ends[1]) / RIM_SMOOTHING, places)
 
     def edges_at(self, places: Floats) -> Ints:
-        """(m,) the last corner before each place."""
+        """(m,) edge of the loop on which each place lies, by the number of its first corner."""
         return np.minimum(np.searchsorted(self.starts, places % 1.0, side="right") - 1, len(self.starts) - 2)
 
 
 def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
-    """Edges and shares of points along a loop: vertices, and more, at most 1 / `LOOP_POINTS` of its length apart."""
+    """Edge and share of each point on a loop: its vertices, and more, at most 1 / `LOOP_POINTS` of its length apart."""
     lengths = side_lengths(loop)
     counts = np.maximum(np.ceil(lengths * LOOP_POINTS / lengths.sum() - 1e-9), 1).astype(np.int64)
     edges, number = numbered(counts)
@@ -96,7 +96,7 @@ def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
 
 
 def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:
-    """Triangulate a film, in a plane or in a disc, before it is solved for; None if its loop crosses itself."""
+    """Triangulate a film in a plane, or in a disc if there is no frame; None if its loop crosses itself there."""
     if frame is None:
         flat = _around_disc(rim.places[:-1])
         inner = spanning.points_in_disc(len(flat))
@@ -120,7 +120,7 @@ def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:
 
 
 EVEN_SHARE = 1e-3
-"""Share to which points around a disc are as far apart as if all sides of the loop were of one length."""
+"""Weight of even spacing in the positions of points around a disc; the rest is by length along the loop."""
 
 
 def _around_disc(shares: Floats) -> Floats:
@@ -128,11 +128,11 @@ def _around_disc(shares: Floats) -> Floats:
 
 
 def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tuple[Floats, Ints] | None:
-    """Make a lid that spans a loop over another lid: added points, and triangles; None if its shadow crosses itself."""
+    """Span a loop with inner points of another lid: added points, and triangles; None if its image crosses itself."""
     n, ways = over.n_rim, np.roll(loop, -1, axis=0) - loop
     edges, shares = cut_to_pieces(loop)
     if frame is None:
-        even = np.arange(len(edges)) / len(edges)  # no two are at one place, where sides are as short as rounding
+        even = np.arange(len(edges)) / len(edges)  # keeps points apart where sides are as short as rounding
         flat = _around_disc((1 - EVEN_SHARE) * (starts[edges] + shares * np.diff(starts)[edges]) + EVEN_SHARE * even)
         inner = np.arange(n, len(over.plane))
     else:
@@ -158,7 +158,7 @@ def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tup
 
 
 def film(pattern: Film) -> Film:
-    """Make the lid of nearly least area (Pinkall & Polthier 1993), within the hull of its rim."""
+    """Make the lid of nearly least area (Pinkall & Polthier 1993), within the convex hull of its rim."""
     n, vertices, faces, plane = pattern.n_rim, pattern.vertices, pattern.faces, pattern.plane
     if n == len(vertices):
         return pattern
@@ -175,14 +175,14 @@ def film(pattern: Film) -> Film:
 
 
 def _laplacian(tails: Ints, heads: Ints, weights: Floats, n: int) -> sparse.csr_array:
-    """(n, n) Laplacian of a graph, given the weights of its edges, which add up."""
+    """(n, n) Laplacian of a graph with weighted edges; weights of repeated edges add up."""
     entries = np.concatenate([-weights, -weights, weights, weights])
     places = np.concatenate([tails, heads, tails, heads]), np.concatenate([heads, tails, tails, heads])
     return sparse.coo_array((entries, places), shape=(n, n)).tocsr()
 
 
 def _extended(matrix: sparse.csr_array, values: Floats) -> Floats:
-    """Extend values at the rim, which comes first, harmonically over a lid with this Laplacian."""
+    """Extend values at the rim, the first vertices of a lid, harmonically over the lid with this Laplacian."""
     n = len(values)
     return np.concatenate([values, sparse.linalg.splu(matrix[n:, n:].tocsc()).solve(-(matrix[n:, :n] @ values))])
 
@@ -193,12 +193,12 @@ def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: f
     ``min Σ |(L x)_v − m_v κ_v n_v − Σ_e ½ |e| g_e|² / (m_v + s_v)``. L is the cotangent Laplacian, m the areas of
     vertices, κ twice the mean curvature at the rim and harmonic inside, and g_e = e × n / |e × n| the direction across
     the edge e of the rim in the plane with the normal n: where the surface goes on smoothly, ∂x/∂g = g there. Springs
-    hold the lid to it: s is 0 where it is clamped, and s_v = (1 / h_v − 1) ¼ W Σ_e ½ |e| where it is held by h_v, which
-    is half as stiff as a disc of width W for h = ½. Spheres and cylinders go on as they are. Each round takes m, L and
-    n from the last, and goes half as far as those before once moves grow, so that it comes to rest. Normals, curvatures
-    and held are those of `continuation`.
+    hold the lid to this: s is 0 where it is clamped, and s_v = (1 / h_v − 1) ¼ W Σ_e ½ |e| where it is held by h_v,
+    which is half as stiff as a disc of width W for h = ½. Spheres and cylinders are continued as such. Each round takes
+    m, L and n from the one before; when a move exceeds the last one, all later moves are halved, so that the plate
+    comes to rest. Normals, curvatures and held are those of `continuation`.
 
-    None where it moves farther than its rim is wide, as on very ragged rims.
+    Return None if the lid moves farther than its rim is wide, as on very ragged rims.
     """
     n = lid.n_rim
     if n == len(lid.vertices):
@@ -222,9 +222,9 @@ def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: f
         normal = (inner.T @ sparse.diags_array(weights) @ inner).tocsc()
         vertices = lid.vertices.copy()
         vertices[n:] = sparse.linalg.splu(normal).solve(-(inner.T @ (weights[:, None] * given)))
-        rises = ((vertices - lid.vertices) * up).sum(axis=1)  # what slides along the surface does not change it
+        rises = ((vertices - lid.vertices) * up).sum(axis=1)  # moves along the surface do not change its shape
         moves.append(float(np.abs(rises).max()))
-        if moves[-1] > moves[-2]:  # the rounds go to and fro
+        if moves[-1] > moves[-2]:  # the moves oscillate
             share *= 0.5
         lid = replace(lid, vertices=lid.vertices + share * rises[:, None] * up)
         if not moves[-1] <= size:
@@ -246,7 +246,7 @@ def _load(rim: Floats, normals: Floats) -> Floats:
 
 
 def _sides(faces: Ints, n: int) -> Ints:
-    """(m, 3) edge opposite each corner of the triangles."""
+    """(m, 3) key of the edge opposite each corner of triangles on n vertices; both directions have the same key."""
     tails, heads = np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)
     return np.minimum(tails, heads) * n + np.maximum(tails, heads)
 
@@ -260,7 +260,7 @@ def _cotangents(vertices: Floats, faces: Ints) -> Floats:
 
 
 def stiffness(lid: Lid) -> sparse.csr_array:
-    """(n, n) the positive semidefinite cotangent Laplacian; corners of flat triangles are bounded."""
+    """(n, n) positive semidefinite cotangent Laplacian of a lid, with bounded cotangents in flat triangles."""
     tails, heads = np.roll(lid.faces, -1, axis=1).ravel(), np.roll(lid.faces, -2, axis=1).ravel()
     return _laplacian(tails, heads, _cotangents(lid.vertices, lid.faces).ravel(), len(lid.vertices))
 
@@ -272,7 +272,7 @@ def vertex_normals(lid: Lid) -> Floats:
 
 
 def running_mean(values: Floats, reach: int) -> Floats:
-    """(n,) means along a loop over values up to so many places away."""
+    """(n,) means of values along a closed loop, each over the values up to `reach` places away."""
     window = np.ones(2 * reach + 1) / (2 * reach + 1)
     return np.convolve(np.concatenate([values[len(values) - reach :], values, values[:reach]]), window, mode="valid")
 
@@ -291,7 +291,7 @@ MOST_PLANAR_RUNS = 16
 class _Side:
     """A straight part of a rim, or a crease."""
 
-    points: Ints  # (k,) without its end
+    points: Ints  # (k,) its points, without its end
     normal: Floats  # (3,) sum over its edges of length times unit normal of the surface
 
 
@@ -301,7 +301,7 @@ class _Run:
 
     first: int  # index of the first side
     count: int
-    points: Ints  # (k,) with the end
+    points: Ints  # (k,) their points, with the end
     opening: Floats  # (3,) area vector of a lid in the plane
 
 
@@ -320,8 +320,9 @@ def flat_lid(loop: Floats) -> tuple[Floats, Ints] | None:
 def creased(loop: Floats, normals: Floats) -> tuple[Floats, Ints] | None:
     """Make the lid of flat faces that closes a rim, as added points and triangles; None if there is none.
 
-    Sides in a plane are closed in it by a crease, three such runs to where their planes meet; no face folds back over
-    the surface, whose (n, 3) `normals` are 0 where unknown.
+    A run of sides in one plane is closed by a flat face that ends at a crease. Three runs that make up the whole loop
+    are closed by faces to the point where their planes meet. No face folds back over the surface, whose (n, 3)
+    `normals` are 0 where unknown.
     """
     points, sides = loop, _straight_sides(loop, normals)
     polygons: list[Ints] = []
@@ -344,7 +345,7 @@ def creased(loop: Floats, normals: Floats) -> tuple[Floats, Ints] | None:
 
 
 def _straight_sides(loop: Floats, normals: Floats) -> list[_Side]:
-    """Straight parts of a loop."""
+    """Split a loop at its corners into straight sides; none if it has no corners."""
     corners = corners_of(loop)
     weighted = side_lengths(loop)[:, None] * normals
     if not len(corners):
@@ -355,7 +356,7 @@ def _straight_sides(loop: Floats, normals: Floats) -> list[_Side]:
 
 
 def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
-    """Find the longest runs of two or more sides in a plane whose lid is not folded back, the largest first."""
+    """Find the longest runs of two or more coplanar sides whose lids are not folded back, by area, largest first."""
     n = len(sides)
     starts = points[[side.points[0] for side in sides]]
     ways = unit(np.roll(starts, -1, axis=0) - starts)
@@ -378,7 +379,7 @@ def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
 
 
 def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple[_Run, _Run, _Run]] | None:
-    """Find the point near a loop of three runs where their planes meet, and the runs."""
+    """Find the point near a loop where the planes of three runs meet that make it up, and these runs; or None."""
     following = {run.first: run for run in runs}
     for first in runs:
         second = following.get((first.first + first.count) % n_sides)
@@ -412,7 +413,7 @@ def _closed_by_a_crease(points: Floats, sides: list[_Side], runs: list[_Run]) ->
 
 
 def _filled(points: Floats, n_rim: int, polygons: list[Ints]) -> tuple[Floats, Ints] | None:
-    """Triangulate planar polygons: the points added to those of a rim, and triangles; None if one crosses itself."""
+    """Triangulate planar polygons: points added after those of the rim, and triangles; None if one crosses itself."""
     vertices, faces, count = [points], [], len(points)
     for polygon in polygons:
         corners = points[polygon]

@@ -29,7 +29,7 @@ STRAIGHT_RIM = 1e-5
 
 
 def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:
-    """(k, 2) directed edges that the faces of each part lack, as often as they do, and (k,) these parts, ascending."""
+    """(k, 2) directed edges that the faces of each part lack, with multiplicity; and (k,) their parts, ascending."""
     table = edge_table(faces)
     owners, edges, excess = table.unbalanced(parts)
     ends = table.vertices[edges]
@@ -45,7 +45,8 @@ def boundary(faces: Ints) -> Ints:
 def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
     """Find closed loops around the gaps of faces, along all boundary edges; no loop passes a vertex twice.
 
-    An edge goes on at the other side of the gap beside it; gaps connected at vertices come apart far from the middle.
+    Where gaps meet at a vertex, an edge is followed by the edge on the other side of the gap beside it. Walks
+    begin far from the middle, so that gaps connected at vertices are separated there.
     """
     if not len(edges):
         return []
@@ -73,7 +74,10 @@ def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
 
 @compiled
 def _across_gaps(starts: Ints, names: Ints) -> Ints:
-    """Find the edge after each, of those at each vertex in order, −1 − e if e arrives; gaps nest like parentheses."""
+    """Find the edge that follows each in a loop around a gap; gaps at a vertex nest like parentheses.
+
+    `names` lists the edges around each vertex in angular order: e if e leaves it, −1 − e if e arrives.
+    """
     following, waiting = np.full(len(names) // 2, -1), np.empty(len(names) // 2, dtype=np.int64)
     for v in range(len(starts) - 1):
         depth = 0
@@ -91,7 +95,7 @@ def _across_gaps(starts: Ints, names: Ints) -> Ints:
 
 @compiled
 def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) -> tuple[Ints, Ints]:
-    """Edges loop by loop, and the end of each loop; walks begin at the edges that come first in an order."""
+    """Return edges loop by loop, and the end of each loop; walks along edges begin at the first edges in `order`."""
     n = len(tails)
     place, walk, passed = np.full(n_vertices, -1), np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
     edges, stops, count, n_loops = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), 0, 0
@@ -124,7 +128,7 @@ def corners_of(points: Floats) -> Ints:
 
 
 def meeting_edges(ends: Floats) -> tuple[Ints, Ints, Bools]:
-    """Pairs of edges without common ends that run along each other, as patches do, and whether in opposite ways."""
+    """Find pairs of edges, not with the same ends, that run along each other, and whether in opposite directions."""
     along = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(along, axis=1)
     ways = along / np.maximum(lengths, 1e-300)[:, None]

@@ -1,4 +1,4 @@
-"""Triangulate closed loops: in a plane, or where their shadows cross themselves, in a disc."""
+"""Triangulate closed loops: in a plane, or in a disc where their projections cross themselves."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..mesh.edges import edge_keys, edge_table
 LAYER_GROWTH = 0.35
 """Growth of triangles with their distance from the rim, relative to that distance."""
 MOST_TIES = 128
-"""Largest number of equally distant points of a loop that are compared, and of places where they are."""
+"""Maximum number of equally distant points of a loop that are compared, and number of places that decide."""
 Frame = tuple[Floats, Floats]
 """Origin and (3, 2) axes of a plane."""
 
@@ -31,7 +31,7 @@ class Spanned:
     faces: Ints  # (m, 3) counterclockwise; the points of the rim come first
 
     def rim(self, loop: Floats) -> Floats:
-        """(r, d) positions of the points of the rim on a loop of that many vertices."""
+        """(r, d) positions of the points of the rim on a loop in any dimension that has as many vertices."""
         ways = np.roll(loop, -1, axis=0) - loop
         return loop[self.edges] + self.shares[:, None] * ways[self.edges]
 
@@ -50,7 +50,7 @@ class Spanned:
 
 
 def frame_of(rim: Floats) -> Frame | None:
-    """Return the plane of a loop's area, in which it runs counterclockwise; None if it has none."""
+    """Return the plane at right angles to a loop's area vector; None if its area is 0. There it is counterclockwise."""
     normal = area_vector(rim)
     length = np.linalg.norm(normal)
     if not length > 1e-6 * np.linalg.norm(np.ptp(rim, axis=0)) ** 2:
@@ -59,13 +59,13 @@ def frame_of(rim: Floats) -> Frame | None:
     around = rim - rim.mean(axis=0)
     around -= np.outer(around @ normal, normal)
     reach = np.linalg.norm(around, axis=1)
-    first = around[farthest(rim, reach)]  # turns with the rim
+    first = around[farthest(rim, reach)]  # this axis turns with the rim
     first = first / np.linalg.norm(first)
     return rim[0], np.stack([first, np.cross(normal, first)], axis=1)
 
 
 def farthest(loop: Floats, away: Floats) -> int:
-    """Find the point of a closed loop that is farthest away; of several, where the loop then stays away longest."""
+    """Find the point of a closed loop that is farthest away; of equal ones, that after which the loop stays farther."""
     ties = np.flatnonzero(away > (1 - 1e-9) * away.max())[:MOST_TIES]
     if len(ties) == 1:
         return int(ties[0])
@@ -94,7 +94,7 @@ def area_vector(loop: Floats) -> Floats:
 
 
 def spanned(loop: Floats, inner: Floats) -> Spanned | None:
-    """Delaunay triangles of a polygon in the plane, with those points that are inside; None if it crosses itself."""
+    """Make Delaunay triangles of a polygon in the plane and points inside it; return None if it crosses itself."""
     count = len(loop)
     edges, shares = np.arange(count), np.zeros(count)
     for _ in range(8):  # until all edges of the rim, halved, are edges of the triangulation
@@ -120,7 +120,7 @@ def spanned(loop: Floats, inner: Floats) -> Spanned | None:
 
 
 def _to_the_left(faces: Ints, n: int) -> Ints | None:
-    """Those of the triangles of a plane to the left of a loop, points 0 to n − 1; None if it crosses itself."""
+    """Return the triangles to the left of the loop through points 0 to n − 1; None if it crosses itself."""
     table = edge_table(faces)
     tails, heads = table.vertices.T
     with_loop = (tails < n) & (heads == (tails + 1) % n)
@@ -136,7 +136,7 @@ def _to_the_left(faces: Ints, n: int) -> Ints | None:
 
 
 def counterclockwise(points: Floats) -> Ints:
-    """Delaunay triangles of points in the plane; where four lie on a circle, no rounding chooses: points are moved."""
+    """Delaunay triangles of points in the plane, moved a little so that rounding does not choose among equal ones."""
     numbers = np.arange(len(points))[:, None]
     moves = (numbers * 0.5 * (5**0.5 - 1) * np.array([1.0, 2**0.5])) % 1.0 - 0.5
     size = float(np.ptp(points, axis=0).max())
@@ -149,7 +149,7 @@ def counterclockwise(points: Floats) -> Ints:
 
 
 def points_inside(polygon: Floats) -> Floats:
-    """Points within a polygon of few sides, as dense as its corners at its rim, the less dense the farther from it."""
+    """Points within a polygon of few sides, as dense as its corners at its rim, and sparser away from it."""
     steps = side_lengths(polygon)
     size = float(np.quantile(steps, 0.9))
     low, high = polygon.min(axis=0), polygon.max(axis=0)
@@ -174,13 +174,13 @@ def _inside(points: Floats, polygon: Floats) -> Bools:
     """(k,) whether points lie inside a polygon: by the parity of crossings."""
     x, y = points.T
     (ax, ay), (bx, by) = polygon.T[..., None], np.roll(polygon, -1, axis=0).T[..., None]
-    rise = np.where(by == ay, 1.0, by - ay)  # what is level is not crossed
+    rise = np.where(by == ay, 1.0, by - ay)  # level sides are not crossed
     crosses = ((ay > y) != (by > y)) & (x < ax + (y - ay) * (bx - ax) / rise)
     return np.logical_xor.reduce(crosses, axis=0)
 
 
 def points_in_disc(n: int) -> Floats:
-    """Points within the unit circle, as dense at its rim as n points around it, the less dense the farther from it."""
+    """Points within the unit circle, as dense as n points around it at its rim, and sparser away from it."""
     rings, radius, step, turn = [np.zeros((1, 2))], 1.0, 2 * np.pi / n, 0.0
     while (radius := radius - step * 0.87) >= step:
         count = max(int(np.ceil(2 * np.pi * radius / step)), 5)

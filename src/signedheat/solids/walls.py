@@ -1,4 +1,4 @@
-"""Strips between rims that run along each other: seams of patches with other vertices, and ends of walls."""
+"""Strips between rims that run along each other: seams of patches whose vertices differ, and ends of walls."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from .rims import corners_of, meeting_edges
 from .spanning import area_vector
 
 NARROW = 0.3
-"""A strip closes two rims if its area, relative to that of flat lids on both, is at most this where it is at right
-angles to the surface; where the surface goes straight on, it closes them if its area is the lesser one. A bowl of half
+"""A strip at right angles to the surface closes two rims if its area, relative to that of flat lids on both, is at most
+this; one that continues the surface straight on closes them if its area is less than that of the lids. A bowl of half
 a ball whose wall is a quarter of its radius has .28, a box without its lid, a tenth as thick as it is wide, .32, two
 square sheets a quarter of their width apart .5."""
 LARGE_OPENING = 0.1
-"""A wall ends where the area of those lids exceeds this share of their parts' area. Otherwise each side goes on over
-its own opening: holes two fifths as wide as a hollow ball have .04, a cup .2, a bowl .5."""
+"""Two rims are the end of a wall if the area of those lids exceeds this share of their parts' area. Otherwise each rim
+is closed by itself: holes two fifths as wide as a hollow ball have .04, a cup .2, a bowl .5."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rim:
     """A closed loop where faces end."""
 
-    ids: Ints  # (n,) and (n, 3) its vertices
-    corners: Floats
+    ids: Ints  # (n,) its vertices
+    corners: Floats  # (n, 3) their positions
     onward: Floats  # (n, 3) unit vectors at its edges, along the surface and away from it
     parts: Ints  # (n,) connected part that ends at each edge
-    centre: Floats  # (3,) a ball around it
-    radius: float
+    centre: Floats  # (3,) centre of a ball around it
+    radius: float  # radius of the ball
     opening: Floats  # (3,) area vector of a lid
 
     @classmethod
     def of(cls, ids: Ints, corners: Floats, behind: Floats, parts: Ints) -> Rim:
-        """Return the rim around a loop of vertices; behind each edge, the face's third corner lies."""
+        """Return the rim of a loop of vertices; `behind` is the third corner of the face at each edge."""
         along = np.roll(corners, -1, axis=0) - corners
         away = corners - behind
         away -= ((away * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-300))[:, None] * along
@@ -48,7 +48,7 @@ class Rim:
 
 
 def seams(rims: list[Rim]) -> list[Ints]:
-    """(k, 3) vertices of triangles of strips between whole sides of rims that run along each other, across gaps."""
+    """Return strips between whole sides of rims that run along each other across gaps, each as (k, 3) triangles."""
     if not rims:
         return []
     corners = [corners_of(rim.corners) for rim in rims]
@@ -92,7 +92,7 @@ def seams(rims: list[Rim]) -> list[Ints]:
 
 
 def _stretches(first: Ints, second: Ints, following: Ints, lengths: Floats) -> list[Ints]:
-    """(k, 2) pairs of sides that meet, each with its reverse, by stretches: from one to the next; the longest first."""
+    """Group pairs of meeting sides, given with their reverses, into stretches: (k, 2) arrays, the longest first."""
     if not len(first):
         return []
     n = len(following)
@@ -113,7 +113,7 @@ def _stretches(first: Ints, second: Ints, following: Ints, lengths: Floats) -> l
 
 
 def _run(sides: Ints, following: Ints) -> Ints:
-    """Sides in the order in which they follow each other; none if they do not."""
+    """Return sides in the order in which they follow each other; none if they are not connected."""
     begins = sides[~np.isin(sides, following[sides])]
     if len(begins) > 1 or not len(sides):
         return sides[:0]
@@ -124,19 +124,19 @@ def _run(sides: Ints, following: Ints) -> Ints:
 
 
 def _places(rim: Rim, corners: Ints, sides: Ints) -> Ints:
-    """Places around a rim of all vertices of some of its sides, one after another, with both ends."""
+    """Return the places around a rim of all vertices of some successive sides, including both ends."""
     begin, stop = corners[sides[0]], corners[(sides[-1] + 1) % len(corners)]
     count = (stop - begin) % len(rim.ids) or len(rim.ids)
     return (begin + np.arange(count + 1)) % len(rim.ids)
 
 
 def wall_ends(rims: list[Rim], areas: Floats) -> list[Ints]:
-    """(k, 3) triangles of strips between whole rims near each other all around, as of a bowl without its lip."""
+    """Return strips, as (k, 3) triangles, between whole rims that are near all around, as of a bowl without its lip."""
     return [strip(rims[i], rims[j]) for i, j in facing(rims, areas)]
 
 
 def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
-    """Pairs of rims that run opposite ways, of parts with these areas: the strip between them is narrow enough."""
+    """Find pairs of rims that run opposite ways and are near enough for a strip, given the areas of their parts."""
     if len(rims) < 2:
         return []
     centres, widths = np.array([rim.centre for rim in rims]), []
@@ -162,7 +162,7 @@ def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
 
 
 def _way(rim: Rim, other: Rim) -> tuple[float, float]:
-    """Area between a rim and another; how much of it goes straight on."""
+    """Return the area between a rim and another, and how much of it continues the surface straight on."""
     along = np.roll(rim.corners, -1, axis=0) - rim.corners
     lengths = np.linalg.norm(along, axis=1)
     edges, shares = cut_to_pieces(other.corners)
@@ -178,7 +178,7 @@ def _way(rim: Rim, other: Rim) -> tuple[float, float]:
 
 
 def strip(one: Rim, other: Rim) -> Ints:
-    """(k, 3) vertices of triangles between rims that run opposite ways, from their nearest two corners on."""
+    """(k, 3) vertices of triangles between rims that run opposite ways, from their two nearest corners on."""
     away, nearest = scipy.spatial.cKDTree(other.corners).query(one.corners)
     start = int(np.argmin(away))
     i = (start + np.arange(len(one.ids) + 1)) % len(one.ids)
@@ -187,7 +187,7 @@ def strip(one: Rim, other: Rim) -> Ints:
 
 
 def _zipped(one: Ints, points: Floats, other: Ints, across: Floats) -> Ints:
-    """Triangles between two chains, along the first and against the other: the shorter diagonal that comes next."""
+    """(k, 3) triangles between two chains, along the first and against the other; each takes the shorter diagonal."""
     a, b, rows = 0, 0, []
     while a < len(one) - 1 or b < len(other) - 1:
         if b == len(other) - 1 or (
