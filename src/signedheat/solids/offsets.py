@@ -27,11 +27,11 @@ from .mesh_orientation import agreeing_faces
 from .tiles import Evaluated
 
 Reach: TypeAlias = Callable[[Floats], Floats]
-"""Signed distance of the surface from each of (n, 3) places of the solid."""
+"""A function that returns the signed distance of the offset surface from each of (n, 3) places of the solid."""
 MEETING_DISTANCE = 1e-7
-"""Triangles meet at a place if their distances from it differ by at most this, relative to the size of the solid."""
+"""Triangles meet at a place if they are at most this far from it, relative to the size of the solid."""
 DIFFERENCE_STEP = 1e-6
-"""Step of the differences that say how a distance varies, relative to the size of the solid."""
+"""Step of the differences that give the gradient of a varying distance, relative to the size of the solid."""
 ALONG_AXES = np.concatenate([np.eye(3), -np.eye(3)])
 
 
@@ -39,15 +39,15 @@ ALONG_AXES = np.concatenate([np.eye(3), -np.eye(3)])
 class Offset:
     """The surface at a distance from a solid, as the zero set of a function that grows outwards."""
 
-    solid: Evaluated  # what distance is to
-    reach: float | Reach  # the distance, negative inside; or one for each nearest place
-    # around edges and corners the surface follows the planes of the faces there up to this many distances; where these
-    # meet farther out it is cut off by a ball. With 1 it is round: the level of the distance itself
+    solid: Evaluated  # from which distance is measured
+    reach: float | Reach  # the distance, negative inside; or a function of the nearest places
+    # around edges and corners the surface follows the planes of the faces there up to this multiple of the distance;
+    # where they meet farther out it is cut off by a ball. With 1 it is round: a level of the distance to the solid
     limit: float = 1.0
 
     @property
     def level(self) -> float | None:
-        """The level of distance, if the distance is constant and round."""
+        """The level of distance that the surface is; None if it varies or is mitred."""
         return None if callable(self.reach) or (self.limit > 1 and self.reach != 0) else self.reach
 
     @property
@@ -56,7 +56,7 @@ class Offset:
         return "the distance that varies" if callable(self.reach) else f"level {self.reach:g}"
 
     def distance(self, points: Floats) -> Floats:
-        """(n,) heights of (n, 3) points above the surface, negative inside; these are distances if constant."""
+        """(n,) heights of (n, 3) points above the surface, negative inside; distances if `reach` is constant."""
         if self.level is not None:
             return self.solid.distance(points) - self.level
         return self._heights(points)[0]
@@ -91,7 +91,7 @@ class Offset:
     def _mitred(
         self, away: Floats, places: Floats, heights: Floats, gradients: Floats, reach: Floats
     ) -> tuple[Floats, Floats]:
-        """Distance from the planes around the nearest places, and its gradients."""
+        """(n,) heights above the planes of the faces at the nearest places, within the limit; and (n, 3) gradients."""
         far = np.abs(heights)
         near = np.flatnonzero((heights * reach > 0) & (far >= np.abs(reach)) & (far < 2 * self.limit * np.abs(reach)))
         if not len(near):
@@ -104,7 +104,7 @@ class Offset:
             return _steepest(features.rows, tree.bounds, tree.items, self._normals, rows, slack)
 
         above, faces = in_chunks(part, np.concatenate([places[near], sides[:, None] * away[near]], axis=1))
-        beyond = (1 - self.limit) * np.abs(reach[near]) + far[near]  # of the ball that cuts off
+        beyond = (1 - self.limit) * np.abs(reach[near]) + far[near]  # heights above the ball that cuts off corners
         planar = (faces >= 0) & (above > beyond)
         heights, gradients = heights.copy(), gradients.copy()
         heights[near] = sides * np.where(faces >= 0, np.maximum(above, beyond), far[near])
@@ -113,7 +113,7 @@ class Offset:
 
     @cached_property
     def _normals(self) -> Floats:
-        """Normals of the triangles; 0 where they do not have the inside behind them only."""
+        """(m, 3) normals of the triangles; 0 for those that do not bound the inside."""
         features = self.solid.tree.features
         return np.where(self.solid.bounding[features.ids][:, None], features.face_normals, 0.0)
 
@@ -146,7 +146,7 @@ def checked_reach(reach: Reach) -> Reach:
 def _steepest(
     rows: Floats, bounds: Floats, items: Ints, normals: Floats, places: Floats, slack: float
 ) -> tuple[Floats, Ints]:
-    """Find the triangle at each place above which its point is highest, or −1, and this height."""
+    """Find (n,) the triangle at each place above whose plane its point is highest, or −1; and this height."""
     heights, faces = np.full(len(places), -np.inf), np.full(len(places), -1, dtype=np.int64)
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
     for p in range(len(places)):
@@ -183,18 +183,18 @@ OFF_SYMMETRY = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class SheetWall:
-    """A solid around a surface: faces, moved to an origin, and the rim, where only what is upright counts."""
+    """A solid around a surface, between two heights, whose sides stand upright on the rim of the surface."""
 
     tree: FaceTree
-    origin: Floats
-    step: float  # by which places are moved from planes of symmetry, where a rim that stands on a face is as near
-    above: float
-    below: float
-    rim: TriangleTree | None  # the r sides of the rim, as triangles without area; None of closed surfaces
+    origin: Floats  # (3,) place that is moved to 0, with the faces
+    step: float  # by which points are moved off planes of symmetry, where a face and a rim standing on it are as near
+    above: float  # height of the solid in front of the surface
+    below: float  # its height behind the surface
+    rim: TriangleTree | None  # the r sides of the rim, as triangles without area; None if the surface is closed
     corners: Floats  # (r, 2, 3) begin and end of each side of the rim
-    sides: Ints  # (m, 3) the side of the rim that each side of each face is; −1 of those inside
+    sides: Ints  # (m, 3) the side of the rim that each side of each face is; −1 if it is not on the rim
     at_vertices: Ints  # (n, 2) the sides of the rim that end and that begin at each vertex; −1 where there are none
-    outward: Floats  # (r + 1, 2, 3) directions away from the surface at begin and end of each side; last zeros, for −1
+    outward: Floats  # (r + 1, 2, 3) directions away from the surface at begin and end of each side; last 0, for −1
 
     @classmethod
     def around(cls, sheet: Shapes, grid: Grid[Literal[3]], above: float, below: float) -> SheetWall:
@@ -248,7 +248,7 @@ class SheetWall:
         edges, vertices = (features > 0) & (features < 4), features > 3
         rim_sides[edges] = self.sides[faces[edges], features[edges] - 1][:, None]
         rim_sides[vertices] = self.at_vertices[self.tree.features.faces[faces[vertices], features[vertices] - 4]]
-        # of the side that ends at a vertex its end, and of the one that begins there its begin
+        # at vertices, the end of the side that ends there, and the begin of the one that begins there
         shares = np.broadcast_to([1.0, 0.0], rim_sides.shape).copy()
         sides = rim_sides[edges, 0]
         begin, end = self.corners[sides].swapaxes(0, 1)

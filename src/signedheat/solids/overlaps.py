@@ -1,10 +1,10 @@
 """Levels of pieces, and bodies among open pieces that overlap, or lie within others.
 
-The winding number jumps by one across a face. The mean of both sides is ½ on a closed surface that faces outwards, −½
-on one that faces inwards, and 0 on a flat sheet; between, it says how much of a body a group of triangles is.
+The winding number jumps by one across a face. Its mean on both sides, the level, is ½ on a closed surface that faces
+outwards, −½ on one that faces inwards, and 0 on a flat sheet; values between tell how much of a body triangles are.
 
 Gauss's formula asks for a level of ½ on all faces, so that what lies within a body must be a cavity of it. Parts of an
-assembly overlap, however, and have bodies within them. What is a body by itself therefore does not see the others,
+assembly overlap, however, and have bodies within them. What is a body by itself therefore ignores every other body,
 unless one of the two is a cavity in the other.
 """
 
@@ -37,7 +37,7 @@ def directed(triangles: Floats, counts: Floats | Ints) -> Floats:
 
 
 def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) -> Floats:
-    """(n,) levels at the centres of some triangles, each due to its own group, with counts as multiplicities."""
+    """(n,) levels at the centres of `faces`, each due to the triangles of its own group, `counts` times each."""
     names, labels = np.unique(groups, return_inverse=True)
     starts, order = grouped(labels, len(names))
     rank = np.argsort(order)
@@ -63,6 +63,7 @@ def levels_of_pieces(pieces: Pieces) -> Floats:
 
 @compiled
 def _among_few(corners: Floats, starts: Ints, counts: Ints, faces: Ints, groups: Ints) -> Floats:
+    """(n,) levels at the centres of faces, summed over the triangles of their groups."""
     levels = np.zeros(len(faces))
     for row in range(len(faces)):
         i, group = faces[row], groups[row]
@@ -79,17 +80,17 @@ def _among_few(corners: Floats, starts: Ints, counts: Ints, faces: Ints, groups:
 
 Nesting = Literal["given", "cavities", "bodies"]
 SHEET = 0.146
-"""Largest level of a piece that bounds nothing: it explains less than half of what is to be explained, (½ − .146)² = ½
-· ¼. Flat and wavy sheets have 0, a seventh of a ball .16, half of one .31, all of it ½."""
+"""Level below which a piece bounds nothing: its squared distance from ½ is more than half of that of a flat sheet,
+(½ − .146)² = ½ · ¼. Flat and wavy sheets have 0, a seventh of a ball .16, half of one .31, all of it ½."""
 HINT = 0.5
-"""A piece was given as facing one way if the area that does so exceeds the rest by this share."""
+"""A piece was given as facing one way if the area that does so exceeds the rest by this share of the whole."""
 OUTSIDE = 0.05
 """Two bodies overlap if a larger share of the area of one lies outside the other; a body lies within if at most this
-share of its rims is outside. Half of the rims of a bowl's or a vase's inside lie outside its outside."""
+share of its rims is outside. Half of the rims of the inside of a bowl or a vase lie outside its outside."""
 
 
 class Rims(NamedTuple):
-    """Edges where pieces end: their middles (k, 3), lengths (k,) and pieces (k,)."""
+    """Edges where pieces end: (k, 3) middles, (k,) lengths and (k,) pieces."""
 
     middles: Floats
     lengths: Floats
@@ -98,15 +99,15 @@ class Rims(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """Pieces, and groups of others, that are bodies by themselves."""
+    """Bodies: single pieces that are bodies by themselves, and groups of other pieces that are."""
 
     numbers: Ints  # (p,) the body that each piece is of, or −1
-    levels: Floats  # (b,) their levels by the signs of their pieces, negative of those that face inwards
+    levels: Floats  # (b,) levels of the bodies as their pieces are directed, negative if they face inwards
     as_given: Bools  # (b,) which were clearly given as bodies that face outwards
 
     @classmethod
     def of(cls, pieces: Pieces, directed: Floats, groups: Ints, alone: Floats, given: Floats) -> Bodies:
-        """Find the bodies among directed pieces, given how much of their area faces as it was given."""
+        """Find the bodies among directed pieces, of whose area `given` faces as it was given, less the rest."""
         n = len(groups)
         itself = np.abs(alone) >= SHEET
         names, owners = np.unique(np.where(itself, n + np.arange(n), groups), return_inverse=True)
@@ -131,7 +132,8 @@ def bodies_around(
 ) -> Floats:
     """(n,) winding numbers, at the places of a system, of the bodies that each place ignores.
 
-    It sees its own body, the one in which this is a cavity, and cavities in it; `nested` decides which bodies are.
+    A place counts its own body, the body in which this is a cavity, and cavities in it; it ignores all others.
+    `nested` decides which bodies within others are cavities.
     """
     triangles = directed(pieces.triangles, signs[pieces.labels])
     bodies = Bodies.of(pieces, triangles, groups, alone, signs * given)
@@ -150,21 +152,21 @@ def bodies_around(
     sizes = np.concatenate([system.areas, rims.lengths])
     order = np.argsort(numbers, kind="stable")
     parts = np.split(triangles[order], np.searchsorted(numbers[order], np.arange(count)))[1:]
-    parts += [closed] * (len(closed) > 0)  # one more body
+    parts += [closed] * (len(closed) > 0)  # closed surfaces count as one more body
     rows, others, numbers_there = _windings(places, normals, sizes, parts)
     homes_there = homes[rows]
     weights = np.where(own, sizes, 0.0)
     on_rim = np.arange(len(places)) >= n
 
     def mean(chosen: Bools, values: NDArray[Any], one: Ints, other: Ints) -> Floats:
-        """Over the chosen places of one body, 0 where these are not in the box of the other, for each pair."""
+        """Average values over the chosen places of one body, 0 outside the box of the other, for pairs of bodies."""
         entries, shape = weights[rows] * chosen[rows] * values, (count + 1, count + 1)
         sums = sparse.coo_array((entries, (homes_there, others)), shape=shape).tocsr()
         total = np.bincount(homes, weights * chosen, count + 1)
         return np.asarray(sums[one, other]).ravel() / np.maximum(total[one], np.finfo(float).tiny)
 
     full = 2 * np.abs(np.append(bodies.levels, 0.5))[others]
-    share = np.clip(numbers_there / full, 0.0, 1.0)  # 1 as if nothing of the other body was gone
+    share = np.clip(numbers_there / full, 0.0, 1.0)  # 1 inside, as if no part of the other body were missing
     surface_within = np.maximum(
         *(mean(~on_rim, share > INSIDE_WINDING, *pair) for pair in ((homes_there, others), (others, homes_there)))
     )
@@ -179,7 +181,7 @@ def bodies_around(
 
 
 def _windings(places: Floats, normals: Floats, sizes: Floats, parts: list[Floats]) -> tuple[Ints, Ints, Floats]:
-    """For each body and place in its box: (k,) places, bodies, and winding numbers, as means of both sides."""
+    """(k,) places in the boxes of bodies, (k,) these bodies, and (k,) their winding numbers, means of both sides."""
     boxes = np.array([(corners.min(axis=(0, 1)), corners.max(axis=(0, 1))) for corners in parts])
     # a point is a triangle whose corners are equal
     starts, bodies = BoxTree.of(boxes[:, 0], boxes[:, 1]).meeting(np.repeat(places[:, None], 3, axis=1))

@@ -2,7 +2,7 @@
 
 The winding number differs on the two sides of a face by the number of times that the face is there; between two faces
 that follow each other around an edge it does not change. This gives it on both sides of all connected faces, up to a
-constant that samples determine. So the inside does not depend on places between faces that nearly coincide.
+constant that samples determine. So the inside does not depend on samples between faces that nearly coincide.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from ..mesh.welding import coincident_faces
 from .winding import INSIDE_WINDING, OFF_FACE, Windings
 
 TOLERANCES: tuple[float, ...] = (SAME_POINT, 10 * SAME_POINT, 100 * SAME_POINT, 1000 * SAME_POINT)
-"""Distances below which points are one, relative to the size of a shape: the first with which what bounds is closed. Of
-boxes that touch, with corners moved by 1e-11 to 1e-5 of their size, none is wrong; without the last up to a seventh,
-with the first alone nine tenths (`benchmarks/deciding_numbers.py`)."""
+"""Distances below which points are one, relative to the size of a shape, tried until what bounds the inside is closed.
+Of touching boxes with corners moved by 1e-11 to 1e-5 of their size, none is wrong; without the last distance up to a
+seventh are, with the first alone nine tenths (`benchmarks/deciding_numbers.py`)."""
 PROBED_FACES = 3
 """Number of faces of each component on both sides of which winding numbers are computed; their median counts."""
 PROBE_DISTANCE = 4.0
@@ -36,10 +36,10 @@ PROBE_DISTANCE = 4.0
 class Regions:
     """Whether the inside lies behind and in front of each face."""
 
-    behind: Bools  # (m,) each: whether it is inside behind the face, and in front of it
-    ahead: Bools
+    behind: Bools  # (m,) whether the inside lies behind the face
+    ahead: Bools  # (m,) whether it lies in front of the face
     doubled: Bools  # (m,) whether another face on the same corners stands for it
-    contradictions: int  # number of sides that face each other, and should have other winding numbers
+    contradictions: int  # number of pairs of facing sides whose winding numbers disagree
 
     @property
     def bounds(self) -> Bools:
@@ -65,7 +65,7 @@ class Regions:
         behind, ahead = (
             np.where(reverse, *pair) for pair in ((ahead[groups], behind[groups]), (behind[groups], ahead[groups]))
         )
-        # of copies the first stays that has the inside behind it, if there is one
+        # of copies, the first that has the inside only behind it stands for all; or else the first
         order = np.lexsort((~behind | ahead, groups))
         doubled = np.ones(len(groups), dtype=bool)
         doubled[order[np.unique(groups[order], return_index=True)[1]]] = False
@@ -75,11 +75,11 @@ class Regions:
 def cut_and_sided(
     cut: Callable[[float], Arrangement], closing: Bools, windings: Windings
 ) -> tuple[Arrangement, Regions]:
-    """Cut faces with a tolerance, and find the regions beside them: those that bound the inside are closed.
+    """Cut faces with the first tolerance with which those that bound the inside are closed, and find their regions.
 
-    Where corners that should coincide are apart by about the tolerance they are not, or sides contradict each other:
-    then larger ones are tried, and that with the fewest faults is taken. `closing` tells which of the faces that were
-    given count in the winding numbers.
+    If corners that should coincide are about a tolerance apart, edges stay open or sides contradict each other. Then
+    larger tolerances are tried; if none works, that with the fewest faults is taken. `closing` tells which of the given
+    faces count in the winding numbers.
     """
     tried: list[tuple[Arrangement, Regions]] = []
     faults: list[int] = []
@@ -93,7 +93,7 @@ def cut_and_sided(
 
 
 def _faults(pieces: Arrangement, regions: Regions, closing: Bools) -> int:
-    """Count contradictions, and open edges of what bounds the inside; none if nothing is cut."""
+    """Count contradictions, and open edges of what bounds the inside; 0 if nothing is cut."""
     if np.array_equal(pieces.origins, np.arange(len(closing))):
         return 0
     bounds = pieces.faces[regions.bounds & closing[pieces.origins]]
@@ -103,7 +103,7 @@ def _faults(pieces: Arrangement, regions: Regions, closing: Bools) -> int:
 def _windings(
     points: Floats, faces: Ints, normals: Floats, times: Ints, windings: Windings, step: float
 ) -> tuple[Floats, int]:
-    """(m, 2) winding numbers behind and in front of each distinct face, given its multiplicity; contradictions.
+    """(m, 2) winding numbers behind and in front of each distinct face, given its multiplicity; and contradictions.
 
     Sides of wide faces are probed at least a step away.
     """
@@ -129,8 +129,8 @@ def _windings(
 def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> tuple[Ints, Ints]:
     """Pairs of sides that face each other around edges, clearest first; 2 f is behind face f, 2 f + 1 in front.
 
-    Where faces do not balance at an edge, rims of what is open are, and nothing is known. Directions across edges come
-    from the planes that faces are pieces of, so that slivers have them, too.
+    Edges at which faces do not balance are left out: they are rims of open surfaces, where nothing is known. Directions
+    across edges come from the planes that faces are pieces of, so that slivers have them, too.
     """
     table = edge_table(faces)
     halfedges = table.pairs[(_ways(table, table.pairs) * times[table.pairs // 3]).sum(axis=1) == 0]
@@ -171,10 +171,11 @@ def _facing(table: EdgeTable, turning: Ints, reached: Ints) -> tuple[Ints, Ints]
 def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints, int]:
     """Levels of the sides of faces, equal for sides that face each other; their components; number of contradictions.
 
-    In front of a face it is less than behind it by how often the face is there; later contradictions change nothing.
+    The level in front of a face is less than that behind it by the multiplicity of the face. Pairs of sides that
+    contradict earlier ones are only counted.
     """
     n, contradictions = 2 * len(times), 0
-    parents, rises = np.arange(n), np.zeros(n, dtype=np.int64)  # from the parent of each
+    parents, rises = np.arange(n), np.zeros(n, dtype=np.int64)  # levels relative to the parents
     for face in range(len(times)):
         parents[2 * face + 1], rises[2 * face + 1] = 2 * face, -times[face]
     for k in range(len(one)):
@@ -196,7 +197,7 @@ def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints, int]:
         elif rise != 0:
             contradictions += 1
     labels, count = np.empty(n, dtype=np.int64), 0
-    for node in range(n):  # those above it have their levels already
+    for node in range(n):  # parents come first, and have their levels already
         if parents[node] == node:
             labels[node] = count
             count += 1
@@ -207,7 +208,7 @@ def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints, int]:
 
 
 def widest(pieces: Arrangement) -> Floats:
-    """(p, 3) middle of the widest face of each piece."""
+    """(p, 3) middle of the widest piece in the cell of each piece."""
     order = np.lexsort((-heights(pieces.points[pieces.faces]), pieces.cells))
     first = order[np.searchsorted(pieces.cells[order], np.arange(int(pieces.cells.max()) + 1))]
     middles: Floats = pieces.points[pieces.faces[first]].mean(axis=1)[pieces.cells]

@@ -1,8 +1,8 @@
 """Unite the triangles that close a solid, or combine two solids: cut faces where they cross, keep those that bound.
 
 Where w is 1 inside a solid and 0 outside, ``w(a) − w(b)`` is 1 in a without b and at most 0 elsewhere, and
-``w(a) + w(b) − 1`` is 1 in both only. So each combination is what lies behind triangles of the two, turned where they
-are subtracted, across which such a sum passes ½; a box around both, turned inside out, is the − 1.
+``w(a) + w(b) − 1`` is 1 in both only. So each combination is bounded by those triangles of both, turned if
+subtracted, across which such a sum passes ½; a box around both, turned inside out, contributes the − 1.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ TRUST_DISTANCE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class TriangleGroup:
-    """Triangles of one kind."""
+    """Triangles of one kind, which all count in the winding number, or all do not."""
 
     triangles: Floats  # (m, 3, 3) corners
     ids: Ints  # (m, 3) vertices, one number for each position
@@ -43,7 +43,7 @@ class TriangleGroup:
 
     @classmethod
     def made(cls, triangles: Floats, closing: bool = True) -> TriangleGroup:
-        """Triangles that were not given; their vertices have negative numbers."""
+        """Return the group of triangles that were not given; their vertices have negative numbers."""
         ids = -1 - same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)
         return cls(triangles, ids, np.full(len(triangles), -1), closing)
 
@@ -51,7 +51,7 @@ class TriangleGroup:
 def united(
     surfaces: list[TriangleGroup], keep_overlaps: bool, notes: Sequence[Note] = (), points: Floats | None = None
 ) -> Solid:
-    """Make the solid that surfaces close, with confidence that falls from `points`, (n, 3), or given corners."""
+    """Make the solid that surfaces close; confidence falls with the distance from (n, 3) `points`, or given corners."""
     whole = joined_surfaces(surfaces)
     closing = np.concatenate([np.full(len(surface.triangles), surface.closing) for surface in surfaces])
     windings = Windings(whole.triangles if closing.all() else whole.triangles[closing])
@@ -60,7 +60,7 @@ def united(
     triangles = whole.triangles if uncut else pieces.points[pieces.faces]
     behind, ahead = regions.behind.copy(), regions.ahead.copy()
     closes = closing[pieces.origins]
-    # winding numbers do not step across sheets
+    # winding numbers do not change across sheets
     behind[~closes], ahead[~closes] = windings.sides(triangles[~closes])
     origins = whole.origins[pieces.origins]
     given = origins >= 0
@@ -79,7 +79,7 @@ def united(
 
 
 def _cut(whole: TriangleGroup, closing: Bools, touching: float) -> Arrangement:
-    """Faces divided where they meet: those that close by each other, all others by these."""
+    """Divide faces where they meet: closing faces where they meet each other, all others where they meet these."""
     ids = whole.ids
     points = whole.triangles.reshape(-1, 3)[first_members(ids.ravel(), int(ids.max()) + 1)]
     faces = same_positions(points)[ids]
@@ -115,7 +115,7 @@ def _arranged(points: Floats, faces: Ints, chosen: Ints, pairs: Ints, touching: 
 
 
 def _notes(triangles: Floats, origins: Ints, kept: Bools, buried: Bools, bounds: Bools) -> list[Note]:
-    """Say what was left out (`buried`), what was completed, and how much bounds nothing."""
+    """Return notes on what was left out (`buried`), what was completed, and how much bounds nothing."""
     notes: list[Note] = []
     areas, given = face_areas(triangles), origins >= 0
     total = max(float(areas[given].sum()), np.finfo(float).tiny)
@@ -132,7 +132,7 @@ def _notes(triangles: Floats, origins: Ints, kept: Bools, buried: Bools, bounds:
 
 
 def _confidence(triangles: Floats, given: Bools, whole: TriangleGroup, points: Floats | None) -> NDArray[np.float32]:
-    """(m,) 1 where surface was given; where it was completed less, the farther from what was given."""
+    """(m,) confidence in triangles: 1 for given ones, and less for others, the farther they are from given ones."""
     confidence = np.ones(len(triangles), dtype=np.float32)
     if points is None:
         points = whole.triangles[whole.origins >= 0].reshape(-1, 3)
@@ -149,7 +149,7 @@ def _confidence(triangles: Floats, given: Bools, whole: TriangleGroup, points: F
 
 
 def joined_surfaces(surfaces: list[TriangleGroup]) -> TriangleGroup:
-    """Several surfaces as one; numbers of vertices that are new, which are negative, stay apart."""
+    """Join surfaces; given vertices with one number become one, new ones, with negative numbers, stay apart."""
     ids, lowest = [], 0
     for surface in surfaces:
         own = np.where(surface.ids < 0, surface.ids + lowest, surface.ids)
@@ -189,7 +189,7 @@ def intersection(a: Solid, b: Solid) -> Solid:
 
 
 def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None) -> Solid:
-    """Make the solid of `a`, and `b`, turned or not; its winding number is the sum of theirs and that of `around`."""
+    """Make the solid whose winding number is that of `a`, plus that of `b`, turned or not, plus that of `around`."""
     (first, of_first), (second, of_second) = ((x.triangles[x.bounding], np.flatnonzero(x.bounding)) for x in (a, b))
     triangles = np.concatenate([first, second[:, ::-1] if turned else second])
     if not len(triangles):

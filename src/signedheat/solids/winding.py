@@ -18,12 +18,12 @@ INSIDE_WINDING = 0.5
 SUMMED_POINTS = 16
 """At this many points or fewer, sums over all triangles take less time and memory than a tree."""
 OFF_FACE = 1e-6
-"""Offset in front of a face and behind it, relative to its size."""
+"""Offset of the points in front of a face and behind it that are tested, relative to its size."""
 
 
 @dataclass(frozen=True, eq=False)
 class Windings(Frozen):
-    """Winding numbers of a cycle of triangles, with balanced edges: integers, which change only across them."""
+    """Winding numbers of triangles with balanced edges: integers, which change only across the triangles."""
 
     triangles: Floats  # (m, 3, 3) corners; equal places have equal numbers
 
@@ -44,7 +44,7 @@ class Windings(Frozen):
         return WindingTree.of(self.triangles)
 
     def numbers(self, points: Floats) -> Floats:
-        """(n,) winding numbers."""
+        """(n,) winding numbers of points."""
         return self.tree.numbers(points) if len(self.triangles) and len(points) else np.zeros(len(points))
 
     def numbers_once(self, points: Floats) -> Floats:
