@@ -1,4 +1,4 @@
-"""Orientation: faces of meshes agree with their neighbours and bound outwards; pieces of curves agree."""
+"""Orient meshes, so that faces agree with their neighbours and face outwards; and curves, so that pieces agree."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Orientation(Frozen, ShortRepr):
     shape : TriangleMesh or PolygonMesh
         The oriented mesh, on the same vertices.
     faces : (k,) int
-        Which faces of the mesh that was given are still there, in order.
+        Faces of the given mesh that were kept, in order.
     turned : (k,) bool
         Which of them were turned.
     parts : (k,) int
@@ -107,10 +107,10 @@ class Orientation(Frozen, ShortRepr):
 def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Orientation:
     """Orient a mesh, and say what was turned, merged and left.
 
-    Vertices at one place, to roundoff, count as one, and so do faces on the same corners. What closes as it was given
-    stays as it is, or turns as a whole to face outwards. Elsewhere faces are made to agree across edges of two, walls
-    between closed cells are left out (`inner_walls`), and Gauss's formula decides which way the pieces so found face
-    and which of them bound nothing (`signedheat.solids.bounding`).
+    Vertices at one place, to roundoff, count as one, and so do faces on the same corners. What is closed as
+    given stays as it is, or turns as a whole to face outwards. Other faces are made to agree across edges of two faces,
+    walls between closed cells are left out (`inner_walls`), and Gauss's formula decides which way the resulting pieces
+    face and which of them bound nothing (`signedheat.solids.bounding`).
 
     Takes O(n log n) time.
 
@@ -119,8 +119,8 @@ def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Ori
     shape : TriangleMesh or PolygonMesh
         Any mesh, however broken.
     nested : {"given", "cavities", "bodies"}
-        What closed pieces within others are: as they were given, to what they lie in; cavities, and bodies in these; or
-        bodies all.
+        What closed pieces within others are: what they were given as, relative to the piece they lie in; cavities, and
+        bodies within these; or all bodies.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def oriented_as(shape: Mesh, chain: Chain, decided: Bounding) -> Orientation:
     proper = chain.numbers >= 0
 
     def given(values: NDArray[Any], without: float) -> NDArray[Any]:
-        """(m,) values of the chain at the triangles that were given."""
+        """(m,) values of the chain at the given triangles; `without` at those that it lacks."""
         return np.append(values, np.array(without, dtype=values.dtype))[chain.numbers]
 
     areas, as_given, inside = given(chain.areas, 0), given(decided.as_given, 0), given(decided.inner, 0)
@@ -164,7 +164,7 @@ def oriented_as(shape: Mesh, chain: Chain, decided: Bounding) -> Orientation:
 
     first = first_members(owners, n)
     turned, whole = most(decided.to_turn(chain)), most(as_given)
-    # of copies one that need not turn stays; all do of what is whole as it was given
+    # of copies, one that need not turn is kept; of what is closed as given, all are
     group = np.where(proper[first] & ~whole, chain.numbers[first], len(chain.faces) + np.arange(n))
     order = np.lexsort((turned, group))
     kept = np.sort(order[np.append(True, np.diff(group[order]) != 0)])
@@ -209,7 +209,7 @@ def owners_of(shape: Mesh) -> Ints:
 
 
 def _turned_mesh(shape: Mesh, kept: Ints, flipped: Bools) -> Mesh:
-    """Take some faces of a mesh, some of them turned; return the mesh itself if nothing changes."""
+    """Return a mesh of the kept faces, some of them flipped; the mesh itself if nothing changes."""
     if not flipped.any() and len(kept) == (shape.n_faces if isinstance(shape, TriangleMesh) else shape.n_polygons):
         return shape
     if isinstance(shape, TriangleMesh):
@@ -271,7 +271,7 @@ def orient(
 
 
 def agreeing_faces(mesh: TriangleMesh) -> Ints:
-    """(m, 3) faces, by the first vertex at each place, turned to agree where all of a component can."""
+    """(m, 3) faces, on the first vertex at each place, turned to agree in components where all faces can."""
     chain, faces = Chain.of(mesh), mesh.faces.copy()
     turned = chain.pieces(np.ones(len(chain.faces), dtype=bool)).turned
     proper = chain.numbers >= 0

@@ -14,7 +14,7 @@ from ..surfaces.point_cloud import PointCloud, outward_normals
 
 
 def orient_points(cloud: PointCloud) -> tuple[PointCloud, OrientedPoints]:
-    """Turn the normals of a point cloud outwards, fitted where there are none; given ones may be mostly inverted."""
+    """Turn the normals of a point cloud outwards, or fit them if it has none; most given normals may be inverted."""
     if cloud.points.shape[1] != 3:
         raise GeometryError(
             f"point clouds are oriented in space: points need 3 coordinates, not {cloud.points.shape[1]}",
@@ -43,7 +43,7 @@ def orient_points(cloud: PointCloud) -> tuple[PointCloud, OrientedPoints]:
 FIT_NEIGHBORS = 30
 """Number of nearest points for each node."""
 WEIGHTED_POINTS = 12
-"""Number of those that get a weight, among those that face along ∇φ."""
+"""Number of them that get a weight: the nearest of those that face along ∇φ."""
 FACING_COSINE = 0.3
 """Cosine between normal and ∇φ above which a point faces along ∇φ."""
 FIT_WIDTH = 2.0
@@ -55,8 +55,9 @@ FIT_REACH = 1.5
 def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats) -> Floats:
     """Move the zero set of φ, (nx, ny, nz), at nodes `steps` apart, onto a smooth surface through oriented points.
 
-    Near it φ becomes the weighted mean of ``½ (n_i + n) · (x − p_i)`` over points p_i, from the first node, n the mean
-    of their normals: the planes with either lie on two sides of a curved surface. Points against ∇φ do not count.
+    Near it φ becomes the weighted mean of ``½ (n_i + n) · (x − p_i)`` over points p_i, where n is the mean of their
+    normals n_i: planes with normals n_i and n lie on opposite sides of a curved surface. Positions are relative to the
+    first node. Points whose normals are against ∇φ do not count.
     """
     tree = scipy.spatial.cKDTree(points)
     n_neighbours = min(FIT_NEIGHBORS, len(points))
@@ -86,7 +87,7 @@ def _slopes(phi: Floats, nodes: Ints, steps: Floats) -> Floats:
 
 
 def mean_gap(points: Floats) -> float:
-    """Side of the square per point, if (n, 3) points were spread over a plane as over their six nearest."""
+    """Return the root of the area per point, taken from discs around (n, 3) points up to their sixth neighbours."""
     reach = scipy.spatial.cKDTree(points).query(points, k=[min(7, len(points))])[0]
     return float(np.median(reach) * np.sqrt(np.pi / 7.0))
 
@@ -94,7 +95,7 @@ def mean_gap(points: Floats) -> float:
 def _fit(
     places: Floats, ahead: Floats, reach: Floats, points: Floats, normals: Floats, gap: float
 ) -> tuple[Floats, Floats]:
-    """Height of each place above the surface through the (k, n, 3) points around it, and its weight."""
+    """(k,) height of each place above the surface through the (k, n, 3) points around it, and (k,) its weight."""
     cosines = np.einsum("pki,pi->pk", normals, ahead)
     facing = cosines > FACING_COSINE
     ranked = np.sort(np.where(facing, reach, np.inf), axis=1)

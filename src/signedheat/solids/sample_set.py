@@ -36,7 +36,7 @@ class Samples:
     center : (3,) float
         Centre of the box around the surface.
     radius : float
-        Distance from there to the farthest place of the surface.
+        Distance from the centre to the farthest place of the surface.
 
     Examples
     --------

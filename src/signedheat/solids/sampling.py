@@ -133,8 +133,9 @@ def training_points(
 ) -> tuple[dict[str, NDArray[np.float32]], dict[str, NDArray[np.float32]]]:
     """Sample n points of each kind in single precision: on a closed surface, and around it with signed distances.
 
-    On it: (n, 6) positions and normals, by area and along sharp edges. Around it: (n, 3) in the cube around its sphere,
-    and near it; their (n,) distances are ``…_label``. With `normalize`, in the unit sphere.
+    On it: (n, 6) positions and normals, by area and along sharp edges. Around it: (n, 3) points in the cube around its
+    bounding sphere, and near the surface, with (n,) distances named ``…_label``. With `normalize`, the surface is
+    scaled to the unit sphere first.
     """
     random = np.random.default_rng(0)
     lower, upper = surface.bounds
@@ -161,7 +162,7 @@ def training_points(
 def _on_sharp_edges(
     surface: TriangleMesh, normals: Floats, n: int, random: np.random.Generator
 ) -> tuple[Floats, Floats]:
-    """(n, 3) places uniform along sharp edges, and means of the normals on both sides."""
+    """(n, 3) places uniform along sharp edges, and (n, 3) mean normals of both sides; none without such edges."""
     pairs = edge_table(surface.faces).pairs
     pairs = pairs[normals[pairs // 3].prod(axis=1).sum(axis=1) < np.cos(SHARP_ANGLE)]
     if not len(pairs):

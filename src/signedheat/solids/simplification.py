@@ -52,7 +52,8 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
 def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
     """Whether all of a surface lies within a distance of another one; False if it is too close to call.
 
-    Distance to a triangle is convex, so corners of pieces tell; pieces near several are cut upright on its sides.
+    Distance to a triangle is convex, so it is greatest at the corners of a piece. Pieces near several triangles are cut
+    by planes upright on the sides of the nearest one.
     """
     tree = FaceTree.of(FaceFeatures.of(other.vertices, other.faces))
     pieces = mesh.vertices[mesh.faces]
@@ -71,7 +72,7 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
 
 
 def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
-    """(k, 3, 3) parts of (n, 3, 3) pieces, cut upright on a side of their nearest triangles, (n, 16), or halved."""
+    """(k, 3, 3) parts of (n, 3, 3) pieces, cut by planes upright on a side of the nearest triangles, or halved."""
     sides = np.linalg.norm(np.roll(pieces, -1, axis=1) - pieces, axis=2)
     relative = pieces - rows[:, None, :3]
     p = (relative * rows[:, None, 3:6]).sum(axis=2)
