@@ -165,7 +165,7 @@ def placed(group: Group, domain: EmbeddedSurface) -> CurveOrPoints:
 
 
 def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[Ints, Floats]:
-    """Return the face and barycentric coordinates of nodes."""
+    """Return faces, (n,), on which the nodes lie, and their barycentric coordinates in these, (n, 3)."""
     mesh = domain.triangulation
     count = np.array([len(node.vertices) for node in nodes])
     faces, weights = np.zeros(len(nodes), dtype=np.int64), np.zeros((len(nodes), 3))
@@ -195,7 +195,7 @@ def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[Ints, Floa
 
 
 def polylines_of_segments(kind: str, nodes: list[Node], segments: Sequence[tuple[int, int]]) -> list[Group]:
-    """Join segments between nodes to curves; nodes at the same position are identified."""
+    """Join segments, which are pairs of indices of nodes, to curves; equal nodes count as one."""
     bad = [s for s in segments if not all(0 <= i < len(nodes) for i in s)]
     if bad:
         raise FileFormatError(
@@ -262,7 +262,7 @@ def read_csv(path: PathLike, domain: EmbeddedSurface) -> list[Curve]:
 
 
 def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]:
-    """Read line and point elements of an OBJ file."""
+    """Read line and point elements of an OBJ file; they are projected unless its vertices are those of the surface."""
     positions, lines, points = read_obj_elements(path)
     bad = [i for ids in lines + points for i in ids if not 0 <= i < len(positions)]
     if bad:
@@ -287,7 +287,7 @@ def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]
 
 
 def nodes_of(faces: Ints, weights: Floats, domain: EmbeddedSurface) -> list[Node]:
-    """Express points on faces as nodes."""
+    """Return nodes for points with barycentric weights on faces; corners with weight 0 are left out."""
     refuse_missing("face", faces, domain.triangulation.n_faces)
     corners = domain.triangulation.faces[faces]
     return [

@@ -31,9 +31,9 @@ SVG_UNITS = {"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm":
 SVG_UNITS |= {"em": 16.0, "ex": 8.0}
 CONTAINERS = ("svg", "g", "a", "switch")
 PLACED = {"svg": ("viewBox", "x", "y"), "symbol": ("viewBox",)}
-"""Attributes of drawings within a drawing that give them coordinates of their own."""
+"""Attributes that give a drawing within a drawing coordinates of its own, by the name of its element."""
 AXES = {"x": 0, "x1": 0, "x2": 0, "cx": 0, "rx": 0, "width": 0, "y": 1, "y1": 1, "y2": 1, "cy": 1, "ry": 1, "height": 1}
-"""Axes of attributes that are lengths along an axis."""
+"""Axis, 0 or 1, of each attribute that is a length along x or y."""
 FILL_RULE = re.compile(r"fill-rule\s*:\s*(\w+)")
 TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
 
@@ -49,7 +49,7 @@ def read_svg(path: PathLike) -> list[tuple[Floats, bool]]:
     lines = [line for part in drawing.drawn(root, np.eye(3)) for line in part]
     if not lines:
         raise FileFormatError("the drawing contains no lines", remedy="convert text and images to paths first")
-    return [(points * (1.0, -1.0) + 0.0, closed) for points, closed in lines]  # −0 is 0
+    return [(points * (1.0, -1.0) + 0.0, closed) for points, closed in lines]  # adding 0 turns −0 into 0
 
 
 @dataclass
@@ -63,7 +63,7 @@ class _Drawing:
     def drawn(
         self, element: ElementTree.Element, outer: Floats, depth: int = 0, is_used: bool = False, rule: str = "nonzero"
     ) -> Iterator[list[tuple[Floats, bool]]]:
-        """Subpaths of an element and its children; those with the evenodd rule as outlines of their fill."""
+        """Yield the subpaths of an element and its children; with the evenodd rule, outlines of what they fill."""
         self.n_used += is_used
         if depth > 100 or self.n_used > 10**5:
             raise damaged("its elements contain themselves or too many others")
@@ -145,7 +145,7 @@ def length(word: str, whole: float = math.nan, name: str = "length") -> float:
 
 
 def _size(root: ElementTree.Element) -> tuple[float, float]:
-    """Width and height in user units; NaN if not given."""
+    """Return the width and height of a drawing in user units; NaN where they are not given."""
     box = [float(word) for word in NUMBER.findall(root.get("viewBox", ""))]
     if len(box) == 4:
         return box[2], box[3]
@@ -155,7 +155,7 @@ def _size(root: ElementTree.Element) -> tuple[float, float]:
 
 
 def _transform(text: str) -> Floats:
-    """(3, 3) the product of a list of transforms."""
+    """Return the product of a list of transforms in an attribute, as a (3, 3) matrix."""
     matrix = np.eye(3)
     for kind, inside in TRANSFORM.findall(text):
         numbers = [float(word) for word in NUMBER.findall(inside)]
@@ -180,14 +180,14 @@ def _transform(text: str) -> Floats:
 
 
 def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
-    """Split a path into commands with arguments; repeated commands are expanded."""
+    """Yield the commands of a path with their arguments; further arguments without a command repeat the last one."""
     position, command = 0, ""
     end = len(data.rstrip())
     while position < end:
         word = COMMAND.match(data, position)
         if word:
             position, command = word.end(), word[1]
-        elif command in "Zz":  # valid even at the beginning
+        elif command in "Zz":  # also true at the beginning, where it is empty
             raise damaged(f"a path goes on with '{data[position : position + 20].strip()}', which is not a command")
         numbers = []
         for place in range(ARGUMENTS[command.upper()]):
@@ -204,7 +204,7 @@ def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
 
 
 def _subpaths(data: str) -> Iterator[tuple[Floats, bool]]:
-    """Return the points of each subpath that has a length, and whether it is closed."""
+    """Yield the points of each subpath that has a length, and whether it is closed."""
     points: list[Complexes] = []
     place = start = control = 0j
     before, closed = "", False
@@ -240,7 +240,7 @@ def _subpaths(data: str) -> Iterator[tuple[Floats, bool]]:
 
 
 def _whole(parts: list[Complexes], closed: bool) -> Iterator[tuple[Floats, bool]]:
-    """Return a subpath if it has a length; it is closed also if it ends where it begins, up to rounding."""
+    """Yield a subpath if it has a length; it is closed also if it ends where it begins, up to rounding."""
     points = np.concatenate([np.zeros(0, dtype=np.complex128), *parts])
     if len(points) == 0 or (points == points[0]).all():
         return
@@ -251,7 +251,7 @@ def _whole(parts: list[Complexes], closed: bool) -> Iterator[tuple[Floats, bool]
 
 
 def _bezier(corners: list[complex]) -> Complexes:
-    """Points of a Bézier curve of any degree, by de Casteljau's algorithm, without the first."""
+    """Return points of a Bézier curve of any degree, by de Casteljau's algorithm; the first one is left out."""
     t = np.arange(1, CURVE_PIECES + 1) / CURVE_PIECES
     rows = [np.full(CURVE_PIECES, corner) for corner in corners]
     while len(rows) > 1:
@@ -263,7 +263,7 @@ def _bezier(corners: list[complex]) -> Complexes:
 def _arc(
     begin: complex, end: complex, rx: float, ry: float, degrees: float, is_large: float, is_clockwise: float
 ) -> Complexes:
-    """Points of an elliptical arc without the first: SVG 1.1, F.6.5, on the circle that the ellipse is mapped to."""
+    """Return points of an elliptical arc but the first, by a map of the ellipse to a circle (SVG 1.1, F.6.5)."""
     rx, ry = abs(rx), abs(ry)
     if rx * ry == 0 or begin == end:
         return np.array([end])

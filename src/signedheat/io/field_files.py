@@ -146,7 +146,7 @@ def load_field(path: PathLike) -> Field:
         )
     image = read_image(path, FIELD_FORMATS - {".vdb"}, "a field")
     if extension(path) == ".npy":
-        contents(Path(path).with_suffix(".json"))  # the grid of the values
+        contents(Path(path).with_suffix(".json"))  # refuse values without the file of their grid
     with reading(path):
         if image.values.dtype == bool:
             raise FileFormatError("the values are booleans, not real numbers: this is not a field")
@@ -156,7 +156,7 @@ def load_field(path: PathLike) -> Field:
 
 
 def made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
-    """Construct a grid or field from a file; errors become errors of the file."""
+    """Make an object of a class from parts of a file; turn a `GeometryError` of it into a `FileFormatError`."""
     try:
         return kind(*parts, **options)
     except GeometryError as error:
@@ -164,7 +164,7 @@ def made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
 
 
 def load_vertex_field(path: PathLike) -> VertexField:
-    """Return a surface with φ at its vertices: what `VertexField.save` wrote, except as ``.obj``."""
+    """Read a field on a surface that `VertexField.save` has written, in any of its formats but ``.obj``."""
     with reading(path):
         if extension(path) in _VALUES:
             shape = _VALUES[extension(path)](path, (VALUES_NAME,))
@@ -214,7 +214,7 @@ def _load_band(path: PathLike) -> GridField:
 
 
 def _write_npz(field: GridField, path: Path) -> None:
-    """Write an archive; of a band its blocks and the coarse field around them."""
+    """Write a field to an archive, with its solid; a band is written as its blocks and the coarse field around them."""
     arrays: dict[str, Any] = {"values": field.values, "origin": field.grid.origin, "spacing": field.grid.spacing}
     arrays |= {CONFIDENCE: field.confidence, "convention": CONVENTION}
     if field.blocks is not None:
@@ -247,7 +247,7 @@ def _write_npy(field: GridField, path: Path) -> None:
 
 
 def _write_for_vtk(field: GridField, path: Path) -> None:
-    """Write all nodes, also of a band, for ParaView and solvers."""
+    """Write values at all nodes of the grid, also for a band, for ParaView and solvers."""
     grid, convention = field.grid, CONVENTION
     values: dict[str, NDArray[np.floating]] = {VALUES_NAME: field.values}
     if field.blocks is not None:
@@ -264,7 +264,7 @@ def _write_nrrd(field: GridField, path: Path) -> None:
 
 
 def whole_values(field: GridField) -> NDArray[np.float32]:
-    """Fill in a band's values at all nodes; beyond the band they are plus or minus its half width."""
+    """Return the values of a band at all nodes of its grid; beyond the band they are plus or minus its half width."""
     assert field.blocks is not None
     grid, width = field.grid, np.float32(field.width)
     counts = -(-np.array(grid.shape) // BLOCK)

@@ -128,7 +128,7 @@ def size_of(path: PathLike) -> int:
 @contextmanager
 def _opened(path: PathLike) -> Iterator[tuple[BinaryIO, int]]:
     """Open a regular file, and yield it with its size in bytes; errors, also of the `with` block, name the file."""
-    extension(path)  # refuses numbers, which would open what the process has opened already
+    extension(path)  # refuses numbers, which `open` takes for files that the process has open already
     try:
         # O_NONBLOCK, so that opening a pipe does not wait for its writer
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))) as file:
@@ -235,7 +235,7 @@ def replaceable(path: PathLike) -> os.stat_result | None:
 
 
 def _new_file(path: PathLike) -> Path:
-    """Make an empty file with a new name, and the folder and permissions of the file that `path` leads to."""
+    """Make an empty file with a new name, in the folder and with the permissions of the file that `path` leads to."""
     status, real = replaceable(path), Path(os.path.realpath(path))
     new = real.with_name(f".signedheat-{secrets.token_hex(8)}{real.suffix}")
     # readable by its owner only, until the permissions are copied
@@ -246,7 +246,7 @@ def _new_file(path: PathLike) -> Path:
 
 
 def _permit(new: Path, status: os.stat_result) -> None:
-    """Copy the owner and permissions of another file, as far as the system permits."""
+    """Give a file the owner and permissions of another one, whose status is given, as far as the system permits."""
     with suppress(OSError):
         os.chown(new, status.st_uid, status.st_gid)
     with suppress(OSError):

@@ -24,11 +24,11 @@ SUPPORTED = ("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lig
 """Prefixes of extensions that are supported or do not affect shapes."""
 INSTANCES = "EXT_mesh_gpu_instancing"
 TRIANGLE_MODE, FAN_MODE = 4, 6
-"""Modes of primitives with faces, between them that of strips; smaller numbers are points and lines."""
+"""Modes of lists and fans of triangles; between them is that of strips, below them are points and lines."""
 
 
 def read_bodies(path: PathLike) -> list[Body]:
-    """Read vertices and triangles of the default scene, placed by its nodes; files that it names must lie below it."""
+    """Read vertices and triangles of the default scene, placed by its nodes; it may name files in its folder tree."""
     scene = _read_scene(path)
     missing = [name for name in scene.tree.get("extensionsRequired", []) if not name.startswith(SUPPORTED)]
     if any(INSTANCES in node.get("extensions", {}) for node in scene.tree.get("nodes", [])):
@@ -49,7 +49,7 @@ def read_bodies(path: PathLike) -> list[Body]:
 
 @dataclass(frozen=True)
 class _Scene:
-    """The description of a scene, and its buffers."""
+    """The description of a scene, parsed from JSON, and its buffers."""
 
     tree: dict[str, Any]
     buffers: list[bytes]
@@ -73,7 +73,7 @@ class _Scene:
         return points[used], np.searchsorted(used, faces)
 
     def numbers(self, index: int) -> NDArray[Any]:
-        """(count, width) numbers of an accessor; normalized integers become fractions."""
+        """Return the (count, width) numbers of an accessor; normalized integers become fractions."""
         accessor = self.tree["accessors"][index]
         count, width = int(accessor["count"]), COMPONENT_COUNTS[accessor["type"]]
         dtype = np.dtype(COMPONENT_TYPES[accessor["componentType"]])
@@ -93,7 +93,7 @@ class _Scene:
         return values
 
     def _viewed(self, part: dict[str, Any], dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
-        """(count, width) numbers in a view of a buffer."""
+        """Return (count, width) numbers in a view of a buffer."""
         view = self.tree["bufferViews"][part["bufferView"]]
         buffer, begin, length = self.buffers[view["buffer"]], view.get("byteOffset", 0), view["byteLength"]
         start, row = begin + part.get("byteOffset", 0), width * dtype.itemsize
@@ -139,7 +139,7 @@ def _read_scene(path: PathLike) -> _Scene:
 
 
 def _triangles(corners: Ints, mode: int) -> Ints:
-    """(m, 3) triangles of a list, strip or fan of corners."""
+    """Return the triangles, (m, 3), of a list, strip or fan of corners."""
     if mode == TRIANGLE_MODE:
         if len(corners) % 3:
             raise damaged(f"{len(corners)} corners do not form triangles")
@@ -150,16 +150,17 @@ def _triangles(corners: Ints, mode: int) -> Ints:
     faces = np.stack([corners[:-2], second, third], axis=1)
     faces[1::2] = faces[1::2, [1, 0, 2]]
     distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return faces[distinct]  # flat triangles join strips
+    return faces[distinct]  # strips are joined by triangles with equal corners
 
 
 def _corner_count(tree: dict[str, Any], mesh: dict[str, Any]) -> int:
+    """Return the number of corners that the primitives of a mesh announce."""
     named = [part.get("indices", part["attributes"].get("POSITION")) for part in mesh["primitives"]]
     return sum(tree["accessors"][index]["count"] for index in named if index is not None)
 
 
 def _places(tree: dict[str, Any]) -> Iterator[tuple[int, Floats]]:
-    """Yield meshes with the (4, 3) transforms of rows that place them; a node occurs once, as glTF demands."""
+    """Yield the number of each mesh and the (4, 3) transform of rows that places it; each node must occur only once."""
     nodes, scenes = tree.get("nodes", []), tree.get("scenes", [])
     if not nodes:
         yield from ((mesh, np.eye(4, 3)) for mesh in range(len(tree.get("meshes", []))))
@@ -180,7 +181,7 @@ def _places(tree: dict[str, Any]) -> Iterator[tuple[int, Floats]]:
 
 
 def _matrix(node: dict[str, Any]) -> Floats:
-    """(4, 4) transform from a node to its parent."""
+    """Return the (4, 4) transform from a node to its parent."""
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     matrix = np.eye(4)

@@ -93,7 +93,7 @@ def read_image(path: PathLike, formats: Collection[str], purpose: str) -> Image:
 
 
 def _aligned(values: NDArray[Any], origin: Any, spacing: Any, **others: Any) -> Image:
-    """Make an image along x, y, z."""
+    """Make an image whose axes are x, y, z; the spacing is one number, or one for each axis."""
     steps = np.asarray(spacing, dtype=np.float64)
     steps = np.full(values.ndim, steps) if steps.ndim == 0 else steps
     return Image(values, np.diag(steps), np.asarray(origin, dtype=np.float64), **others)
@@ -148,7 +148,7 @@ def _read_nrrd(path: PathLike) -> Image:
 
 
 def _nrrd_header(data: bytes) -> tuple[dict[str, str], bytes]:
-    """Split off the header: fields by lower-case name, some of which may lack a space; and the rest."""
+    """Return the fields of the header by name, in lower case and without synonyms (`JOINED`), and the data after it."""
     if not data.startswith(b"NRRD"):
         raise damaged("it does not begin with NRRD")
     fields: dict[str, str] = {}
@@ -163,7 +163,7 @@ def _nrrd_header(data: bytes) -> tuple[dict[str, str], bytes]:
 
 
 def _nrrd_vectors(text: str) -> Floats:
-    """(n, d) vectors like ``(1,0,0) (0,1,0)``; the word ``none``, for axes outside of space, gives NaN."""
+    """Parse (n, d) vectors like ``(1,0,0) (0,1,0)``; the word ``none``, for axes outside of space, gives NaN."""
     words = re.findall(r"\([^)]*\)|none", text)
     rows = [[math.nan] if word == "none" else word.strip("()").split(",") for word in words]
     width = max(map(len, rows))
@@ -171,7 +171,7 @@ def _nrrd_vectors(text: str) -> Floats:
 
 
 def _nrrd_values(data: bytes, header: dict[str, str], count: int, dtype: np.dtype[Any], path: PathLike) -> NDArray[Any]:
-    """Read the `count` values."""
+    """Return the first `count` values of the data, which are encoded as the header says."""
     encoding, size = header["encoding"].lower(), count * dtype.itemsize
     skip = int(header.get("byte skip", 0))
     if encoding in ("ascii", "text", "txt"):

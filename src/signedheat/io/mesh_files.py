@@ -29,7 +29,7 @@ NUMBER_LINE = re.compile(r"[-+.eE\d/ ]+")
 """Matches lines of numbers with any keyword."""
 ANNOUNCED_ROUNDING = 1e-4
 """Rounding error, relative to the size of a shape, above which a warning is issued."""
-_HEADER = 84  # of STL, in bytes: 80 of comment, 4 that count the facets
+_HEADER = 84  # bytes of the header of STL: 80 of comment, 4 that count the facets
 
 
 def read_stl(path: PathLike) -> TriangleMesh:
@@ -80,7 +80,7 @@ def warn_of_rounding(points: Floats, rounded: Floats) -> None:
 
 
 def _text_corners(data: bytes) -> Floats:
-    """(3 m, 3) corners of the facets of all solids; each facet must have three."""
+    """Return the corners, (3 m, 3), of the m facets of all solids in STL text; each facet must have three."""
     ends = len(re.findall(rb"(?mi)^[ \t]*endsolid\b", data))
     words = re.sub(rb"(?mi)^[ \t]*(end)?solid\b[^\r\n]*", b"", data).lower().split()  # names may hold keywords
     places: dict[bytes, list[int]] = {b"facet": [], b"endfacet": [], b"vertex": []}
@@ -103,6 +103,7 @@ def _text_corners(data: bytes) -> Floats:
 
 
 def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:
+    """Return the mesh of m triangles with these corners, (3 m, 3); equal corners become one vertex."""
     if not len(corners):
         return TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
     corners = corners + corners.dtype.type(0)  # turns −0 into 0
@@ -111,7 +112,7 @@ def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:
 
 
 def _rows_of_words(words: list[str], counts: Ints) -> Iterator[str]:
-    """Split lines into words, as many as each line announces."""
+    """Join words to lines, each of as many words as `counts` says."""
     return (" ".join(islice(left, count)) for left in [iter(words)] for count in counts.tolist())
 
 
@@ -164,10 +165,10 @@ def write_pc(shape: Elements, path: PathLike) -> bytes:
 
 
 def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
-    """Split lines by keyword; each keyword is replaced by the number of vertices so far."""
+    """Return lines as lists of words, by keyword; in each, the number of vertices so far replaces the keyword."""
     lines: dict[str, list[list[Any]]] = {"v": [], "vn": [], "f": [], "l": [], "p": []}
     content = text(path)
-    ensure_fits(400 * sum(content.count(f"\n{keyword} ") for keyword in lines), path)  # measured, for each line
+    ensure_fits(400 * sum(content.count(f"\n{keyword} ") for keyword in lines), path)  # bytes for each line, measured
     for number, line in enumerate(re.sub(r"\\[ \t]*\n", " ", content).split("\n"), start=1):
         words: list[Any] = line.partition("#")[0].split()
         if words and words[0] in lines:
@@ -185,7 +186,7 @@ def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
 
 
 def _coordinates(rows: list[list[Any]], what: str) -> Floats:
-    """(n, 3) numbers, the first three of each line; weights and colours are ignored."""
+    """Return the first three numbers of each line, (n, 3); weights and colours are ignored."""
     short = next((k for k, row in enumerate(rows) if len(row) < 4), None)
     if short is not None:
         cause = f"number {short} of the {what} has {len(rows[short]) - 1} coordinates instead of 3: it may be truncated"
@@ -194,7 +195,7 @@ def _coordinates(rows: list[list[Any]], what: str) -> Floats:
 
 
 def _elements(words: list[list[Any]]) -> tuple[Ints, Ints]:
-    """Vertex ids, from 0, of all elements, and their number in each; −1 refers to the vertex before."""
+    """Return the vertex ids of all elements, from 0, and how many each has; in the file, −1 is the vertex before it."""
     counts = np.array([len(element) - 1 for element in words], dtype=np.int64)
     flat = [word for element in words for word in element[1:]]
     if any("/" in word for word in flat):
@@ -246,7 +247,7 @@ def read_off(path: PathLike) -> Elements:
 
 
 def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> Iterator[list[str]]:
-    """Join lines until each holds as many words as it announces; more words on the last line stay."""
+    """Yield each line, joined with the next ones until it has at least as many words as `length` says."""
     for row in lines:
         wanted = length(row)
         while len(row) < wanted and (more := next(lines, None)) is not None:
@@ -255,7 +256,7 @@ def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> 
 
 
 def _corner_count(word: str) -> int:
-    """Count the corners of a face; 0 if it is not a number, which is refused later."""
+    """Return the number of corners that a face announces; 0 if the word is no number, which is refused later."""
     return int(word) if word.isdecimal() and len(word) < 19 else 0
 
 

@@ -19,7 +19,7 @@ import numpy as np
 NEW_NETWORK, NEW_USER = 0x40000000, 0x10000000
 """Linux flags for a network namespace without interfaces, and for the user namespace that permits it."""
 FORBIDDEN = ("socket.", "subprocess.", "os.exec", "os.fork", "os.posix_spawn", "os.spawn", "os.system", "urllib.")
-"""Audit events of Python that are refused."""
+"""Beginnings of the names of Python's audit events that are refused."""
 
 
 class Refused(Exception):
@@ -27,8 +27,8 @@ class Refused(Exception):
 
 
 def las(path: str) -> dict[str, Any]:
-    """Points of a LAS or LAZ file."""
-    sys.modules["requests"] = None  # type: ignore[assignment]  # which laspy would import, to fetch files
+    """Read the points of a LAS or LAZ file."""
+    sys.modules["requests"] = None  # type: ignore[assignment]  # so that laspy cannot fetch files
     import laspy
 
     if path.lower().endswith(".laz") and not laspy.LazBackend.detect_available():
@@ -38,7 +38,7 @@ def las(path: str) -> dict[str, Any]:
 
 
 def e57(path: str) -> dict[str, Any]:
-    """Points of all scans of an E57 file, each in its own place."""
+    """Read the points of all scans of an E57 file, each in its own place."""
     import pye57
 
     file = pye57.E57(path)
@@ -48,7 +48,7 @@ def e57(path: str) -> dict[str, Any]:
 
 
 def step(path: str, deflection: float | None, fineness: float, angle: float) -> dict[str, Any]:
-    """Triangles of a STEP file, and how many of them and of their corners each CAD face has."""
+    """Triangulate a STEP file: points, triangles with ids from 0 in each CAD face, and counts of both for each face."""
     from OCP import Bnd, BRep, BRepBndLib, BRepMesh, IFSelect, Message, STEPControl, TopAbs, TopExp, TopLoc, TopoDS
 
     printer = Message.Message_PrinterOStream.get_type_descriptor_s()
@@ -87,7 +87,7 @@ def step(path: str, deflection: float | None, fineness: float, angle: float) -> 
 
 
 def dae(path: str) -> dict[str, Any]:
-    """Triangles of a COLLADA scene, placed by its nodes."""
+    """Read the triangles of a COLLADA scene, placed by its nodes."""
     import trimesh
 
     with open(path, "rb") as file:
@@ -102,7 +102,7 @@ def dae(path: str) -> dict[str, Any]:
 
 
 def cells(path: str, module: str) -> dict[str, Any]:
-    """Points, cells and values at the points, by one of meshio's modules."""
+    """Read points, cells and values at the points by one of meshio's modules."""
     from importlib import import_module
 
     mesh = import_module(f"meshio.{module}").read(path)
@@ -114,7 +114,7 @@ def cells(path: str, module: str) -> dict[str, Any]:
 
 
 def nifti(path: str) -> dict[str, Any]:
-    """Values and affine map of a NIfTI image."""
+    """Read the values and the (4, 4) affine map of a NIfTI image."""
     import nibabel
 
     nibabel.imageglobals.logger.disabled = True
@@ -131,7 +131,7 @@ def confine(memory: int, seconds: int) -> None:
     with contextlib.suppress(ImportError):
         import resource
 
-        # files may be as large as messages are
+        # the process writes only messages to a file
         kinds = {resource.RLIMIT_CPU: seconds, resource.RLIMIT_FSIZE: 1 << 20, resource.RLIMIT_CORE: 0}
         for kind, most in (kinds | {resource.RLIMIT_DATA: memory}).items():
             _, bound = resource.getrlimit(kind)

@@ -58,7 +58,7 @@ def read_ply(path: PathLike, names: Sequence[str] = ()) -> Elements:
     properties of the vertices to read as `values`; those that the file lacks are left out.
     """
     tables = _tables(path)
-    # without lists
+    # properties that are lists are left out
     vertex = {name: column for name, column in tables.get("vertex", {}).items() if not isinstance(column, tuple)}
     if not {"x", "y", "z"} <= vertex.keys():
         raise FileFormatError("there is no element 'vertex' with x, y and z: this is not a shape")
@@ -116,12 +116,12 @@ def _header_of(
 
 
 def write_parts(parts: Iterator[tuple[Floats, Ints]], path: PathLike) -> tuple[int, int]:
-    """Write triangles that are more than fit into memory to a binary PLY file as they come, in double precision."""
+    """Write a mesh larger than memory to binary PLY, part by part; return its numbers of vertices and faces."""
     ensure_writable(path, {".ply"}, "a mesh part by part")
     n_vertices = n_faces = 0
 
     def header() -> bytes:
-        """Of the same length whatever the numbers: a comment takes what they leave."""
+        """Return a header of the same length for all numbers: spaces in a comment make up for their digits."""
         free = " " * (24 - len(str(n_vertices)) - len(str(n_faces)))  # twelve digits each
         return _header_of(n_vertices, "xyz", n_faces, count_type="uchar", comment=f"signedheat{free}")
 
@@ -145,7 +145,7 @@ def write_parts(parts: Iterator[tuple[Floats, Ints]], path: PathLike) -> tuple[i
 
 
 def _tables(path: PathLike) -> dict[str, dict[str, Any]]:
-    """Return the columns of each element: arrays; for lists, pairs of all entries in a row and (n,) counts."""
+    """Return the columns of each element by name; lists give two arrays, of all their entries and of (n,) counts."""
     form, elements, body = _header(contents(path).removeprefix(codecs.BOM_UTF8))
     read_element = _text_reader(body) if form == "ascii" else _BinaryReader(body, form).read
     return {element.name: read_element(element) for element in elements}
@@ -193,7 +193,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
 
 
 def _count(word: str) -> int:
-    """Return the number of rows of an element."""
+    """Return the number of rows that a word of the header announces; raise ValueError if it is none."""
     if not word.isdecimal() or len(word) > 18:
         raise ValueError(word)
     return int(word)
@@ -207,7 +207,7 @@ def _truncated(element: _Element) -> FileFormatError:
 
 @dataclass
 class _BinaryReader:
-    """Reads one element after another."""
+    """Reads the elements of a binary file, one after another."""
 
     body: bytes
     form: str
@@ -217,7 +217,7 @@ class _BinaryReader:
         self.order = "<" if self.form == "binary_little_endian" else ">"
 
     def read(self, element: _Element) -> dict[str, Any]:
-        """Read columns by name; lists become all entries in a row and their numbers."""
+        """Read the columns of the next element by name, as `_tables` returns them."""
         if not element.properties:
             return {}
         lists = {name: kind for name, kind in element.properties.items() if isinstance(kind, tuple)}
@@ -230,7 +230,7 @@ class _BinaryReader:
         return self._row_by_row(element) if table is None else table
 
     def _all_alike(self, element: _Element, lists: dict[str, tuple[str, str]]) -> dict[str, Any] | None:
-        """Return the table if all lists have the length of the first, which is quick; otherwise None."""
+        """Read all rows at once, which is quick, if their lists are as long as in the first row; else return None."""
         lengths = dict.fromkeys(lists, 0)
         if element.count:
             start, first = self.at, self._row_by_row(replace(element, count=1))
@@ -275,7 +275,7 @@ class _BinaryReader:
         }
 
     def _one(self, code: str, length: int, element: _Element) -> NDArray[Any]:
-        """Read the next numbers."""
+        """Read the next `length` numbers, of the type `code`."""
         size = length * int(code[1])
         if length < 0 or self.at + size > len(self.body):
             raise _truncated(element)

@@ -19,7 +19,7 @@ from .files import PathLike, contents, damaged, extension, reading, refuse_kind,
 from .sandbox import parsed
 
 SEPARATORS, DECIMAL_COMMAS = str.maketrans(",;", "  "), str.maketrans(",;", ". ")
-"""Meanings of commas and semicolons in a table."""
+"""Replacements of commas and semicolons: both separate numbers, or commas are decimal."""
 WITH_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 FIELD_TYPES = {"F": "f", "I": "i", "U": "u"}
 """Types of fields, with their letters in NumPy."""
@@ -30,8 +30,8 @@ SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance "
 def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
     """Read blocks of lines separated by empty lines; all lines have the same number of numbers, one of `widths`.
 
-    They are separated by commas, semicolons, tabs or spaces; where all commas stand between digits, and something else
-    separates the numbers, they are decimal commas. What follows ``#`` and a header line are skipped.
+    Numbers are separated by commas, semicolons, tabs or spaces. Commas are decimal where they all stand between digits
+    and something else separates the numbers. Text after ``#`` and a header line are skipped.
     """
     blocks: list[list[list[float]]] = [[]]
     columns = 0
@@ -63,7 +63,7 @@ def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
 
 
 def _has_decimal_commas(content: str) -> bool:
-    """Whether each line has several numbers, separated by other characters than commas."""
+    """Whether commas are decimal: each line has several numbers that other characters separate."""
     if "," not in content:
         return False
     lines = (line.partition("#")[0].replace(";", " ").split() for line in content.split("\n"))
@@ -128,7 +128,7 @@ def read_pcd(path: PathLike) -> Elements:
 
 
 def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
-    """Read columns of numbers by the names of the fields."""
+    """Return the first number of each field at the n points of a PCD file, (n,), by the name of the field."""
     try:
         names, kind = header["FIELDS"], header["DATA"][0].lower()
         counts = [int(word) for word in header.get("COUNT", ["1"] * len(names))]
@@ -145,7 +145,7 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
             raise FileFormatError(f"{n} points take {n * row.itemsize} bytes, and {len(body)} follow")
         rows = np.frombuffer(body, row, n)
         return {name: rows[f"{k}"][:, 0].astype(np.float64) for k, name in enumerate(names)}
-    if kind == "binary_compressed":  # one field after another
+    if kind == "binary_compressed":  # all values of a field come before those of the next
         body, position = _unpacked(body, n * row.itemsize), 0
         table = {}
         for name, code, count in zip(names, types, counts, strict=True):
@@ -166,7 +166,7 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
 
 
 def read_las(path: PathLike) -> PointCloud:
-    """Read the points of a LAS or LAZ file, with its scale and offset; it has no normals."""
+    """Read the points of a LAS or LAZ file, scaled and moved as it says; it has no normals."""
     parts = parsed("las", path, "laspy", f"{extension(path)} files", bytes_per_byte=1000)
     return _cloud(parts["points"], path)
 
@@ -225,8 +225,9 @@ def _cloud(points: Floats, path: PathLike) -> PointCloud:
 def _unpacked(body: bytes, size: int) -> bytes:
     """Unpack LZF data, which follow two four-byte numbers: their packed and unpacked lengths.
 
-    A byte below 32 is followed by one more byte than it says. Others have the length of a part that comes again, less
-    two, in three bits (seven: the next byte is added), and in the other five and a byte how far back it is, less one.
+    A control byte c < 32 is followed by c + 1 bytes to copy. Any other one repeats a part of the result: its upper
+    three bits are the length less two (if they are 7, the next byte is added); its lower five bits and the next byte
+    tell how far back the part begins, less one.
     """
     ends = struct.unpack_from("<II", body) if len(body) >= 8 else (0, -1)
     if ends[1] != size or len(body) < 8 + ends[0]:
@@ -249,7 +250,7 @@ def _unpacked(body: bytes, size: int) -> bytes:
             if back > len(result):
                 raise IndexError
             part = bytes(result[len(result) - back : len(result) - back + length])
-            result += (part * (length // len(part) + 1))[:length]  # it may come again within itself
+            result += (part * (length // len(part) + 1))[:length]  # a part may overlap its own repetition
     except IndexError:
         raise FileFormatError("the compressed data are damaged") from None
     if len(result) != size:

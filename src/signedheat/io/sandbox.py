@@ -31,9 +31,9 @@ PARSER_PROGRAM = (
 )
 """Program of the process: it starts isolated from the current folder, then takes over the import path."""
 LEAST_MEMORY, MEMORY_PER_BYTE = 1 << 29, 100
-"""Memory limit of a parser: a constant, and a factor for the size of the file."""
+"""Memory limit of a parser in bytes: a constant part, and a factor of the size of the file."""
 LEAST_SECONDS = 10
-"""Limit of processor time of a parser, and one second more for every 20,000 bytes of the file."""
+"""Limit of processor time of a parser; every 20,000 bytes of the file add one second to it."""
 ARRAY_TYPE = re.compile(r"[<>|][biuf][1248]")
 ALONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 """Environment variables that limit threads to one, since idle threads take memory."""
@@ -51,8 +51,9 @@ def parsed(
 ) -> dict[str, Any]:
     """Parse a file by a function of `parsers` in a process of its own, and return arrays and other values by name.
 
-    `package` is what it needs, for a `purpose`; memory is limited to `bytes_per_byte` of the file beyond
-    `LEAST_MEMORY`, processor time by `least_seconds`. Options are what JSON can hold.
+    The function needs `package`; errors say that this is for a `purpose`. Its memory is limited to `LEAST_MEMORY` and
+    `bytes_per_byte` for each byte of the file, its processor time to `least_seconds` and more for large files.
+    `options` are passed on to it, and JSON must be able to hold them.
     """
     size = size_of(path)
     ensure_installed(package, purpose)
@@ -91,7 +92,7 @@ def parsed(
 
 
 def _answer(stream: BinaryIO, path: PathLike) -> dict[str, Any] | None:
-    """Read the answer of a parser, arrays of numbers that fit in memory; None if it is incomplete."""
+    """Read the answer of a parser, values and arrays by name; return None if it is incomplete or malformed."""
     try:
         about = json.loads(stream.readline(1 << 24))  # longer than any answer without its arrays
         if "values" not in about:

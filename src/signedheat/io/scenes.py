@@ -39,7 +39,7 @@ MOST_COMPONENT_DEPTH = 32
 """Largest depth of nested components."""
 
 Key = tuple[str, str]
-"""A part of the package, and the id of an object in it."""
+"""The name of a part, which is a file in a 3MF package, and the id of an object in it."""
 FACET_DEFLECTION = 1e-3
 """Default distance of triangles from the surface, relative to the diagonal of the box around it."""
 FACET_ANGLE = 0.3
@@ -67,7 +67,7 @@ def read_dae(path: PathLike) -> TriangleMesh:
 
 @dataclass
 class _Object:
-    """A mesh, or other objects, each with a (4, 3) transform that multiplies rows from the right."""
+    """A mesh, or parts, which are other objects with (4, 3) transforms that multiply rows from the right."""
 
     vertices: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     faces: Ints = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
@@ -102,13 +102,13 @@ def unit_of(path: PathLike) -> str | None:
 
 
 def scale_to(path: PathLike, units: str) -> float:
-    """Return the factor from the lengths of a file to TO, given units ``TO`` or ``FROM:TO``, if it states none."""
+    """Return the factor to TO from the unit of a file, or FROM if it states none; `units` are ``TO`` or ``FROM:TO``."""
     assumed, _, wanted = units.rpartition(":")
     return METRES[unit_of(path) or assumed or wanted] / METRES[wanted]
 
 
 class _Package:
-    """The parts of a package, read when they are needed."""
+    """A 3MF package, which is a ZIP archive; its parts are read when they are needed."""
 
     def __init__(self, path: PathLike) -> None:
         self._path = path
@@ -119,7 +119,7 @@ class _Package:
 
     @property
     def root(self) -> str:
-        """The name of the part with the build, according to the relations of the package."""
+        """The name of the part that says what to build, according to the relationships of the package."""
         if "_rels/.rels" in self._zip.namelist():
             for relation in ElementTree.fromstring(self._bytes("_rels/.rels")):
                 if relation.get("Type", "").endswith("/3dmodel"):
@@ -143,7 +143,7 @@ class _Package:
         return self._objects[key]
 
     def count(self, key: Key, depth: int = 0) -> tuple[int, int]:
-        """Count the triangles of an object with all its components, and their depth, without placing them."""
+        """Return the numbers of triangles and of levels of an object with all its components, without placing them."""
         if key not in self._counts:
             if depth > MOST_COMPONENT_DEPTH:
                 raise damaged("its components contain themselves, or too many others")
@@ -156,7 +156,7 @@ class _Package:
         return self._counts[key]
 
     def placed(self, key: Key, matrix: Floats) -> Iterator[Body]:
-        """Vertices and faces of an object and its components; those without triangles are not visited."""
+        """Yield the transformed vertices and faces of an object and its components, except those without triangles."""
         if not self.count(key)[0]:
             return
         item = self.object(key)
@@ -166,7 +166,7 @@ class _Package:
             yield from self.placed(part, np.vstack([own[:3] @ matrix[:3], own[3] @ matrix[:3] + matrix[3]]))
 
     def _bytes(self, part: str) -> bytes:
-        """Return a part, of which no more is unpacked than it announces."""
+        """Return the bytes of a part; no more are unpacked than the archive announces."""
         entry = self._zip.getinfo(part)
         ensure_fits(10 * entry.file_size, self._path)  # its tree of elements is several times larger
         with self._zip.open(entry) as file:
@@ -177,7 +177,7 @@ class _Package:
 
 
 def _all(element: ElementTree.Element, name: str) -> Iterator[ElementTree.Element]:
-    """Elements of a name, in whatever namespace."""
+    """Return the elements of a name within an element, in any namespace."""
     return (each for each in element.iter() if each.tag.rpartition("}")[2] == name)
 
 
@@ -213,7 +213,7 @@ def _object(element: ElementTree.Element, part: str) -> _Object:
 
 
 def read_step(path: PathLike, deflection: float | None = None) -> tuple[TriangleMesh, Ints]:
-    """Triangles of a ``.step`` or ``.stp`` file, and the number of the CAD face that each is part of.
+    """Read the triangles of a ``.step`` or ``.stp`` file, and the number of the CAD face that each is part of.
 
     `Closest.faces` are triangles: the second array, taken at them, says on which CAD face the nearest place lies.
 
@@ -229,7 +229,7 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
     mesh : TriangleMesh
         In millimetres, whatever the units of the file; its faces face outwards, as those of the CAD solid.
     cad_faces : (m,) int
-        Faces are numbered from 0 in the order of the file.
+        The number of the CAD face of each triangle; faces are numbered from 0 in the order of the file.
 
     Raises
     ------
@@ -244,18 +244,18 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
     >>> cad_faces[signedheat.complete(mesh).closest(points).faces]  # doctest: +SKIP
     """
     fineness = {"deflection": deflection, "fineness": FACET_DEFLECTION, "angle": FACET_ANGLE}
-    # one line may describe a sphere, of any number of triangles, or be slow to triangulate
+    # one line may describe a surface of very many triangles, or one that is slow to triangulate
     parts = parsed("step", path, "OCP", ".step files", bytes_per_byte=10_000, least_seconds=60, **fineness)
     counts = parts["triangle_counts"]
     if not counts.sum():
         raise FileFormatError("it has no surface", path=path)
     starts = np.cumsum([0, *parts["point_counts"][:-1]])
     faces = parts["triangles"] + np.repeat(starts, counts)[:, None]
-    # corners of neighbouring faces are one within the precision of Open CASCADE
+    # corners of neighbouring faces that agree within the precision of Open CASCADE become one vertex
     kept, numbers = np.unique(welded(parts["points"], 1e-6 * parts["diagonal"]), return_inverse=True)
     return TriangleMesh(parts["points"][kept], numbers.ravel()[faces]), np.repeat(np.arange(len(counts)), counts)
 
 
 def step_mesh(path: PathLike) -> TriangleMesh:
-    """Return the triangles alone."""
+    """Read the triangles of a STEP file alone."""
     return read_step(path)[0]

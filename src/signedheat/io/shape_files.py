@@ -34,7 +34,7 @@ from .vtk_xml import read_vtp, write_vtp
 
 
 def read_archive(path: PathLike) -> Solid | TriangleMesh:
-    """Return the solid in a NumPy archive, or that of a field in space; of one without a solid the surface at 0."""
+    """Return the solid in a NumPy archive, or that of the field in it, or the zero level set of a field without one."""
     if holds_solid(path):
         return load(path)
     field = load_field(path)
@@ -81,7 +81,7 @@ WRITERS: dict[str, Callable[[Elements, PathLike], bytes]] = {
 SHAPE_FORMATS = frozenset(WRITERS)
 
 CHECKED_FACES = 100_000
-"""Memory is checked for this many faces or more."""
+"""Number of faces from which on `read` checks that there is memory to work with them."""
 
 
 def read(path: PathLike) -> Shape | Solid:
@@ -137,7 +137,7 @@ def read(path: PathLike) -> Shape | Solid:
             refuse_beyond_memory(
                 f"a surface of {faces:,} faces",
                 faces,
-                lambda n: float(250 * n),  # a lower bound of what each face takes
+                lambda n: float(250 * n),  # a lower bound of the bytes that each face takes
                 lambda n: f"use at most {n:,} faces, coarsened or in parts",
             )
         return shape
@@ -152,7 +152,7 @@ def save(shape: Shape | ForeignShape, path: PathLike) -> None:
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh, PointCloud, TetMesh or Solid
-        The shape; of a solid its surface, or in ``.npz`` itself: `Solid.save`.
+        The shape. A solid is written as its surface, or in ``.npz`` as itself (`Solid.save`).
     path : str or path
         The file.
 
@@ -187,7 +187,7 @@ SOLID_FORMATS = SAMPLE_FORMATS = frozenset({".npz"})
 
 
 def save_solid(solid: Solid, path: PathLike) -> None:
-    """Write a solid; to formats of shapes its surface."""
+    """Write a solid to a NumPy archive, or its surface in a format of shapes."""
     ensure_writable(path, SOLID_FORMATS | SHAPE_FORMATS, "a solid")
     if extension(path) not in SOLID_FORMATS:
         return save(solid.surface(keep_faces=True), path)
@@ -195,7 +195,7 @@ def save_solid(solid: Solid, path: PathLike) -> None:
 
 
 def save_samples(samples: Samples, path: PathLike, layout: Layout) -> None:
-    """Write samples."""
+    """Write samples to a NumPy archive, in the given layout."""
     chosen(layout, Layout, "layout")
     format_for(path, dict.fromkeys(SAMPLE_FORMATS), "samples")
     if layout == "deepsdf":  # (k, 4) in single precision: x, y, z and distance of the points outside and inside

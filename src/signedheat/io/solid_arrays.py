@@ -1,4 +1,4 @@
-"""Solids as arrays of an archive: of their own, and of the fields that hold them."""
+"""Convert solids to arrays and back, for archives of solids and of the fields that hold them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ARCHIVE_VERSION = 2
 
 
 def arrays_of(solid: Solid) -> dict[str, NDArray[Any]]:
-    """Return what a solid is made of, with a key that tells whether it has been changed."""
+    """Return the arrays of a solid by name, with a key that tells whether they have been changed."""
     arrays: dict[str, NDArray[Any]] = {
         "triangles": solid.triangles,
         "origins": solid.origins,
@@ -39,7 +39,7 @@ def arrays_of(solid: Solid) -> dict[str, NDArray[Any]]:
 
 
 def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
-    """Return the solid that `arrays_of` gave these of; without notes."""
+    """Return the solid of which `arrays_of` returned these arrays, which are checked; it has no notes."""
     triangles, closing, origins = arrays["triangles"], arrays["closing"], arrays["origins"]
     confidence, bounding, n = arrays["confidence"], arrays["bounding"], len(triangles) if triangles.ndim else 0
     kinds = (triangles, "f", (n, 3, 3)), (closing, "f", (len(closing) if closing.ndim else 0, 3, 3))

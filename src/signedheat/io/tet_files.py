@@ -57,11 +57,11 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
 
 
 def load_cells(path: PathLike) -> Any:
-    """Points, cells and values at the points, as a `meshio.Mesh` has them."""
+    """Read points, cells and values at the points; the result has the attributes of a `meshio.Mesh`."""
     if extension(path) == ".vtu":
         return read_vtu(path, (VALUES_NAME,))
     for file in _files(path):
-        if all(line.startswith(b"#") for line in contents(file).split(b"\n") if line.strip()):  # meshio would read on
+        if all(line.startswith(b"#") for line in contents(file).split(b"\n") if line.strip()):  # meshio would never end
             raise FileFormatError("the file is empty", remedy="write it again", path=file)
     if extension(path) == ".msh":
         _refuse_announcements(path)

@@ -1,6 +1,6 @@
-"""OpenVDB float grids, written: a tree of blocks of 8³ voxels, in cubes of 16³ blocks, in cubes of 32³ of those.
+"""Write OpenVDB float grids: trees of blocks of 8³ voxels, in cubes of 16³ blocks, in nodes of 32³ cubes.
 
-After the published description of the format, file version 224: a header; the grid's kind and where it begins;
+Files follow the published description of the format, version 224: a header; the grid's kind and where it begins;
 metadata, transform, topology from the root down (masks and values of what has no children), and at the end the voxels
 of the blocks in the same order. Numbers are little-endian; bit n of a mask is bit n % 8 of its byte n // 8.
 """
@@ -42,7 +42,7 @@ Outside = Callable[[Ints, int], NDArray[np.float32]]
 class _Tree:
     """A float grid as the file has it."""
 
-    background: np.float32  # value of voxels that are nowhere
+    background: np.float32  # value of voxels that the tree does not contain
     places: Ints  # (n, 3) first voxels of the blocks, in the order of the file
     values: NDArray[np.floating]  # (n, 8, 8, 8) each: values of their voxels, and which of these are active
     active: Bools
@@ -62,13 +62,13 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
     path : str or path
         The file; written under a temporary name and renamed.
     half : bool
-        Store values in 16 bits: of the size of the band, 3 digits are left.
+        Store values in 16 bits, with about three digits.
 
     Raises
     ------
     FileFormatError
-        If the name is no ``.vdb``, the field is none on a grid in space, its values are too large for 16 bits, or the
-        file cannot be written.
+        If the name does not end in ``.vdb``, the field is not on a grid in space, its values are too large for 16
+        bits, or the file cannot be written.
 
     Examples
     --------
@@ -103,7 +103,7 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
 
 
 def _band(field: GridField) -> _Tree:
-    """Return the blocks of a band; elsewhere, the value is plus or minus the background, as in the coarse field."""
+    """Return the tree of a band; outside the blocks, values are the background with the sign of the coarse field."""
     assert field.blocks is not None
     grid, background = field.grid, np.float32(field.width)
     finite = ~np.isnan(field.values)
@@ -122,7 +122,7 @@ def _band(field: GridField) -> _Tree:
 
 
 def _whole(field: GridField) -> _Tree:
-    """All nodes of a grid in blocks; those without a value, and what fills the last blocks, are inactive."""
+    """Return the tree of all nodes of a grid; nodes without a value, and padding of the last blocks, are inactive."""
     shape = field.grid.shape
     counts = -(-np.array(shape) // BLOCK)
     background = np.nextafter(np.float32(np.nanmax(field.values)), np.float32(np.inf))
@@ -153,16 +153,16 @@ def _in_order(
 def _write_file(
     file: BinaryIO, tree: _Tree, metadata: dict[str, str | bool], origin: Floats, spacing: Floats, half: bool
 ) -> None:
-    """Write the header, and the grid with where it begins, where its voxels do, and where it ends."""
+    """Write the header, the offsets of the grid, of its voxels and of its end, and the grid."""
     kind = np.dtype("<f2" if half else "<f4")
     file.write(struct.pack("<qIIIB", VDB_MAGIC, VDB_VERSION, *VDB_LIBRARY, 1) + str(uuid.uuid4()).encode())
-    file.write(struct.pack("<II", 0, 1))  # metadata of the file; grids
+    file.write(struct.pack("<II", 0, 1))  # no metadata of the file, and one grid
     file.write(_text(VALUES_NAME) + _text("Tree_float_5_4_3" + ("_HalfFloat" if half else "")) + _text(""))
     offsets = file.tell()
     file.write(struct.pack("<qqq", 0, 0, 0))
     begin = file.tell()
     file.write(struct.pack("<I", ZIP_FLAG) + _metadata(metadata) + _transform(origin, spacing))
-    file.write(struct.pack("<I", 1) + np.float32(kind.type(tree.background)).tobytes())  # buffers of values
+    file.write(struct.pack("<I", 1) + np.float32(kind.type(tree.background)).tobytes())  # one buffer of values
     _write_topology(file, tree, kind)
     voxels = file.tell()
     for active, values in zip(tree.active, tree.values, strict=True):
@@ -177,7 +177,7 @@ def _write_topology(file: BinaryIO, tree: _Tree, kind: np.dtype) -> None:
     cube, top_size = VOXELS_PER_CHILD[0], CHILDREN_PER_EDGE[0] * VOXELS_PER_CHILD[0]
     cubes_of = _by_parent(tree.places // cube * cube, top_size)
     blocks_of = _by_parent(tree.places, cube)
-    file.write(struct.pack("<II", 0, len(cubes_of)))  # tiles of the root, children
+    file.write(struct.pack("<II", 0, len(cubes_of)))  # the root has no tiles, and as many children
     masks = iter(tree.active)
     for top, cubes in cubes_of.items():
         file.write(struct.pack("<iii", *top) + _node(np.array(top), 0, cubes, tree.outside, kind))
@@ -189,7 +189,7 @@ def _write_topology(file: BinaryIO, tree: _Tree, kind: np.dtype) -> None:
 
 
 def _node(place: Ints, level: int, children: Ints, outside: Outside, kind: np.dtype) -> bytes:
-    """Return a node at a place: masks of its cubes with children and of active ones (none); values, 0 at children."""
+    """Return a node: masks of its cubes that have children and that are active (none), and values, 0 at children."""
     size, shape = VOXELS_PER_CHILD[level], (CHILDREN_PER_EDGE[level],) * 3
     cubes = place + size * np.indices(shape).reshape(3, -1).T
     has_child = np.zeros(shape, dtype=bool)
@@ -206,7 +206,7 @@ def _transform(origin: Floats, step: Floats) -> bytes:
 
 
 def _metadata(metadata: dict[str, str | bool]) -> bytes:
-    """Named values with their types."""
+    """Return named values with their types."""
     result = struct.pack("<I", len(metadata))
     for name, value in metadata.items():
         data = value.encode() if isinstance(value, str) else bytes([value])
@@ -225,7 +225,7 @@ def _mask(chosen: Bools) -> bytes:
 
 
 def _packed(values: NDArray[np.floating], kind: np.dtype) -> bytes:
-    """Values packed by zlib where that is shorter: after their number of bytes, which is negative where it is not."""
+    """Return values, packed by zlib if that is shorter, after their number of bytes, which is negative otherwise."""
     data = values.astype(kind).tobytes()
     packed = zlib.compress(data, 1)
     is_shorter = len(packed) < len(data)
@@ -234,7 +234,7 @@ def _packed(values: NDArray[np.floating], kind: np.dtype) -> bytes:
 
 
 def _by_parent(places: Ints, size: int) -> dict[tuple[int, ...], Ints]:
-    """Places of nodes, each once, by the place of the node of `size` voxels around them; both in order."""
+    """Return the distinct places of nodes, sorted, by the place of their parent, `size` voxels along each edge."""
     nodes = np.unique(places, axis=0)
     parents, rows = np.unique(nodes // size * size, axis=0, return_inverse=True)
     order = np.argsort(rows.ravel(), kind="stable")

@@ -41,9 +41,9 @@ SPACES = {
 class LabelImage(Represented, Frozen):
     """Labels of voxels, and where these are.
 
-    It is taken wherever a shape is, as its `boundary` in the world, if it has zeros and one other label. Else distance
-    is measured along the axes of the image (`grid`, `surface`), and written back into its place (`save`, `to_world`):
-    that does not change it, as the axes are at right angles.
+    An image with zeros and one other label can be given wherever a shape can, and stands for its `boundary` in the
+    world. For others, distance is measured along the axes of the image (`grid`, `surface`), and written back into its
+    place (`save`, `to_world`), which does not change distances, as the axes are at right angles.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class LabelImage(Represented, Frozen):
         Parameters
         ----------
         label : number, optional
-            Which; may be left out where the image has zeros and one other label.
+            The label; may be left out where the image has zeros and one other label.
 
         Returns
         -------

@@ -1,7 +1,7 @@
 """VTK's XML files: image data (``.vti``), polygonal data (``.vtp``) and cells (``.vtu``, which are only read).
 
-Written with appended raw data, as VTK does by default; read in every encoding that VTK writes. The only library that
-reads all of these, VTK itself, takes more than half a gigabyte installed.
+Files are written with appended raw data, as VTK does by default, and read in every encoding that VTK writes. The only
+library that reads all of these, VTK itself, takes more than half a gigabyte installed.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ CELL_NAMES = {
 
 
 def write_vti(origin: Floats, spacing: Floats, values: Mapping[str, NDArray[Any]], convention: str) -> bytes:
-    """Image data of up to three axes; a missing axis has one node. ParaView shows the first of the values."""
+    """Return a ``.vti`` file of up to three axes; a missing axis has one node. ParaView shows the first values."""
     name, first = next(iter(values.items()))
     missing = 3 - first.ndim
     extent = " ".join(f"0 {n - 1}" for n in first.shape + (1,) * missing)
@@ -62,7 +62,7 @@ def write_vti(origin: Floats, spacing: Floats, values: Mapping[str, NDArray[Any]
 
 
 def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Floats, NDArray[Any] | None]:
-    """Read the array that the file says to show, or else the first; origin, spacing, and the array named `other`."""
+    """Read the array that the file says to show, or else the first; origin; spacing; and the array `other`, if any."""
     root, arrays = parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
     extent = parsed_numbers(image.get("WholeExtent", "").split() if image is not None else [], "extent", int)
@@ -102,7 +102,7 @@ def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Flo
 
 
 def write_vtp(shape: Elements, path: PathLike) -> bytes:
-    """Polygons, or points with normals and areas, with named values at each; ParaView shows the first of these."""
+    """Return a ``.vtp`` file of polygons, or of points with normals and areas; ParaView shows the first values."""
     points, corners, counts = shape.points, shape.corners, shape.counts
     given = {"Normals": shape.normals, "area": shape.areas, **shape.values}
     group = "Polys" if len(counts) else "Verts"
@@ -170,7 +170,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Cells:
-    """Read points, cells and values at the points, named as in a `meshio.Mesh`."""
+    """Points, cells and values at the points, as attributes with the names of those of a `meshio.Mesh`."""
 
     points: Floats
     cells: list[Block]
@@ -178,7 +178,7 @@ class Cells:
 
 
 def read_vtu(path: PathLike, names: tuple[str, ...] = ()) -> Cells:
-    """Points, cells, and those point data that are named."""
+    """Read points, cells, and the point data whose names are given."""
     root, arrays = parse(path, "UnstructuredGrid")
     pieces = root.findall("UnstructuredGrid/Piece")
     if len(pieces) != 1:
@@ -218,7 +218,7 @@ def _words(values: Any) -> str:
 
 
 class _Writer:
-    """Collects arrays for the appended section."""
+    """Builds a file of VTK; arrays are collected for its appended section."""
 
     def __init__(self) -> None:
         self._blocks: list[bytes] = []
@@ -294,7 +294,10 @@ class _Arrays:
         return values
 
     def _block(self, data: bytes | memoryview, is_base64: bool, size: int) -> bytes | memoryview:
-        """Return the bytes of one array, `size` or too few: sizes, then data; in base 64 each of the two by itself."""
+        """Return the bytes of an array, `size` or too few, which follow a header of sizes.
+
+        In base 64, header and data are encoded together if the data are plain, and apart if they are compressed.
+        """
         width = self.header.itemsize
 
         def take(start: int, length: int) -> tuple[bytes | memoryview, int]:
