@@ -49,7 +49,7 @@ def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None
 
 
 def named_path(name: str | os.PathLike[str]) -> Path:
-    """Make a path of a name; refuse an empty name, such as of an unset variable."""
+    """Turn a name into a path; refuse an empty name, as of an unset shell variable, and one with a null character."""
     if not os.fspath(name) or "\0" in str(name):
         cause = "holds a null character" if os.fspath(name) else "is empty"
         raise FileFormatError(f"the name {cause}", remedy="name a file or a folder, or . for this one", path=name)
@@ -101,7 +101,7 @@ def _is_file_or_broken_link(path: Path) -> bool:
 
 
 def _names(below: dict[str, str]) -> list[str]:
-    """Give files unique names: without extension, with it, or with more of their folders."""
+    """Return a unique name for each file: without extension, or where files share that, with it or with folders."""
     alike: dict[str, list[str]] = {}
     for place in below:
         alike.setdefault(os.path.basename(place).lower(), []).append(os.path.dirname(place))

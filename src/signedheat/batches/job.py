@@ -99,9 +99,9 @@ class Job:
     offsets : tuple of float
         Distances at which to write closed surfaces, such as ``NAME_+0.5.stl``.
     surfaces : str
-        Extension of their files.
+        Extension of the files of these surfaces.
     samples : Sampling, optional
-        Training points, written to ``NAME.npz``, or to ``NAME_samples.npz`` if that is the field.
+        Training points, written to ``NAME.npz``, or to ``NAME_samples.npz`` if ``NAME.npz`` is the field.
     info : bool
         Report counts and defects of the shape in the manifest, as ``signedheat info`` does.
     resolution, spacing, padding
@@ -111,13 +111,14 @@ class Job:
     constraint, diffusion, as_oriented, keep_overlaps, lids, nested
         As for `signed_distance`.
     plain : bool
-        Take the method's own field, not distance to the shape; so do the constraints `EachComponent` and `LevelValues`.
+        Take the method's own field, not distance to the shape, as with the constraints `EachComponent` and
+        `LevelValues`.
 
     Raises
     ------
     SignedHeatError
         If nothing is asked for, samples or a band are asked for of a plain field, offsets lie beyond the band or are
-        not numbers, or an extension is none of a field or a surface.
+        not numbers, or an extension is not known for a field or a surface.
 
     Examples
     --------
@@ -274,7 +275,7 @@ class Watertight:
     tolerance : float, optional
         Simplify the surface, by no more than this distance.
     resolution, spacing
-        Of the contour, as for `Solid.surface`.
+        The grid of the contour, as for `Solid.surface`.
     samples : int, optional
         Number of training points of each kind, in two files that public shape generators read: ``_surface.npz`` with
         positions and normals in ``random_surface`` and ``sharp_surface``, and ``_sdf.npz`` with points in the volume,
@@ -284,8 +285,8 @@ class Watertight:
     label : float, optional
         In an image of labels, take the voxels with this label, in the coordinates of the image.
     units : str, optional
-        Unit of all lengths, such as ``"mm"``, to which files that state theirs are scaled; those that do not are in it
-        already, or, with ``"inch:mm"``, in inches.
+        Unit of all lengths, such as ``"mm"``. Files that state another unit are scaled to it; those that state none
+        are taken to be in it already, or, with ``"inch:mm"``, in inches.
 
     Examples
     --------
@@ -337,7 +338,7 @@ class Watertight:
         with warnings.catch_warnings(record=True) as losses:
             warnings.simplefilter("always", InexactWarning)
             save(surface, f"{stem}{self.surfaces}")
-        # as it was written: rounded, and joined where parts touch
+        # of the file, in which coordinates are rounded, and parts that touch are joined
         faults = faults_of(cast("TriangleMesh", read(Path(f"{stem}{self.surfaces}"))))
         way = "; ".join([way, *(str(loss.message) for loss in losses)])
         if self.samples is not None:
@@ -350,7 +351,7 @@ class Watertight:
         return {"way": way, **figures, **faults, "units": units, "notes": notes}
 
     def _closed_surface(self, solid: Solid) -> tuple[TriangleMesh, str]:
-        """Make a closed surface of a solid, and say how."""
+        """Make a closed surface of a solid, and say how it was made."""
         whole = partial(solid.surface, resolution=self.resolution, spacing=self.spacing)
         contour = partial(whole, tolerance=self.tolerance)
         if self.thickness is not None:
@@ -371,7 +372,7 @@ class Watertight:
 
 
 SHEET_BOUNDARY = 1e-3
-"""A shape is a sheet if a smaller share of its area is on the boundary of its solid."""
+"""A shape is a sheet if less than this share of its area bounds its solid."""
 PARTS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [1 / 3, 1 / 3, 1 / 3]])
 """Barycentric coordinates at which distances of a triangle are measured: corners, middles of sides, and centre."""
 
@@ -379,8 +380,8 @@ PARTS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5],
 def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[str, object]:
     """Return counts and sizes of a closed surface, and its distances from the faces of a solid and back.
 
-    `to_faces` is the largest distance from the surface, but where it lies on the completion, to its level around the
-    faces that were given; `from_faces` that from faces that bound the solid to the surface, less the level.
+    The surface should have the distance `level` from the solid: `to_faces` is its largest deviation from that where
+    the nearest face is a given one; `from_faces` is that of given faces, measured from them to the surface.
     """
     corners = surface.vertices[surface.faces]
     volumes = part_volumes(surface.vertices, surface.faces)[1]
@@ -411,12 +412,13 @@ def faults_of(surface: TriangleMesh) -> dict[str, object]:
 
 
 def _places(triangles: Floats) -> Floats:
+    """Return the positions `PARTS` in each of m triangles, (7 m, 3)."""
     places: Floats = np.einsum("pk,mkj->mpj", PARTS, triangles).reshape(-1, 3)
     return places
 
 
 def _openings(completion: Floats) -> int:
-    """Count the connected parts of a completion."""
+    """Count the connected parts of a completion, (m, 3, 3) triangles."""
     if not len(completion):
         return 0
     _, faces = np.unique(completion.reshape(-1, 3), axis=0, return_inverse=True)

@@ -25,7 +25,7 @@ class Outcome:
     name : str
         Name of its results, without extension, in the folder of the batch.
     input : str
-        The file.
+        Path of the file.
     state : "done", "failed", "timed out" or "died"
         How it ended.
     seconds : float
@@ -33,7 +33,7 @@ class Outcome:
     message : str
         The error, or if it is done, what to know before trusting the results.
     outputs : tuple of str
-        Files, in the folder of the batch.
+        Files of the results, relative to the folder of the batch.
     figures : mapping
         Figures of quality, as ``--json`` prints them.
     job : str
@@ -91,7 +91,7 @@ class Manifest:
 
 
 def source_of(path: Path) -> tuple[int, int]:
-    """Size and time of modification of a file; zeros where there is none."""
+    """Return the size of a file in bytes and its time of modification in nanoseconds; zeros if there is no file."""
     with suppress(OSError):
         status = path.stat()
         return status.st_size, status.st_mtime_ns
@@ -99,7 +99,7 @@ def source_of(path: Path) -> tuple[int, int]:
 
 
 def _line(outcome: Outcome) -> str:
-    """Write a line, escaped where names of files hold separators of lines or bytes that are not text."""
+    """Return the line of an outcome, in ASCII if names of files hold line separators or bytes that are not text."""
     line = json.dumps(asdict(outcome), ensure_ascii=False)
     return (line if line.isprintable() else json.dumps(asdict(outcome))) + "\n"
 
@@ -117,7 +117,7 @@ def _read(path: Path) -> dict[str, Outcome]:
 
 
 def _outcome(entries: dict[str, Any]) -> Outcome:
-    """Make an outcome of its entries; raise ValueError, TypeError or KeyError if they are no outcome."""
+    """Make an outcome of the entries of a line; raise ValueError, TypeError or KeyError if they describe none."""
     outcome = Outcome(**{**entries, "outputs": tuple(entries["outputs"]), "source": tuple(entries["source"])})
     texts = (outcome.name, outcome.input, outcome.state, outcome.message, outcome.job, *outcome.outputs)
     if not all(isinstance(text, str) and "\0" not in text for text in texts):

@@ -40,9 +40,9 @@ from .job import Job
 from .manifest import Manifest, Outcome, State, source_of
 
 Function = Callable[[Path, Path], Mapping[str, object]]
-"""Takes a file and the common beginning of the names of its results; returns figures that JSON can hold."""
+"""A job: it takes a file and the common beginning of the names of its results; it returns figures for JSON."""
 Done = tuple[Outcome, bool]
-"""The outcome of a shape, and whether memory ran out, so that it may succeed once other processes have ended."""
+"""The outcome of a task, and whether memory may have run out: then it may succeed once other processes have ended."""
 PROCESS_DEATHS = (EOFError, OSError, pickle.UnpicklingError)
 """Exceptions when reading from or writing to a process that has died."""
 THREAD_VARIABLES = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -100,7 +100,7 @@ class Task:
         return Outcome(*ended, job=self.description, source=source_of(path))
 
     def _move_to(self, folder: Path) -> list[str]:
-        """Move all results to the folder, or none unless the disk fails, and return their names."""
+        """Check that each result can be moved to the folder, then move them all, and return their names."""
         results = sorted(self.scratch.iterdir())
         with writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
@@ -152,9 +152,9 @@ class Worker:
         return (task.outcome("failed", 0.0, done), False) if isinstance(done, str) else done
 
     def _ready(self, tries: int = 2) -> subprocess.Popen[bytes]:
-        """Return the process once it waits for a task; replace it once if it dies before.
+        """Wait until the process can take a task, and return it; if it dies before that, start another one, once.
 
-        That happens, for example, while the package is being updated, and has nothing to do with the shape.
+        It dies, for example, while the package is being updated, which has nothing to do with the shape.
         """
         process = self._process = self._process or self._started()
         try:
@@ -175,7 +175,7 @@ class Worker:
             self._process.kill()
 
     def close(self) -> str:
-        """Wait for the process to end, and describe how it ended."""
+        """Give the process a second to exit, then kill it, and describe how it ended."""
         process, self._process = self._process, None
         if process is None:
             return "it was stopped"
@@ -193,6 +193,7 @@ class Worker:
         return printable(f"its process died (status {code}: {last:.200})")
 
     def _started(self) -> subprocess.Popen[bytes]:
+        """Start the process, with standard error in a temporary file."""
         self._errors = tempfile.TemporaryFile()
         return subprocess.Popen(
             command_for(f"{__name__}:serve"),
@@ -260,7 +261,7 @@ class Batch:
     outcomes : tuple of Outcome
         One for each shape, in the order of the inputs.
     manifest : Path
-        The file that holds them, a line of JSON each.
+        The file that holds the outcomes, a line of JSON each.
     skipped : int
         Number of shapes that an earlier run had done.
 
@@ -399,7 +400,7 @@ def run(
 
 
 def _described(job: Function) -> str:
-    """Describe a job and the version of the package; shapes with another description are done again."""
+    """Describe a job and the version of the package; shapes done under another description are done again."""
     text = f"{job.__module__}.{job.__qualname__}" if isinstance(job, FunctionType) else repr(job)
     package = __name__.partition(".")[0]
     return f"{text} by {package} {import_module(package).__version__}"
@@ -442,7 +443,7 @@ def _locked(folder: Path) -> Iterator[Path]:
 def _in_processes(
     tasks: list[Task], number: int, threads: int, time_limit: float | None
 ) -> Generator[Outcome, None, None]:
-    """Yield outcomes as tasks end; shapes that ran out of memory are tried once more at the end, alone."""
+    """Yield outcomes as tasks end; those that ran out of memory or died are tried once more at the end, alone."""
     starved = []
     workers = [Worker(threads) for _ in range(max(1, min(number, len(tasks))))]
     idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()
@@ -493,7 +494,7 @@ def _on_cluster(
 
 
 def duration(seconds: float) -> str:
-    """Seconds in words."""
+    """Write a number of seconds in seconds, minutes or hours."""
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

@@ -29,7 +29,7 @@ EXIT_FAILED, EXIT_BUG = 1, 70
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command."""
+    """Run the command that the arguments name, and return the exit status."""
     open_standard_streams()
     with Signals() as signals, _warnings_in_lines():
         try:
@@ -37,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         except SystemExit as stop:  # from argparse, after help or an error of usage
             return int(stop.code or 0)
         except BaseException as error:
-            if signals.caught or isinstance(error, KeyboardInterrupt):  # it may have been converted on its way
+            if signals.caught or isinstance(error, KeyboardInterrupt):  # a library may have replaced `Stopped`
                 say("signedheat: stopped; nothing half-written is left behind")
                 return 128 + int(signals.caught or 2)
             if os.environ.get("SIGNEDHEAT_TRACEBACK"):

@@ -66,7 +66,7 @@ RUNNING = group(
 
 
 def check_batch(arguments: Namespace) -> None:
-    """Reject a batch without results, results that contradict each other, and options of distance where none is."""
+    """Reject a batch without results, contradictory results, and options for distances if none are computed."""
     try:
         job_of(arguments)
     except SignedHeatError as problem:
@@ -116,7 +116,7 @@ def names_file(output: str) -> bool:
 
 
 def check_watertight(arguments: Namespace) -> None:
-    """Take the format from the name of the output; reject another one."""
+    """Take the format of the surface from the name of an output file; reject ``--surface`` with another one."""
     if names_file(arguments.output):
         ending = Path(arguments.output).suffix.lower().lstrip(".")
         if ending not in SURFACE_FILES:

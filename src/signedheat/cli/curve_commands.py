@@ -74,7 +74,7 @@ def about_curves(written: str) -> tuple[Option, ...]:
 
 
 def check_curves(arguments: Namespace) -> None:
-    """Reject turning none of the curves that are taken as they are anyway, and isolines next to standard output."""
+    """Reject ``--as-oriented`` if curves are taken as they are anyway, and ``--contours`` with standard output."""
     refuse_together(arguments, "--as-oriented", WITHOUT_COMPLETION)
     if arguments.output == "-" and is_given(arguments, "--contours"):
         arguments.parser.error("--contours writes a file next to the output: name a file instead of standard output")
@@ -102,7 +102,7 @@ def check_curves(arguments: Namespace) -> None:
     check=check_curves,
 )
 def surface(arguments: Namespace) -> Summary:
-    """Read, check that the results can be written, compute, write."""
+    """Write the distance to curves on a surface, and its isolines if they are asked for."""
     sh.io.ensure_writable(arguments.output, sh.io.VERTEX_FIELD_FORMATS, "a field on a surface")
     domain, sources = surface_and_curves(arguments)
     field = distance_on_surface(domain, sources, arguments)
@@ -149,7 +149,7 @@ def surface(arguments: Namespace) -> Summary:
     check=check_curves,
 )
 def close(arguments: Namespace) -> Summary:
-    """Read, check that the results can be written, complete, write."""
+    """Write the completed curves on a surface."""
     sh.io.ensure_writable(arguments.output, sh.io.CURVE_FORMATS, "curves")
     domain, sources = surface_and_curves(arguments)
     with shapes.prefix_errors(arguments.curves), ProgressBar(is_quiet(arguments)) as progress:
@@ -193,7 +193,7 @@ def surface_and_curves(arguments: Namespace) -> tuple[Any, list[Any]]:
         raise SourceError(
             f"curves lie on meshes, points and voxels, not on a {kind}", element="surface", path=arguments.mesh
         )
-    if isinstance(domain, sh.TriangleMesh):  # before curves are looked for on it
+    if isinstance(domain, sh.TriangleMesh):  # refuse large meshes before curves are located on them
         with shapes.prefix_errors(arguments.mesh):
             discretization.refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
     elif arguments.intrinsic:

@@ -1,4 +1,4 @@
-"""Everything that has kernels, run on small shapes: what `warmup` compiles."""
+"""Run everything that has compiled functions on small shapes, so that `warmup` compiles them."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def intrinsic() -> None:
 
 
 def tets() -> None:
-    """Run distance on few tets and on many: systems are factorised or iterated."""
+    """Run distance on few tets and on many, as systems are factorised or solved iteratively."""
     ball = samples.sphere(1)
     sh.SignedHeatSolver(sh.tetrahedralize(ball, resolution=7, grading=np.inf)).distance(ball)
     field = sh.SignedHeatSolver(sh.tetrahedralize(ball, resolution=5)).distance(ball)
@@ -107,4 +107,4 @@ JOBS: dict[str, Callable[[], None]] = {
     "reports": reports,
     "lines in the plane": plane,
 }
-"""Jobs, the longest first, which share few kernels. Of 100 s of processor time solids take 36, and refining 27."""
+"""Jobs, the longest first, which share few kernels. Of 100 s of processor time, the first takes 36, the second 27."""

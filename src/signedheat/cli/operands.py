@@ -101,7 +101,7 @@ def named(unit: str | None, power: str = "") -> str:
 
 
 def place(coordinates: Iterable[float]) -> str:
-    """Write a place in one line."""
+    """Write the coordinates of a place in one line."""
     return f"({', '.join(f'{x:.4g}' for x in coordinates)})"
 
 
@@ -114,7 +114,7 @@ def solid_of(arguments: Namespace, path: str) -> Any:
 
 
 def placement(arguments: Namespace, path: str) -> Floats | None:
-    """Return the map for ``--units``, then ``--transform``; None if neither is given."""
+    """Return the (4, 4) matrix that applies ``--units``, then ``--transform``; None if neither is given."""
     if arguments.units is None and arguments.transform is None:
         return None
     matrix = np.eye(4)
@@ -135,7 +135,7 @@ def unit_scale(arguments: Namespace, path: str) -> float:
 
 
 def matrix_of(words: list[str]) -> Floats:
-    """(4, 4) matrix from 16 or 12 numbers, row by row, or from a text file of them."""
+    """Return the (4, 4) matrix of 16 or 12 numbers, row by row, or of a text file that holds them."""
     if len(words) == 1:
         words = contents(words[0])[:10_000].decode("utf-8", "replace").replace(",", " ").split()
     try:
@@ -215,7 +215,7 @@ def compute(shape: Any, domain: sh.Grid, arguments: Namespace) -> sh.GridField: 
 @overload
 def compute(shape: Any, domain: sh.TetMesh, arguments: Namespace) -> sh.TetField: ...
 def compute(shape: Any, domain: sh.Grid | sh.TetMesh, arguments: Namespace) -> sh.GridField | sh.TetField:
-    """Distance to a solid in space, to polylines in the plane; what matters about it goes to standard error."""
+    """Return the distance to a shape in space or to lines in the plane; print important notes on standard error."""
     where: Any = (
         nullcontext(arguments.scheduler) if arguments.workers is None else ThreadPoolExecutor(arguments.workers)
     )
@@ -233,7 +233,7 @@ def say_important(arguments: Namespace, diagnostics: Diagnostics, path: str | No
 
 
 def hint(field: sh.GridField) -> str:
-    """Return another line of output about sources that may have been given twice, or nothing."""
+    """Return another line of output if faces may have been given twice, or else an empty text."""
     note = field.diagnostics.note(SampledSource)
     cancelled = note.area_cancelled if note else 0.0
     if cancelled < CANCELLED_AREA:
@@ -366,6 +366,6 @@ def counts(what: Any) -> dict[str, Any]:
 def output_names(output: str, distances: list[float]) -> list[str]:
     """Return the given name for one distance, or names with the distances in them for several."""
     path = Path(output)
-    if len(distances) == 1 or not path.name:  # a name that is none is refused as it is
+    if len(distances) == 1 or not path.name:  # what does not name a file is refused later
         return [output]
     return [str(path.with_name(f"{path.stem}_{number}{path.suffix}")) for number in distinct_names(distances)]

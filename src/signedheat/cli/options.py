@@ -34,7 +34,7 @@ SURFACES = "surface: .stl .obj .ply .off .vtp"
 LENGTH_UNITS = ("micron", "mm", "millimeter", "cm", "centimeter", "inch", "foot", "m", "meter")
 """Units of length."""
 CONSTRAINTS = ("free", "zero-set", "hard", "each-component", "soft", "soft:WEIGHT")
-"""Names of the constraints without a number."""
+"""Names of the constraints except levels, as they are given and listed in errors."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -178,7 +178,7 @@ def refuse_output_over_input(arguments: Namespace) -> None:
 
 
 def refuse_unused_formats(arguments: Namespace) -> None:
-    """Exit with an error if a format of standard input or output is given, and neither is read or written."""
+    """Exit with an error if the format of standard input or output is given, and that stream is not used."""
     streams = (("--from", ("shape", "mesh", "field", "file", "files"), "input"), ("--format", ("output",), "output"))
     for option, names, stream in streams:
         named = [path for name in names for path in _names(getattr(arguments, name, None))]
@@ -228,7 +228,7 @@ def ending(word: str) -> str:
 
 
 def bounded(fault: str, is_within: Callable[[float], bool]) -> Callable[[str], float]:
-    """Return a parser of finite numbers within bounds; of others it tells the fault."""
+    """Return a parser of finite numbers within bounds; its error for other numbers names the fault."""
 
     def parse(word: str) -> float:
         value = finite(word)
@@ -380,7 +380,7 @@ SCHEDULER = option("--scheduler", metavar="ADDRESS", help="a running Dask cluste
 
 
 def workers(help: str) -> Option:
-    """Return the number of processes or threads."""
+    """Return the option for the number of processes or threads."""
     return option("--workers", type=whole_number(1, MOST_THREADS), metavar="N", help=help)
 
 
@@ -457,16 +457,16 @@ EXCLUDED = {
     "--tets": ("--spacing", "--origin", "--shape", "--band", "--label"),
     "--every-piece": WITHOUT_COMPLETION,
 }
-"""Options that contradict others, or others with a value that begins so."""
+"""Options that contradict others, which may be named with the beginning of a value, as for `is_given`."""
 WITHOUT_SOLIDS = {
     **dict.fromkeys(("--band", "--lids", "--nested", "--keep-overlaps"), (*WITHOUT_COMPLETION, DRAWING, THICKEN)),
     **dict.fromkeys(("--as-oriented", "--plain", "--constraint", "--diffusion"), (THICKEN,)),
 }
-"""Options of solids, and what makes none of a shape."""
+"""Options about solids, and the options and inputs with which no solid is made."""
 
 
 def is_given(arguments: Namespace, named: str) -> bool:
-    """Whether an option has another value than its default, or one that begins as named; or another fact holds."""
+    """Whether ``--option`` or ``--option BEGINNING-OF-VALUE`` is given; other names are of operations, or `DRAWING`."""
     if not named.startswith("-"):
         return named in (arguments.operation, DRAWING if is_planar(arguments.shape or "") else None)
     name, _, beginning = named.partition(" ")
@@ -483,7 +483,7 @@ def refuse_together(arguments: Namespace, name: str, others: Iterable[str]) -> N
 
 
 def refuse_contradictions(arguments: Namespace) -> None:
-    """Exit with an error if an option has no effect beside another one, or without it."""
+    """Exit with an error if an option contradicts another one, needs another one, or has a wrong number of values."""
     error, declared = arguments.parser.error, arguments.command.declared
     for name in (name for name in declared if is_given(arguments, name)):
         refuse_together(arguments, name, EXCLUDED.get(name, ()))

@@ -166,7 +166,7 @@ def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation 
 
 
 def verdict_of_solid(solid: sh.Solid) -> str:
-    """Say in one line that a solid is complete.
+    """Say in one line that a solid is complete, and how much of it is completion or sheets.
 
     Examples
     --------
@@ -216,7 +216,7 @@ def orientation_text(found: Orientation) -> str:
 
 
 def curve_report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str, Any]:
-    """Make the row of a source: elements with its points, kinds of segments, length, open ends."""
+    """Return figures of a curve or points: where the points lie, and of a curve its segments, length and open ends."""
     places = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
     kinds = np.bincount(places.kinds, minlength=3)
     row: dict[str, Any] = {
@@ -279,7 +279,7 @@ def _count(number: int, name: str) -> str:
 
 
 def _width_rows(widths: Widths) -> dict[str, str]:
-    """Rows of the table by their names; only the thinnest place is the least of all, walls and gaps are percentiles."""
+    """Return rows of the table by name; walls and gaps are percentiles, the thinnest place is the minimum."""
     rows = {}
     for name, low, typical in (
         ("thin walls (1 %)", widths.wall, widths.typical_wall),
@@ -296,7 +296,7 @@ def _width_rows(widths: Widths) -> dict[str, str]:
 
 
 def _least_spacing(shape: Any) -> float | None:
-    """Spacing of the finest grid around the shape that fits into free memory; None if there is none."""
+    """Return the spacing of the finest grid around the shape that fits into free memory; None if there is none."""
     available = available_memory()
     if available is None or not (shape.bounds[1] > shape.bounds[0]).any():
         return None

@@ -36,7 +36,7 @@ def warmup(arguments: Namespace) -> Summary:
             while waiting:
                 n_done = len(names) - len(waiting)
                 progress(n_done / len(names), f"compiling, {n_done} of {len(names)} parts done")
-                done, waiting = wait(waiting, 0.5, FIRST_COMPLETED)  # or half a second, to show the progress
+                done, waiting = wait(waiting, 0.5, FIRST_COMPLETED)  # at most half a second, to show the progress
                 for job in done:
                     job.result()
                     n_done += 1
@@ -65,7 +65,7 @@ def run_job(name: str) -> None:
     """Run a job of `warmup` without announcements and warnings."""
     Announcement.are_wanted = False
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about shapes too small to say anything
+        warnings.simplefilter("ignore")  # the shapes are too small for warnings to mean anything
         kernel_runs.JOBS[name]()
 
 

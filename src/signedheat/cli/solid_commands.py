@@ -55,7 +55,7 @@ DISTANCES = {
 
 
 def check_volume(arguments: Namespace) -> None:
-    """Reject sizes for tets that are given."""
+    """Reject ``--resolution`` and ``--padding`` where ``--tets`` names a file."""
     if arguments.tets and (arguments.resolution, arguments.padding) != (None, None):
         arguments.parser.error("--resolution and --padding are for tets around the shape, and --tets names others")
 
@@ -79,7 +79,7 @@ def check_volume(arguments: Namespace) -> None:
     usage="SHAPE -o OUT [options]",
 )
 def volume(arguments: Namespace) -> Summary:
-    """Read, check that the result can be written, compute, write."""
+    """Write the distance to a shape on a grid or on tets; a file that cannot be written is refused at once."""
     if arguments.tets is not None:
         return _on_tets(arguments)
     image = shapes.image_of(arguments)
@@ -104,7 +104,7 @@ def volume(arguments: Namespace) -> Summary:
 
 
 def _on_tets(arguments: Namespace) -> Summary:
-    """Compute the volume command's result on tets instead of a grid."""
+    """Write the distance to a shape on tets, for `volume`."""
     sh.io.ensure_writable(arguments.output, sh.io.TET_FIELD_FORMATS, "a field on tets")
     require("meshio", "fields on tets")
     shape, field = shapes.on_tets(arguments)
@@ -145,7 +145,7 @@ def check_offset(arguments: Namespace) -> None:
     usage="SHAPE DISTANCE [DISTANCE ...] -o OUT [options]",
 )
 def offset(arguments: Namespace) -> Summary:
-    """Read, check that the results can be written, compute once, contour and write each."""
+    """Write a surface, or lines in the plane, at each distance; the distance field is computed once for all."""
     outputs = shapes.output_names(arguments.output, arguments.distances)
     planar = is_planar(arguments.shape)
     for path in outputs:
@@ -216,7 +216,7 @@ def check_morph(arguments: Namespace) -> None:
     check=check_morph,
 )
 def morph(arguments: Namespace) -> Summary:
-    """Read, check that the result can be written, compute, write."""
+    """Write the surface that an operation of morphology makes of a shape."""
     shapes.ensure_surface_writable(arguments.output)
     shape = shapes.read_shape(arguments, arguments.shape)
     fields: list[sh.GridField] = []
@@ -264,7 +264,7 @@ def morph(arguments: Namespace) -> Summary:
     usage="MESH -o OUT [options]",
 )
 def fill(arguments: Namespace) -> Summary:
-    """Check that the result can be written, read, close, write."""
+    """Write a mesh with its holes, or some of them, closed."""
     shapes.ensure_surface_writable(arguments.output)
     mesh: Any = sh.read(arguments.mesh)
     with shapes.prefix_errors(arguments.mesh):
@@ -291,7 +291,7 @@ def check_combined(arguments: Namespace) -> None:
 
 
 def combined(combine: Callable[[sh.Solid, sh.Solid], sh.Solid], arguments: Namespace) -> Summary:
-    """Check that the result can be written, read and complete each shape, combine, write."""
+    """Complete each shape, combine the solids from left to right, and write the result."""
     path = arguments.output
     sh.io.ensure_writable(path, (sh.io.SHAPE_FORMATS | {".npz"}) - {".xyz", ".pc"}, "a surface or a solid")
     unit = shapes.unit_in_use(arguments, *arguments.files)
@@ -304,7 +304,7 @@ def combined(combine: Callable[[sh.Solid, sh.Solid], sh.Solid], arguments: Names
 
 
 def combining(name: str) -> Command:
-    """Return the command of this name."""
+    """Declare the command of `COMBINED` with this name."""
     combine, help = COMBINED[name]
     return command(
         name,
@@ -340,7 +340,7 @@ union, intersect, subtract = map(combining, COMBINED)
     usage="SHAPE -o OUT.npz [options]",
 )
 def sample(arguments: Namespace) -> Summary:
-    """Check that the result can be written, read, complete, sample, write."""
+    """Complete a shape, and write samples of the distance to it."""
     sh.io.ensure_writable(arguments.output, sh.io.SAMPLE_FORMATS, "samples")
     solid = shapes.solid_of(arguments, arguments.shape)
     with shapes.prefix_errors(arguments.shape):
@@ -363,13 +363,13 @@ def sample(arguments: Namespace) -> Summary:
     format_option("stl"),
 )
 def contour(arguments: Namespace) -> Summary:
-    """Load, contour, write."""
+    """Write the surface, curves or lines on which a field takes a level."""
     path = arguments.output
     formats = (sh.io.SHAPE_FORMATS | sh.io.CURVE_FORMATS | sh.io.POLYLINE_FORMATS) - {".xyz", ".pc"}
     sh.io.ensure_writable(path, formats, "a surface, curves or lines")
     image: sh.io.LabelImage | None = None
     field = shapes.field_or_image(arguments.field)
-    if field is None:  # a set of voxels, or a field on tets, or refused
+    if field is None:  # a set of voxels or a field on tets; other files are refused
         field = (sh.io.read_labels if Path(arguments.field).suffix == ".npy" else sh.load_field)(arguments.field)
     if isinstance(field, sh.io.LabelImage):
         image = field

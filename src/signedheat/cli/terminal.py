@@ -54,7 +54,7 @@ def open_standard_streams() -> None:
 
 
 def fitting(text: str, stream: TextIO) -> str:
-    """Text that a stream can hold, without control characters other than the ends of lines.
+    """Return a text that a stream can encode, without control characters other than the ends of lines.
 
     Examples
     --------
@@ -72,12 +72,12 @@ def fitting(text: str, stream: TextIO) -> str:
 
 
 def say(text: str) -> None:
-    """Write to standard error; where it is closed or full, nobody can be informed."""
+    """Write a line to standard error; if that is closed or full, do nothing."""
     _write_error("", text, "\n")
 
 
 def _write_error(before: str, text: str, after: str) -> None:
-    """Write text to standard error, between characters that go there as they are."""
+    """Write text to standard error; control characters are removed from `text`, not from `before` and `after`."""
     stream = sys.stderr
     try:
         if stream is not None:
@@ -187,7 +187,7 @@ class Signals:
         raise Stopped
 
     def _again(self, lost: sys.UnraisableHookArgs) -> None:
-        """Send a signal again that came while a library called Python, which loses exceptions; report all others."""
+        """Send a signal again whose exception was lost in a callback of a library; report other lost exceptions."""
         if self.caught is None or not isinstance(lost.exc_value, Stopped):
             return self._hook(lost)
         self._last = -SIGNAL_PAUSE
@@ -195,7 +195,7 @@ class Signals:
 
 
 def _send(number: int) -> None:
-    """Send a signal to the main thread, which then no longer waits, where the system can."""
+    """Send a signal to the main thread, which interrupts its waiting; on other systems, raise it in this thread."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, number)
     else:

@@ -229,7 +229,7 @@ def take_inputs(arguments: Namespace, *names: str) -> None:
     usage="SCAN NOMINAL [-o OUT ...] [--tolerance T ...]",
 )
 def deviation(arguments: Namespace) -> Summary:
-    """Read, check that the result can be written, measure, write."""
+    """Report the distances of a scan to a nominal part, and write them to the files that are asked for."""
     for output in arguments.output:
         sh.io.ensure_writable(output, sh.view.DEVIATION_FORMATS, "deviations")
     unit = shapes.unit_in_use(arguments, arguments.scan, arguments.nominal)
@@ -273,7 +273,7 @@ def deviation(arguments: Namespace) -> Summary:
     usage="SHAPE [-o OUT ...] [--least T] [options]",
 )
 def thickness(arguments: Namespace) -> Summary:
-    """Check that the result can be written, read, complete, measure, write."""
+    """Report the thickness of the walls of a shape, and write it to the files that are asked for."""
     for output in arguments.output:
         sh.io.ensure_writable(output, sh.view.THICKNESS_FORMATS, "thickness")
     solid, unit = shapes.solid_of(arguments, arguments.shape), shapes.unit_in_use(arguments, arguments.shape)
