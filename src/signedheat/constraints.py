@@ -66,9 +66,9 @@ class ZeroSet(Constraint):
     ----------
     hard : bool
         Impose φ = 0 at every sample of the source. By default, φ is zero on surfaces along curves that follow edges;
-        where a curve crosses faces, springs keep φ below some hundredths of h, since a linear function that is zero
-        there would be constant around the curve. On grids and tets, a smooth function or springs correct φ to zero
-        along the source, which is cheaper and, on broken input, more accurate.
+        where a curve crosses faces, springs keep |φ| below some hundredths of h, since a linear function that is zero
+        there would be constant around the curve. On grids a smooth function, and on tets springs, correct φ to about
+        zero along the source, which is cheaper and, on broken input, more accurate.
 
     Examples
     --------
@@ -90,7 +90,7 @@ class EachComponent(Constraint):
     Parameters
     ----------
     hard : bool
-        Impose the levels at every sample; by default, as exactly as `ZeroSet`.
+        Impose the levels at every sample; by default, they are imposed as exactly as by `ZeroSet`.
 
     Examples
     --------
@@ -120,8 +120,8 @@ class LevelValues(ShortRepr, Constraint):
     Raises
     ------
     ConstraintError
-        If a value is not finite, or beyond 1e40; when solving, if there are neither as many values as sources nor as
-        many as components.
+        If a value is not finite, or beyond 1e40; or, when solving, if the number of values is neither that of the
+        sources nor that of the components.
 
     Examples
     --------

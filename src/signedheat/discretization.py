@@ -1,7 +1,7 @@
 """The protocols between domains and the method.
 
-Every domain lowers to a `Discretization` by `discretize`, a function that dispatches on the type of the domain. The
-method (`method.py`) is written once, for discretisations, and does not depend on any domain.
+To lower a domain is to make the `Discretization` on which the method computes; `discretize` does it for every type of
+domain. The method (`method.py`) is written once, for discretisations, and does not depend on any domain.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .exchange import ACCEPTED_SHAPES
 
 
 class SourceTerm(Protocol):
-    """Sources lowered to one discretisation."""
+    """Sources lowered to one discretisation: in the form in which the method takes them."""
 
     @property
     def vectors(self) -> Any: ...  # X₀ of Eq. 12 (on surfaces Eq. 11, Eq. 19), in the discretisation's own layout
@@ -32,7 +32,7 @@ class SourceTerm(Protocol):
     @property
     def components(self) -> Ints: ...  # (s,) connected component of the source that each sample lies on, from 0
     @property
-    def source_ids(self) -> Ints: ...  # (s,) index of the source, of those passed to the solver, of each sample
+    def source_ids(self) -> Ints: ...  # (s,) index of each sample's source among those passed to the solver
 
 
 class Integration(Protocol):
@@ -50,7 +50,7 @@ class Integration(Protocol):
         """Minimise ∫|∇φ − Y|² (Eq. 2) with nothing imposed: ``C φ = b`` (Eq. 13)."""
 
     def solve_many(self, divergences: Iterable[Any], sources: Sequence[Any]) -> Iterable[Floats]:
-        """Solve for several sources (see `SolvesEach`)."""
+        """Solve for several sources, together if that is faster, else as `SolvesEach` does."""
 
     def fit(self, divergence: Any, source: Any, levels: Levels) -> Floats:
         """Impose levels at the samples (Eq. 14), in the way that suits the domain best."""
@@ -63,17 +63,17 @@ class Integration(Protocol):
 
 
 class Adaptable(Protocol):
-    """What becomes a discretisation when the sources are given."""
+    """Something that becomes a discretisation once the sources are known."""
 
     def adapt(self, sources: Sequence[Any]) -> tuple[Discretization, Sequence[Any]]:
         """Return a discretisation that can represent these sources, and the sources on it: usually ``(self, sources)``.
 
-        Unoriented curves inside faces of a surface, for instance, need edges of their own.
+        Unoriented curves inside faces of a surface, for instance, need edges that run along them.
         """
 
 
 class Discretization(Adaptable, Protocol):
-    """A domain as the method needs it: what each of the three steps does on it, for sources that it has lowered."""
+    """A domain as the method needs it: it lowers sources, and performs each of the three steps for them."""
 
     @property
     def integration(self) -> Integration:
@@ -86,28 +86,28 @@ class Discretization(Adaptable, Protocol):
         """Solve ``(M + tL) X = X₀`` (Eq. 12); directions stay right however small X becomes."""
 
     def diffuse_many(self, sources: Sequence[SourceTerm]) -> Iterable[Any]:
-        """Diffuse several sources of one τ (see `DiffusesEach`)."""
+        """Diffuse several sources of one τ, together if that is faster, else as `DiffusesEach` does."""
 
     def to_cells(self, vectors: Any) -> NDArray[Any]:
-        """X at the cells on which ∇φ lives: complex numbers on surfaces, rows of components in space."""
+        """Return X at the cells in which ∇φ is computed: complex numbers on surfaces, rows of components in space."""
 
     def divergence(self, directions: NDArray[Any]) -> Any:
-        """b, the right-hand side of ``C φ = b``."""
+        """Return b, the right-hand side of ``C φ = b``."""
 
 
 class DiffusesEach:
-    """For discretisations that have nothing to gain by diffusing several sources at once."""
+    """Mixin for discretisations that gain nothing by diffusing several sources at once."""
 
     def diffuse_many(self: Discretization, sources: Sequence[Any]) -> Iterable[Any]:
-        """One after the other, each when it is needed."""
+        """Diffuse one source after the other, each when its result is needed."""
         return (self.diffuse(source) for source in sources)
 
 
 class SolvesEach:
-    """For step 3 that has nothing to gain by solving for several sources at once."""
+    """Mixin for integrations that gain nothing by solving for several sources at once."""
 
     def solve_many(self: Integration, divergences: Iterable[Any], sources: Sequence[Any]) -> Iterable[Floats]:
-        """One after the other, each when it is needed."""
+        """Solve for one source after the other, each when its result is needed."""
         return (self.solve(divergence, source) for divergence, source in zip(divergences, sources, strict=True))
 
 
@@ -119,7 +119,7 @@ class Levels:
     groups: Ints | None = None  # (s,) group of each sample
 
     def at(self, places: Any) -> Levels:
-        """Average levels by the rows of a sparse matrix (r, s), each of samples of one group."""
+        """Average levels by an (r, s) sparse matrix, each row of which weights samples of a single group."""
         return Levels(
             places @ self.values, None if self.groups is None else self.groups[places.indices[places.indptr[:-1]]]
         )

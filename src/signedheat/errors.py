@@ -50,7 +50,7 @@ class SignedHeatError(ValueError):
         element: str | None = None,
         path: str | os.PathLike[str] | None = None,
     ) -> None:
-        cause = printable(" ".join(cause.split()))  # one line, whatever it quotes
+        cause = printable(" ".join(cause.split()))  # one line, even if it quotes several
         super().__init__(cause)
         self.cause: str = cause
         self.remedy: str | None = remedy
@@ -105,7 +105,7 @@ class OutsideError(SignedHeatError):
 
 
 class MemoryLimitError(SignedHeatError):
-    """A problem that does not fit in memory, or a result on disk, refused before anything is allocated."""
+    """A problem that does not fit in memory, or a result that does not fit on disk; found in advance where possible."""
 
 
 class FactorizationError(SignedHeatError):
@@ -134,7 +134,7 @@ class InexactWarning(UserWarning):
 
 def warn_user(message: str, category: type[Warning]) -> None:
     """Issue a warning attributed to the line of user code that called this package."""
-    within = {__name__.partition(".")[0], "functools"}  # dispatchers lie between functions of this package
+    within = {__name__.partition(".")[0], "functools"}  # whose singledispatch calls functions of this package
     depth, frame = 1, inspect.currentframe()
     while frame and frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in within:
         frame, depth = frame.f_back, depth + 1

@@ -30,14 +30,15 @@ Field = GridField | VertexField | TetField
 
 AnyField = TypeVar("AnyField", GridField, VertexField, TetField, Field)
 SMALL_LOOP = 3.5
-"""Length of a loop, in sides of the triangles that it crosses, below which a quarter or more of its heat cancels."""
+"""Length of a loop, in side lengths of the triangles that it crosses, below which at least a quarter of its heat
+cancels."""
 JOINED_NEIGHBORS = 8
-"""Number of nearest points to which a point is joined: on a surface about six lie around a point."""
+"""Number of nearest points to which `spread` joins a point: on a surface about six lie around a point."""
 
 
 @singledispatch
 def to_field(discretization: Any, values: Floats, source: Any, diagnostics: Diagnostics) -> Field:
-    """Make the field with the values of a discretisation's unknowns, and add its notes to the diagnostics."""
+    """Make a field of the values at a discretisation's unknowns, and add the discretisation's notes to diagnostics."""
     raise UnsupportedTypeError(f"there is no field for {type(discretization).__name__}", element="domain")
 
 
@@ -77,7 +78,7 @@ def _(
 
 
 def _named(domain: object, vertex: int) -> str:
-    """Name a vertex by its place, which does not depend on how vertices are numbered, or else by its number."""
+    """Name a vertex by its place, which does not depend on the numbering of vertices, or without one by its number."""
     places = getattr(domain, "vertices", getattr(domain, "points", None))
     return f"number {vertex}" if places is None else f"at ({', '.join(f'{x:.4g}' for x in places[vertex])})"
 
@@ -98,7 +99,7 @@ def _(discretization: TetDiscretization, values: Floats, source: TetSource, diag
 
 
 def sampled(source: GridSource) -> SampledSource:
-    """Note into how many samples a source was merged on a grid, and what that lost."""
+    """Return the note on how many samples a source was merged into on a grid, and on the area that was lost."""
     return SampledSource(len(source.weights), source.samples.outside, source.samples.cancelled)
 
 
@@ -115,7 +116,7 @@ def warned(field: AnyField) -> AnyField:
 
 
 def small_loops(source: SurfaceSource) -> int:
-    """Count closed oriented curves shorter than `SMALL_LOOP` sides of triangles, to which distance is inaccurate."""
+    """Count closed oriented curves shorter than `SMALL_LOOP` sides of triangles, for which φ is inaccurate."""
     parts = [part for part in source.parts if part.oriented and len(part.ends)]
     if not parts:
         return 0
@@ -125,7 +126,7 @@ def small_loops(source: SurfaceSource) -> int:
     lengths = np.concatenate([part.lengths for part in parts])
     faces = np.concatenate([part.faces for part in parts])
     inside = np.concatenate([part.edges < 0 for part in parts])
-    sides = np.where(inside, np.sqrt(4 / 3**0.5 * triangles.face_areas[faces]), 0.0)  # edges see what runs along them
+    sides = np.where(inside, np.sqrt(4 / 3**0.5 * triangles.face_areas[faces]), 0.0)  # 0 along edges: resolved
     length, weighted = np.bincount(label, lengths), np.bincount(label, lengths * sides)
     odd = np.bincount(ends.ravel(), minlength=len(nodes)) % 2 == 1
     is_open = mask_of(len(length), label[odd[ends].any(axis=1)])
@@ -133,7 +134,7 @@ def small_loops(source: SurfaceSource) -> int:
 
 
 def spread(points: Floats, values: Floats, used: Bools) -> Floats:
-    """(n,) signed distances, continued by the way between neighbours among the `used` (n,) where they are NaN."""
+    """Continue (n,) signed distances to `used` points where they are NaN, by shortest paths between neighbours."""
     lacking = np.isnan(values) & used
     ids = np.flatnonzero(used)
     if not lacking.any() or len(ids) <= JOINED_NEIGHBORS:
@@ -143,7 +144,7 @@ def spread(points: Floats, values: Floats, used: Bools) -> Floats:
     graph = sparse.csr_matrix(
         (np.maximum(far[:, 1:].ravel(), 1e-300), (rows, near[:, 1:].ravel())), shape=(len(ids),) * 2
     )
-    graph = sparse.csr_matrix(graph.minimum(graph.T))  # joined from both sides
+    graph = sparse.csr_matrix(graph.minimum(graph.T))  # points are joined if each is a neighbour of the other
     finite = np.flatnonzero(~lacking[ids])
     start = np.abs(values[ids[finite]])
     pairs, source = graph.tocoo(), np.full(len(finite), len(ids))

@@ -13,11 +13,11 @@ from .grids.grid import Grid
 from .mesh.edges import CLEARANCE
 
 ON_LEVEL = 1e-3
-"""Distance from a level, in cells, up to which a point is on it."""
+"""Distance from a level, in cells, up to which a point counts as lying on it."""
 
 
 class NodeValues(Protocol):
-    """Values of nodes by their indices: an array, or anything indexed like one."""
+    """Values at the nodes of a grid, by their indices: an array, or anything that is indexed like one."""
 
     @property
     def shape(self) -> tuple[int, ...]: ...
@@ -25,7 +25,7 @@ class NodeValues(Protocol):
 
 
 def refuse_beyond_walls(walls: Floats, distance: float, domain: str, remedy: str) -> None:
-    """Raise `OutsideError` if a level leaves a domain, by values at its walls, although the shape does not."""
+    """Raise `OutsideError` if the values at a domain's walls show that a level leaves it, but the shape does not."""
     low, high = float(np.fmin.reduce(walls)), float(np.fmax.reduce(walls))
     if (low > 0 or high < 0) and low < distance < high:
         raise OutsideError(

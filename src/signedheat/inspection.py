@@ -30,7 +30,7 @@ class SurfaceReport:
     n_faces: int
     n_edges: int  # between two different vertices
     corners_per_face: tuple[int, int]  # the least and greatest number
-    components: int  # connected through shared vertices; unreferenced vertices do not count
+    components: int  # sets of faces connected through shared vertices
     open_edges: int  # with a single face
     borders: int  # connected sets of open edges
     nonmanifold_edges: int  # with more than two faces
@@ -158,7 +158,7 @@ def _n_marked(n: int, ids: Ints) -> int:
 
 
 def _n_components(n: int, tails: Ints, heads: Ints) -> int:
-    """Count the connected sets of halfedges."""
+    """Count the connected components of halfedges, given by their tails and heads among n vertices."""
     return _n_marked(n, connected_components(n, tails, heads)[tails])
 
 

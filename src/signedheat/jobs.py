@@ -22,7 +22,7 @@ logger: logging.Logger = logging.getLogger("signedheat")
 MOST_THREADS = 1024
 """Largest number of threads, or of processes, that is accepted."""
 CLEAR_LINE = "\r\x1b[2K"
-"""Clears the current line of a terminal."""
+"""Escape sequence that clears the current line of a terminal."""
 
 Progress = Callable[[float, str], None]
 """Called with the fraction done, from 0 to 1, and the name of the step that begins."""
@@ -48,7 +48,7 @@ class Announcement:
 
 
 class Stopwatch:
-    """Times named steps, logs them, and reports progress."""
+    """Measures the time of named steps, logs it, and reports progress."""
 
     def __init__(self, progress: Progress | None, steps: int) -> None:
         self.seconds: dict[str, float] = {}
@@ -74,7 +74,7 @@ class Stopwatch:
 
 
 def within(progress: Progress | None, start: float, stop: float) -> Progress | None:
-    """Progress of a part of a computation, from `start` to `stop` of the whole."""
+    """Return a callback for the progress of a part of a computation, which reports `start` to `stop` of the whole."""
     if progress is None:
         return None
     whole = progress
@@ -85,7 +85,7 @@ ENTRY_PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from importlib import import_module; "
     "module, name = sys.argv[2].split(':'); getattr(import_module(module), name)(*sys.argv[3:])"
 )
-"""Program of a new process: it starts isolated, and then takes over the import path."""
+"""Program of a new process: the process starts isolated, and then takes over the import path of this one."""
 
 
 def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:
@@ -108,13 +108,13 @@ def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -
         try:
             return future.result(0.1)
         except FutureTimeout:
-            if future.done():  # the timeout is the job's own
+            if future.done():  # the job itself raised the error
                 raise
             report()
 
 
 def run_limited(job: Callable[[], Any], seconds: float) -> Any:
-    """Run a job on its own thread and return its result; raise `TimeoutError` after some seconds."""
+    """Run a job on its own thread and return its result; raise `TimeoutError` if it takes longer than `seconds`."""
     end = time.monotonic() + seconds
 
     def refuse_to_wait() -> None:

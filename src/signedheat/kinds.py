@@ -18,13 +18,13 @@ from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
 
 EmbeddedSurface: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface
-"""Surfaces with positions in space, on which curves and points are given."""
+"""Surfaces with positions in space, on which curves and points can lie."""
 SurfaceDomain: TypeAlias = EmbeddedSurface | IntrinsicTriangulation
 """Domains of distance along a surface."""
 Domain: TypeAlias = SurfaceDomain | TetMesh | Grid[int]
 """All domains of distance."""
 AnySurface = TypeVar("AnySurface", bound=SurfaceDomain)
-"""A surface of one kind."""
+"""One kind of surface, for functions whose result lies on a surface of the same kind."""
 ShapeLike: TypeAlias = Shape | ForeignShape
 """Shapes, including objects of trimesh, PyVista, meshio and Open3D, and pairs (vertices, faces)."""
 Shapes: TypeAlias = ShapeLike | Sequence[ShapeLike]
@@ -34,7 +34,7 @@ Polylines: TypeAlias = Polyline | Sequence[Polyline]
 SpaceSource: TypeAlias = ShapeLike | Polyline
 """Sources of distance on grids."""
 SpaceSources: TypeAlias = SpaceSource | Sequence[SpaceSource]
-"""One of them or several."""
+"""One source of distance on grids or several."""
 Source: TypeAlias = SpaceSource | CurveOrPoints
 """Sources of distance on any domain."""
 Sources: TypeAlias = Source | Sequence[Source | Sequence[CurveOrPoints]]

@@ -20,22 +20,22 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 CGROUPS = Path("/proc/self/cgroup")
-"""Lists the control groups of this process, a line ``id:controllers:path`` each."""
+"""File that lists the control groups of this process, each on a line ``id:controllers:path``."""
 CGROUP_ROOT = Path("/sys/fs/cgroup")
-"""Folder of the groups of version 2, with those of version 1 in ``memory``."""
+"""Folder of control groups of version 2; its subfolder ``memory`` has those of version 1."""
 CGROUP_FILES = {"": ("memory.max", "memory.current"), "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes")}
-"""Files with the limit and the usage of a group, by the controllers in its line: versions 2 and 1."""
+"""Names of the files with the limit and the usage of a group, by the controllers in its line: versions 2 and 1."""
 BYTES_UNLOADED, BYTES_IMPORTED, BYTES_LOADED = 45_000_000, 24_000_000, 7_000_000
 """Bytes that libraries will still allocate: before Numba is imported, after that, and after the first kernel. Cached
 files of libraries, 75 to 140 MB, are not counted, since the system can free them."""
 BYTES_MAPPED = {"VmSize": 685_000_000, "VmData": 165_000_000}
 """Bytes that libraries map but hardly touch; they count towards limits on address space and data."""
 REMEDY_MARGIN = 1.1
-"""Safety factor of the size that a remedy names, since free memory changes between calls."""
+"""Safety factor of the size that an error suggests, since free memory changes between calls."""
 
 
 def libraries() -> int:
-    """Bytes that libraries will still allocate, mostly for the compiler that the first kernel loads."""
+    """Estimate the bytes that libraries will still allocate, mostly for the compiler that the first kernel loads."""
     if made:
         return BYTES_LOADED
     return BYTES_IMPORTED if "numba" in sys.modules else BYTES_UNLOADED
@@ -56,7 +56,7 @@ def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float]
 def within_memory(function: Callable[P, T]) -> Callable[P, T]:
     """Decorate a public function so that an allocation that fails within it raises a `MemoryLimitError`.
 
-    What takes most is estimated and refused before; this is for the rest.
+    The largest allocations are estimated and refused in advance; this is for all others.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def within_memory(function: Callable[P, T]) -> Callable[P, T]:
 def untouched_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     """Allocate zeros whose pages take memory only once they are written.
 
-    `numpy.zeros` uses pages of 2 MB, most of which a surface through a grid would touch.
+    `numpy.zeros` uses pages of 2 MB, and a surface through a grid would touch most of them.
     """
     count = math.prod(shape)
     if count == 0:
@@ -91,7 +91,7 @@ def untouched_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
 
 
 def fitting_count(count: int, estimate: Callable[[int], float], available: float) -> int:
-    """Find the largest number of elements, up to `count`, whose estimated memory is available."""
+    """Find the largest number of elements, up to `count`, whose estimated memory is at most `available`."""
     low, high = 0, count
     while low < high:
         middle = (low + high + 1) // 2
@@ -100,19 +100,19 @@ def fitting_count(count: int, estimate: Callable[[int], float], available: float
 
 
 def available_memory() -> int | None:
-    """Bytes that this process can still allocate, by free memory, control groups and ``ulimit``; None if unknown."""
+    """Return the bytes left to this process by free memory, control groups and ``ulimit``; None if unknown."""
     limits = [bound for bound in (_free(), *_containers(), *_own_limits()) if bound is not None]
     return max(min(limits), 0) if limits else None
 
 
 def _free() -> int | None:
-    """Memory of the machine that is free without swapping."""
+    """Return the bytes of the machine's memory that are free without swapping, or None if that is unknown."""
     kilobytes = _fields("/proc/meminfo").get("MemAvailable")
     return None if kilobytes is None else 1024 * kilobytes
 
 
 def _containers() -> list[int]:
-    """Memory that each control group around this process leaves, up to the root."""
+    """Return the bytes that each control group around this process leaves, from its own up to the root."""
     lines = [line.split(":", 2) for line in _text(CGROUPS).splitlines() if line.count(":") > 1]
     own = {controllers: path for _, controllers, path in lines}
     left = []
@@ -127,7 +127,7 @@ def _containers() -> list[int]:
 
 
 def _cached(group: Path) -> int:
-    """Bytes of cached files in a group, which the system can free."""
+    """Return the bytes of cached files in a group, which the system can free."""
     words = dict(line.split(maxsplit=1) for line in _text(group / "memory.stat").splitlines() if " " in line)
     total = "total_" if "total_inactive_file" in words else ""
     return sum(int(words.get(f"{total}{name}", 0)) for name in ("inactive_file", "active_file"))
@@ -158,6 +158,6 @@ def _text(path: Path | str) -> str:
 
 
 def _fields(path: str) -> dict[str, int]:
-    """Whole numbers by name, from lines like ``MemAvailable:  1024 kB``."""
+    """Read whole numbers by name from lines like ``MemAvailable:  1024 kB`` of a system file."""
     pairs = (line.split(":", 1) for line in _text(path).splitlines() if ":" in line)
     return {name: int(words[0]) for name, rest in pairs if (words := rest.split()) and words[0].isdigit()}

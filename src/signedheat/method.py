@@ -22,7 +22,7 @@ def diffuse(discretization: Discretization, source: SourceTerm) -> Any:
 
 
 def diffuse_many(discretization: Discretization, sources: Sequence[SourceTerm]) -> Iterable[Any]:
-    """Step 1 for each of several sources of the same τ; at once, where the discretisation can."""
+    """Step 1 for several sources of the same τ, together where the discretisation can do that."""
     return discretization.diffuse_many(sources)
 
 
@@ -44,7 +44,7 @@ def integrate_many(
     sources: Sequence[SourceTerm],
     constraint: Constraint,
 ) -> Iterable[Floats]:
-    """Step 3 for each of several sources; at once, where nothing is imposed and the discretisation can."""
+    """Step 3 for several sources, together where nothing is imposed and the discretisation can do that."""
     if isinstance(constraint, Free):
         divergences = (discretization.divergence(each) for each in directions)
         return discretization.integration.solve_many(divergences, sources)

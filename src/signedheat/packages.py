@@ -1,7 +1,7 @@
 """Packages that are imported at first use, because they are slow to import or optional.
 
-NumPy and SciPy are imported as usual. All other packages, and modules of this one whose import would be slow or
-circular, are `lazy_module` handles at the top of modules.
+NumPy and SciPy are imported as usual. For all other packages, and for modules of this one whose import would be slow
+or circular, modules hold `lazy_module` handles in place of imports.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class LazyModule:
 def lazy_module(name: str, purpose: str) -> Any:
     """Make a handle that acts as a module, and imports it at the first use of an attribute.
 
-    `purpose` is a plural noun, with which the error begins if the import fails: "contours need the package skimage,
+    `purpose` is a plural noun that begins the error message if the import fails: "contours need the package skimage,
     which is not installed".
 
     Examples

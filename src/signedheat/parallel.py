@@ -1,4 +1,4 @@
-"""Threads that share rows, and connections to Dask clusters."""
+"""Functions applied to rows of arrays on several threads, and connections to Dask clusters."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .packages import lazy_module
 distributed: Any = lazy_module("distributed", "Dask clusters")
 
 ROWS_PER_TASK = 1 << 13
-"""Rows per task of a thread."""
+"""Number of rows that a thread processes at a time."""
 CLUSTER_SECONDS = 30.0
 """Seconds to wait for a cluster to answer."""
 
@@ -71,11 +71,11 @@ def connected(address: str) -> Any:
 
 
 def _hear_greeting(host: str, port: int) -> None:
-    """Refuse a listener that is not a scheduler, for which Dask would wait or allocate too much."""
+    """Refuse a listener that is not a scheduler: Dask would wait too long for it, or allocate too much memory."""
     with socket.create_connection((host, port), CLUSTER_SECONDS) as connection:
         try:
             heard = connection.recv(8, socket.MSG_WAITALL)
         except TimeoutError:
             heard = b""
-    if len(heard) < 8 or int.from_bytes(heard, "little") > 1 << 20:  # no first message is as long
+    if len(heard) < 8 or int.from_bytes(heard, "little") > 1 << 20:  # a scheduler's first message is not as long
         raise ConnectionError("the listener there is not a scheduler")

@@ -1,4 +1,4 @@
-"""The public names, all of which importing this module imports; `signedheat` imports it at the first use of one."""
+"""All public names. Since importing them takes long, `signedheat` imports this module when one is first used."""
 
 from . import batches, errors, io, morphology, results, samples, torch, view  # noqa: F401  makes them sh.batches and so on
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
@@ -55,7 +55,7 @@ from .tets.tet_mesh import TetMesh
 from .transforms import transform
 
 MODULES = ("batches", "errors", "io", "morphology", "results", "samples", "torch", "view")
-"""What is used by the name of its module; ``from signedheat import *`` leaves these alone."""
+"""Modules whose contents are used by the name of the module; ``from signedheat import *`` does not import them."""
 
 __all__ = [
     "CancellingNormalsError", "ConstraintError", "Convex", "Curve", "DigitalSurface", "EachComponent", "Extrapolated",

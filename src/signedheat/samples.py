@@ -1,6 +1,6 @@
 """Sample shapes: a few closed ones, functions that damage them, and the broken duck of `signedheat demo`.
 
-All are generated, from fixed seeds.
+All are generated; random ones from fixed seeds.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def duck(n: int = 56) -> TriangleMesh:
     Parameters
     ----------
     n : int
-        Number of grid cells along its length from which the body is contoured.
+        Number of cells along the duck's length of the grid on which the body is contoured.
     """
     lower, upper = np.array([-1.15, -0.8, -0.75]), np.array([1.0, 0.8, 1.15])
     spacing = 2.15 / n
@@ -107,12 +107,12 @@ def broken_duck() -> TriangleMesh:
 
 
 def union(*meshes: TriangleMesh) -> TriangleMesh:
-    """Join all faces of several meshes in one; no vertices are merged."""
+    """Join all faces of several meshes in one mesh, without merging vertices."""
     return TriangleMesh(*joined_triangles(meshes))
 
 
 def without_patches(mesh: TriangleMesh, n_patches: int, radius: float, seed: int = 0) -> TriangleMesh:
-    """Remove the faces within `radius` of some vertices, which are chosen far from each other."""
+    """Remove the faces within `radius` of `n_patches` vertices, which are chosen far from each other."""
     picked = [int(np.random.default_rng(seed).integers(mesh.n_vertices))]
     nearest = np.linalg.norm(mesh.vertices - mesh.vertices[picked[0]], axis=1)
     while len(picked) < n_patches:

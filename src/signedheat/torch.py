@@ -1,4 +1,4 @@
-"""Distances that PyTorch differentiates: by points, and by the vertices of the mesh.
+"""Distances that PyTorch can differentiate with respect to the points and to the vertices of the mesh.
 
 ``sh.torch.distance(solid, points, vertices)`` is `Solid.distance` of tensors. PyTorch is imported at the first call.
 """
@@ -20,26 +20,26 @@ torch: Any = lazy_module("torch", "tensors")
 
 
 def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Tensor:
-    """Signed distances of points, negative inside, that PyTorch differentiates.
+    """Compute signed distances of points, negative inside, that PyTorch can differentiate.
 
-    The distance d at a point p has its nearest place q at weights w in a face with the corners v. It changes by
-    ``∇d · (δp − Σ w δv)``, since q moves along the surface only. Where q lies on the completion it does not depend on
-    the vertices: completion is held fixed. These are first derivatives; second ones are zero.
+    Let q be the place nearest to a point p at distance d, with weights w in a face with corners v. Then d changes by
+    ``∇d · (δp − Σ w δv)``, since q moves along the surface only. If q lies on the completion, d does not depend on
+    the vertices, since the completion is held fixed. Only first derivatives are computed; second ones are zero.
 
     Parameters
     ----------
     solid : Solid
         What `complete` has made of a mesh. Complete it again when an optimiser has moved the vertices.
     points : (..., 3) tensor
-        Where, on any device; batches of any shape.
+        Where to measure, in batches of any shape, on any device.
     vertices : (k, 3) tensor, optional
-        Those of the mesh that was completed, to be differentiated by.
+        Vertices of the mesh that was completed, if derivatives with respect to them are wanted.
 
     Returns
     -------
     (...) tensor
-        In the shape of the points, of their device and, if that is one of reals, their type; computed on the processor
-        in double precision.
+        Distances with the shape and device of the points, and their type if it is a floating-point type; computed on
+        the CPU in double precision.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
             )
         vertices = torch.as_tensor(vertices)
         now, then = vertices.detach().cpu().double().numpy(), solid.source.vertices
-        # single precision rounds off less, and steps of an optimiser are larger
+        # rounding to single precision is smaller than this, and steps of an optimiser are larger
         if now.shape != then.shape or not np.abs(now - then).max() <= 1e-5 * np.abs(then).max():
             raise SourceError(
                 "the vertices differ from those of the completed mesh",

@@ -28,7 +28,7 @@ def transform(
 ) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh | Represented:
     """Move, turn, scale or shear a shape by an affine map.
 
-    Insides stay insides: the faces of a mirrored shape are turned over. A solid stays one: nothing is completed again.
+    What is inside stays inside: the faces of a mirrored shape are flipped. A solid stays a solid, as it was completed.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def transform(
     Returns
     -------
     TriangleMesh, PolygonMesh, PointCloud, TetMesh or Solid
-        Of the same kind.
+        A shape of the same kind.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def _(shape: PointCloud, linear: Floats, move: Floats) -> PointCloud:
             remedy="multiply the points by one of your own",
             element="points",
         )
-    # normals become those of the transformed planes, areas those of pieces of them
+    # normals become those of the transformed tangent planes, and areas those of the transformed disks in them
     normals, areas = shape.normals, shape.areas
     if normals is not None:
         cofactors = normals @ (abs(np.linalg.det(linear)) * np.linalg.inv(linear))
@@ -151,7 +151,7 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
 
 
 def joined_triangles(parts: Sequence[TriangleMesh | PolygonMesh], origin: Floats | float = 0.0) -> Body:
-    """Return the vertices, relative to `origin`, and the triangles of all meshes together."""
+    """Join the triangles of all meshes, with vertices relative to `origin`."""
     meshes = [part.triangulation for part in parts]
     return concatenated([(mesh.vertices - origin, mesh.faces) for mesh in meshes])
 
