@@ -29,11 +29,11 @@ SMALL_ANGLE = 10.0
 AUTO_ANGLE = 20.0
 """Smallest angle of "auto", in degrees: the vertices that 28 would take are better spent on large triangles."""
 COARSEST_TRIANGLE = 1.41
-"""Circumradius of the largest triangles, over the mean one: larger ones resolve neither curves nor directions."""
+"""Largest circumradius, relative to that of a mean triangle: larger ones resolve neither curves nor directions."""
 BYTES_PER_REFINED = 750
 """Memory of each triangle of a refinement, besides that of distance on it."""
 SHARE_OF_PIECE = 0.5
-"""h over the length of the pieces of a curve that is to be completed, where triangles are larger."""
+"""h, relative to the length of the pieces of a curve that is to be completed, if h would be larger otherwise."""
 MOLLIFIED_MARGIN = 1e-9
 """Margin of the triangle inequalities, relative to the mean length, in the triangles that the method runs on."""
 
@@ -58,7 +58,7 @@ class Retriangulated:
 
 
 class RetriangulatedForZeroSet(Retriangulated):
-    """`Retriangulated` for the zero set alone: large triangles would blur small pieces of curves."""
+    """`Retriangulated` for the zero set alone, with h small enough that small pieces of curves are not blurred."""
 
     coarsest: ClassVar[float] = np.inf
 
@@ -109,7 +109,8 @@ def refined(
     coarsest: float = COARSEST_TRIANGLE,
 ) -> SurfaceDiscretization:
     """Discretise a mesh by its intrinsic Delaunay refinement; fields are reported on the mesh, and kept on both."""
-    refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", more=BYTES_PER_REFINED * mesh.n_faces)  # which only grow
+    # refinement only adds triangles
+    refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", more=BYTES_PER_REFINED * mesh.n_faces)
     domain = intrinsic_delaunay(mesh, keep, refine=True, angle=angle, coarsest=coarsest, progress=progress)
     refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
     return lowered(domain, domain=mesh, restriction=mesh.places, triangulation=domain)

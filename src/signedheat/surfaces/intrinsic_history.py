@@ -40,7 +40,7 @@ class Lines(NamedTuple):
     owners: Ints  # (r,) which line
     faces: Ints  # (r,) the face crossed
     starts: Floats  # (r, 3) barycentric coordinates of where the line enters the face
-    ends: Floats  # (r, 3) and leaves it
+    ends: Floats  # (r, 3) barycentric coordinates of where it leaves the face
     vectors: Floats  # (r, k, 3) vectors transported along the line, as differences of barycentric coordinates
 
     def chosen(self, rows: Ints) -> Lines:
@@ -54,8 +54,8 @@ class History(Frozen):
 
     before: IntrinsicMesh
     after: IntrinsicMesh  # its first vertices are those of `before`
-    steps: Ints  # (n, 4) as `gluing.record` writes them, and weights (n, 4)
-    weights: Floats
+    steps: Ints  # (n, 4) as `gluing.record` writes them
+    weights: Floats  # (n, 4) of the four points of each step
 
     def forward(self, faces: Ints, barycentric: Floats, vectors: Floats | None = None) -> tuple[Ints, Floats, Floats]:
         """Transfer points of `before`, and vectors (p, k, 3) at them, to `after`."""
@@ -118,7 +118,7 @@ class History(Frozen):
 class Links(NamedTuple):
     """Which steps change each face, one after the other, so that a point visits only those that change its face."""
 
-    forward: bool  # from the first step to the last, or back
+    forward: bool  # whether they lead from the first step to the last, or back
     first: NDArray[np.int32]  # (m,) first step that changes each face, −1 if there is none
     next_of_face: NDArray[np.int32]  # (n, 3) the next one, for each face of a step
 
@@ -147,7 +147,7 @@ def for_tracing(triangles: IntrinsicMesh) -> Gluing:
 
 
 def straight_lines(gluing: Gluing, faces: Ints, barycentric: Floats, vectors: Floats) -> Lines:
-    """Trace straight lines, given by their midpoints and vectors there: the first one is the whole line."""
+    """Trace straight lines, given by midpoints (p, 3) and vectors (p, k, 3) there: the first is the whole line."""
     halves = np.ascontiguousarray(vectors, dtype=np.float64).copy()
     halves[:, 0] *= 0.5
     room = 4 * len(faces) + 16
@@ -171,7 +171,7 @@ def straight_lines(gluing: Gluing, faces: Ints, barycentric: Floats, vectors: Fl
 
 
 def misplaced_lines(triangles: IntrinsicMesh, lines: Lines, lengths: Floats) -> Ints:
-    """Ids of lines whose traces are not finite or twice too long: triangles as thin as rounding turn lines."""
+    """Ids of lines whose traces are not finite or twice too long, because nearly flat triangles turned them."""
     along, corners = lines.vectors[:, 0], triangles.corner_positions[lines.faces]
     with np.errstate(all="ignore"):  # they may have overflowed
         traced, rounding = np.abs((along * corners).sum(axis=1)), 1e-5 * (np.abs(along) * np.abs(corners)).sum(axis=1)
@@ -231,7 +231,7 @@ def exchange(
     kind: int, c: Floats, forward: bool, corners: Ints, start: int, new_corners: Ints, new_start: Ints, rows: Floats
 ) -> int:
     """Transfer a point, the first row, and vectors over one step; return which of the step's new faces contains it."""
-    lead = 3 if kind == SPLIT_FACE else 2  # the points before it are on one side of the dependency
+    lead = 3 if kind == SPLIT_FACE else 2  # points with a smaller index are on one side of the dependency
     x = np.zeros(4)
     gone, place = -1, 0
     for r in range(len(rows)):
@@ -245,7 +245,7 @@ def exchange(
                     gone, least = l, x[l] / c[l]
             while gone >= 0 and (new_corners[place] == gone).any():
                 place += 1
-        if gone >= 0:  # no point goes where a face is only turned over
+        if gone >= 0:  # no point is left out where a face is only turned over
             amount = x[gone] / c[gone] if forward else -x[gone] / c[gone]
             for l in range(4):
                 x[l] += -amount * c[l] if l < lead else amount * c[l]
@@ -270,8 +270,8 @@ def squared_length(g: Gluing, f: int, v: Floats) -> tuple[float, float]:
 def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, sign: float, out: Lines, n: int) -> int:
     """Trace a geodesic from a point along its first vector, times ±1, over its length; carry the other vectors.
 
-    Write a row for each face crossed, from row n on, as far as there is room; return the next row. A line ends where
-    faces as thin as rounding have made it longer.
+    Write a row for each face crossed, from row n on, as far as there is room; return the next row. A line ends early
+    where rounding in nearly flat faces has made it longer.
     """
     f, left, slides = face, 1.0, 0
     w, v = barycentric.copy(), vectors.copy()
@@ -311,7 +311,7 @@ def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, s
         t = g.sibling[h]
         i, j, a = h % 3, following(h) % 3, leaving
         slides = 0 if step > 0.0 else slides
-        if t == h or g.sibling[t] != h:  # where no single face goes on; only rounding leads out: go along the edge
+        if t == h or g.sibling[t] != h:  # no single face follows, and only rounding leads out: go along the edge
             top, base = apex(g, h), g.length[g.edge[h]]
             x, y = top.real, top.imag
             # at a smaller angle the line runs along the boundary

@@ -38,16 +38,16 @@ from ..mesh.gluing import (
 PER_FACE = ("tail", "edge", "forward", "front", "sibling")
 PER_EDGE = ("start", "length", "fixed", "flips")
 TO_GROW = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow", "group", "extent")
-"""Arrays of a `Gluing`, per face and per edge, and of an `Agenda`, that become longer as there are more triangles."""
+"""Names of the arrays of a `Gluing`, per face and per edge, and of an `Agenda`, that grow with the triangulation."""
 
 
 def refine_all(
     gluing: Gluing, angle: float, coarsest: float, max_vertices: int, progress: Callable[[float], None] | None = None
 ) -> tuple[Gluing, Ints, Bools, bool]:
-    """Refine a Delaunay triangulation, in place, until no face is thin, and then none large: see `intrinsic_delaunay`.
+    """Refine a Delaunay triangulation, in place, until no face is thin, then none large: see `intrinsic_delaunay`.
 
-    Returns it; the fixed edge of the input that each edge (e,) is part of, or −1; which faces (m,) `close_faces` finds;
-    and whether it ended before the limit on the number of vertices. `progress` gets the fraction done.
+    Returns it; for each edge (e,) the fixed edge of the input that it is part of, or −1; the result of `close_faces`;
+    and whether refinement ended before the limit on the number of vertices. `progress` gets the fraction done.
     """
     segments, agenda = agenda_of(gluing)
     goal = Goal(np.tan(angle / 2) ** 2, np.inf, max_vertices)
@@ -67,12 +67,12 @@ def refine_all(
 def refined(
     gluing: Gluing, agenda: Agenda, goal: Goal, progress: Callable[[float], None] | None
 ) -> tuple[Gluing, Agenda, int]:
-    """Refine until the goal is met or no vertex is left; return the arrays, perhaps longer, and why it ended."""
+    """Refine until the goal or the vertex limit is reached; return the arrays, perhaps longer, and why it ended."""
     list_all(gluing, agenda, goal)
-    listed = np.flatnonzero(agenda.bins >= 0)  # by size: the largest come first, so that their list says how far it is
+    listed = np.flatnonzero(agenda.bins >= 0)  # the largest faces come first, so the current list shows progress
     done = 0.0
     while True:
-        status = refine(gluing, agenda, goal, 5000)  # vertices, made in some hundredths of a second
+        status = refine(gluing, agenda, goal, 5000)  # vertices take some hundredths of a second
         if status == PAUSED and progress is not None:
             done = max(done, float(listed[-1] - agenda.seen[1]) / len(listed))
             progress(min(done, 1.0))
@@ -96,7 +96,7 @@ def close_faces(gluing: Gluing, agenda: Agenda) -> Bools:
 
 
 def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
-    """Make the work lists of refinement, and list the fixed edges, which boundary and nonmanifold edges become."""
+    """Fix boundary and nonmanifold edges; return the ids of all fixed edges, and the work lists of refinement."""
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     counts = np.bincount(gluing.edge[: 3 * n_faces], minlength=n_edges)
     gluing.fixed[:n_edges] |= counts != 2
@@ -140,7 +140,7 @@ class Agenda(NamedTuple):
 
     stack: Ints  # edges to be checked for the Delaunay property
     stacked: Bools  # (e,) whether an edge is on the stack
-    bins: Ints  # first bad face by the binary logarithm of its circumradius
+    bins: Ints  # first bad face of each list; lists are by the binary logarithm of the circumradius
     next_face: Ints  # (m,) the next face in the same bin
     listed: Bools  # (m,) whether a face is in a bin
     segment: Ints  # (e,) the input segment of each fixed edge
@@ -148,13 +148,11 @@ class Agenda(NamedTuple):
     segment_length: Floats  # (s,)
     on_segment: Ints  # (n,) the segment on which a new vertex was inserted
     narrow: Bools  # (n,) input vertices at which two segments meet at less than 60°, or with a smaller total angle
-    group: Ints  # (n,) vertices that nearly coincide, and the size of each group, from `coinciding`
-    extent: Floats
+    group: Ints  # (n,) first vertex of the group with which each nearly coincides, or −1: see `coinciding`
+    extent: Floats  # (n,) extents of the groups, at their first vertices
     seen: Ints  # number of steps of the history whose faces have been listed, and the bin that the last face came from
-    seen_sides: (
-        Complexes  # work arrays of `encroached`: ends of halfedges; and these, and whether their side is 1 or −1
-    )
-    halfedges: Ints
+    seen_sides: Complexes  # work array of `encroached`: (k, 2) ends of the halfedges still to be visited
+    halfedges: Ints  # work array of `encroached`: (k, 2) these halfedges, and their sides, 1 or −1
 
 
 class Goal(NamedTuple):
@@ -193,7 +191,7 @@ def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
 
 @compiled
 def is_bad(g: Gluing, f: int, goal: Goal) -> tuple[bool, int]:
-    """Whether a face is too thin (its smallest angle is opposite to its shortest side) or too large; and that side."""
+    """Tell whether a face is too thin or too large; return also its shortest side, opposite to its smallest angle."""
     h = 3 * f
     for k in range(1, 3):
         if g.length[g.edge[3 * f + k]] < g.length[g.edge[h]]:
@@ -204,7 +202,7 @@ def is_bad(g: Gluing, f: int, goal: Goal) -> tuple[bool, int]:
 
 @compiled
 def list_face(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> None:
-    """Put a face on the lists, if it is bad."""
+    """Put a face on its list of bad faces, if it is bad and not listed yet."""
     bad, h = is_bad(g, f, goal)
     if agenda.listed[f] or not bad:
         return
@@ -225,7 +223,7 @@ def list_all(g: Gluing, agenda: Agenda, goal: Goal) -> None:
 
 @compiled
 def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
-    """Return the bad face of (nearly) the largest circumradius, or −1."""
+    """Remove a bad face of (nearly) the largest circumradius from the lists and return it; −1 if there is none."""
     for place in range(BAD_FACE_LISTS - 1, -1, -1):
         while agenda.bins[place] >= 0:
             f: int = agenda.bins[place]
@@ -239,7 +237,7 @@ def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
 
 @compiled
 def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
-    """Insert a vertex at the circumcentre of bad face f, or on a segment in the way; return False without room for it.
+    """Insert a vertex at the circumcentre of bad face f, or on a segment in the way; return False if arrays are full.
 
     A face whose shortest side joins vertices that nearly coincide stays, unless it is a cap with nothing in the way.
     """
@@ -247,7 +245,7 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     close = coincide(g, agenda, h)
     if is_hopeless(g, agenda, h) or (close and not is_cap(g, agenda, f)):
         return True
-    outcome, place, center = find_circumcenter(g, f)  # the place is the face that has it, or the halfedge in the way
+    outcome, place, center = find_circumcenter(g, f)  # the place is its face, or the halfedge in the way
     if outcome == CENTER_LOST:
         return True
     segment = place if outcome == CENTER_BLOCKED else encroached(g, agenda, place, center)
@@ -309,7 +307,7 @@ def is_hopeless(g: Gluing, agenda: Agenda, h: int) -> bool:
 
 @compiled
 def sector(g: Gluing, corner: int) -> float:
-    """Angle around the tail of a halfedge between two segments, or the total angle; counted up to π."""
+    """Angle at the tail of a halfedge between the segments on either side of it, or the total angle, summed up to π."""
     n, d = tangent_at(g, corner)
     total: float = 2.0 * np.arctan2(np.sqrt(n), np.sqrt(d))
     for side in range(2):
@@ -337,7 +335,7 @@ def narrow_vertices(g: Gluing) -> Bools:
 
 @compiled
 def has_room(g: Gluing, agenda: Agenda, ring: int) -> bool:
-    """Whether splitting an edge with so many faces fits into the arrays (splitting a face needs less)."""
+    """Whether the arrays have room to split an edge with `ring` faces (splitting a face needs less)."""
     fits: bool = 3 * (g.counts[N_FACES] + ring + 2) <= len(g.tail) and g.counts[N_EDGES] + ring + 4 <= len(g.length)
     return fits and g.counts[N_VERTICES] + 1 <= len(agenda.on_segment) and g.counts[N_STEPS] + ring + 2 <= len(g.steps)
 
@@ -427,8 +425,8 @@ def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
 def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool:
     """Split a segment that keeps face f from being removed; return False if the arrays have no room for it.
 
-    That is in the middle, or beside a vertex that nearly lies on it, or, near an end where segments meet at a small
-    angle, a power of two from there (Ruppert 1995). A face with two sides on the segment is split instead.
+    It is split in the middle; or beside a vertex that nearly lies on it; or, if segments meet at a small angle at one
+    end, at a power of two from that end (Ruppert 1995). A face with two sides on the segment is split instead.
     """
     e = g.edge[h]
     segment, length, step = agenda.segment[e], g.length[e], g.counts[N_STEPS]
@@ -470,7 +468,7 @@ CENTER_INSIDE, CENTER_BLOCKED, CENTER_LOST = 0, 1, 2
 
 @compiled
 def unfold(g: Gluing, h: int, side: int, tail: complex, head: complex) -> tuple[complex, int]:
-    """Unfold the face beyond halfedge h, from tail to head: its apex, and its side, 1 if counter-clockwise."""
+    """Unfold the face beyond halfedge h; return its apex, and 1 if it is then counter-clockwise, else −1."""
     t = g.sibling[h]
     if g.forward[t] == g.forward[h]:
         side = -side
@@ -484,7 +482,7 @@ def unfold(g: Gluing, h: int, side: int, tail: complex, head: complex) -> tuple[
 
 @compiled
 def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, complex]:
-    """Walk from the barycentre of a face to its circumcentre: inside a face, blocked by a halfedge, or lost if flat."""
+    """Walk from a face's barycentre to its circumcentre; return outcome, face or halfedge reached, and place there."""
     corners = corners_of(g, f)
     base, x, y = corners[1].real, corners[2].real, corners[2].imag
     if not y > 0.0:
@@ -524,7 +522,7 @@ def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, complex]:
 
 @compiled
 def encroached(g: Gluing, agenda: Agenda, f: int, p: complex) -> int:
-    """Find a segment that p, in the frame of face f, sees and that has p in its diametral circle; −1 if none."""
+    """Find a segment visible from p (in the frame of face f) whose diametral circle contains p; −1 if there is none."""
     ends, halfedges = agenda.seen_sides, agenda.halfedges
     corners = corners_of(g, f)
     for k in range(3):
@@ -558,7 +556,7 @@ def encroached(g: Gluing, agenda: Agenda, f: int, p: complex) -> int:
 
 
 NEAR_GROUP = 0.01
-"""Vertices nearly coincide where the size of their group is less than this fraction of the distance to any other."""
+"""Vertices nearly coincide where the size of their group is less than this fraction of the distance to others."""
 
 
 @compiled
@@ -572,10 +570,10 @@ def root(parent: Ints, a: int) -> int:
 
 @compiled
 def coinciding(tail: Ints, head: Ints, length: Floats, order: Ints, n_vertices: int) -> tuple[Ints, Floats]:
-    """Group vertices that nearly coincide; return the first vertex of the group of each, or −1, and there its extent.
+    """Group vertices that nearly coincide; return (n,) first vertices of their groups, or −1, and (n,) extents there.
 
-    From short to long edges (Kruskal), a group is kept whose extent, the sum of the lengths that made it, is less than
-    `NEAR_GROUP` times the next edge that leaves it; of nested ones the largest is.
+    Vertices are joined from short to long edges (Kruskal). A group is kept if its extent, the sum of the lengths that
+    made it, is less than `NEAR_GROUP` times the next edge that leaves it; of nested groups only the largest is kept.
     """
     parent, node = np.arange(n_vertices), np.arange(n_vertices)
     first, second = np.full(2 * n_vertices, -1), np.full(2 * n_vertices, -1)

@@ -41,7 +41,7 @@ class ConformingRefinement(Frozen):
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments], heights: Floats) -> ConformingRefinement:
-        """Cut faces along segments, put vertices at points, and sort faces by heights (n,), not as they were given."""
+        """Cut faces along segments, put vertices at points, and sort faces by heights (n,), whatever their order."""
         finer, parents, corners = triangles, np.arange(triangles.n_faces), np.eye(3)[None]
         along = np.empty(0, dtype=np.int64)
         if parts:
@@ -72,7 +72,7 @@ class ConformingRefinement(Frozen):
 
 
 def in_order(triangles: IntrinsicMesh, heights: Floats) -> tuple[IntrinsicMesh, Ints, Ints, Ints]:
-    """Sort faces, corners and edges by heights (m, 3), and return (e,), (m,) and (m, 3) the number that each had."""
+    """Sort faces, corners and edges by heights (m, 3); return their old ids, (e,), (m,) and (m, 3), as well."""
     faces = np.argsort(heights.sum(axis=1), kind="stable")
     turns = (heights[faces].argmin(axis=1)[:, None] + np.arange(3)) % 3
     old = triangles.edges
@@ -102,7 +102,7 @@ def differences_of(triangles: IntrinsicMesh, faces: Ints, vectors: Complexes) ->
     flat = np.flatnonzero(area[:, 0] <= LEAST_AREA * (np.abs(u) ** 2 + np.abs(v) ** 2)[:, 0])
     area[flat] = 1.0
     second, third = (np.conj(vectors) * v).imag / area, (np.conj(u) * vectors).imag / area
-    if len(flat):  # the shortest of the solutions that come nearest
+    if len(flat):  # least-squares solutions of least norm
         sides = np.stack([u[flat], v[flat]], axis=-1)
         sides = np.stack([sides.real, sides.imag], axis=-2)
         parts = np.stack([vectors[flat].real, vectors[flat].imag], axis=-1)
@@ -173,7 +173,7 @@ def _joined(triangles: IntrinsicMesh, points: LocatedPoints, faces: Ints, owners
     ends = np.where(last, nodes[owners, 1], n + np.arange(len(owners)))
     starts = np.where(first, nodes[owners, 0], np.roll(ends, 1))
     joined = np.stack([starts, ends], axis=1)
-    for k, own in enumerate((n + len(faces), n)):  # where rounding has put a node beyond the face: their own ends
+    for k, own in enumerate((n + len(faces), n)):  # pieces whose node rounding puts beyond the face keep their end
         beyond = np.flatnonzero(~contain(triangles, faces, points[joined[:, k]]))
         joined[beyond, k] = own + beyond
     return joined
@@ -212,9 +212,10 @@ ZERO_VALUE = 1e-12
 
 
 def level_lines(history: History, refinement: ConformingRefinement, values: Floats) -> list[tuple[Ints, Floats, bool]]:
-    """Trace the zero set of a function linear on triangles after a history, consistently oriented, on those before.
+    """Trace, on the triangles before a history, the zero set of a function that is linear on those after it.
 
-    Returns faces and barycentric coordinates of each polyline, larger values to its left, and whether it is closed.
+    They must be consistently oriented. Returns faces and barycentric coordinates of each polyline, with larger values
+    to its left, and whether it is closed.
     """
     least = ZERO_VALUE * max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-300)
     line = zero_line(history.after, cleared(history.after, values, least))

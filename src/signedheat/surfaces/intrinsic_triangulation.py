@@ -106,7 +106,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         """(n, 3) positions in space of the vertices, all of which lie on the mesh."""
         faces, weights = self.vertex_places
         positions = np.concatenate([self.mesh.vertices, np.empty((len(faces) - self.mesh.n_vertices, 3))])
-        used = faces >= 0  # all that are not the mesh's own are
+        used = faces >= 0  # only vertices of the mesh can be unused
         positions[used] = self.in_space(faces[used], weights[used])
         return frozen(positions)
 
@@ -249,7 +249,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return gradients_along(np.einsum("psk,pkd->psd", sides, self.mesh.vertices[self.mesh.faces[ids]]), rises)
 
     def _existing(self, faces: ArrayLike) -> Ints:
-        """(p,) faces of the mesh; those that do not exist are refused."""
+        """(p,) ids of faces of the mesh as integers; ids that do not exist are refused."""
         ids = whole_numbers(faces, "faces")
         refuse_missing("face", ids, self.mesh.n_faces)
         return ids

@@ -69,7 +69,7 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
 
 
 def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], Ints, LocatedPoints]:
-    """Find the polygons, the triangle of each, and crossings of edges: corners from n_vertices on."""
+    """Find the polygons, the triangle of each, and the crossings of edges, which are corners from id n_vertices on."""
     triangles, n = triangulation.triangles, triangulation.n_vertices
     lines = triangulation.history.edges_after()
     lost = misplaced_lines(triangles, lines, triangulation.history.before.lengths_of_edges)
