@@ -151,8 +151,8 @@ class DigitalSurface(Displayed, Surface):
     def smooth_surface(self) -> TriangleMesh:
         """A smooth surface between the centres of the voxels inside and those outside: closed, manifold, outward.
 
-        It stays within half a voxel, along each axis, of the corners of voxels, and has all voxels on their sides:
-        signed distance to it is negative at the centres of those inside, and at no others.
+        It stays within half a voxel, along each axis, of the corners of voxels, and separates the same voxels: signed
+        distance to it is negative at the centres of those inside, and at no others.
         """
         vertices, faces = surface_net(self.volume)
         return TriangleMesh(self.origin + vertices * self.spacing, faces)
@@ -185,7 +185,7 @@ either."""
 
 
 def surface_net(volume: Bools) -> tuple[Floats, Ints]:
-    """Make a smooth closed surface between voxels inside and outside: vertices, in voxels, and triangles."""
+    """Make a smooth closed surface between voxels inside and outside; return vertices, in voxels, and triangles."""
     padded = np.pad(volume, 2)
     nodes = [np.argwhere(np.diff(padded, axis=axis)) for axis in range(3)]
     first, along = np.concatenate(nodes), np.repeat(np.arange(3), [len(part) for part in nodes])
@@ -203,7 +203,7 @@ def surface_net(volume: Bools) -> tuple[Floats, Ints]:
 
 
 def _rooms(cells: DualCells, crossings: Crossings) -> tuple[Floats, Floats]:
-    """(v, 3) middle of each piece of the surface in a cell; (v, 1) largest move of its vertex: none in shared cells."""
+    """(v, 3) middle of each piece of surface in a cell; (v, 1) largest move of its vertex, 0 if the cell has others."""
     count = len(cells.owners)
     crossed = crossings.nodes + 0.5 * np.eye(3)[crossings.axes]
     degrees = np.bincount(cells.quads.ravel(), minlength=count)
@@ -214,7 +214,7 @@ def _rooms(cells: DualCells, crossings: Crossings) -> tuple[Floats, Floats]:
 
 
 def _relaxed(quads: Ints, middles: Floats, room: Floats) -> Floats:
-    """(v, 3) places at which a net bends least, by accelerated gradients that restart (O'Donoghue & Candès 2015)."""
+    """(v, 3) places where a net bends least, by accelerated gradients with restarts (O'Donoghue & Candès 2015)."""
     count = len(middles)
     tails, heads = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
     links = sparse.coo_array((np.ones(len(tails)), (tails, heads)), shape=(count, count)).tocsr()
@@ -224,7 +224,7 @@ def _relaxed(quads: Ints, middles: Floats, room: Floats) -> Floats:
     bending = sparse.csr_array(sparse.eye_array(count) - sparse.diags_array(weights) @ links)
     back = bending.T.tocsr()
     places, ahead, pace = middles, middles, 1.0
-    for _ in range(200):  # the slowest modes that `STAYING` allows need about 4 / √STAYING, 73
+    for _ in range(200):  # the slowest modes that `STAYING` allows need about 4 / √STAYING = 73 steps
         slope = back @ (bending @ ahead) + STAYING * (ahead - middles)
         # every bending mode decays with a step below 2 / (2² + `STAYING`)
         new = np.clip(ahead - 0.24 * slope, middles - room, middles + room)
@@ -243,9 +243,10 @@ ATTACHMENT = 0.1
 
 
 def smoothed_corners(vertices: Floats, corners: Ints, normals: Floats) -> Floats:
-    """(n, 3) corners p of least ``Σ (n_f · (p_j − p_i))² + ATTACHMENT Σ |p_i − v_i|²``, for the sides ij of squares f.
+    """(n, 3) corners p, moved so that squares f with sides ij are nearly orthogonal to their normals n_f.
 
-    After Coeurjolly, Lachaud & Gueth, *Digital surface regularization with guarantees*, 2021.
+    They minimise ``Σ (n_f · (p_j − p_i))² + ATTACHMENT Σ |p_i − v_i|²``, after Coeurjolly, Lachaud & Gueth, *Digital
+    surface regularization with guarantees*, 2021.
     """
     m, n = len(corners), len(vertices)
     row, tails, heads = np.arange(4 * m), corners.ravel(), np.roll(corners, -1, axis=1).ravel()
@@ -265,7 +266,7 @@ def smoothed_corners(vertices: Floats, corners: Ints, normals: Floats) -> Floats
 STEEPEST_NORMAL = 0.05
 """Least cosine of the angle between a corrected normal and the square's own."""
 WIDEST_BLUR, NARROWEST_BLUR = 1e3, 1e-3
-"""Radius in extents of the volume, and width in voxels, beyond which a blur changes no normal any more."""
+"""Largest radius of a blur, in extents of the volume, and least width, in voxels: beyond these no normal changes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,7 +325,7 @@ def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: 
     extent = spacing * volume.shape
     width = np.maximum(0.5 * min(radius, WIDEST_BLUR * float(extent.max())) / spacing, NARROWEST_BLUR)
     padded = np.pad(volume, 1).astype(np.float32)
-    reach = [min(int(4 * w + 0.5), n) for w, n in zip(width, padded.shape, strict=True)]  # beyond, there is nothing
+    reach = [min(int(4 * w + 0.5), n) for w, n in zip(width, padded.shape, strict=True)]  # beyond is nothing
     inside = tuple((surfels.voxels + 1).T)
     outside = tuple((surfels.voxels + surfels.outward + 1).T)
     gradient = np.empty_like(own)

@@ -35,19 +35,19 @@ from ..search.nearest_triangles import TriangleTree
 from .plane_fits import point_spacing
 
 NORMAL_DISTANCE = 2.0
-"""Spacings added to the distance of a neighbour for each unit of length between its normal and the point's, so that
-points on the other side of a plate are four spacings farther. 72 thin clouds have 2,750 edges at holes, at 1 4,400, at
-3 2,030; but then 6 of 12 balls of 200 random points have a hole, at 2 none."""
+"""Spacings by which neighbours count as farther (by Pythagoras) per unit of distance between their normals and the
+point's: four on the other side of a plate. 72 thin clouds have 2,750 edges at holes, with 1 4,400, with 3 2,030; but
+with 3, 6 of 12 balls of 200 random points have a hole, with 2 none."""
 OPPOSITE_SIDES = -0.5
-"""Cosine between the normals of two places below which they lie on different sides of a plate or wall. At -0.8 and at 0
-edges at holes of point clouds are 4 and 8 % more."""
+"""Cosine between the normals of two places below which they lie on different sides of a plate or wall. With -0.8 and
+0 there are 4 and 8 % more edges at holes of point clouds."""
 SAME_SIDE_HEIGHT = 0.03
 """Height over a point's tangent plane, in spacings, up to which another point lies on the same side, whatever its
-normal. At 0.01 edges at holes are 3 % fewer, at 0.1 51 % more."""
+normal. With 0.01 there are 3 % fewer edges at holes, with 0.1 51 % more."""
 OWN_NORMAL_WEIGHT = 0.03
 """Weight of a point's own normal in its tangent plane, relative to that of its neighbours: it decides where these lie
-along a line, as on the narrow side of a plate. At 0.01 edges at holes are 44 % more; at 0.1 6 % fewer, but 3 of 12
-balls of 200 random points have a hole."""
+along a line, as on the narrow side of a plate. With 0.01 there are 44 % more edges at holes; with 0.1 6 % fewer, but 3
+of 12 balls of 200 random points have a hole."""
 SPACING_NEIGHBORS = 7
 """Number of neighbours from which spacing is estimated."""
 PROPOSED_AT_ONCE = 65536
@@ -65,11 +65,11 @@ class LocalTriangulations:
 def local_triangulations(
     points: Floats, normals: Floats, n_neighbors: int = 30, given: Floats | None = None
 ) -> LocalTriangulations:
-    """Triangulate points (n, 3) with normals, some of them given, in O(n log n) time."""
+    """Triangulate points (n, 3) with normals, oriented like most of those `given`, in O(n log n) time."""
     planes = TangentPlanes.of(points, normals, n_neighbors)
     faces, candidates = joined_triangles(planes)
     alone = islands(planes, faces)
-    if alone.any():  # their normals fit no point nearby
+    if alone.any():  # their normals contradict the points nearby
         planes = TangentPlanes.of(points, np.where(alone[:, None], -normals, normals), n_neighbors)
         faces, candidates = joined_triangles(planes)
     if len(faces) == 0:
@@ -81,7 +81,7 @@ def local_triangulations(
 
 
 def joined_triangles(planes: TangentPlanes) -> tuple[Ints, Ints]:
-    """Triangulate the points of each side, and join both where they end; return also all triangles proposed."""
+    """Triangulate the points of each side, and join the sides where they end; return also all proposed triangles."""
     points, everywhere = planes.points, np.arange(len(planes.points))
     beside = ~planes.opposed(everywhere, planes.neighbors)
     proposals = [proposed_triangles(planes, everywhere, planes.neighbors, beside)]
@@ -99,7 +99,7 @@ def joined_triangles(planes: TangentPlanes) -> tuple[Ints, Ints]:
 
 
 def islands(planes: TangentPlanes, faces: Ints) -> Bools:
-    """(n,) points joined by faces to fewer others than a neighbourhood has, and next to points of another side."""
+    """(n,) whether a point is in a component smaller than a neighbourhood, and next to points of another side."""
     n, k = planes.neighbors.shape
     tail, head = edge_table(faces).vertices.T
     part = connected_components(n, tail, head)
@@ -120,12 +120,12 @@ class TangentPlanes:
     axes: Floats  # (n, 2, 3) two axes in each plane
     outward: Floats  # (n, 3) unit vectors in the planes, away from the neighbours on the same side
     neighbors: Ints  # (n, k) ids of the nearest points, where those with other normals count as farther
-    reach: Floats  # (n,) distance to the last of them, counted so
-    flat: Floats  # (n,) height over the plane up to which points lie in it
+    reach: Floats  # (n,) distance to the last of them, measured in this way
+    flat: Floats  # (n,) height over the plane up to which points count as lying in it
 
     @classmethod
     def of(cls, points: Floats, normals: Floats, n_neighbors: int) -> TangentPlanes:
-        """Fit planes to the neighbours on the same side: the normals of scans often belong to another mesh."""
+        """Fit planes to the neighbours on the same side, since the normals of scans often belong to another mesh."""
         k, many = (min(size, len(points) - 1) for size in (n_neighbors, 2 * n_neighbors))
         nearest = min(SPACING_NEIGHBORS, many)
         tree = scipy.spatial.cKDTree(points)
@@ -151,7 +151,7 @@ class TangentPlanes:
         return cls(points, axis, axes[:, :2], outward, neighbors, reach, flat)
 
     def opposed(self, here: Ints, there: Ints) -> Bools:
-        """(m, k) whether points (m, k) lie on the other side of a plate than others (m,)."""
+        """(m, k) whether the points `there` (m, k) lie on the other side of a plate than the points `here` (m,)."""
 
         def found(ids: Ints) -> tuple[Bools]:
             first, rest = ids[:, :1], ids[:, 1:]
@@ -161,9 +161,9 @@ class TangentPlanes:
         return in_chunks(found, np.column_stack([here, there]))[0]
 
     def unfolded(self, here: Ints, there: Ints) -> Floats:
-        """(m, 2) places of points (m,) in the planes of others (m,), along the mean of both normals.
+        """(m, 2) places of points `there` (m,) in the planes of points `here` (m,), along the mean of both normals.
 
-        On the other side of a plate, the directions in which both sides end take the place of the normals.
+        For points on the other side of a plate, the directions in which both sides end replace the normals.
         """
 
         def places(pairs: Ints) -> tuple[Floats]:
@@ -180,16 +180,16 @@ class TangentPlanes:
         return in_chunks(places, np.column_stack([here, there]))[0]
 
     def unfolded_sides(self, triangles: Ints) -> Iterator[tuple[Floats, Floats]]:
-        """Yield, for each corner, the ways (m, 2) to the next one and to the one after, in the plane of the corner."""
+        """Yield, for each corner, the vectors (m, 2) to the next one and to the one after, in the corner's plane."""
         for k in range(3):
             corners, right, left = (triangles[:, (k + shift) % 3] for shift in range(3))
             yield self.unfolded(corners, right), self.unfolded(corners, left)
 
 
 def turned_alike(offsets: Floats, normal: Floats, others: Floats, flat: Floats) -> tuple[Floats, Bools]:
-    """Turn mistaken normals (…, 3) back; return also which points lie on the other side of a plate.
+    """Invert mistaken normals among `others` (…, 3); return also which points lie on the other side of a plate.
 
-    A contrary normal is a mistake in the tangent plane, or if of both points only one is above the other.
+    A contrary normal is a mistake if its point lies in the tangent plane, or if only one point is above the other.
     """
     contrary = dot(normal, others) < OPPOSITE_SIDES
     over, under = dot(offsets, normal), -dot(offsets, others)
@@ -214,14 +214,14 @@ def principal_axes(offsets: Floats, weights: Floats, normals: Floats, reach: Flo
 
 
 def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, allowed: Bools) -> tuple[Ints, Ints]:
-    """(m, 3) distinct triangles that `centers` (c,) propose of `allowed` neighbours (c, k), and (m,) votes."""
+    """(m, 3) distinct triangles that `centers` (c,) propose with `allowed` neighbours (c, k), and (m,) their votes."""
     triangles = [np.empty((0, 3), dtype=np.int64)]
     k = neighbors.shape[1]
     for begin in range(0, len(centers), PROPOSED_AT_ONCE):
         part = slice(begin, begin + PROPOSED_AT_ONCE)
         chunk = centers[part]
         places = planes.unfolded(np.repeat(chunk, k), neighbors[part].ravel()).reshape(len(chunk), k, 2)
-        # the others are moved to the origin, where voronoi_fans skips them
+        # neighbours not allowed are moved to the origin, where voronoi_fans skips them
         x, y = np.moveaxis(places * allowed[part, :, None], 2, 0)
         order = np.argsort(x * x + y * y, axis=1)
         x, y = np.take_along_axis(x, order, axis=1), np.take_along_axis(y, order, axis=1)
@@ -243,7 +243,7 @@ def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, al
 
 
 def accepted_triangles(planes: TangentPlanes, proposals: Sequence[tuple[Ints, Ints]]) -> Ints:
-    """Well-shaped triangles that overlap no better one: of earlier proposals, then with more votes, then rounder."""
+    """Well-shaped triangles that overlap no better one: of earlier proposals, then of more votes, then rounder."""
     triangles = np.concatenate([part for part, _ in proposals])
     votes = np.concatenate([part for _, part in proposals])
     rank = np.repeat(np.arange(len(proposals)), [len(part) for part, _ in proposals])
@@ -275,7 +275,7 @@ def nonoverlapping_triangles(planes: TangentPlanes, triangles: Ints) -> Ints:
 
 
 def split_at_points_left(points: Floats, faces: Ints, candidates: Ints) -> Ints:
-    """Split the triangle nearest to each point whose candidates all overlap others; those without any are outliers."""
+    """Split the triangle nearest to each point whose candidates all overlap others; points without any are outliers."""
     while len(left := np.setdiff1d(candidates, faces)):
         nearest, _ = TriangleTree.of(points[faces]).nearest(points[left])
         split, first = np.unique(nearest, return_index=True)
@@ -286,13 +286,13 @@ def split_at_points_left(points: Floats, faces: Ints, candidates: Ints) -> Ints:
 
 
 def aligned(axes: Floats, faces: Ints, normals: Floats, given: Floats) -> Ints:
-    """(n,) signs that orient normals alike across edges and as estimated (node n), and each component as given."""
+    """(n,) signs that orient `axes` alike across edges and like `normals`, and each component like `given`."""
     n = len(axes)
     tail, head = edge_table(faces).vertices.T
     parts = connected_components(n, tail, head)
     across = (axes[tail] * axes[head]).sum(axis=1)
     links = Links(tail, head, across * np.abs(across))  # creases weigh little
-    own = (axes * normals).sum(axis=1)  # estimates weigh as much as a neighbour in the same plane
+    own = (axes * normals).sum(axis=1)  # estimates, node n, weigh as much as a neighbour in the same plane
     found = signs_of(Links.joined(links, Links(np.arange(n), np.full(n, n), own)), n + 1)
     signs = (found[:n] * found[n]).astype(np.int64)
     preference = np.bincount(parts, signs * (axes * given).sum(axis=1))
@@ -309,16 +309,17 @@ def facing(planes: TangentPlanes, normals: Floats, faces: Ints) -> Ints:
 
 
 CELL_ROOM = 64
-"""Sides of a Voronoi cell, and triangles at a point, for which there is room."""
+"""Largest number of sides of a Voronoi cell, and of triangles at a point."""
 SECTOR_OVERLAP = 1e-7
 """Radians by which the sectors of two triangles at a corner may overlap."""
 
 
 @compiled
 def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
-    """(n, CELL_ROOM) Delaunay neighbours of the origin among places (n, k, 2), counter-clockwise; (n,) sides.
+    """(n, CELL_ROOM) Delaunay neighbours of the origin among places (n, k, 2), counter-clockwise; (n,) counts.
 
-    The Voronoi cell, a square to ±1, is cut by bisectors of neighbours, nearest first; sides left are −1, and count.
+    The Voronoi cell, at first a square from −1 to 1, is cut by the bisectors of neighbours, nearest first. Sides of the
+    square that remain are −1, and count.
     """
     n, k = places.shape[:2]
     neighbours = np.full((n, CELL_ROOM), -1, dtype=np.int64)
@@ -371,7 +372,7 @@ def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
 
 @compiled
 def accept_apart(triangles: Ints, starts: Floats, widths: Floats, n_points: int) -> Bools:
-    """(m,) triangles whose sectors, from starts (m, 3) counter-clockwise by widths, overlap none accepted earlier."""
+    """(m,) whether the sectors of a triangle, from starts (m, 3) on by widths (m, 3), overlap none accepted earlier."""
     accepted = np.zeros(len(triangles), dtype=np.bool_)
     sectors = np.zeros((n_points, CELL_ROOM, 2))
     count = np.zeros(n_points, dtype=np.int64)
@@ -401,7 +402,7 @@ HOLE_SIDES = 12
 
 
 def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
-    """Fill holes of at most `HOLE_SIDES` sides, which faces surround, by triangles; no diagonal is an edge already."""
+    """Triangulate holes of at most `HOLE_SIDES` sides, without diagonals that are already edges."""
     edges = edge_table(faces)
     face, side = np.nonzero(edges.face_counts[edges.face_edges] == 1)
     tails, heads = faces[face, side], faces[face, (side + 1) % 3]
@@ -433,7 +434,7 @@ def next_around_gap(points: Floats, normals: Floats, tails: Ints, heads: Ints) -
 
 
 def _loop_from(start: int, following: Ints) -> list[int]:
-    """Follow the boundary edges of a loop; return none if they do not close."""
+    """List the boundary edges of the loop from `start` on; none if it does not close within `HOLE_SIDES` edges."""
     loop = [start]
     while len(loop) <= HOLE_SIDES:
         onward = int(following[loop[-1]])

@@ -22,15 +22,15 @@ also on thin sheets and at edges that the points resolve; noise as wide as the n
 ANGLE_ERROR = 0.13
 """Largest angle, in radians, by which noise may turn planes, as estimated from their deviation."""
 CLEAN_HEIGHTS = (0.25, 0.15, 0.1)
-"""Heights over the plane through a point, in reaches, beyond which a neighbour belongs to another sheet, one by one."""
+"""Heights over the plane through a point, in reaches, beyond which neighbours are left out, in successive fits."""
 NOISY_HEIGHTS = (0.5, 0.5, 0.5)
 """The same over planes that move from a noisy point to where its neighbours are densest."""
 TWO_SIDES = 0.9
 """Mean distance of neighbours from a quadric through them, relative to the root of its mean square, above which they
-are those of two sides: where these are even, it is .88 to .99, where they are random .83 to .96, but of one noisy side
-.74 to .86."""
+are those of two sides: it is .88 to .99 for two sides with even points, .83 to .96 with random ones, but .74 to .86 for
+one noisy side."""
 MERGED_SHARE = 0.03
-"""Share of points with neighbours on two sides from which a cloud is announced. Of scans, CAD and tori with up to .4
+"""Share of points with neighbours on two sides above which there is a warning. Of scans, CAD and tori with up to .4
 spacings of noise at most .014 are such; of plates, bowls, lenses and tubes whose sides are merged .25 to 1."""
 ONE_SIDE = 0.02
 """Root mean square distance from a quadric, in spacings, up to which neighbours are taken for those of one side."""
@@ -39,7 +39,7 @@ QUADRIC_NEIGHBORS = 24
 STARTS = 5
 """Number of planes from which the fit to points on a surface starts, since it ends at the nearest of several sheets."""
 TRIED_POINTS = 2000
-"""Number of points on which it is tried whether they are noisy, or have two sides."""
+"""Number of points that are examined to find out whether a cloud is noisy, or has two sides."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class PlaneFits:
 
 
 def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
-    """Fit a plane near each of (n, 3) distinct points; of noisy ones to `n_neighbors`, otherwise to few."""
+    """Fit a plane near each of (n, 3) distinct points: to `n_neighbors` of noisy ones, or, if that is None, to few."""
     tree = scipy.spatial.cKDTree(points)
     noisy = n_neighbors is not None
     size = n_neighbors or min(CLEAN_NEIGHBORS, len(points) - 1)
@@ -65,7 +65,7 @@ def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
 
 
 def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
-    """Sizes of neighbourhoods in which noise lets planes be fitted, from the least; without noise none."""
+    """List the sizes of neighbourhoods, ascending, that allow planes to be fitted despite noise; none without noise."""
     largest = (len(points) - 1) // 4
     if largest < CLEAN_NEIGHBORS:
         return []
@@ -86,13 +86,13 @@ def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
 
 
 def noise_scale(points: Floats, normals: Floats | None = None) -> int | None:
-    """Size of neighbourhoods for noisy points, whose normals may be given; None without noise."""
+    """Choose the size of neighbourhoods for noisy points, whose normals may be given; None without noise."""
     sizes = noisy_sizes(points, normals)
     return sizes[min(2, len(sizes) - 1)] if sizes else None
 
 
 def point_spacing(distances: Floats, k: int) -> Floats:
-    """Distance between points, from that to the k-th neighbour: the circle around k points has k squared spacings."""
+    """Estimate spacing from the distance to the k-th neighbour: the disk of that radius has k squared spacings."""
     return distances / np.sqrt(k / np.pi)
 
 
@@ -128,7 +128,7 @@ def planes_near(
     *,
     on_surface: bool,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Fit planes near `chosen` points (c,) to their neighbours, without those beyond `heights`, one after the other.
+    """Fit planes near `chosen` points (c,) to their neighbours, leaving out those beyond each of `heights` in turn.
 
     Heights are over the plane through the point, if `on_surface`, else over that through the mean of the neighbours.
     Returns (c, 3) normals, (c, 3) means, (c,) reaches (distances to the last neighbour), and (c,) root mean square
@@ -245,11 +245,10 @@ def robust_planes(
     centers: Floats,
     deviations: Floats,
 ) -> None:
-    """Fit a plane near each point, its first neighbour, to neighbours within `heights`, in reaches, one after the
-    other.
+    """Fit a plane near each point, listed first among its neighbours, to those within each of `heights` in turn.
 
-    They are over the plane through the point, if `on_surface`, else the last centre; of several starts the best is
-    kept.
+    Heights are in reaches, over the plane through the point, if `on_surface`, else through the last centre; of several
+    starts the best is kept.
     """
     n, k = neighbors.shape
     offsets, near, weights = np.empty((k, 3)), np.empty(k), np.empty(k)

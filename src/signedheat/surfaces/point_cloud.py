@@ -1,4 +1,4 @@
-"""Point clouds, as domains, and, with normals, as sources in space; and which side of their axes is out.
+"""Point clouds, as domains, and, with normals, as sources in space; and the outward orientation of normals.
 
 The ball around a Delaunay tet touches four points and contains none. Where it touches two of them along their normals,
 it lies on the same side of the surface near both. So tets link the signs of normals, across edges, gaps and thin walls
@@ -35,16 +35,16 @@ if TYPE_CHECKING:
     import trimesh  # noqa: F401  named in the base class
 
 CONTRARY_NORMALS = 0.35
-"""Share of the given normals that may contradict the orientation of the points, unless all are inverted. It is .39 to
-.49 where both sides of a plate are taken for one, and .3 where .3 of the normals are turned."""
+"""Share of the given normals, or of their inverses, that may contradict the orientation of the points. It is .39 to .49
+where both sides of a plate are taken for one, and .3 where .3 of the normals are turned."""
 BAD_SEAM = 0.35
-"""Number of edges next to another side across which triangles face opposite ways, over the root of the number of
-points, above which there is a warning. On scans, CAD and a box with up to .15 spacings of noise it is at most .07,
+"""Number of edges next to another side across which triangles face opposite ways, relative to the root of the number
+of points, above which there is a warning. On scans, CAD and a box with up to .15 spacings of noise it is at most .07,
 where parts of thin plates face the wrong way mostly .41 to .96."""
 STEEP = 0.7
 """Cosine between a normal and the direction to a neighbour above which the neighbour lies on another side."""
 EDGE_NEIGHBORS = 13
-"""Number of points near an edge that may lie on another side: about twice its own neighbourhood."""
+"""Number of points near an edge that are searched for another side: about twice its own neighbourhood."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +71,9 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     Notes
     -----
-    As a domain, a cloud needs no normals, and its normals need not be consistent: they are oriented together, and
-    triangles on the points with them, each connected component to the side to which most of the normals given point;
-    without any outward, and upward for points in a plane. The left of a curve is as seen from that side, unless the
+    As a domain, a cloud needs no normals, and its normals need not be consistent. Normals and triangles are oriented
+    together, each connected component to the side to which most of its given normals point; without given normals
+    outward, and upward for points in a plane. The left of a curve is as seen from that side, unless the
     curve has normals of its own. Points that coincide count once; points without a triangle, such as outliers, get NaN.
 
     Examples
@@ -204,7 +204,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @cached_property
     def surface_normals(self) -> Floats:
-        """(n, 3) unit normals, estimated from neighbours, on the side from which `triangulation` is oriented."""
+        """(n, 3) unit normals, estimated from neighbours, on the side to which the faces of `triangulation` point."""
         ids, triangulated = self._distinct
         normals = np.empty_like(self.points)
         normals[ids] = triangulated.normals
@@ -235,33 +235,33 @@ def _same_length(values: Floats, points: Floats, name: str) -> None:
 
 
 KEPT_SPACING = 0.35
-"""Distance between the noisy points that are kept, in reaches: larger than the noise that planes leave."""
+"""Least distance between the noisy points that are kept, in reaches: larger than the noise that planes leave."""
 MOST_TET_POINTS = 100_000
-"""Number of points for which tets are made; the others take the signs of their neighbours."""
+"""Largest number of points for which tets are made; the others take the signs of their neighbours."""
 GIVEN_SIGN_WEIGHT = 0.1
-"""Weight of given signs, over half the sum of the weights of all links of a point."""
+"""Weight of given signs, relative to half the typical sum of the weights of all links of a point."""
 MOST_WRONG = 3.0
 """Given signs stay unless the share that seems wrong exceeds this many times the share of contradictions."""
 COHERENCE_GAIN = 0.0015
 """Gain of coherence for which larger neighbourhoods are taken, and loss at which no larger ones are tried."""
 JOGGLE = 1e-4
-"""Random move of points, over the distance to neighbours: flat faces and lattices are slow to triangulate."""
+"""Random shift of points, relative to their reach, since flat faces and lattices are slow to triangulate."""
 BALL_COSINE = 0.5
 """Cosine between a normal and the direction to a ball's centre below which a ball links no signs."""
 OUTLIER_DISTANCE = 4.0
-"""Distance from a point to its neighbours, over that of these to theirs, above which it is an outlier. Where spacing is
-even it is up to 1.4, where density halves within three spacings 1.6."""
+"""Distance from a point to its neighbours, relative to that from these to theirs, above which it is an outlier. It is
+up to 1.4 where spacing is even, and 1.6 where density halves within three spacings."""
 DIRECT_NEIGHBORS = 8
 """Number of neighbours with which a point is compared directly."""
 DIRECT_WEIGHT = 0.1
-"""Weight of a link between neighbours, over that of a ball; with noisy points they weigh the same."""
+"""Weight of a link between neighbours, relative to that of a ball; with noisy points they weigh the same."""
 UPWARD = np.array([0.01, 0.1, 1.0])
-"""Direction of out where nothing decides it, as for points in a plane: up, and on vertical planes along the second
+"""Outward direction where nothing decides it, as for points in a plane: up, and on vertical planes along the second
 axis. If a component is halved or doubled, planes keep their sides."""
 MUTUALLY_BELOW = 0.98
-"""Share of pairs of near points with opposite normals of which each is below the other, less the share of those of
-which each is above it, above which given normals are kept on thin sheets: there it is 1, and .9 if a fifth of the
-normals are turned."""
+"""Given normals are kept on thin sheets if, of all near points with opposite normals, the shares below and above the
+other point differ by at least this. On thin sheets the difference is 1, and .9 if a fifth of the normals are turned.
+"""
 LISTED_AT_ONCE = 4096
 """Number of points whose neighbours are listed at once."""
 
@@ -276,7 +276,7 @@ class OutwardSigns:
 
 
 def outward_normals(points: Floats, given: Floats | None = None) -> tuple[Floats, PlaneFits, OutwardSigns]:
-    """Orient normals at (n, 3) distinct points outwards: the given ones, some of which are turned, or fitted ones."""
+    """Orient normals at (n, 3) distinct points outwards: the given ones, some of which are inverted, or fitted ones."""
     if given is None:
         fits, outward = fitted_outward(points)
         return fits.axes * outward.signs[:, None], fits, outward
@@ -289,7 +289,7 @@ def outward_normals(points: Floats, given: Floats | None = None) -> tuple[Floats
 def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
     """Keep the signs of given normals (n, 3) on sheets thinner than the spacing, where balls are no evidence.
 
-    That is if all over the cloud, of two near points with opposite normals, each is below the other, or each above.
+    They are kept if, all over the cloud, near points with opposite normals are each below the other, or each above.
     """
     k = min(DIRECT_NEIGHBORS, len(points) - 1)
     distances, near = scipy.spatial.cKDTree(points).query(points, k=k + 1)
@@ -305,7 +305,7 @@ def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
 
 
 def fitted_outward(points: Floats) -> tuple[PlaneFits, OutwardSigns]:
-    """Fit planes of the size at which (n, 3) distinct points contradict each other least, with outward signs."""
+    """Fit planes to neighbourhoods of the size at which signs contradict each other least; return these signs, too."""
     tried: list[tuple[PlaneFits, OutwardSigns]] = []
     for size in noisy_sizes(points) or (None,):
         fits = fit_planes(points, size)
@@ -351,7 +351,7 @@ def _lone(places: Floats, reaches: Floats) -> Bools:
 
 
 def _followed(places: Floats, normals: Floats, others: Floats, axes: Floats) -> Floats:
-    """Signs of axes at other places that agree with the normals around them."""
+    """(k,) signs that make the axes at `others` (k, 3) agree with the normals around them."""
     distances, near = scipy.spatial.cKDTree(places).query(others, k=min(6, len(places)), workers=-1)
     distances, near = distances.reshape(len(others), -1), near.reshape(len(others), -1)
     weights = 1.0 / (distances + 1e-9 * max(float(distances.max()), np.finfo(float).tiny))
@@ -360,7 +360,7 @@ def _followed(places: Floats, normals: Floats, others: Floats, axes: Floats) -> 
 
 
 def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = False) -> tuple[Links, bool]:
-    """Link the signs of axes (n, 3) by neighbours, balls, and with the outside, node n; say whether there are balls."""
+    """Link signs of axes (n, 3) by neighbours, balls and the hull (to the outside, node n); tell if there are balls."""
     near = _neighbor_links(places, axes, 1.0 if noisy else DIRECT_WEIGHT)
     moves = np.random.default_rng(0).uniform(-1, 1, places.shape) * (JOGGLE * reaches[:, None])
     try:
@@ -382,6 +382,7 @@ def _confidence(cosines: Floats) -> Floats:
 
 
 def _ball_links(places: Floats, axes: Floats, tets: Ints) -> Links:
+    """Link the signs at every two corners of a tet (t, 4) along whose axes its circumscribed ball lies."""
     corners = places[tets]
     u, v, w = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
     uu, vv, ww = ((side * side).sum(axis=1, keepdims=True) for side in (u, v, w))
@@ -414,7 +415,7 @@ def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> L
 
 
 def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
-    """Link neighbours as if on a circle: reflected in the plane midway, one axis is the other."""
+    """Link neighbours as if on a circle: reflection in the plane midway between them maps one axis to the other."""
     n, k = len(places), min(DIRECT_NEIGHBORS, len(places) - 1)
     neighbors = scipy.spatial.cKDTree(places).query(places, k=k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), neighbors.ravel()
@@ -427,7 +428,7 @@ def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
 
 
 def spread_out(points: Floats, radii: Floats) -> Ints:
-    """Ids, ascending, of points (n, d) that are kept: in order, all not within the radius (n,) of one kept before."""
+    """Ids, ascending, of the points (n, d) that are kept: those not within the radius (n,) of any kept before them."""
     tree = scipy.spatial.cKDTree(points)
     kept = np.ones(len(points), dtype=bool)
     for begin in range(0, len(points), LISTED_AT_ONCE):
