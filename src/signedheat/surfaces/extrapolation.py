@@ -17,7 +17,7 @@ from .surface_source import SurfaceSource
 FINE_EXTENT = 263.0
 """Extent of a surface, in h, above which τ grows: that of 20,000 vertices in equilateral triangles."""
 TIME_AT_ENDS = 1 / 3
-"""τ where curves end, relative to that of the extrapolation: the paper's 1 by default."""
+"""τ where curves end, relative to that of the extrapolation; by default it is then 1, as in the paper."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class Extrapolated:
     smooths the source, with an error of the size √t. Of the directions Y and their first two derivatives by t the
     combination in which both cancel is taken. On triangles the error then falls about like their size, and is less than
     half as large on fine meshes; on the coarsest there is little to gain. The derivatives need no other factor: step 1
-    solves three times with one. By default τ is 3 up to about 20,000 vertices, and beyond grows with the fifth root of
-    their number.
+    solves three times with the same one. By default τ is 3 up to about 20,000 vertices, and beyond grows with the fifth
+    root of their number.
 
     Where an oriented curve on a surface ends, away from its boundary, heat completes what is missing, and Y depends on
     t by more than an error: in that connected part of the surface the directions of τ/3 are taken as they are.
@@ -70,7 +70,8 @@ Diffusion = float | Extrapolated
 def default_diffusion(discretization: Discretization) -> Diffusion:
     """`Extrapolated` on surfaces, where directions limit the accuracy; 1 in space.
 
-    Extrapolation leaves 1/τ², and Y is smoothed over h √τ where it turns back: with τ like h^(−2/5) both fall alike.
+    Extrapolation leaves an error like 1/τ², and Y is smoothed over h √τ where it turns back: with τ like h^(−2/5) both
+    fall alike.
     """
     if not isinstance(discretization, SurfaceDiscretization):
         return 1.0
@@ -95,7 +96,7 @@ def lowered_for_times(discretization: Discretization, sources: Sequence[Any], di
 
 
 def blended(sources: Sequence[SourceTerm], directions: Iterable[NDArray[Any]]) -> NDArray[Any]:
-    """Y everywhere, from the directions of each source of `lowered_for_times`."""
+    """Combine the directions of the sources of `lowered_for_times` to Y on all faces."""
     everywhere, *at_ends = directions
     for ending in at_ends:
         assert isinstance(sources[0], SurfaceSource)

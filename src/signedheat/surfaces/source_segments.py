@@ -37,7 +37,7 @@ from .triangle_mesh import TriangleMesh
 
 Positions: TypeAlias = Floats | None
 SOURCE_POINT = 1e-14
-"""Distance of points, relative to the size of a surface, up to which they are one."""
+"""Extent of a curve, relative to the size of its surface, up to which it counts as a point."""
 
 
 @singledispatch
@@ -116,7 +116,7 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, numb
 
 
 def one_sided(sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]], triangles: IntrinsicMesh) -> list[int]:
-    """List the sources with a curve without normals along which faces cannot be turned to agree: it has one side."""
+    """List sources with an oriented curve without normals along which faces cannot be oriented consistently."""
     if triangles.is_consistently_oriented:
         return []
     numbers = []
@@ -146,7 +146,7 @@ def is_element_list(source: object) -> TypeGuard[ElementList]:
 
 
 def curve_of_elements(triangles: Triangles, points: ElementList) -> Curve | SurfacePoints:
-    """Make the curve, or point source, of vertices, edges with a fraction, and faces with coordinates."""
+    """Make a curve, or a point source, from vertices, edges with a fraction, and faces with coordinates."""
     kinds = np.array([min(len(given), FACE) for _, given in points])
     vertices, edges, faces = (
         np.array([element if kind == wanted else least for (element, _), kind in zip(points, kinds, strict=True)])
@@ -169,7 +169,7 @@ def curve_of_elements(triangles: Triangles, points: ElementList) -> Curve | Surf
 
 
 def as_curves(domain: object, sources: list[Any]) -> list[Any]:
-    """Make curves of lists of elements on surfaces, those of an intrinsic triangulation on its mesh."""
+    """Convert lists of elements to curves, on surfaces only; those of an intrinsic triangulation are on its mesh."""
     domain = getattr(domain, "mesh", domain)
     if not isinstance(domain, Surface):
         return sources
@@ -177,12 +177,12 @@ def as_curves(domain: object, sources: list[Any]) -> list[Any]:
 
 
 def given_curves(domain: object, sources: list[Any]) -> tuple[list[Any], WithoutLength | None]:
-    """Make curves of lists of elements, and leave out curves without length if there are other sources."""
+    """Convert lists of elements to curves; leave out curves without length if there are other sources."""
     curves = as_curves(domain, sources)
     domain = getattr(domain, "mesh", domain)
     if not isinstance(domain, Surface):
         return curves, None
-    for k, source in enumerate(curves):  # by its number, before others are left out
+    for k, source in enumerate(curves):  # errors name its number before others are left out
         if isinstance(source, Curve | SurfacePoints):
             name = f"{'curve' if isinstance(source, Curve) else 'source'} {k}: point"
             refuse_missing("face", source.faces, domain.triangulation.n_faces, name)
@@ -199,7 +199,7 @@ def numbers_kept(n: int, left_out: WithoutLength | None) -> Ints:
 
 
 def numbers_given(sources: Sequence[Any], left_out: WithoutLength | None) -> Ints:
-    """(n,) the same for n curves, of which those of a group count one by one."""
+    """(n,) numbers of the n curves that were kept, like `numbers_kept`, but counting every curve of a group."""
     kept = numbers_kept(len(sources), left_out)
     counts = np.ones(kept.max(initial=-1) + 1, dtype=np.int64)
     counts[kept] = [len(source) if isinstance(source, Sequence) else 1 for source in sources]
@@ -256,7 +256,7 @@ class CurveGroups:
 
 
 def nearest_others(ends: Floats) -> Ints:
-    """(2 k, 2) for each end of k pieces its piece, and that with the nearest end, perhaps its own."""
+    """(2 k, 2) for each end of k pieces, its piece and the piece with the end nearest to it, perhaps the same one."""
     rows = np.arange(len(ends))
     piece = rows // 2
     distances, near = scipy.spatial.cKDTree(ends).query(ends, k=min(3, len(ends)))

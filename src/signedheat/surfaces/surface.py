@@ -27,15 +27,15 @@ from ..validation import array_of, coordinates, finite_number, flag, numbers
 from .surface_curves import Curve, SurfacePoints
 
 ONE_CROSSING = 2e-5
-"""Distance, over a face's least height, up to which points in a row are one: where a line passes a vertex that rounding
-puts next to it, it crosses edges up to 1e-5 of that apart. Of 22,000 steps of completed curves on spheres none is
-between 3e-6 and 3e-5, and 15 between 3e-5 and 1e-3."""
+"""Distance, relative to a face's least height, up to which consecutive points of a curve count as one: where rounding
+moves a line off a vertex, it crosses the edges there at points up to 1e-5 apart. Of 22,000 steps of completed curves on
+spheres none is between 3e-6 and 3e-5, and 15 are between 3e-5 and 1e-3."""
 
 
 def level_set(mesh: Triangles, values: Floats, level: float) -> list[Curve]:
-    """Level set of a piecewise linear function by marching triangles, with larger values, and equal ones, to the left.
+    """Extract a level set of a piecewise linear function by marching triangles; larger or equal values are to the left.
 
-    Faces with a NaN corner are skipped; where faces are not consistently oriented, curves have normals.
+    Faces with a NaN corner are skipped. If the faces are not consistently oriented, the curves get normals.
     """
     faces, edges = mesh.faces, mesh.edges
     values = snapped(values, edges.vertices, level)
@@ -72,7 +72,7 @@ def checked_levels(values: ArrayLike, level: float, n_vertices: int) -> tuple[Fl
 
 
 def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
-    """Curves without points within `ONE_CROSSING` of a face's least height of the next one; one point is no curve."""
+    """Drop points of curves that nearly coincide with the next one (see `ONE_CROSSING`), and curves of one point."""
     kept_curves = []
     for curve in curves:
         corners = mesh.vertices[mesh.faces[curve.faces]]
@@ -90,7 +90,7 @@ def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
 
 
 def snapped(values: Floats, ends: Ints, level: float) -> Floats:
-    """Values; those that differ from a level by rounding only are set to that level."""
+    """Set values (n,) that differ from a level by rounding only to that level; `ends` (e, 2) are the edges."""
     with np.errstate(invalid="ignore"):  # values may be infinite
         steps = np.abs(values[ends[:, 0]] - values[ends[:, 1]])
     steps[~np.isfinite(steps)] = 0.0
@@ -100,7 +100,7 @@ def snapped(values: Floats, ends: Ints, level: float) -> Floats:
 
 
 def gradient_directions(mesh: Triangles, values: Floats, faces: Ints) -> Floats:
-    """(k, 3) gradients of a piecewise linear function on some faces, up to a positive factor each."""
+    """(k, 3) gradients of a piecewise linear function on faces (k,), each up to a positive factor."""
     corners = mesh.vertices[mesh.faces[faces]]
     opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
     of_corners = np.cross(area_vectors(corners)[:, None], opposite)
@@ -111,7 +111,7 @@ def gradient_directions(mesh: Triangles, values: Floats, faces: Ints) -> Floats:
 
 
 def along_sides(mesh: Triangles, chosen: Bools) -> list[Curve]:
-    """Curves along chosen sides of faces, in the direction in which the face is to the left."""
+    """Assemble curves along the `chosen` (m, 3) sides of faces, with the face to the left of each side."""
     faces, sides = np.nonzero(chosen)
     following = (sides + 1) % 3
     tails, heads = mesh.faces[faces, sides], mesh.faces[faces, following]
@@ -129,7 +129,7 @@ def along_sides(mesh: Triangles, chosen: Bools) -> list[Curve]:
 
 
 def inward(mesh: Triangles, faces: Ints, sides: Ints) -> Floats:
-    """(k, 3) directions in faces, orthogonal to one of their sides, inward."""
+    """(k, 3) directions in the planes of faces (k,), orthogonal to one side of each and pointing inward."""
     corners = mesh.vertices[mesh.faces[faces]]
     row = np.arange(len(faces))
     along = corners[row, (sides + 1) % 3] - corners[row, sides]
@@ -316,8 +316,8 @@ class Surface(Frozen):
         Returns
         -------
         list of Curve
-            One for each connected component, open or closed; larger values are to its left. They pass through seams
-            on both sides of which the function is the same.
+            One for each connected component, open or closed; larger values are to its left. Curves cross seams if the
+            function agrees on both sides of all of them.
 
         Raises
         ------
@@ -389,11 +389,11 @@ class Surface(Frozen):
         return corners // 3, np.eye(3)[corners % 3]
 
     def _triangulation_vertices(self, vertices: Ints) -> Ints:
-        """Vertices of `triangulation` that are vertices of the domain."""
+        """Return the vertices of `triangulation` that correspond to vertices of the domain."""
         return vertices
 
     def _triangle_mask(self, face_mask: Bools) -> Bools:
-        """Faces of `triangulation` that belong to faces of the domain."""
+        """Turn a mask of the faces of the domain into a mask of the faces of `triangulation`."""
         check_mask(face_mask, self.triangulation.n_faces)
         return face_mask
 
@@ -425,7 +425,7 @@ class PlaceableTriangles(Triangles, Protocol):
 def projected_curve(
     mesh: PlaceableTriangles, points: ArrayLike, closed: bool, oriented: bool, max_distance: float | None
 ) -> Curve:
-    """Join the closest points on a mesh by geodesic paths."""
+    """Find the points of a mesh closest to `points`, and join them by geodesic paths."""
     points = coordinates(points, "points of the polyline", 3, SourceError)
     if len(points) < 2:
         raise SourceError(

@@ -36,8 +36,8 @@ class Curve(Frozen):
         Whether the curve has a positive and a negative side; distance to an unoriented curve is unsigned.
     normals : (segments, 3) float, optional
         Direction in space in which φ grows across each segment. Needed where left has no meaning: for curves along
-        which a surface that is not orientable loses its orientation, and for pieces on faces that are not consistently
-        oriented, to agree. Normals are projected on the surface; their lengths are ignored.
+        which a surface that is not orientable loses its orientation, and to make pieces agree whose faces are not
+        consistently oriented. Normals are projected on the surface; their lengths are ignored.
 
     Raises
     ------

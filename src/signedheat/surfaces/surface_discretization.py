@@ -36,17 +36,17 @@ from .vector_heat import VectorHeat, extrapolated, nonmanifold_frames
 class SurfaceDiscretization:
     """The discretisation of a surface."""
 
-    domain: Any  # of the fields returned: a mesh, a cloud, a digital surface or an intrinsic triangulation
+    domain: Any  # on which fields are returned: a mesh, a cloud, a digital surface, an intrinsic triangulation
     triangles: IntrinsicMesh  # on which the method runs
     restriction: Ints  # (n,) vertex of the triangles for each vertex of the domain
-    transfer: Callable[[Any], Any] | None = None  # from a source on the domain to one on the triangles, if faces differ
-    # (n_vertices, 3) in space, or (m, 3, 3) at the corners, up to translation, if every face lies in a plane of its
-    # own; for curves with given normals. By default those of the domain's triangulation.
+    transfer: Callable[[Any], Any] | None = None  # maps a source on the domain to the triangles, if faces differ
+    # Positions in space, for curves with given normals: (n_vertices, 3), or (m, 3, 3) of the corners if every face lies
+    # in a plane of its own, up to translation. By default those of the domain's triangulation.
     positions: Floats | None = None
     triangulation: IntrinsicTriangulation | None = None  # of the domain, whose field is kept as well
     spacing: float = math.nan  # h: by default half the mean edge length, the distance between midpoints of edges
     notes: tuple[Note, ...] = ()  # on repairs made in building the triangles, for the diagnostics of every field
-    # by diffusion time: there is another one where curves end
+    # by diffusion time, of which there is a second one where curves end
     _heats: LastUsed[float, VectorHeat] = field(default_factory=lambda: LastUsed(2), init=False, repr=False)
     _turned: LastUsed[bytes, SurfaceDiscretization] = field(default_factory=LastUsed, init=False, repr=False)
 
@@ -62,7 +62,7 @@ class SurfaceDiscretization:
 
     @cached_property
     def integration(self) -> SurfaceIntegration:
-        """Step 3."""
+        """Step 3 of the method, which integrates the directions to φ."""
         ordered = partial(factorize, order=self.vertex_order)
         return SurfaceIntegration(self.stiffness, factorize=ordered, strength=SURFACE_SPRINGS / self.spacing)
 
@@ -96,7 +96,7 @@ class SurfaceDiscretization:
         return segments_of_each(sources, self.triangles, positions)
 
     def _turned_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
-        """Choose other first faces at nonmanifold edges, and share all of step 3, which does not depend on them."""
+        """Use triangles with other first faces at nonmanifold edges; share step 3, which does not depend on them."""
         if triangles is self.triangles:
             return self
 
@@ -108,7 +108,7 @@ class SurfaceDiscretization:
         return self._turned(fingerprint(triangles.first_halfedges), turned)
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
-        """X₀ (Eq. 11, Eq. 19) and the rows that interpolate φ along the sources (Eq. 14)."""
+        """Compute X₀ (Eq. 11, Eq. 19) and the rows that interpolate φ along the sources (Eq. 14)."""
         return surface_source(self.triangles, sources, diffusion, self.spacing)
 
     def diffuse(self, source: Any) -> list[Complexes]:
@@ -116,13 +116,13 @@ class SurfaceDiscretization:
         return self.diffuse_many([source])[0]
 
     def diffuse_many(self, sources: Sequence[Any]) -> list[list[Complexes]]:
-        """Solve Eq. 12 for several sources at once, of the same t, and all of them to be extrapolated or none."""
+        """Solve Eq. 12 for several sources at once, which have the same t and are all extrapolated or all not."""
         time, order = sources[0].time, self.triangles.edges.elimination_order
         heat = self._heats(time, lambda: VectorHeat(self.triangles, time, order(self.vertex_order)))
         return heat.solve([source.vectors for source in sources], changes=2 if sources[0].extrapolated else 0)
 
     def to_cells(self, stages: list[Complexes]) -> Complexes:
-        """(m,) three times the mean of X over the edges of each face (Sec. 6), of the last stage that has them all."""
+        """(m,) sum of X over the edges of each face, three times the mean (Sec. 6), from its last stage without NaN."""
         sums = self.triangles.sums_in_faces(stages[0])
         for stage in stages[1:]:
             later = self.triangles.sums_in_faces(stage)
@@ -134,7 +134,7 @@ class SurfaceDiscretization:
         return divergence(self.triangles, directions)
 
     def reached_by(self, vectors: sparse.csr_array) -> Bools:
-        """(n_vertices,) vertices with a face in a component with a source: vectors diffuse across edges only."""
+        """(n_vertices,) whether a vertex has a face in a component with a source: vectors diffuse across edges only."""
         parts = self.triangles.face_components
         if not parts.any():
             return np.ones(self.triangles.n_vertices, dtype=bool)
@@ -170,7 +170,7 @@ def large_angles(triangles: IntrinsicMesh) -> float:
 
 
 BYTES_PER_TRIANGLE = {"pardiso": (1200, 40), "superlu": (100, 200)}
-"""Peak memory of each triangle by back end, and its growth with every doubling of their number, by the fill of factors.
+"""Peak memory per triangle, in bytes, by back end, and its growth with every doubling of their number, due to fill-in.
 Measured on 20,000 to 310,000 triangles with one diffusion time."""
 
 
@@ -207,7 +207,7 @@ class SurfaceIntegration(SpringIntegration):
         return SOFT_STRENGTH / SURFACE_SPRINGS * self.strength
 
     def anchored(self, source: SourceTerm) -> Factor:
-        """Factor of C with φ held at zero along the source, as stiffly at every sample."""
+        """Factorise C with φ held at zero along the source by equally stiff springs at all samples."""
         return self._pulled_factor(source.interpolation, DirectIntegration.springs(self, source))
 
     def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, Floats]:
@@ -236,7 +236,7 @@ class SurfaceIntegration(SpringIntegration):
 
 
 LIGHTER = 0.87
-"""Memory of a triangle of a polygon, over that of others: few edges meet at virtual vertices. Measured on quads."""
+"""Memory per triangle of polygons, relative to other triangles: few edges meet at virtual vertices. From quads."""
 
 
 @discretize.register
@@ -246,9 +246,9 @@ def _(domain: PolygonMesh) -> SurfaceDiscretization:
 
 
 def lowered_polygons(domain: PolygonMesh) -> SurfaceDiscretization:
-    """Discretise polygons, whose memory the caller has checked, by h of their own edges.
+    """Discretise polygons, whose memory the caller has checked, with h from their own edges.
 
-    φ is solved for on virtual vertices, too: with them eliminated (``PᵀCP``), a curve across polygons could not be a
+    φ is solved for on virtual vertices, too: if they were eliminated (``PᵀCP``), a curve across polygons could not be a
     level set of φ, which would be constant on whole polygons.
     """
     lowered = lowered_mesh(domain.triangulation)
@@ -258,7 +258,7 @@ def lowered_polygons(domain: PolygonMesh) -> SurfaceDiscretization:
 
 
 BYTES_OF_NEIGHBORS, BYTES_PER_POINT = 40_000_000, 1300
-"""Measured bytes of the libraries that find neighbours, and of the neighbours, in addition to those of triangles."""
+"""Measured bytes of the libraries that find neighbours, and of the neighbours of each point, without triangles."""
 
 
 @discretize.register

@@ -206,7 +206,7 @@ def missing_parts(
 
 
 def without_false_zeros(triangles: IntrinsicMesh, values: Floats, near: Bools, sided: Ints) -> Floats:
-    """(n,) values of φ, NaN around parts of its zero set `near` unoriented sources (n,) and at no `sided` vertex.
+    """(n,) φ with NaN around parts of its zero set that are `near` (n,) unoriented sources and at no `sided` vertex.
 
     φ is zero at such a source only on average, so it may change sign around it.
     """
@@ -215,7 +215,7 @@ def without_false_zeros(triangles: IntrinsicMesh, values: Floats, near: Bools, s
     m, e = len(crossed), triangles.n_edges
     through = np.roll(signs, -1, axis=1)[crossed] * signs[crossed] < 0
     face, side = np.nonzero(through)
-    # a graph of the faces that are crossed, and then all edges, each face joined to those that it is crossed at
+    # nodes are the crossed faces, then all edges; each face is linked to the edges at which it is crossed
     line = connected_components(m + e, face, m + triangles.edges.face_edges[crossed[face], side])[:m]
     corners = triangles.corner_vertices[crossed]
     is_sided = mask_of(len(values), sided)
@@ -245,7 +245,7 @@ class CurveSides:
 
 
 def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
-    """Find the sides of curves: regions that no curve crosses are on one if all segments show them the same."""
+    """Find the sides of curves: a region that no curve crosses lies on one side if all segments next to it agree."""
     ends = free_ends(triangles, placed)
     nearby, reach = nearest_sides(triangles, placed, ends)
     oriented = placed.sides != 0
@@ -274,7 +274,7 @@ def free_ends(triangles: IntrinsicMesh, placed: PlacedSegments) -> Ints:
 
 
 def nearest_sides(triangles: IntrinsicMesh, placed: PlacedSegments, ends: Ints) -> tuple[Ints, Floats]:
-    """Side of the nearest oriented segment in the faces at each vertex, by the most frontal of equals; distance."""
+    """(n,) side and distance of the oriented segment in the faces at each vertex that is nearest, then most frontal."""
     n = triangles.n_vertices
     rows = np.flatnonzero(placed.sides != 0)
     start, step = placed.positions[rows, :1], np.diff(placed.positions[rows], axis=1)

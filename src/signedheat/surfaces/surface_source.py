@@ -44,7 +44,7 @@ class SurfaceSource(Frozen):
 
     @cached_property
     def ending(self) -> Bools:
-        """(m,) whether a face lies in a connected part in which an oriented curve ends, at two faces."""
+        """(m,) whether an oriented curve ends, off boundary and nonmanifold edges, in the connected part of a face."""
         triangles = self.triangles
         oriented = [part for part in self.parts if part.oriented]
         if not oriented:
@@ -57,7 +57,7 @@ class SurfaceSource(Frozen):
 
 
 def lie_along(triangles: IntrinsicMesh, points: LocatedPoints, edges: Bools) -> Bools:
-    """(p,) points on some of the edges (e,), or at vertices of them."""
+    """(p,) whether points lie on one of the chosen `edges` (e,), or at a vertex of one."""
     vertices = mask_of(triangles.n_vertices, triangles.edges.vertices[edges])
     return ((points.kinds == VERTEX) & vertices[points.elements % triangles.n_vertices]) | (
         (points.kinds == EDGE) & edges[points.elements % triangles.n_edges]
@@ -67,8 +67,8 @@ def lie_along(triangles: IntrinsicMesh, points: LocatedPoints, edges: Bools) -> 
 def surface_source(triangles: IntrinsicMesh, sources: Sequence[Any], diffusion: float, spacing: float) -> SurfaceSource:
     """Lower sources to an intrinsic mesh, whose faces they refer to; ``t = diffusion · spacing²``.
 
-    A sequence among them counts as one; an isolated point weighs as a curve of length `spacing`. Unoriented curves must
-    run along edges (`refine_to_conform`).
+    A sequence within `sources` counts as one; a point weighs as much as a curve of length `spacing`. Unoriented curves
+    must run along edges (`refine_to_conform`).
     """
     groups = segments_of_each(sources, triangles)
     parts = [part for group in groups for part in group]
@@ -107,9 +107,9 @@ def surface_source(triangles: IntrinsicMesh, sources: Sequence[Any], diffusion: 
 
 
 def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> csr_array:
-    """(1, e) Eq. 11 with the mean ⅓ for ψ_e(m): i(b − a) of ab to its edge, or in thirds to the edges of its face.
+    """(1, e) sums of i(b − a) over segments ab (Eq. 11): on their own edge, or a third on each edge of their face.
 
-    (The published code adds the whole vector to each of the three edges.)
+    ψ_e(m) is replaced by its mean, ⅓. (The published code adds the whole vector to each of the three edges.)
     """
     sums = csr_array((1, triangles.n_edges), dtype=np.complex128)
     for part in parts:
@@ -146,7 +146,7 @@ def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments],
 
 
 def vertex_point_vectors(triangles: IntrinsicMesh, vertices: Ints) -> csr_array:
-    """(1, e) X₀ of points at vertices (Eq. 19): a corner of angle α, from d on, adds i d (1 − e^{iα}) / Θ."""
+    """(1, e) X₀ of points at vertices: a corner from direction d on by angle α adds i d (1 − e^{iα}) / Θ (Eq. 19)."""
     faces, corners = np.nonzero(mask_of(triangles.n_vertices, vertices)[triangles.corner_vertices])
     leaving = triangles.edge_vectors[faces, corners]
     arriving = -triangles.edge_vectors[faces, (corners + 2) % 3]
@@ -158,9 +158,10 @@ def vertex_point_vectors(triangles: IntrinsicMesh, vertices: Ints) -> csr_array:
 
 
 def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_array:
-    """(1, e) X₀ of points on edges and in faces: −∇δ_p against ψ_e, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
+    """(1, e) X₀ of points on edges and in faces: −∇δ_p tested with ψ_e, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
 
-    That is the gradient of the heat kernel; at vertices of equilateral triangles Eq. 19 over √3 h, which callers mend.
+    It gives the gradient of the heat kernel. At vertices of equilateral triangles it would be Eq. 19 divided by √3 h;
+    the caller multiplies by that factor.
     """
     corner = np.argwhere(located.barycentric > 0)
     vertices = triangles.corner_vertices[located.faces[corner[:, 0]], corner[:, 1]]
@@ -173,7 +174,7 @@ def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr
 
 
 def from_faces(triangles: IntrinsicMesh, faces: Ints, vectors: Complexes) -> csr_array:
-    """(1, e) sums of face vectors over the three edges of each face."""
+    """(1, e) sums of face vectors (k,), each of which counts for all three edges of its face (k,)."""
     in_frames = triangles.in_edge_frames(vectors[:, None], faces)
     return scatter(triangles.n_edges, triangles.edges.face_edges[faces], in_frames)
 
@@ -199,7 +200,7 @@ def joined(parts: Sequence[CurveSegments]) -> tuple[LocatedPoints, Ints]:
 
 
 def ends_among(parts: Sequence[CurveSegments], who: Ints) -> Ints:
-    """(k, 2) points at the ends of every segment, from the number of each node's point."""
+    """(k, 2) point ids at the ends of every segment of all parts, where `who` has the point id of each node."""
     offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
     ends: Ints = np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])
     return who[ends]
@@ -212,11 +213,11 @@ def connected(parts: Sequence[CurveSegments]) -> Ints:
 
 
 def free_end_arcs(triangles: IntrinsicMesh, edges: Ints, vertices: Ints, least: float) -> tuple[Ints, Complexes]:
-    """Faces (j,), and vectors (j,) away from the free ends of curves, summed over the half disk behind each.
+    """Faces (j,), and vectors (j,) in them away from the free ends of curves, for the half disk behind each end.
 
-    Behind is a quarter of the total angle or more from the curve; at boundary and nonmanifold vertices a right angle.
-    An end weighs as its edge, at least `least`, so that short edges do not make it vanish. (The published code has no
-    least.)
+    Behind means at least a quarter of the total angle away from the curve; at boundary and nonmanifold vertices, a
+    right angle. The vectors of an end weigh as much as its edge, but at least `least`, so that they do not vanish at
+    short edges. (The published code has no such minimum.)
     """
     faces, vectors = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.complex128)]
     starts, members = grouped(triangles.corner_vertices.ravel(), triangles.n_vertices)

@@ -99,12 +99,12 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @cached_property
     def intrinsic(self) -> IntrinsicMesh:
-        """The triangles in the plane, joined at seams, with edges lengthened by rounding so that each has an area."""
+        """The faces, joined at seams and laid out in the plane, with edges lengthened a bit so that all have area."""
         return laid_out(self.joined, TRIANGLE_MARGIN)[0]
 
     @cached_property
     def places(self) -> Ints:
-        """(n,) the first vertex at the place of each boundary vertex, as along seams; all others are their own."""
+        """(n,) for each boundary vertex the first one at its position, as along seams; for all others themselves."""
         return joined_rims(self.vertices, self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel(), SEAM_UNITS)
 
     @cached_property

@@ -53,7 +53,10 @@ class VectorHeat:
         return np.bincount(self.triangles.edges.face_edges.ravel(), thirds).astype(np.float64)
 
     def solve(self, sources: Sequence[csr_array], changes: int = 0) -> list[list[Complexes]]:
-        """X for each X₀, in stages (n_edges, 1 + `changes`) of any scale: X, R X, R² X, …; NaN where another has it."""
+        """Return X for each X₀, in stages (n_edges, 1 + `changes`) with columns X, R X, R² X, …, ``R = (M + tL)⁻¹ M``.
+
+        Each stage has a scale of its own, and NaN at edges where another stage has the values.
+        """
         starts = np.zeros((self.triangles.n_edges, len(sources), 1 + changes), dtype=np.complex128)
         for k, source in enumerate(sources):
             starts[source.indices, k, 0] = scaled(source.data, float(self.mass.min()))[0]
@@ -109,8 +112,7 @@ def extrapolated(columns: Complexes) -> Complexes:
 
 
 def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matrix:
-    """Upper triangle of ``M + t L`` (Eq. 12), in the frames of the edges: complex (e, e), or real (2e, 2e) with
-    reflections.
+    """Upper triangle of ``M + t L`` (Eq. 12) in edge frames: complex (e, e), or real (2e, 2e) with reflections.
 
     L (Eq. 9) has ``2 (cot α + cot β)`` on the diagonal, α and β the corners of a face at the ends of the edge, and ``−2
     cot θ conj(z_fe) z_fg`` between edges e and g that meet in θ (Eq. 8). M is a third of the area of each face.
@@ -167,7 +169,7 @@ def nonmanifold_frames(
 ) -> tuple[IntrinsicMesh, Sequence[Sequence[CurveSegments]]]:
     """Make the face nearest to the sources the first face of every edge with more than two faces.
 
-    Vectors that pass between two of the others would be reflected. Edges whose ends are nearer keep their first face.
+    Vectors that pass between two other faces are reflected. Edges whose ends are nearer still keep their first face.
     """
     table = triangles.edges
     if table.face_counts.max(initial=0) <= 2:
@@ -202,7 +204,7 @@ def mirrored(part: CurveSegments, changed: Bools) -> CurveSegments:
 
 
 def _distances(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> Floats:
-    """(n_vertices,) distance of every vertex from the sources along edges, from the corners of their faces on."""
+    """(n_vertices,) distance of every vertex from the sources, along edges from the corners of the sources' faces."""
     nodes = concatenated([part.nodes for part in parts])
     corners = triangles.corner_positions[nodes.faces]
     at = np.einsum("nk,nk->n", nodes.barycentric, corners)

@@ -61,8 +61,8 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     source : SourceTerm, optional
         The lowered source, which `sharpen` needs.
     finer : VertexField, optional
-        The same on an intrinsic triangulation of the mesh, on whose vertices φ was computed: contours, values at points
-        and sharpening use these too.
+        φ on an intrinsic triangulation of the mesh, at whose vertices it was computed: contours, values at points and
+        sharpening use these too.
 
     Raises
     ------
@@ -162,8 +162,8 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     def face_gradients(self) -> Floats:
         """(m, 3) ∇φ on the faces of the domain's triangulation, in space; of length about 1, since φ is a distance.
 
-        Of φ between the vertices of the domain: where it was computed on finer triangles, `gradient` is more accurate.
-        Zero on degenerate faces.
+        φ is interpolated between the vertices of the domain; where it was computed on finer triangles, `gradient` is
+        more accurate. Gradients are zero on degenerate faces.
         """
         field = self._embedded
         mesh = field.domain.triangulation
@@ -221,7 +221,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return replace(result, finer=VertexField(domain, values))
 
     def _at_vertices_of(self, domain: IntrinsicTriangulation) -> Floats:
-        """φ at the vertices of an intrinsic triangulation of the mesh; NaN at those that no face has."""
+        """φ at the vertices of an intrinsic triangulation of the mesh; NaN at vertices without a face."""
         if self.finest.domain is domain:
             return self.finest.values
         faces, weights = domain.vertex_places
