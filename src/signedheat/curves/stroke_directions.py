@@ -34,7 +34,7 @@ the area."""
 TOGETHER_COST = 0.5
 """Cost of turning all strokes of a curve, relative to that of turning one by one."""
 WEAK_TURNING_COST = 0.02
-"""Cost of turning a stroke of mean length if sides are smooth. If two follow each other, with a gap of half of their
+"""Cost of turning a stroke of mean length in `smooth_signs`. If two follow each other, with a gap of half of their
 length, the energy is less by 0.05. Halved and doubled, none of 46 drawings changes."""
 MOST_UNEXPLAINED = 0.5
 """If more than this share of the length of all strokes bounds nothing, none is left out. Halved and doubled, none of 46
@@ -43,16 +43,16 @@ TRIED_SINGLY = 16
 """Number of strokes, the longest first, that are turned or left out one by one where they explain nothing; limited for
 speed. Halved and doubled, none of 46 drawings changes."""
 HALF, TURNED = 0.45, 0.34
-"""Turning loops, this share of each or more, is a guess if they make up more than that share of the length. Of 600
-drawings of which parts are turned (`benchmarks/strokes.py`, seeds 20000 to 20200) 6 are wrong in silence and 29 right
-with a warning; at .49 of each 7 and 25, at .4 4 and 37, at .37 4 and 48; at .25 of the length 3 and 43, at .3 5 and
-31. Above a half, two halves of a circle that contradict each other would be no guess if a dot decides between them."""
+"""The inside is a guess if more than the first share of some loops is turned, and that makes up the second share of the
+length. Of 600 drawings with turned parts (`benchmarks/strokes.py`, seeds 20000 to 20200) 6 are wrong in silence and 29
+right with a warning; the first at .49 7 and 25, at .4 4 and 37, at .37 4 and 48; the second at .25 3 and 43, at .3 5
+and 31. Above a half, two halves of a circle that contradict each other would be no guess if a dot decides."""
 WORTH = 0.5
-"""The inside is a guess if it depends on a stroke worth less than this, relative to its length. At .4 6 and 15 of these
-drawings, halved 8 and 15, at .6 5 and 22."""
+"""The inside is a guess if it depends on a stroke worth less than this, relative to its length. At .4, 6 of these 600
+drawings are wrong in silence and 15 right with a warning; halved 8 and 15, at .6 5 and 22."""
 CHANGED_AREA = 0.05
-"""The inside depends on a stroke if this share of the area changes sides without it: halved 5 and 23 of these drawings,
-doubled 9 and 15."""
+"""The inside depends on a stroke if this share of the area changes sides without it. Halved, 5 of these 600 drawings
+are wrong in silence and 23 right with a warning; doubled, 9 and 15."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +66,11 @@ class CurvePieces:
     numbers: Ints  # (j,) which of the curves given are oriented, ordered by place
     stroke: Ints  # (j,) the stroke that each of these is part of
     movable: Bools  # (k,) whether each stroke is a piece: open, and not from boundary to boundary of the surface
-    strokes: Strokes  # the energy of the sets that they may bound
+    strokes: Strokes  # the strokes, and the energy of the sets that they may bound
 
     @classmethod
     def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> CurvePieces | None:
-        """Return the pieces; None if there are none."""
+        """Return the oriented curves as strokes; None if none of these may be turned."""
         numbers = [k for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented]
         listed = [cast("Curve", curves[k]) for k in numbers]
         if not listed:
@@ -80,7 +80,7 @@ class CurvePieces:
         order = order_in_space(places)
         listed = [listed[k] for k in order]
         each = [part for (part,) in surface.segments([[curve] for curve in listed])]
-        by_points = np.array([curve.normals is None for curve in listed])  # not by normals: they may disagree
+        by_points = np.array([curve.normals is None for curve in listed])  # not those with normals, which may differ
         first, copy = without_copies(each, by_points)
         parts, stroke = joined_end_to_end([each[k] for k in first], by_points[first])
         movable = np.array([is_piece(surface.triangles, part) for part in parts])
@@ -102,9 +102,9 @@ class Decision:
 
     pieces: CurvePieces  # the curves
     best: Inside  # the best directions that were found, and what is inside then
-    # whether most of the length bounds nothing in the least energy, so that sides were taken to be smooth
+    # whether most of the length bounds nothing at the least energy, so that directions are those of `smooth_signs`
     bounds_nothing: bool = False
-    tied: bool = False  # whether something else is inside in another answer that costs the same
+    tied: bool = False  # whether another answer, which costs the same, has something else inside
 
     def turned(self, n: int) -> Bools:
         """(n,) which of all curves given are turned."""
@@ -112,12 +112,12 @@ class Decision:
 
     @property
     def loose(self) -> Bools:
-        """(k,) which strokes bound nothing, where others do."""
+        """(k,) which movable strokes bound nothing, if others bound something."""
         movable, explained = self.pieces.movable, self.best.explained >= EXPLAINED
         return movable & ~explained & explained.any()
 
     def loops_left_out(self) -> Ints:
-        """Numbers of the curves of loops all of whose strokes bound nothing, but would if there were no others."""
+        """Return the numbers of curves of loops that bound nothing, but would bound something without the others."""
         strokes = self.pieces.strokes
         found = np.zeros(len(self.loose), dtype=bool)
         for group in np.flatnonzero(strokes.whole_loops(self.loose)).tolist():
@@ -133,20 +133,20 @@ class Decision:
         return not self.bounds_nothing and bool((self.best.explained[~self.loose] >= EXPLAINED).all())
 
     def turned_loops(self) -> Ints:
-        """Numbers of the curves turned of loops half of which or more is turned, unless they are few."""
+        """Return the numbers of turned curves in loops of which about half or more is turned; none if these are few."""
         strokes, best = self.pieces.strokes, self.best
         lengths = np.where(best.explained >= EXPLAINED, strokes.lengths, 0.0)
         turned, total = (np.bincount(strokes.group, lengths * way) for way in (best.signs < 0, 1))
         against = (turned > HALF * total)[strokes.group] & (best.signs < 0) & (lengths > 0)
-        few = lengths[against].sum() < TURNED * lengths[against | (best.signs > 0)].sum()  # others turned prove nothing
+        few = lengths[against].sum() < TURNED * lengths[against | (best.signs > 0)].sum()  # others turned: no evidence
         return self.pieces.curves(against & (not few))
 
     def worth_little(self, values: Floats) -> Ints:
-        """Numbers of the curves without which the inside is another, and the least energy rises by little.
+        """Return the numbers of curves on which the inside depends, although they are worth little.
 
-        An arc alone is worth its length less that of its gap, a stray stroke little, because lines are added for it.
-        The inside is another where the cut says so, or, away from strokes, the (n,) values of the field: heat closes an
-        arc by a larger bulge than lines do.
+        A stroke is worth what the least cost rises by without it: an arc alone, its length less that of its gap; a
+        stray stroke little, because lines are added for it. The area that changes is that of the cut, and, away from
+        strokes, also where (n,) values of the field disagree: heat closes an arc by a larger bulge than lines do.
         """
         strokes, best, own = self.pieces.strokes, self.best, self.pieces.strokes.surface.restriction
         missing = cost(strokes, best) + strokes.lengths.sum()  # a stroke is worth its length less this, or more
@@ -166,7 +166,7 @@ class Decision:
 
 
 def order_in_space(places: Sequence[Floats]) -> Ints:
-    """(k,) the order of curves by their middles and first points, each (j, 3), whatever their number and scale."""
+    """Return (k,) the order of curves, each (j, 3) points, by mean and first point, however numbered and scaled."""
     keys = np.array([[*points.mean(axis=0), *points[0]] for points in places])
     low = np.minimum(keys[:, :3].min(axis=0), keys[:, 3:].min(axis=0))
     size = max(float((keys - np.tile(low, 2)).max()), np.finfo(float).tiny)
@@ -174,17 +174,17 @@ def order_in_space(places: Sequence[Floats]) -> Ints:
 
 
 def likely_curves(ends: Floats, stroke: Ints) -> tuple[Ints, Floats]:
-    """(k,) group of strokes that are likely to be one curve, and (g,) length of its gaps; from (2 j, 3) ends."""
+    """Return (k,) the likely curve of each stroke, and (g,) the length of its gaps, from (2 j, 3) ends of its parts."""
     j = len(stroke)
     nearest = nearest_others(ends)
     tails, heads = np.concatenate([nearest, np.stack([np.arange(j), j + stroke], axis=1)]).T
     group = np.unique(connected_components(j + int(stroke.max()) + 1, tails, heads)[j:], return_inverse=True)[1].ravel()
-    away = scipy.spatial.cKDTree(ends[::2]).query(ends[1::2])[0]  # where one ends another begins: no copy of it
+    away = scipy.spatial.cKDTree(ends[::2]).query(ends[1::2])[0]  # from ends to beginnings: copies end together
     return group.astype(np.int64), np.bincount(group[stroke], away).astype(np.float64)
 
 
 def given_domain(surface: SurfaceDiscretization) -> Surface:
-    """Return the surface that curves are given on."""
+    """Return the surface that the curves were given on."""
     domain: Surface = surface.domain.mesh if isinstance(surface.domain, IntrinsicTriangulation) else surface.domain
     return domain
 
@@ -194,7 +194,7 @@ def is_piece(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
     if part.ends[0, 0] == part.ends[-1, 1]:
         return False
     edges = triangles.edges
-    # across three faces no direction goes on to the others
+    # at an edge of three faces a direction in one of them says nothing about the others
     at_boundary = mask_of(triangles.n_vertices, edges.vertices[edges.face_counts != 2])
     ends = interpolation_at(triangles, part.nodes[part.ends[[0, -1], [0, 1]]])
     return not all(at_boundary[ends[end].indices].all() for end in (0, 1))
@@ -203,7 +203,7 @@ def is_piece(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
 def decide(pieces: CurvePieces) -> Decision:
     """Return the directions of strokes for which the inside costs least; only movable strokes may be turned.
 
-    Cuts and directions are improved in turn; where more of the curves is gone than there is, sides are smooth instead.
+    Cuts and directions are improved in turn. If most of the length then bounds nothing, `smooth_signs` decides instead.
     """
     strokes, movable = pieces.strokes, pieces.movable
     smooth = np.where(movable, smooth_signs(strokes, movable), 1.0)
@@ -225,7 +225,7 @@ def decide(pieces: CurvePieces) -> Decision:
 
 
 def least_of(strokes: Strokes, insides: list[Inside]) -> Inside:
-    """Return the first of those with the least cost, to rounding."""
+    """Return the first of the insides whose `misfit` is the least, up to rounding."""
     costs = np.array([misfit(strokes, inside) for inside in insides])
     return insides[int(np.argmax(costs <= costs.min() + EQUAL_COSTS * strokes.lengths.sum()))]
 
@@ -238,26 +238,26 @@ def altered(signs: Floats, rows: list[int], factor: float) -> Floats:
 
 
 def mostly_loose(strokes: Strokes, inside: Inside) -> bool:
-    """Whether most of the length bounds nothing: more of it is gone than there is."""
+    """Whether most of the length of strokes bounds nothing: probably more of the curves is missing than there is."""
     lengths = strokes.lengths
     return bool(lengths[inside.explained < EXPLAINED].sum() > MOST_UNEXPLAINED * lengths.sum())
 
 
 def cost(strokes: Strokes, inside: Inside) -> float:
-    """Return the energy, and what turning costs: less for all strokes of a curve, which say one and the same thing."""
+    """Return the energy and the cost of turning, which is less for all strokes of a loop: they may be one curve."""
     turned, total = (np.bincount(strokes.group, strokes.lengths * way) for way in (inside.signs < 0, inside.signs != 0))
     together = (turned == total) & strokes.is_loop & (np.bincount(strokes.group) > 1)
     return inside.energy + TURNING_COST * float((np.where(together, TOGETHER_COST, 1.0) * turned).sum())
 
 
 def misfit(strokes: Strokes, inside: Inside) -> float:
-    """Return the same, and what loops cost that bound nothing: as if all of their strokes were turned one by one."""
+    """Return the `cost`, and for loops that bound nothing as much as for turning all of their strokes one by one."""
     loose = strokes.whole_loops((inside.signs > 0) & (inside.explained < EXPLAINED))[strokes.group]
     return cost(strokes, inside) + TURNING_COST * float(strokes.lengths[loose].sum())
 
 
 def turnable(strokes: Strokes, inside: Inside, movable: Bools) -> list[list[int]]:
-    """Strokes to turn together or alone: those that bound nothing, others that may be the reason, and whole curves."""
+    """Return lists of strokes to turn together: whole curves, all that bound nothing, and the longest one by one."""
     explained = inside.explained >= EXPLAINED
     loose, others = np.flatnonzero(movable & ~explained), np.flatnonzero(movable & explained)
     longest = [longest_of(strokes, rows).tolist() for rows in (loose, others)]
@@ -279,7 +279,7 @@ def settled_from(strokes: Strokes, starts: list[Floats], movable: Bools) -> list
 
 
 def settled(strokes: Strokes, signs: Floats, movable: Bools) -> Inside:
-    """Sides and directions that fit each other, improved in turn until nothing changes."""
+    """Return sides and directions that fit each other: they are improved in turn until nothing changes."""
     best = inside = strokes.inside(signs)
     for _ in range(20):
         turn = movable & (inside.explained < 0)
@@ -291,7 +291,7 @@ def settled(strokes: Strokes, signs: Floats, movable: Bools) -> Inside:
 
 
 def smooth_signs(strokes: Strokes, movable: Bools) -> Floats:
-    """(k,) directions of least energy if sides are smooth."""
+    """(k,) directions with which smooth sides that jump across the strokes have the least energy (`Strokes.agreed`)."""
     agreed, given = strokes.agreed, np.where(movable, WEAK_TURNING_COST, 1e6) * strokes.lengths
     given = given / strokes.lengths.mean()
     weights = np.block([[agreed, given[:, None]], [given[None], np.zeros((1, 1))]])
@@ -310,8 +310,8 @@ class CurveOrientation(Frozen, ShortRepr):
     turned : (k,) bool
         Which of them were turned.
     agreement : (k,) float
-        How much of each bounds what all of them bound together: 1 all of it, 0 nothing, as spurious pieces often do; 1
-        for what has no ends of its own.
+        How much of each bounds what all of them bound together: 1 all of it, 0 nothing, as spurious pieces often do.
+        It is 1 for curves and points that are never turned.
 
     Examples
     --------
@@ -357,7 +357,7 @@ def curve_orientation(
 
     Of all sets of vertices of the surface and all directions of the pieces those are taken that have the least energy:
     the length of the boundary of the set where no piece is, less the length of the pieces that bound it the right way
-    round, and half of the length that is turned. For given directions the set is a minimum cut. Where most of the
+    round, plus half of the length that is turned. For given directions the set is a minimum cut. Where most of the
     length bounds no set, as a loop round a torus does not, pieces that follow each other are made to face the same way.
 
     Curves that are closed, those from boundary to boundary of the surface (nonmanifold edges count as boundary),
@@ -406,7 +406,7 @@ def curve_orientation(
 
 
 def pieces_for_all(domain: SurfaceDomain, curves: Sequence[CurveOrPoints]) -> CurvePieces | None:
-    """Return the pieces of curves as they are by default, so that options of distance decide nothing about them."""
+    """Return the pieces of curves on the triangles of default options, so that options decide nothing about them."""
 
     def seen(solver: SignedHeatSolver[SurfaceDomain]) -> CurvePieces | None:
         return CurvePieces.of(surface_of(triangulated_once(solver, curves)), curves)

@@ -1,4 +1,4 @@
-"""The energy of an inside that strokes bound, and the inside of least energy, which is a minimum cut of a graph."""
+"""The inside that strokes bound, a set of vertices: its energy, and that of least energy, a minimum cut of a graph."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..surfaces.surface_discretization import SurfaceDiscretization
 
 PULL_UNITS = 2.0**40
-"""Sum of all pulls to one side, as integers: a flow in integers ends exactly."""
+"""Sum of all pulls to one side after they are scaled to integers, with which the greatest flow is exact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +43,10 @@ class CutGraph:
         return cls(starts, np.ascontiguousarray(heads[order]), place[(order + len(edges)) % len(order)], order)
 
     def cut(self, falling: Floats, rising: Floats, pull: Floats, ties: Floats) -> Floats:
-        """(n,) signs s = ±1 of nodes with the least cost of edges that are cut, less Σ (pull + ties) s.
+        """Return the (n,) signs s = ±1 of nodes that minimise the cost of the edges cut, less Σ (pull + ties) s.
 
-        Of several such signs, those with the fewest positive. An edge whose first node is positive and whose second is
-        negative costs `falling`, (e,), the reverse `rising`. The ties, (n,), are small, and are all of one sign.
+        Of several minima it is that with the fewest positive signs. An edge whose first node is positive and whose
+        second is negative costs `falling`, (e,), the reverse `rising`. Ties, (n,), are small, and all of one sign.
         """
         both = pull + ties
         total = 2 * max(float(both[both > 0].sum()), -float(both[both < 0].sum()))
@@ -55,7 +55,7 @@ class CutGraph:
         costs = np.minimum(np.concatenate([falling, rising])[self.order], total)
         residual, pulls, small = (np.rint(PULL_UNITS / total * x).astype(np.int64) for x in (costs, 2 * pull, 2 * ties))
         source_side(self.starts, self.heads, self.reverse, residual, pulls)
-        # What is strongly connected by more than all ties lies on one side: few parts are left to be cut by these.
+        # All ties cannot separate nodes that arcs of greater capacity connect strongly: few parts are left to be cut.
         tied = (residual > np.abs(small).sum()).astype(np.int8)
         strong = sparse.csr_matrix((tied, self.heads, self.starts), shape=(len(pull), len(pull)))
         strong.eliminate_zeros()
@@ -72,15 +72,15 @@ class CutGraph:
 Ids = Ints
 
 FREE, TERMINAL, ORPHAN = -1, -2, -3
-"""Arc to the parent of a node that lies in no tree, next to a terminal, or cut off from its parent."""
+"""In place of the arc to its parent: for a node in no tree, next to a terminal, or cut off from its parent."""
 
 
 @compiled
 def source_side(starts: Ids, heads: Ids, reverse: Ids, residual: Ids, pull: Ids) -> Bools:
-    """(n,) nodes that the source still reaches at the greatest flow; `residual` and `pull` are overwritten.
+    """Return (n,) whether the source still reaches each node at the greatest flow (Boykov & Kolmogorov 2004).
 
     Arcs of node i are those from starts[i] to starts[i + 1]; `reverse` is the arc back. A pull is the capacity from the
-    source to a node, or, if negative, from it to the sink.
+    source to a node, or, if negative, from it to the sink. `residual` and `pull` are overwritten.
     """
     n, now = len(pull), 1
     tree = np.sign(pull).astype(np.int8)  # 1 in the source's tree, −1 in the sink's
@@ -140,7 +140,7 @@ def source_side(starts: Ids, heads: Ids, reverse: Ids, residual: Ids, pull: Ids)
 
 @compiled
 def _augment(heads: Ids, reverse: Ids, residual: Ids, pull: Ids, parent: Ids, meeting: int, orphans: Ids) -> int:
-    """Push what the path through an arc between the trees bears; how many nodes it cuts off."""
+    """Push the most that the path through an arc between the trees can bear; return how many orphans that makes."""
     least = residual[meeting]
     for end in range(2):
         i = heads[reverse[meeting]] if end == 0 else heads[meeting]
@@ -185,7 +185,7 @@ def _adopted(
     now: int,
     p: int,
 ) -> bool:
-    """Whether a node cut off has a neighbour with a way to the terminal; the nearest becomes its parent."""
+    """Return whether a neighbour of orphan p has a way to the terminal of its tree; the nearest becomes its parent."""
     best, nearest = ORPHAN, np.int64(1) << 60
     for a in range(starts[p], starts[p + 1]):
         if tree[heads[a]] != tree[p] or residual[reverse[a] if tree[p] > 0 else a] == 0:
@@ -217,31 +217,31 @@ REWARD = 1.0
 """Reward for explaining a stroke, relative to its length: at most 1, since a line around a stroke is as long again.
 From 0.8 to 1.0 the table of damaged curves does not change."""
 STROKE_WIDTH, WIDEST_STROKE = 2.0, 0.01
-"""Distance from a stroke up to which sides count for whether it is explained, in edges of the mesh, but at most this
-share of the length of all strokes. So strokes drawn again next to it are one. Of 46 drawings none changes if both are
-halved or the first is doubled; one does if the second is."""
+"""Distance from a stroke up to which vertices count for whether it is explained: the first in edges of the mesh, but at
+most the second, a share of the length of all strokes. So a stroke drawn twice counts as one. Of 46 drawings none
+changes if both are halved or the first is doubled; one does if the second is."""
 STAIRCASE_LENGTH = 0.92
 """Length of a line relative to the length of the dual edges that it cuts."""
 CORNER_ON_SEGMENT = 1e-6
-"""A corner is on a segment up to this height above it, relative to its face."""
+"""A corner is on a segment up to this height above it, relative to the longest side of its face."""
 EQUAL_COSTS = 1e-6
 """Two answers cost the same if they differ by less, relative to the length of all strokes: rounding would choose."""
 EXPLAINED = 0.5
 """A stroke bounds the inside if it is explained to this share. Halved, none of 46 drawings changes; doubled, two
 change, and eleven more are announced."""
 STROKES_AT_ONCE = 64
-"""Batch size for the jumps of strokes."""
+"""Number of strokes for which `Strokes.agreed` solves at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Inside:
     """The best sides for strokes that run in given directions."""
 
-    signs: Floats  # (k,) the directions ±1, relative to those that the strokes were given with
+    signs: Floats  # (k,) directions relative to the given ones: 1, −1 if turned, 0 if the stroke is left out
     sides: Floats  # (n,) 1 or −1 at every vertex
     # (k,) how far each stroke bounds the inside: 1 all along, 0 nowhere, −1 all along but the wrong way round
     explained: Floats
-    # the length of the boundary of the inside where no stroke is, less `REWARD` times the strokes' lengths that are
+    # the length of the boundary of the inside where no stroke is, less `REWARD` times the length of strokes that is
     # explained
     energy: float
 
@@ -250,23 +250,23 @@ class Inside:
 class Strokes:
     """Oriented curves on a surface, and the energy of sets of vertices that they may bound."""
 
-    surface: SurfaceDiscretization  # that they lie on
-    lengths: Floats  # (k,) of the strokes
+    surface: SurfaceDiscretization  # the surface that they lie on
+    lengths: Floats  # (k,) length of each stroke
     # (k, n) half the mean over the vertices left of a stroke, less that over those right of it
     means: sparse.csr_matrix
     # (k, e) 1 where the first vertex of an edge is left of a stroke that crosses it, −1 where the second is
     crossed: sparse.csr_matrix
     fluxes: sparse.csr_matrix  # (k, n) integrals along each stroke of the slopes of hat functions towards its left
     width: float  # distance up to which strokes next to each other count as one
-    group: Ints  # (k,) strokes whose ends are nearest to each other, which are likely to be one curve
-    is_loop: Bools  # (g,) whether that is likely to be closed: its gaps are shorter than half of its strokes
+    group: Ints  # (k,) the likely curve of each stroke: strokes with ends nearest to each other are likely to be one
+    is_loop: Bools  # (g,) whether that curve is likely to be closed: its gaps are shorter than half of its strokes
     _found: dict[bytes, Inside] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(
         cls, surface: SurfaceDiscretization, parts: Sequence[CurveSegments], edge: float, group: Ints, is_loop: Bools
     ) -> Strokes:
-        """See where the vertices lie from each stroke; `edge` is how far those may be apart that are drawn for one."""
+        """Find which vertices are on which side of each stroke; `edge` is the mean length of an edge of the mesh."""
         triangles = surface.triangles
         lengths = np.array([part.lengths.sum() for part in parts])
         seen = sides_seen(triangles, parts)
@@ -329,11 +329,11 @@ class Strokes:
 
     @property
     def seen(self) -> list[Inside]:
-        """All that was asked of `inside`."""
+        """Every result of `inside` so far."""
         return list(self._found.values())
 
     def inside(self, signs: Floats) -> Inside:
-        """Return the sides of least energy for strokes with these directions, 0 if one is left out: a minimum cut."""
+        """Return the inside of least energy, a minimum cut, for strokes with these (k,) directions, 0 if left out."""
         key = signs.tobytes()
         if key not in self._found:
             sides, boundary = self._cut(signs, -1.0)
@@ -343,7 +343,7 @@ class Strokes:
         return self._found[key]
 
     def either_way(self, inside: Inside) -> float:
-        """Area between the smallest and the largest inside of least energy, if other strokes bound the largest."""
+        """Return the area between the smallest and largest inside of least energy; 0 if the same strokes bound both."""
         labels = self.surface.triangles.face_components
         parts = np.zeros(self.surface.triangles.n_vertices, dtype=np.int64)
         parts[self.surface.triangles.corner_vertices] = labels[:, None]
@@ -354,7 +354,7 @@ class Strokes:
         return float(self.areas[reached & (largest != inside.sides)].sum())
 
     def _cut(self, signs: Floats, larger: float) -> tuple[Floats, float]:
-        """Return the sides of least energy, of several the largest inside (1) or the smallest (−1), and the cost."""
+        """Return sides of least energy, and what the edges cut cost; of several, the largest (1) or smallest (−1)."""
         along = self.crossed.multiply(signs[:, None]).tocsr()
         covered = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
         falling, rising = (np.where(mask, 0.0, self.costs) for mask in covered)
@@ -367,7 +367,7 @@ class Strokes:
 
 
 def fluxes_across(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> sparse.csr_matrix:
-    """(k, n) sparse integrals along curves of the slopes of hat functions to their left, along edges of both faces."""
+    """(k, n) integrals along curves of the slopes of hat functions to their left; along edges, means over the faces."""
     placed = PlacedSegments.of(triangles, parts)
     owners = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])[placed.given]
     grows = 1j * np.diff(placed.positions, axis=1) * placed.sides[:, None]
@@ -404,7 +404,7 @@ def sides_seen(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> spar
 
 
 def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, width: float) -> sparse.csr_matrix:
-    """(k, n) sparse ±1 at vertices on either side of each stroke: corners of crossed faces, and more up to a width."""
+    """(k, n) sparse: ±1 left or right of a stroke, at corners of faces that it crosses and vertices near these."""
     n = triangles.n_vertices
     tails, heads = triangles.edges.vertices.T
     both_ways = np.concatenate([tails, heads]), np.concatenate([heads, tails])
@@ -430,7 +430,7 @@ def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, width: float) -> 
 
 
 def _means(chosen: sparse.csr_matrix, areas: Floats) -> sparse.csr_matrix:
-    """(k, n) rows that take the mean over the vertices chosen, by area."""
+    """(k, n) sparse weights by area: the mean over the vertices chosen in each row."""
     weighted = sparse.csr_matrix(chosen.astype(bool).astype(float) @ sparse.diags(areas))
     total = np.asarray(weighted.sum(axis=1)).ravel()
     return sparse.csr_matrix(sparse.diags(1 / np.where(total > 0, total, 1.0)) @ weighted)
