@@ -31,8 +31,8 @@ from .resolution import flattened, on_resolving_triangles
 from .stroke_directions import pieces_for_all
 
 LEAST_LOOP = 0.5
-"""Loops that are shorter than this, or farther from the curves, relative to the shortest curve, complete nothing: there
-φ has the wrong sign."""
+"""Loops that are shorter than this, or farther from the curves, relative to the shortest curve, complete nothing: φ has
+the wrong sign inside them."""
 
 
 @within_memory
@@ -109,7 +109,7 @@ def completion(
     as_oriented: bool = False,
     every_piece: bool = False,
 ) -> tuple[VertexField[SurfaceDomain], list[Curve]]:
-    """Distance to broken curves, on a repaired mesh that has them along edges where such can be made; its zero set."""
+    """Return the distance to broken curves, found on a repaired mesh, along its edges if possible; its zero set."""
     as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
     own_levels = isinstance(constraint, EachComponent | LevelValues)
     surface = cast("SurfaceDomain", converted(domain))
@@ -169,7 +169,7 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
 
 
 def beyond_the_rim(triangles: IntrinsicMesh, values: Floats) -> None:
-    """Give zeros in rows along the rim the sign of the rim beyond both ends; else the one that neighbours lack."""
+    """Give zeros in a row along the rim the sign beyond both ends of it, or else the one that neighbours lack."""
     least = 1e-7 * float(triangles.lengths_of_edges.mean())
     zero, ends = np.abs(values) <= least, triangles.edges.vertices
     rim = ends[triangles.edges.face_counts == 1]

@@ -47,16 +47,16 @@ class MeshRepaired(Note):
 class RepairedMesh:
     """A mesh with its seams joined and without copies of faces, which agree with their neighbours where they can."""
 
-    given: TriangleMesh  # the mesh before
-    mesh: Any  # and after, a `TriangleMesh` on some of the same vertices
+    given: TriangleMesh  # the mesh before the repair
+    mesh: Any  # the mesh after it, a `TriangleMesh` on some of the same vertices
     places: Ints  # (n,) vertex of the repaired mesh at each one of the given mesh
     faces: Ints  # (m,) triangle of the repaired mesh for each one of the given mesh, on the same vertices
     corners: Ints  # (m, 3) corner of that triangle at each corner of the given one
-    notes: tuple[Note, ...]  # on what was done
+    notes: tuple[Note, ...]  # what was done
 
     @classmethod
     def of(cls, given: object) -> RepairedMesh | None:
-        """Repair a mesh; None if there is nothing to do, or it is none."""
+        """Return a repaired triangle mesh; None if there is nothing to repair, or the shape given is none."""
         if not isinstance(given, TriangleMesh):
             return None
         n, kept = given.n_vertices, np.unique(copied_faces(given.faces, given.n_vertices))
@@ -96,14 +96,14 @@ class RepairedMesh:
         return VertexField(self.given, values, diagnostics)
 
     def curve_on_given(self, curve: Curve) -> Curve:
-        """Return a curve on the repaired mesh as one on the given mesh, in the first of copies."""
+        """Return a curve on the repaired mesh as one on the given mesh; of copies of a face, it is on the first."""
         faces = np.unique(self.faces, return_index=True)[1][curve.faces]
         weights = np.take_along_axis(curve.barycentric, self.corners[faces], axis=1)
         return Curve(faces, weights, curve.closed, curve.oriented, curve.normals)
 
 
 def warn_of_gaps(mesh: object) -> None:
-    """Warn of vertices of rims that are nearly, but not, at the place of others."""
+    """Warn if vertices of rims are so near others that they may be meant to be one, but too far to be joined."""
     if not isinstance(mesh, TriangleMesh | PolygonMesh):
         return
     joined, nearly = (joined_rims(mesh.vertices, *_halfedges(mesh), units) for units in (SEAM_UNITS, GAP_UNITS))
@@ -124,7 +124,7 @@ def _halfedges(mesh: TriangleMesh | PolygonMesh) -> tuple[Ints, Ints]:
 
 
 def copied_faces(faces: Ints, n_vertices: int) -> Ints:
-    """(m,) first face on the vertices of each, where an edge has more faces than two; elsewhere the face itself."""
+    """(m,) first face on the vertices of each face with an edge of more than two faces; elsewhere the face itself."""
     first = np.arange(len(faces))
     pairs = pair_halfedges(faces.ravel(), np.roll(faces, -1, axis=1).ravel(), n_vertices)
     crowded = np.flatnonzero((pairs.around > 2).reshape(-1, 3).any(axis=1))
@@ -153,8 +153,8 @@ class CurvesTaken(Note):
     left_out : (k,) int
         Curves that bound nothing together with the others.
     share_left_out : float
-        Their share of the length of all curves. It is no warning: of 515 drawings on which every wrong answer is
-        announced otherwise, it is more than a twentieth on a quarter of those that are right.
+        Their share of the length of all curves. A large share is no reason to warn: of 515 drawings on which every
+        wrong answer is announced otherwise, it is more than a twentieth on a quarter of those that are right.
     """
 
     turned: list[int]
@@ -183,12 +183,12 @@ def distance_to_pieces(
     numbers: Ints | None = None,
     pieces: CurvePieces | None = None,
 ) -> tuple[VertexField[Surface], list[CurveOrPoints]]:
-    """Distance to curves that may be pieces of broken ones, and the curves that it was measured to.
+    """Return the distance to curves that may be pieces of broken ones, and the curves that it was measured to.
 
     Pieces are turned until they bound something together (`curve_orientation`), and those that do not are left out,
     unless most do not. Where faces cannot agree which side is left, pieces are taken as they are. There is an
     `InexactWarning` where the answer is a guess. Warnings and notes name curves by `numbers`, (n,), by default their
-    places in the list. `pieces` are decided on triangles of their own, by default those of the solver.
+    places in the list. `pieces` may have triangles of their own; by default they are found on those of the solver.
     """
     listed = flattened(curves)
     numbers = np.arange(len(listed)) if numbers is None else numbers

@@ -93,7 +93,7 @@ def distance_to_lines(
 
 
 def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics, progress: Progress | None) -> GridField:
-    """Measure to a drawing at the nodes of a grid; the field holds the drawing."""
+    """Return the distance to a drawing at the nodes of a grid, as a field that holds the drawing."""
     if progress is not None:
         progress(0.8, "measure")
     begin = time.perf_counter()
@@ -148,7 +148,7 @@ def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
 def strokes_that_agree(
     lines: Sequence[Polyline], numbers: Sequence[int], every_piece: bool, progress: Progress | None
 ) -> tuple[list[Polyline], CurvesTaken | None]:
-    """Turn strokes and leave some out, as `distance_to_pieces` does on a rectangle around the drawing; note what.
+    """Turn strokes and leave some out, as `distance_to_pieces` does on a rectangle around them; also return a note.
 
     Warnings and the note name the lines by `numbers`, which differ.
     """
@@ -172,7 +172,7 @@ def strokes_that_agree(
 
 
 def _triangles_around(bounds: Floats) -> TriangleMesh:
-    """Return a rectangle around a box, with the usual room: squares cut along one diagonal or the other in turn."""
+    """Return a rectangle of triangles around a box, with some room: squares cut along either diagonal in turn."""
     nodes = Grid.around(bounds, STROKE_NODES)
     index = np.arange(nodes.n_nodes).reshape(nodes.shape)
     a, b, c, d = (ids.ravel() for ids in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
@@ -189,17 +189,17 @@ def segments_of_lines(lines: Sequence[Polyline]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Drawing(Frozen):
-    """What distance in the plane is measured to, exactly, at any points."""
+    """Segments in the plane to which distance can be measured exactly at any point."""
 
     lines: Floats  # (m, 2, 2) ends of the segments that were given. Distance is positive to their left
     # (k, 2, 2) segments where lines are missing
     completion: Floats = field(default_factory=lambda: np.empty((0, 2, 2)))
-    # decides the sides of the completion, and away from lines. Without it lines bound what they go around
+    # decides the side at the completion and away from lines. Without it, lines are outlines of what is inside
     phi: GridField[Literal[2]] | None = None
 
     @classmethod
     def completed(cls, lines: Floats, phi: GridField[Literal[2]]) -> Drawing:
-        """Lines, and the zero set of φ where that is far from them."""
+        """Make a drawing of lines and of the zero set of φ where that is far from them."""
         crosses = bool((phi.values < 0).any() and (phi.values >= 0).any())
         zero_set = segments_of_lines(phi.contour()) if crosses else np.empty((0, 2, 2))
         if len(lines) and len(zero_set):
@@ -222,7 +222,7 @@ class Drawing(Frozen):
 
     @cached_property
     def _corners(self) -> tuple[Ints, Floats, Ints]:
-        """(m, 2) corners of the lines; sums of the unit normals of the lines that meet there; and their number."""
+        """Return (m, 2) corners at ends of lines, (c, 2) sums of unit normals of lines at corners, their number."""
         along = self.lines[:, 1] - self.lines[:, 0]
         normals = unit(np.stack([-along[:, 1], along[:, 0]], axis=1))
         corners, places = np.unique(self.lines.reshape(-1, 2), axis=0, return_inverse=True)
@@ -262,7 +262,7 @@ class Drawing(Frozen):
         return Closest(*(shaped(result, shape) for result in results))
 
     def _closest(self, points: Floats) -> tuple[Floats, Floats, Ints]:
-        """Signed distances of (n, 2) points, the nearest places, and the segments on which they are."""
+        """Return the signed distances of (n, 2) points, the nearest places, and the segments on which these lie."""
         found = self._tree.search(_in_space(points))
         nearest, places = self._tree.features.ids[found.faces], found.places[:, :2]
         on_line = nearest < len(self.lines)
@@ -273,7 +273,7 @@ class Drawing(Frozen):
         return sides * found.distances, places, nearest
 
     def _sides(self, points: Floats, places: Floats, nearest: Ints) -> Floats:
-        """1 to the left of lines, −1 to their right; at a corner by the sum of the normals of all that meet there."""
+        """(n,) 1 to the left of the nearest line, −1 to its right; at corners, by the sum of all normals there."""
         corners, sums, counts = self._corners
         ends = self.lines[nearest]
         along = ends[:, 1] - ends[:, 0]
@@ -296,7 +296,7 @@ def _in_space(points: Floats) -> Floats:
 
 
 def tree_of(segments: Floats) -> FaceTree:
-    """Make a tree of triangles that stand upright on the segments (m, 2, 2), so that their nearest places are there."""
+    """Make a tree of triangles that stand upright on segments (m, 2, 2): those are nearest to points of the plane."""
     a, b = segments.transpose(1, 0, 2)
     corners = np.pad(np.stack([a, b, (a + b) / 2], axis=1), ((0, 0), (0, 0), (0, 1)))
     corners[:, 2, 2] = np.linalg.norm(b - a, axis=1)

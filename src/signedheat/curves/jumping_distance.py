@@ -167,7 +167,7 @@ def piecewise_distance(
 
 
 def part_of(progress: Progress | None, start: float, stop: float, step: str) -> Callable[[float], None] | None:
-    """Return what is called with the fraction done of a part of one step."""
+    """Return a function that reports progress, given the fraction done of a part of a step; None without `progress`."""
     return None if progress is None else lambda share: progress(start + (stop - start) * share, step)
 
 
@@ -186,7 +186,7 @@ def jumps_of(phi: PiecewiseField, solution: JumpSolution, error: float) -> Jumps
 
 
 def memory_estimate(n_triangles: int) -> float:
-    """Bytes that a field on so many triangles takes at the most, besides libraries."""
+    """Return the most bytes that a field on so many triangles takes, without those of libraries."""
     per_triangle, per_doubling = BYTES_WITH_JUMPS[chosen_backend()]
     return n_triangles * (per_triangle + per_doubling * math.log2(max(n_triangles, 2)))
 
@@ -203,7 +203,7 @@ def _retriangulated(
     fits = conforms(discretization, sources)
     if isinstance(domain, TriangleMesh) and (intrinsic is True or (intrinsic == "auto" and is_spoiled(domain))):
         angle = 28.0 if intrinsic is True else AUTO_ANGLE
-        ways = (sources,) if intrinsic is True else ((), sources)  # unoriented curves along edges must keep these
+        ways = (sources,) if intrinsic is True else ((), sources)  # unoriented curves along edges may need these kept
         try:
             for keep in ways:
                 refined = intrinsic_delaunay(domain, keep, refine=True, angle=angle, coarsest=COARSEST_TRIANGLE)
@@ -248,7 +248,7 @@ def conforms(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoi
 def conforming(
     discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]
 ) -> SurfaceDiscretization:
-    """Return the discretisation itself, if unoriented curves run along its edges; rounding may move them off edges."""
+    """Return the discretisation itself; raise `SourceError` if unoriented curves do not run along its edges."""
     if conforms(discretization, sources):
         return discretization
     raise SourceError(
@@ -258,7 +258,7 @@ def conforming(
 
 
 def corner_slopes(triangles: IntrinsicMesh, directions: Complexes) -> Floats:
-    """(m, 3) ``Y_f · (q_k − centroid)``: φ at the corners, if it were zero at the centroid (constraint of Eq. 16)."""
+    """(m, 3) ``Y_f · (q_k − centroid)``: φ at the corners if it is zero at the centroid (constraint of Eq. 16)."""
     centroid = triangles.corner_positions.mean(axis=1, keepdims=True)
     return (np.conj(directions)[:, None] * (triangles.corner_positions - centroid)).real
 
@@ -292,7 +292,7 @@ def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> B
 
 
 def centered(triangles: IntrinsicMesh, values: Floats, parts: Sequence[CurveSegments]) -> Floats:
-    """Values whose median over the source is zero, by length, on every component; NaN where there is no source."""
+    """Return values less their median, by length, over the source in each component; NaN where there is no source."""
     label = triangles.face_components
     faces, heights, weights = [], [], []
     for part in parts:

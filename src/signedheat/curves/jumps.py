@@ -1,4 +1,4 @@
-"""The constants of piecewise-continuous integration: those of least cost, with a certificate; and where they jump.
+"""Piecewise-continuous integration: the constants of least cost, with a certificate, and the jumps that they leave.
 
 Summed over the two ends of an edge, the cost of a pair of faces in Eq. 16 is ``w (b − a)``, whatever the constants are,
 plus ``2w`` times the distance of x = c_f − c_g from the interval [a, b], whose ends are the values of x that make φ
@@ -27,10 +27,10 @@ from ..surfaces.cotan import cotan_matrix, divergence
 from .piecewise_field import PiecewiseField
 
 DUALITY_GAP, MOST_SPLITTING_ROUNDS = 2e-3, 3000
-"""Gap at which minimisation ends, and the largest number of its rounds."""
+"""Relative gap between objective and bound at which minimisation ends, and the largest number of its rounds."""
 LOOSE_GAP = 0.15
-"""Below this gap it is checked whether constants leave a cut: if not, the remaining jumps are smaller than
-triangles."""
+"""Below this gap it is checked whether constants leave a cut: if not, minimisation ends, since the remaining jumps are
+smaller than triangles."""
 ROUNDS_PER_LOOK = 25
 """Rounds between two evaluations of the gap."""
 THRESHOLD_GROWTH, GROWTH_ROUNDS = 2.0, 250
@@ -43,8 +43,8 @@ class JumpProblem:
     """Minimise ``floor + Σ 2w dist(c_f − c_g, [a, b])`` over one constant c per face."""
 
     faces: Ints  # (p, 2) the faces f and g of each pair
-    # (p,) a and b: the differences that make φ continuous at one end of the edge, and at the other, the smaller
-    # first
+    # (p,) a and b, a ≤ b: the differences c_f − c_g that make φ continuous at one end of the edge, and at the
+    # other
     low: Floats
     high: Floats
     weights: Floats  # (p,) w, positive
@@ -61,7 +61,7 @@ class JumpProblem:
         return self.floor + 2.0 * float(self.weights @ np.abs(difference - np.clip(difference, self.low, self.high)))
 
     def bound(self, flow: Floats) -> float:
-        """Lower bound of the objective from a flow (p,) that is conserved in every face (weak duality)."""
+        """Return a lower bound of the objective from a flow (p,) that is conserved in every face (weak duality)."""
         excess = np.abs(flow / (2.0 * self.weights)).max(initial=1.0)
         return self.floor - float(np.maximum(self.low * flow, self.high * flow).sum() / excess)
 
@@ -71,7 +71,7 @@ class JumpProblem:
         return 0.5 * float(np.mean(np.abs(self.low) + np.abs(self.high)))
 
     def incidence(self) -> sparse.csr_matrix:
-        """K: sparse (p, n_faces)."""
+        """Return K, sparse (p, n_faces), which takes constants to their `differences`."""
         n = len(self.faces)
         pair = np.repeat(np.arange(n), 2)
         return sparse.csr_matrix((np.tile([1.0, -1.0], n), (pair, self.faces.ravel())), shape=(n, self.n_faces))
@@ -145,9 +145,12 @@ def minimize(
 
 
 def regions_moved(problem: JumpProblem, constants: Floats) -> Floats:
-    """Constants with regions between cuts of equal cost moved to a neighbour, smallest first, by weighted medians."""
+    """Return constants after regions between cuts, smallest first, have joined a neighbour at no higher cost.
+
+    Each is shifted by the weighted median of the shifts that make φ continuous at an end of an edge around it.
+    """
     constants = constants.copy()
-    for _ in range(problem.n_faces):  # each leaves one region less
+    for _ in range(problem.n_faces):  # each round leaves one region less
         difference = problem.differences(constants)
         excess = difference - np.clip(difference, problem.low, problem.high)
         joined = np.abs(excess) <= problem.scale
@@ -157,7 +160,7 @@ def regions_moved(problem: JumpProblem, constants: Floats) -> Floats:
         if not between.any():
             break
         sizes = np.bincount(region)
-        sizes[np.setdiff1d(region, faces[between])] = problem.n_faces + 1  # parts of the surface on their own
+        sizes[np.setdiff1d(region, faces[between])] = problem.n_faces + 1  # components, without neighbours
         smallest = sizes.argmin()
         rows = np.flatnonzero(between & (faces == smallest).any(axis=1))
         way = np.where(faces[rows, 0] == smallest, 1.0, -1.0)
@@ -191,12 +194,12 @@ LEAST_JUMP = 3.0
 """The largest jump on a cut is at least this many times the longest side of a typical triangle."""
 
 LEAST_BRANCH_JUMP = 5.0
-"""The largest jump on a branch of a cut is at least this many times that side, or half of the highest. Where directions
-turn within several triangles, there are lower jumps."""
+"""The largest jump on a branch of a cut is at least this many times that side, or half of the largest on the cut. Where
+directions turn within several triangles, there are lower jumps."""
 
 SMOOTHED_WIDTH = 10.0
-"""Width of `smoothed`, relative to the root of the area of a part: that of step 3 to a thousandth. With more, M would
-be rounded away."""
+"""w in `smoothed`, relative to the square root of the area of a part: the result is that of step 3 to a thousandth. If
+w were larger, rounding would remove M."""
 
 
 def typical_size(triangles: IntrinsicMesh) -> float:
@@ -205,7 +208,7 @@ def typical_size(triangles: IntrinsicMesh) -> float:
 
 
 def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: Floats) -> Bools:
-    """(p,) pairs of faces between which (m, 3) values at corners jump, on lines, by more than errors in triangles."""
+    """(p,) whether (m, 3) values at corners jump between faces of each pair, along a line, by more than errors do."""
     longest, typical = triangles.edge_lengths.max(axis=1), typical_size(triangles)
     height = np.abs(pairs.ends(values)).max(axis=1)
     high = np.flatnonzero(height > np.maximum(longest[pairs.faces].max(axis=1), typical))
@@ -222,7 +225,7 @@ def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: Floats) -> Bo
 
 
 def without_twigs(edges: Ints, high: Bools) -> Bools:
-    """(k,) which (k, 2) edges are left without the lines between ends and forks that are `high`, (k,), nowhere.
+    """(k,) which of (k, 2) edges remain if lines between ends and forks without any `high` edge, (k,), are removed.
 
     Examples
     --------
@@ -251,7 +254,7 @@ def is_continuous(
     corners, n = triangles.corner_vertices, triangles.n_vertices
     mean = np.bincount(corners.ravel(), values.ravel(), n) / np.maximum(np.bincount(corners.ravel(), minlength=n), 1)
     rough = np.abs(gradients(triangles, mean[corners]) - directions) > 0.5
-    for _ in range(2):  # two rows of faces around a rough one: where Y turns back, few are rough side by side
+    for _ in range(2):  # a cut has two rows of rough faces around one: where Y turns, few are rough together
         inner = np.ones(n, dtype=bool)
         inner[corners[~rough]] = False
         rough = np.asarray(inner[corners].all(axis=1))

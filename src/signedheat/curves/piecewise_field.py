@@ -269,7 +269,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
 
 
 class IntrinsicPiecewiseField(PiecewiseField):
-    """A `PiecewiseField` on the triangles of an `IntrinsicTriangulation`; points refer to the mesh of that.
+    """A `PiecewiseField` on the triangles of an `IntrinsicTriangulation`; points are given on its mesh.
 
     `domain` and `surface` are the triangulation.
     """

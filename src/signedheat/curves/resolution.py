@@ -21,7 +21,7 @@ from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.triangle_mesh import TriangleMesh
 
 SHORT_CURVE = 16.0
-"""Curves shorter than this, in h, all pieces included, get triangles of their own."""
+"""Curves that are shorter than this, in h, with all of their pieces, get triangles of their own."""
 
 Surface = TypeVar("Surface", bound=SurfaceDomain)
 Found = TypeVar("Found")
@@ -60,7 +60,7 @@ def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
 
 
 def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveOrPoints]) -> SignedHeatSolver[Surface]:
-    """Return the solver with the triangles that it makes for the curves, which then serve some of the curves, too."""
+    """Return the solver with the triangles that it makes for all curves, which it then also uses for some of them."""
     made = solver.discretization
     if not isinstance(made, Retriangulated):
         return solver
