@@ -31,7 +31,7 @@ CHANCE_LEVEL = 0.42
 Two sheets a quarter of their width apart have .38, three sides of a box .2, a side that four others lack .47, and a
 ball that has lost 85 % of its faces .95."""
 PARTLY_INSIDE = 0.25
-"""Loose pieces lie along closed ones if the mean winding number of these there is farther from all whole numbers."""
+"""Loose pieces lie along closed ones if the mean winding number of these there is not this near to a whole number."""
 GAP_REACH = 1.5
 """Largest distance between faces of two pieces that belong together, relative to the size of the smaller piece."""
 
@@ -44,7 +44,7 @@ class Bounding(Frozen):
     turned: Bools  # (m,) which must turn from the way in which they were given first
     counts: Ints  # (m,) how often each bounds, negative if reversed; 0 for sheets, inner walls and faces that cancel
     closed: Bools  # (m,) which belong to closed pieces
-    # (m,) cluster of loose pieces, which are sheets by themselves and bound only together; −1 for all other triangles
+    # (m,) cluster, where it consists mostly of loose pieces, which bound only together; −1 for all other triangles
     loose: Ints
     # (m,) mean level of the cluster, which is half of the share of the body that is left; ½ for all other triangles
     levels: Floats
@@ -151,7 +151,8 @@ def _nested(
 ) -> tuple[Floats, int, int]:
     """Return (p,) signs that turn closed pieces outwards, and the numbers of bodies and of cavities within others.
 
-    Those within others face as `nested` says: with "given" as they were given, or by depth if that is unclear.
+    Those within others face as `nested` says: with "given" as they were given relative to the
+    outermost body, or by depth if that is unclear.
     """
     n = len(closed)
     counted = np.flatnonzero(counts != 0)

@@ -28,8 +28,8 @@ from .overlaps import OUTSIDE
 from .winding import INSIDE_WINDING
 
 CAVITY_SHARE = 0.9
-"""A cell is a cavity if at least this share of its walls' area faces into it, and as much of the outside outwards. By
-chance all six walls of a cell face inwards once in 64 times."""
+"""A cell is a cavity if at least this share of its area faces into it, and this share of the outside faces outwards.
+By chance all six walls of a cell face inwards once in 64 times."""
 
 
 def inner_walls(chain: Chain) -> Bools:

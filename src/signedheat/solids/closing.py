@@ -154,10 +154,10 @@ is 90°."""
 
 
 def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints, most: float) -> list[Ints]:
-    """Fill each loop of n vertices by the (n − 2, 3) triangles that bend least, or none if the rim bends over `most`.
+    """Fill each loop of n vertices by (n − 2, 3) triangles of least bend, or none if the bend at its rim is too large.
 
-    Loops run counterclockwise as seen from outside. `normals` are those of the faces behind their edges, loop by loop.
-    No diagonal is one of the edges whose sorted `edge_keys` are `taken`.
+    `most` is the largest bend. Loops run counterclockwise as seen from outside. `normals` are those of the faces behind
+    their edges, loop by loop. No diagonal is one of the edges whose sorted `edge_keys` are `taken`.
     """
     starts = np.concatenate([[0], np.cumsum([len(loop) for loop in loops], dtype=np.int64)])
     if not len(loops):

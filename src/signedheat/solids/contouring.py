@@ -114,7 +114,7 @@ OUTSIDE_CELL = 0.6
 VERTEX_SPACING = 0.2
 """Least distance, in cells, between vertices that have left their cells."""
 CHECKED_BEND = np.deg2rad(5.0)
-"""Angle between two faces above which their edge is checked; it is small where a corner is missing."""
+"""Angle between two faces above which their edge is checked; the angle is small where a corner is missing."""
 CHORD_ERROR = 0.02
 """Distance from the level, in cells, above which an edge along a crease is divided."""
 DIVISIONS = 6
@@ -141,7 +141,7 @@ class ImplicitSurface(Protocol):
 
 
 def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats) -> Floats:
-    """Return (3, v, 3) candidates for the vertex of each piece, in cells: the best, the best in its cell, a middle."""
+    """Return (3, v, 3) candidates for each piece's vertex, in cells: the best, the best in its cell, and its middle."""
     count = len(cells.owners)
     vertices, middles, wider = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
     rows, sides = np.nonzero(cells.edges >= 0)
@@ -169,7 +169,7 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats
 
 
 def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
-    """Decide which (v,) vertices take the wider candidate: of those close together, only the one that moves least."""
+    """(v,) whether each vertex takes its wider candidate; if some are close together, the one that moves least."""
     away = np.where(np.isnan(wider[:, 0]), np.inf, np.linalg.norm(wider - vertices, axis=1))
     in_cell: Bools = (np.floor(wider) == cells.places[cells.owners]).all(axis=1)
     rows = np.flatnonzero(np.isfinite(away) & ~in_cell)

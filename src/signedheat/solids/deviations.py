@@ -316,7 +316,7 @@ def deviation(
 
 
 def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, FaceFeatures | None]:
-    """Return whether a part is open as a whole, and its two-sided faces, turned to agree: all then, else its sheets."""
+    """Return whether a part is open as a whole, and its faces, turned to agree; only its sheets if it is not open."""
     if isinstance(given, PointCloud):
         return False, None
     areas, was_given = face_areas(solid.triangles), solid.origins >= 0

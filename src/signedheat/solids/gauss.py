@@ -6,7 +6,7 @@ sides, the *level*, is ½ on every face. Each piece gets an unknown weight s, an
     E(s) = Σ A_i (½ − Σ_j W_ij s_j)² + μ Σ c_ij (s_i − sign(n_i · n_j) s_j)² + λ Σ A_i s_i²
 
 W_ij is the mean winding number of piece j at piece i, for i = j the mean of both sides. The sign of s orients.
-The second term, between neighbours in one plane, helps points and small pieces, each of which alone tells little.
+The second term, between neighbours in one plane, is for points and small pieces, each of which alone tells little.
 
 For points: Lin et al., Surface reconstruction from point clouds without normals by parametrizing the Gauss formula (TOG
 2022); Lin, Shi and Liu, Fast and globally consistent normal orientation based on the winding number normal consistency
@@ -77,7 +77,7 @@ def system_of(pieces: Pieces) -> Matrix | Dipoles:
     """Make the system of some pieces: dipoles for many loose triangles, exact solid angles for the rest."""
     sizes, areas = np.bincount(pieces.labels), pieces.areas
     many = areas.sum() ** 2 > LOOSE_DIPOLES * (areas**2).sum() and areas[sizes == 1].sum() > 0.5 * areas.sum()
-    # each face becomes a dipole, and a tree replaces the matrix W
+    # with many pieces each face becomes a dipole, and a tree replaces the matrix W
     return Dipoles.of_triangles(pieces) if many or len(areas) > 3000 else Matrix.of(pieces)
 
 

@@ -101,7 +101,7 @@ def _divergence(nodes: Ints, vectors: NDArray[np.float32], shape: tuple[int, ...
 
 
 def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, Floats]:
-    """Return a wall's axis, its end, and a lattice of places on it, in cells, half a cell beyond the last nodes."""
+    """Return axis, end and lattice of a wall, half a cell beyond the last nodes: places about 8 apart, in cells."""
     lines = [np.linspace(-0.5, n - 0.5, max(2, 1 + -(-n // 8))) for n in shape]
     lines[axis] = lines[axis][[-1 if end else 0]]
     lattice = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
@@ -158,7 +158,7 @@ class Heat:
 
 
 def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0.0) -> tuple[Floats, Ints] | None:
-    """Extract the closed zero set of φ around a shape, with a given width of cells; None if it bounds nothing."""
+    """Extract the closed zero set of φ around a shape, in cells of about a width (0: the finest); None if none."""
     bounds = shape.bounds
     side = float(np.ptp(bounds, axis=0).max())
     nodes = int(np.clip((1 + 2 * HEAT_PADDING) * side / cell, *HEAT_NODES)) if cell > 0 else HEAT_NODES[1]

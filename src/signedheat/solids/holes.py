@@ -100,8 +100,8 @@ def fill_holes(
     FilledMesh or FilledPolygonMesh
         A `TriangleMesh`, or a `PolygonMesh` of a mesh of polygons, with three more attributes: ``origins``, (m,) int,
         the number of each face in the given mesh, −1 for new ones; ``filled`` and ``left``, the vertices around each
-        rim that was closed, and that is still open. Where a lid is finer than the edges around it, triangles without
-        area lie between.
+        rim that was closed, and around each that is still open. Where a lid is finer than the edges around it,
+        triangles without area lie between.
 
     Raises
     ------
@@ -189,7 +189,7 @@ def _through(around: Rims, vertices: Floats, named: Ints) -> Bools:
 
 
 def _as_neighbours(faces: Ints, turned: Bools, added: Ints) -> Ints:
-    """Turn new faces where most of the given faces next to them had been turned."""
+    """Turn each connected part of the new faces if most of the given faces along its edges had been turned."""
     if not len(added):
         return added
     table = edge_table(np.concatenate([faces, added]))

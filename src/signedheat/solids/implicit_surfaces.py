@@ -87,7 +87,7 @@ class NodePlanes:
         return self._values_and_slopes(points)[0]
 
     def gradient(self, points: Floats) -> Floats:
-        """(n, 3) slopes: of the plane that is the extreme, or mixed."""
+        """(n, 3) slopes, of the plane that is the maximum or minimum, or mixed."""
         return self._values_and_slopes(points)[1]
 
     def _values_and_slopes(self, points: Floats) -> tuple[Floats, Floats]:
