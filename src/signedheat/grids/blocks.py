@@ -37,7 +37,7 @@ class Blocks:
 
     @classmethod
     def of(cls, places: NDArray[np.integer], shape: tuple[int, ...]) -> Blocks:
-        """Make blocks at (n, 3) places, in order and without repetition."""
+        """Make the blocks at (n, 3) places, which need neither be sorted nor distinct."""
         cubes = -(-np.array(shape) // (BLOCK * CUBE))
         ranked = np.asarray(places, dtype=np.int64).reshape(-1, 3)
         cube = np.ravel_multi_index(tuple((ranked // CUBE).T), tuple(cubes))
@@ -50,7 +50,7 @@ class Blocks:
 
     @cached_property
     def tables(self) -> Tables:
-        """Number of each cube, −1 where it holds nothing; and (cubes, 16, 16, 16) the block at each place in a cube."""
+        """The number of each cube, −1 if it holds no block; and (cubes, 16, 16, 16) the block at each place, or −1."""
         cubes = np.full(tuple(-(-n // (BLOCK * CUBE)) for n in self.shape), -1, dtype=np.int32)
         if not len(self):
             return cubes, np.full((0, CUBE, CUBE, CUBE), -1, dtype=np.int32)
@@ -64,7 +64,7 @@ class Blocks:
         return cubes, rows
 
     def rows(self, places: NDArray[np.integer]) -> NDArray[np.int32]:
-        """Return (k,) the number of the block at each of (k, 3) places; −1 where there is none, or no grid."""
+        """Return (k,) the number of the block at each of (k, 3) places; −1 where there is none, or outside the grid."""
         wanted = np.asarray(places, dtype=np.int64)
         limit = -(-np.array(self.shape) // BLOCK)
         inside = np.flatnonzero(((wanted >= 0) & (wanted < limit)).all(axis=1))
@@ -86,7 +86,7 @@ class BlockValues:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Nodes of the grid."""
+        """Number of nodes of the grid along each axis."""
         return self.blocks.shape
 
     def __getitem__(self, nodes: tuple[NDArray[np.integer], ...]) -> Floats:
@@ -105,7 +105,7 @@ class BlockValues:
         return _interpolate(self.blocks.tables, self.values, np.ascontiguousarray(points, dtype=np.float64), limit)
 
     def window(self, first: NDArray[np.integer], shape: tuple[int, int, int]) -> NDArray[np.float32]:
-        """Return values in a box of nodes from `first` on; NaN where there are none."""
+        """Return the values in a box of `shape` nodes whose lowest node is `first`; NaN where there is none."""
         low, high = first // BLOCK, -(-(first + np.array(shape)) // BLOCK)
         counts = high - low
         rows = self.blocks.rows(low + np.indices(counts).reshape(3, -1).T)
@@ -119,7 +119,7 @@ class BlockValues:
 
 @compiled
 def _interpolate(tables: Tables, values: NDArray[np.float32], points: Floats, limit: Floats) -> Floats:
-    """Interpolate linearly at points in cells; NaN beyond the last node, `limit`, and where a node has no block."""
+    """Interpolate linearly at points in cells; NaN outside the grid, with last node `limit`, and without a block."""
     cubes, rows = tables
     out = np.empty(len(points))
     for p in range(len(points)):

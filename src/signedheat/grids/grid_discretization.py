@@ -30,20 +30,20 @@ BYTES_PER_GRID_NODE, BYTES_PER_CELL = {1: 42, 2: 42, 3: 25, 4: 42}, 930
 """Measured peak memory of a distance computation for each node, by dimension; and for each square cell of surface in
 space."""
 MOST_BYTES_PER_NODE = 22
-"""Most bytes that surface adds for each node, where it is everywhere."""
+"""Most bytes that surface adds for each node: where it fills the whole grid."""
 SPACING_MARGIN = 1.08
 """Factor by which the suggested spacing is larger than needed, since free memory changes from run to run."""
 
 
 def memory_estimate(grid: Grid, per_node: float | None = None, extra: float = 0.0) -> int:
-    """Estimate the peak memory of a distance computation on a grid; others have `per_node` and `extra` bytes."""
+    """Estimate the peak memory, in bytes, of work on a grid: a distance, or one of `per_node` and `extra` bytes."""
     if per_node is None:
         per_node = BYTES_PER_GRID_NODE[grid.dimension]
     return int(per_node * grid.n_nodes + extra) + libraries()
 
 
 def bytes_of_area(area: float, spacing: Floats, n_nodes: float) -> float:
-    """Estimate the memory that surface of this area adds on a grid of this spacing, in space."""
+    """Estimate the bytes that a surface of this area adds on a grid in space; 0 in other dimensions."""
     if len(spacing) != 3:
         return 0.0
     cells = float(area / float(np.prod(spacing)) ** (2 / 3))
@@ -70,7 +70,7 @@ def refuse_large_grid(grid: Grid, per_node: float | None = None, extra: float = 
 def fitting_spacing(
     grid: Grid, available: int, per_node: float | None = None, extra: float = 0.0, area: float = 0.0
 ) -> Floats:
-    """Return (d,) about the least spacing, in the proportions of the grid's, at which its box fits into memory."""
+    """Return (d,) roughly the least spacing, proportional to the grid's, with which its box fits into memory."""
     base = memory_estimate(grid, 0.0, extra)
     whole = memory_estimate(grid, per_node, extra) - base
     spacing: Floats = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
@@ -158,7 +158,7 @@ class GridDiscretization(DiffusesEach):
         return self, sources
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> GridSource:
-        """Compute X₀ and the rows that interpolate φ on the source (Eq. 11 in space): area vectors spread to nodes."""
+        """Compute X₀, area vectors spread to nodes (Eq. 11 in space), and the rows that interpolate φ on the source."""
         samples = sample_on_grid(sources, self.grid)
         refuse_large_grid(self.grid, area=float(samples.weights.sum()))
         return GridSource(samples, self.grid, diffusion)
@@ -188,9 +188,9 @@ def _(domain: Grid) -> GridDiscretization:
 PENALTY = 10.0
 """Penalty of the augmented Lagrangian, in 1/h."""
 LEAST_PENALTY, LARGEST_PENALTY = 1e-6, 30.0
-"""Least penalty in the preconditioner, and largest penalty, relative to the default."""
+"""Least penalty in the preconditioner, and largest penalty that is not taken as infinite, relative to the default."""
 EQUAL_ROWS = 1e-6
-"""Difference below which rows of samples are equal, and their levels contradict each other."""
+"""Difference below which rows of samples count as equal, so that different levels contradict each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,7 +228,7 @@ class GridIntegration(SolvesEach):
         return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
 
     def fit_exactly(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
-        """Solve Eq. 14 by an augmented Lagrangian; the least correction near samples takes its rest."""
+        """Solve Eq. 14 by an augmented Lagrangian; the least correction at nodes near samples removes the rest."""
         refuse_beyond_memory(
             f"the zero set imposed exactly on {self.grid.n_nodes:,} nodes",
             self.grid.n_nodes,
@@ -291,7 +291,7 @@ def deviation(values: Floats, source: GridSource, levels: Levels) -> Floats:
 
 
 def diffused_mean(source: GridSource, values: Floats) -> NDArray[np.float32]:
-    """Return means of values at the samples over the grid, weighted by area and by heat, without the finest level."""
+    """Return at each node the mean of values at samples, weighted by area and heat; the finest level is left out."""
     largest = np.abs(values).max()
     if largest == 0.0:
         return np.zeros(source.grid.shape, dtype=np.float32)

@@ -50,18 +50,18 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     diagnostics : Diagnostics
         Timings, diffusion time, and notes on the computation.
     confidence : (*grid.shape) float, optional
-        From 0 to 1: how far the surface that is nearest to each node was there (1), or had to be completed (less, the
-        farther from any face), where the field was sharpened to a shape.
+        From 0 to 1, for fields sharpened to a shape: 1 where the surface nearest to a node is given, less where it had
+        to be completed, the farther from any face.
     solid : Solid, optional
         What the values are distances to: calls are exact then, and contours lie on their level exactly. ``.npz`` files,
         negation and multiplication keep it; ``repr`` says whether it is there.
     blocks : Blocks, optional
-        Blocks of 8³ nodes that have values, those of a band around the surface; by default all nodes have. Values and
-        confidence are then (n, 8, 8, 8), in single and half precision, NaN at nodes of the last blocks beyond the grid.
+        The blocks of 8³ nodes in a band around the surface, if only these have values; by default all nodes do. Values
+        and confidence are then (n, 8, 8, 8), in single and half precision, NaN at nodes of blocks beyond the grid.
     coarse : GridField, optional
-        φ on the whole box, which a field in a band has, for what lies beyond the band.
+        φ on the whole box, for points beyond the band; every field in a band has one.
     width : float
-        Half width of the band: up to which distance all nodes are there.
+        Half width of the band: all nodes up to this distance from the surface have values.
 
     Raises
     ------
@@ -223,12 +223,12 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
     @property
     def whole(self) -> GridField[Dimension]:
-        """A field on the whole box: of one in a band the coarse one, else itself."""
+        """The field on the whole box: the coarse field if this one is in a band, else itself."""
         return self if self.coarse is None else self.coarse
 
     @property
     def n_nodes(self) -> int:
-        """Number of nodes that are there."""
+        """Number of stored nodes: all of the grid, or those of the blocks of a band."""
         return int(self.values.size)
 
     @property
@@ -319,19 +319,19 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             )
 
     def save_contour(self, path: str | PathLike[str], level: float = 0.0) -> tuple[int, int]:
-        """Write the level set φ = level in space to a file; that of a band part by part, larger than memory.
+        """Write the level set φ = level in space to a file; that of a band part by part, so that it may exceed memory.
 
         Parameters
         ----------
         path : str or path
             A ``.ply`` file. An existing one survives a failure.
         level : float
-            See `contour`. Creases of bands are left as the cells cut them.
+            See `contour`. In bands, creases are left as the cells cut them.
 
         Returns
         -------
         vertices, faces : int
-            How many there are.
+            How many were written.
 
         Raises
         ------
@@ -363,7 +363,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return ply.write_parts(parts, path)
 
     def dense(self) -> GridField[Dimension]:
-        """Return the field at all nodes of its grid, those beyond a band interpolated from the coarse ones.
+        """Return the field at all nodes of its grid; nodes beyond a band are interpolated from the coarse field.
 
         Returns
         -------
@@ -455,7 +455,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     def to_pyvista(self) -> pyvista.ImageData:
         """Convert to an image of PyVista.
 
-        A field in the plane has z = 0; of one in a band it is the coarse field, and ``dense()`` has all nodes.
+        A field in the plane has z = 0. Of a field in a band the coarse field is taken; ``dense()`` has all nodes.
 
         Returns
         -------
@@ -481,7 +481,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return image
 
     def confidence_at(self, points: ArrayLike) -> NDArray[np.float32]:
-        """Interpolate how far the surface that is nearest was there (1), or had to be completed (less).
+        """Return the confidence at points: 1 where the nearest surface is given, less where it had to be completed.
 
         Parameters
         ----------
@@ -491,7 +491,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         Returns
         -------
         (...) float
-            From 0 to 1; at points outside the grid, that of the nearest point of its box; 1 if the field has none.
+            From 0 to 1. Outside the grid it is that of the nearest point of its box; it is 1 if the field has none.
 
         Examples
         --------
@@ -516,7 +516,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
     @property
     def surface_confidence(self) -> float | None:
-        """Mean confidence at the nodes within a cell of the zero set, one number for the whole field; or None."""
+        """Mean confidence at the nodes within a cell of the zero set; None without confidence or such nodes."""
         cell = float(self.grid.spacing.max())
         near = (self.values < cell) & (self.values > -cell)
         if self.confidence is None or not near.any():
@@ -553,12 +553,12 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
     @cached_property
     def _defined(self) -> tuple[Floats, Floats] | None:
-        """Values with 0 where there is none, and 1 where there is one, else 0; or None if all nodes have one."""
+        """The values with 0 in place of NaN, and 1 at nodes with a value, 0 at others; None if all nodes have one."""
         defined = ~np.isnan(self.values)
         return None if defined.all() else (np.where(defined, self.values, 0.0), defined.astype(np.float64))
 
     def _slopes(self, points: Floats) -> Floats:
-        """Return central differences of the interpolant, which are those at the nodes, interpolated."""
+        """Return (n, d) central differences of the interpolant: they equal those at the nodes, interpolated."""
         slopes = np.empty_like(points)
         for axis, step in enumerate(self.grid.spacing):
             ahead, behind = points.copy(), points.copy()
@@ -578,5 +578,5 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
 
 def values_at_walls(field: GridField[Dimension]) -> Floats:
-    """Return the values at the boundary of the grid of a field, in no order."""
+    """Return the values at the boundary of the grid of a field, in no particular order."""
     return np.concatenate([field.whole.values.take([0, -1], axis).ravel() for axis in range(field.grid.dimension)])

@@ -23,7 +23,7 @@ measure: Any = lazy_module("skimage.measure", "contours")
 CAP = 0.01
 """Distance, in cells, by which the walls that close a surface lie outside the box of the nodes."""
 LARGEST_VALUE = 1e30
-"""Marching cubes computes with single precision: numbers it is given, and their inverses, are not larger."""
+"""Bound of the numbers that marching cubes is given, and of their inverses: it computes in single precision."""
 
 
 def closed_surface(
@@ -116,13 +116,13 @@ Refine = Callable[[Floats], Floats]
 def block_contour(
     values: BlockValues, spacing: Floats, level: float, refine: Refine | None = None
 ) -> tuple[Floats, Ints]:
-    """Extract the level set in cells with values, facing greater ones, and closed `CAP` cells out of the grid."""
+    """Extract the level set in cells with values, facing greater values, and closed `CAP` cells outside the grid."""
     vertices, faces = zip(*contour_parts(values, spacing, level, refine), strict=True)
     return np.concatenate(vertices), np.concatenate(faces)
 
 
 def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Iterator[tuple[Ints, Floats, Ints]]:
-    """Yield the place of each window of blocks that the level set passes, in order, and its part of the set."""
+    """Yield, in order, the place of each window of blocks that the level set crosses, its vertices and faces."""
     least = CLEARANCE * float(spacing.min())
     capped = _reaches_walls(values, level)
     for window in np.unique(values.blocks.places // WINDOW, axis=0).astype(np.int64):
@@ -143,9 +143,9 @@ def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Itera
 
 
 def _window_surface(height: NDArray[np.float32]) -> tuple[Floats, NDArray[np.int32]] | None:
-    """Return vertices and faces, in cells whose nodes all have a value; None if there are none."""
+    """Return vertices, in cells, and faces of the zero set where all nodes of a cell have values; None if empty."""
     finite = ~np.isnan(height)
-    whole = np.zeros(height.shape, dtype=bool)  # cells, at their last nodes
+    whole = np.zeros(height.shape, dtype=bool)  # each cell is marked at its last node
     inner = np.ones(tuple(n - 1 for n in height.shape), dtype=bool)
     any_inside, all_inside = np.zeros_like(inner), np.ones_like(inner)
     inside = height < 0
@@ -164,7 +164,7 @@ def _window_surface(height: NDArray[np.float32]) -> tuple[Floats, NDArray[np.int
 
 
 def edges_of(vertices: Floats) -> tuple[Bools, Ints]:
-    """Return (n,) whether vertices, in cells, lie on edges of the grid, and numbers shared on the same edge."""
+    """Return (n,) whether vertices, in cells, lie on edges of the grid, and numbers that are equal on one edge."""
     base = np.floor(vertices)
     crossed = vertices > base
     on_edge = crossed.sum(axis=1) == 1
@@ -184,7 +184,7 @@ def _reaches_walls(values: BlockValues, level: float) -> bool:
 
 
 def _close_at_walls(height: NDArray[np.float32], first: Ints, limit: Ints) -> None:
-    """Write the layer of nodes beyond the walls, outside, so that crossings lie `CAP` cells beyond the walls."""
+    """Make the layer of nodes beyond the walls positive, so that crossings lie `CAP` cells beyond the walls."""
     for axis in range(3):
         for beyond, wall in ((-1, 0), (int(limit[axis]), int(limit[axis]) - 1)):
             target, source = beyond - int(first[axis]), wall - int(first[axis])
@@ -195,7 +195,7 @@ def _close_at_walls(height: NDArray[np.float32], first: Ints, limit: Ints) -> No
 
 
 Part = tuple[Floats, Ints]
-"""Vertices, (n, 3), and faces, (m, 3), whose ids count the vertices of all parts before."""
+"""Vertices (n, 3) and faces (m, 3); vertex ids count on from those of the parts before."""
 _Seam = tuple[Ints, Ints]
 """Keys of the vertices on the walls of a window, ascending, and the numbers of these vertices."""
 

@@ -41,7 +41,7 @@ BAND = 14.0
 RIM_WIDTH = 3
 """Width, in nodes, of the rim of the band that takes its values from the coarser level."""
 SMALL_BAND = 0.125
-"""Share of the grid below which a first band is swept twice as often: it costs little there."""
+"""Share of the grid below which a band without values of a finer level is swept twice as often: it costs little."""
 COARSEST_NODES = 32
 """Number of nodes along every axis up to which a grid is not coarsened."""
 UNHALVED_NODES = 4
@@ -60,16 +60,16 @@ class Level:
 
 
 Guess = tuple[NDArray[np.float32], Bools]
-"""X on a level, taken from a finer one, and the stretches in which it is known and not swept."""
+"""X on a level, taken from a finer one, and the stretches in which it is known, which are not swept."""
 
 
 def diffuse_multilevel(
     sources: NodeSources, time: Callable[[float], float], finest: int = 0, rounds: int = 2
 ) -> list[Level]:
-    """Solve ``(1 − tΔ) X = B``, Eq. 12, on levels from `finest` on; `time` gives t by mean spacing.
+    """Solve ``(1 − tΔ) X = B``, Eq. 12, on levels from `finest` on; `time` gives t for a mean spacing.
 
-    Each level is swept in all combinations of directions, `rounds` times, or twice as often from values of a finer
-    level.
+    Each level is swept in all combinations of directions: `rounds` times, twice as often if it starts from values of
+    a finer level, and `COARSEST_ROUNDS` times if it is the coarsest.
     """
     levels: list[Level] = []
     guess = None
@@ -105,7 +105,7 @@ def coarsening(shape: tuple[int, ...], steps: Floats) -> Ints:
 
 
 def skip_finest(shape: tuple[int, ...], steps: Floats, finest: int) -> tuple[list[Level], tuple[int, ...], Floats]:
-    """Return the first `finest` levels of the hierarchy, empty; and shape and spacing of the next grid."""
+    """Return the first `finest` levels of the hierarchy, without vectors; and shape and spacing of the next grid."""
     levels: list[Level] = []
     while len(levels) < finest and ((factors := coarsening(shape, steps)) > 1).any():
         levels.append(Level(None, None, factors))
@@ -157,12 +157,12 @@ def _coarser(shape: tuple[int, ...], steps: Floats) -> tuple[tuple[int, ...], Fl
 
 
 def _coarse_shape(shape: tuple[int, ...], factors: Ints) -> tuple[int, ...]:
-    """Return the nodes along each axis of the next coarser grid."""
+    """Return the number of nodes along each axis of the next coarser grid."""
     return tuple(n if f == 1 else n // 2 + 1 if f == 2 else 1 for n, f in zip(shape, factors.tolist(), strict=True))
 
 
 def _carried(level: Level, shape: tuple[int, ...], power: float) -> Guess | None:
-    """Return the values of a level for the next coarser one, in stretches of which all nodes have a value."""
+    """Return a level's values for the next coarser one, and the stretches that are complete; None if none is."""
     assert level.vectors is not None and level.inside is not None
     vectors = untouched_zeros((*shape, 4), np.float32)
     counts = np.zeros((*shape[:3], -(-shape[3] // STRETCH)), dtype=np.int64)
@@ -176,7 +176,7 @@ def _carried(level: Level, shape: tuple[int, ...], power: float) -> Guess | None
 def collapse(
     levels: list[Level], shape: tuple[int, ...], components: int, extract: Callable[..., None]
 ) -> NDArray[np.float32]:
-    """Return (components, *shape) what ``extract(vectors, inside, out, …)`` makes of X on the finest valid level."""
+    """Return (components, *shape) ``extract(vectors, inside, out, …)`` of X, at each node of its finest valid level."""
     shapes = [tuple(shape)]
     for level in levels[:-1]:
         shapes.append(_coarse_shape(shapes[-1], level.factors))
@@ -207,7 +207,7 @@ def _carry(
     coarse: NDArray[np.float32],
     counts: NDArray[np.integer],
 ) -> None:
-    """Copy vectors to the nodes of both grids, lengths raised to a power; count the known nodes of each stretch."""
+    """Copy vectors at nodes that the coarse grid shares, lengths raised to a power; count known nodes by stretch."""
     n0, n1, n2, n3 = vectors.shape[:4]
     for i in range(0, n0, 2 if factors[0] == 2 else 1):
         for j in range(0, n1, 2 if factors[1] == 2 else 1):
@@ -274,7 +274,7 @@ def unit_vectors(
     for component in components[1:]:
         np.maximum(sizes, np.abs(component), out=sizes)
     known = _nodes_of(inside[window], sizes.shape[3]) & (sizes >= LEAST_KNOWN)
-    factors = np.float32(1) / np.where(known, sizes, np.float32(1))  # by which they are divided before they are squared
+    factors = np.float32(1) / np.where(known, sizes, np.float32(1))  # squares without them would underflow
     squares = sum((factors * component) ** 2 for component in components[: len(out)])
     factors /= np.sqrt(np.where(known, squares, np.float32(1)))
     for component, into in zip(components, out, strict=False):
@@ -292,7 +292,7 @@ def quotients(
 
 
 def _nodes_of(stretches: Bools, n: int) -> Bools:
-    """Return the values of stretches of lines at each of the n nodes of these."""
+    """Repeat the values of the stretches of lines for each of the n nodes along a line."""
     return np.repeat(stretches, STRETCH, axis=3)[..., :n]
 
 
@@ -301,7 +301,7 @@ def diffuse_by_sweeps(
 ) -> NDArray[np.float32]:
     """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j``, Eq. 12, in `active` stretches, a = t / h².
 
-    Elsewhere X, (l₀, l₁, l₂, n, 4), is `given`, and overwritten; by default it is zero, in memory never touched.
+    Elsewhere X (l₀, l₁, l₂, n, 4) is as in `given`, which is overwritten; by default zero, in memory never touched.
     """
     shape = sources.shape
     vectors = untouched_zeros((*shape, 4), np.float32) if given is None else given

@@ -74,11 +74,11 @@ class NodeSources(NamedTuple):
 def merge_in_cells(
     simplices: tuple[Floats, Floats, Floats, Ints], shape: Ints, size: float, sources: NodeSources, scale: float
 ) -> tuple[tuple[Floats, Floats, Floats, Ints], NodeSources]:
-    """Merge simplices to one sample for each cell, of a grid of `shape` nodes, and component; add vectors to nodes.
+    """Merge simplices to one sample for each cell of a grid and each component; add their vectors to the nodes.
 
-    Simplices are corners (m, c, d) in cells, vectors, weights and components; parts are at most `size` cells long.
-    Returns positions, vectors, weights and components of the samples; and the sources, with multilinear shares of all
-    vectors over `scale`.
+    Simplices are corners (m, c, d) in cells, vectors, weights and components, split into parts at most `size` cells
+    long; the grid has `shape` nodes. Return positions, vectors, weights and components of the samples; and the sources
+    with all vectors, divided by `scale` and shared among nodes by multilinear weights.
     """
     corners, vectors, weights, components = simplices
     order = np.argsort(components, kind="stable")
@@ -106,7 +106,7 @@ def _merge(
     sources: NodeSources,
     scale: float,
 ) -> tuple[Floats, Ints, NDArray[np.float32]]:
-    """Sum weight · position, vector and weight for each component and cell."""
+    """Return sums of weight · position, vector and weight by component and cell, the components, and node sums."""
     nodes, places = sources.sums, sources.places.reshape(-1, sources.places.shape[3])
     n_corners, dimension = corners.shape[1], corners.shape[2]
     deepest = 256
@@ -117,7 +117,7 @@ def _merge(
     first = 0  # slots of the current component start here
     current = np.int64(-1)
     centre = np.empty(dimension)
-    lines = np.zeros(1 << (dimension - 1), dtype=np.int64)  # of nodes, around a piece, and its share of each
+    lines = np.zeros(1 << (dimension - 1), dtype=np.int64)  # grid lines around a piece, and its share of each
     parts = np.empty(1 << (dimension - 1))
     n = shape[dimension - 1]
     limit, part_of_corner = size * size, 1.0 / n_corners

@@ -1,8 +1,8 @@
-"""Signed distance to the zero set of an array, smooth, with edges, or of nothing but signs; sharpening on grids.
+"""Signed distance to the zero set of an array: a smooth one, one with edges, or one of mere signs; sharpening on grids.
 
-The zero set is the contour of values that are linear along the edges of the grid, and distance is that to the contour's
+The zero set is the contour of values that are linear along the edges of the grid, and distance is measured to its
 triangles. A crossing of the contour with an edge is smooth where neighbouring crossings lie on the paraboloid that
-touches the zero set there: around smooth crossings distance is that to the touching circle.
+touches the zero set there: around smooth crossings distance is measured to the touching circle.
 
 Internally arrays have four axes and vectors four components, of which the first are unused in fewer dimensions;
 positions are in units of length from the grid's origin.
@@ -37,11 +37,11 @@ from .stencil import padded_shape
 
 @within_memory
 def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | Sequence[bool] = False) -> Floats:
-    """Compute the signed distance of the nodes of a grid to the zero set of an array: of a level set, or of ±1.
+    """Compute the signed distance of the nodes of a grid to the zero set of an array of values, or of signs.
 
     Where the zero set is smooth, distance is of second order, and exact for planes and spheres; at its edges it is
-    that to the contour of values that are linear between nodes. An array of two opposite values has the side of each
-    node and nothing else: of the contours that separate them so, a smooth one is taken.
+    that to the contour of values that are linear between nodes. An array of two opposite values tells only the side of
+    each node: of the contours that separate the two sides, a smooth one is taken.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
     spacing : float, or one for each axis
         Distance between neighbouring nodes.
     periodic : bool, or one for each axis
-        Axes behind whose last node the first comes again.
+        Axes along which the first node follows the last one again.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
 
 @sharpen_field.register
 def _(field: GridField, source: object, method: Method | None, progress: Progress | None) -> GridField:
-    """Measure the distance of every node to the zero set; that of a field with its solid is known, up to a factor."""
+    """Measure the distance of every node to the zero set; a field with its solid holds it already, up to a factor."""
     if source is not None or method is not None:
         raise UnsupportedTypeError(
             "fields on grids are measured to their zero set", remedy="leave out source and method", element="method"
@@ -141,7 +141,7 @@ def _(
 
 
 def _distances(values: Floats, spacing: Floats, pads: Ints) -> Floats:
-    """Return the distance of each node that is not padding; axes have at least two nodes."""
+    """Return (n,) unsigned distances of the nodes that are not padding; every axis has at least two nodes."""
     signs = values.ndim > 1 and bool((np.abs(values) == 1).all())
     if signs:
         values = smoothed_signs(values)
@@ -154,7 +154,7 @@ def _distances(values: Floats, spacing: Floats, pads: Ints) -> Floats:
             remedy="subtract a level; of an image of 0 and 1, for instance, pass 0.5 - image",
             element="values",
         )
-    if signs:  # which say nothing of how the zero set bends
+    if signs:  # signs say nothing about how the zero set bends
         contour = contour._replace(smooth=np.zeros_like(contour.smooth))
     inner = [np.arange(pad, n - pad) * step for pad, n, step in zip(pads, values.shape, steps[unused:], strict=True)]
     places = np.stack(np.meshgrid(*[np.zeros(1)] * unused, *inner, indexing="ij"), axis=-1)
@@ -174,38 +174,38 @@ SMOOTH_CROSSING = 0.05
 cells' radius are wrong by at most .04 cells, with .1 by .01; those of clipped balls by .07 and .12."""
 
 FLAT_RADIUS = 0.25
-"""Radius around a crossing, relative to a cell's diagonal, within which the zero set of signs with four axes is flat.
-Distances of balls and half spaces 13 to 17 nodes wide are best with .125 to .25, those of boxes with more."""
+"""Radius around a crossing, relative to a cell's diagonal, within which the zero set of signs with four axes is
+flat. Distances of balls and half spaces 13 to 17 nodes wide are best with .125 to .25, those of boxes with more."""
 
 
 class Crossings(NamedTuple):
-    """The zero set of the cubic interpolant near crossed edges: places on it, and how it lies and bends there."""
+    """Places on the zero set of the cubic interpolant near crossed edges, with its normals and curvatures there."""
 
     places: Floats  # (c, 4)
     normals: Floats  # (c, 4) unit vectors
     bends: Floats  # (c, 4, 4) symmetric shape operators
 
     def heights(self, chosen: Ints, away: Floats) -> Floats:
-        """Return (n,) heights, over the tangent planes of some crossings (n,), of what is (n, 4) away from them."""
+        """Return (n,) heights, over the tangent planes of (n,) crossings, of places that are (n, 4) away from them."""
         return np.einsum("ni,ni->n", away, self.normals[chosen])
 
     def bend_along(self, chosen: Ints, across: Floats) -> Floats:
-        """Return (n,) curvatures of the zero set at some crossings (n,) along (n, 4), times their squared lengths."""
+        """Return (n,) curvatures of the zero set at (n,) crossings along (n, 4) vectors, times squared lengths."""
         return np.einsum("ni,nij,nj->n", across, self.bends[chosen], across)
 
 
 class Contour(NamedTuple):
     """The zero set of an array."""
 
-    # (v, 3) along axes 1 to 3, and (m, 3): the contour of values that are linear along edges; empty in four dimensions
+    # (v, 3) along axes 1 to 3, and (m, 3): the contour of values that are linear along edges; empty with four axes
     vertices: Floats
     faces: Ints
     numbers: Ints  # (v,) the crossing at each vertex; −1 at vertices on no edge of the array
     zeros: Floats  # (k, 4) nodes that are zero, without a negative neighbour
     curved: Crossings  # of edges with the zero set of the cubic interpolant
-    # (c, 4) the crossings: where smooth on the zero set of the cubic interpolant, else of values linear along edges
+    # (c, 4) the crossings: smooth ones on the zero set of the cubic interpolant, others on that linear along edges
     points: Floats
-    smooth: Bools  # (c,) whether distance around a crossing is that to the interpolant's zero set
+    smooth: Bools  # (c,) whether distance around a crossing is measured to the interpolant's zero set
     uneven: float  # how much distance to the interpolant may differ from that to the triangles
     reach: float  # no point of the zero set is farther from its nearest crossing
 
@@ -217,7 +217,7 @@ def smoothed_signs(signs: Floats) -> Floats:
 
 
 def zero_contour(values: Floats, steps: Floats) -> Contour:
-    """Extract the zero set of an array with one to four axes, on four without triangles; zero counts as positive."""
+    """Extract the zero set of an array with one to four axes, of four without triangles; zero counts as positive."""
     unused = 4 - values.ndim
     field = np.ascontiguousarray(values).reshape(padded_shape(values.shape))
     reach = float(np.linalg.norm(steps[unused:]))
@@ -264,7 +264,7 @@ def distances_to(contour: Contour, places: Floats) -> Floats:
 
 
 def _around(contour: Contour, corners: Ints, distances: Floats, places: Floats) -> Floats:
-    """Return distances, (n,) to triangles of (n, 3) corners; where smooth, to the interpolant at the nearest corner."""
+    """Correct (n,) distances to triangles of (n, 3) corners: where the nearest corner is smooth, to its circle's."""
     squares = np.empty(corners.shape)
     for k in range(3):
         away = places - contour.points[corners[:, k]]
@@ -278,7 +278,7 @@ def _around(contour: Contour, corners: Ints, distances: Floats, places: Floats) 
 
 
 def _around_crossings(contour: Contour, crossings: Ints, places: Floats) -> Floats:
-    """Return (n,) distances to the interpolant's zero set at the nearest crossings; if not smooth, to a flat piece."""
+    """Return (n,) distances to the touching circles at the nearest crossings; if not smooth, to flat discs."""
     away = places - contour.curved.places[crossings]
     heights = contour.curved.heights(crossings, away)
     across = np.sqrt(np.maximum((away**2).sum(axis=1) - heights**2, 0.0))
@@ -287,7 +287,7 @@ def _around_crossings(contour: Contour, crossings: Ints, places: Floats) -> Floa
 
 
 def circle_distances(contour: Contour, crossings: Ints, away: Floats) -> Floats:
-    """Return (n,) distances, from (n, 4) away, to the circles that touch the zero set at crossings, in their planes."""
+    """Return (n,) distances to circles that touch the zero set at crossings, of places (n, 4) away from those."""
     heights, squares = contour.curved.heights(crossings, away), np.einsum("ni,ni->n", away, away)
     across = away - heights[:, None] * contour.curved.normals[crossings]
     sides, distances = np.einsum("ni,ni->n", across, across), np.sqrt(squares)
@@ -301,7 +301,7 @@ def circle_distances(contour: Contour, crossings: Ints, away: Floats) -> Floats:
 
 
 def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Ints]:
-    """Return vertices, in cells, and triangles; crossed edges, and a vertex on each; the edge of each vertex, or −1."""
+    """Return vertices, in cells; triangles; crossed edges; a vertex on each edge; and each vertex's edge, or −1."""
     unused = 3 - values.ndim
     if not ((values < 0).any() and (values >= 0).any()):
         none = np.empty(0, dtype=np.int64)
@@ -322,7 +322,7 @@ def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Int
     if not on_edge.all():
         _between_others(vertices, faces, ~on_edge)
     edges = np.column_stack([np.zeros(len(nodes)), nodes, axes + 1])[on_edge].astype(np.int32)
-    edges[:, 1 : 1 + unused] = 0  # copies of one edge
+    edges[:, 1 : 1 + unused] = 0  # copies along unused axes are one edge
     edges, first, numbers_of = np.unique(edges, axis=0, return_index=True, return_inverse=True)
     numbers = np.full(len(vertices), -1)
     numbers[on_edge] = numbers_of.ravel()
@@ -330,7 +330,7 @@ def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Int
 
 
 def _between_others(vertices: Floats, faces: Ints, chosen: Bools) -> None:
-    """Move the chosen vertices to the middle of those that they share triangles with."""
+    """Move the chosen vertices to the mean of the other vertices that they share triangles with."""
     sums, counts = np.zeros_like(vertices), np.zeros(len(vertices))
     for k in range(3):
         for neighbor in (k - 1, k - 2):
@@ -342,7 +342,7 @@ def _between_others(vertices: Floats, faces: Ints, chosen: Bools) -> None:
 
 
 def _unevenness(curved: Crossings, linear: Floats, pairs: Ints) -> Floats:
-    """Return (e,) how far each crossing moves, or how far those it is joined to lie off its paraboloid, if farther."""
+    """Return (c,) the larger of each crossing's way from the linear place, and its neighbours' from its paraboloid."""
     uneven: Floats = np.linalg.norm(curved.places - linear, axis=1)
     crossing, neighbor = np.concatenate([pairs, pairs[:, ::-1]]).T
     away = curved.places[neighbor] - curved.places[crossing]
@@ -412,7 +412,7 @@ def _cubic(field: Floats, place: Floats, weights: Floats, gradient: Floats) -> f
 
 @compiled
 def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the `Crossings` of crossed edges."""
+    """Return the places, normals and bends of `Crossings` for (e, 5) crossed edges."""
     n = len(edges)
     places, normals, bends = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4, 4))
     weights = np.empty((2, 4, 4))

@@ -22,9 +22,9 @@ class Closest:
     points : (..., 3) float
         The nearest places.
     faces : (...) int
-        Face of the shape that was given on which each lies; −1 on the completion.
+        Face of the given shape on which each place lies; −1 on the completion.
     barycentric : (..., 3) float
-        Where in it: weights of its corners, for triangles; NaN elsewhere.
+        Position in that face, if it is a triangle: the weights of its corners; NaN elsewhere.
     gradients : (..., 3) float
         Gradients of the distance, of length 1; on the surface, its normals.
     confidence : (...) float
@@ -55,10 +55,10 @@ class Closest:
 
 
 class SolidQueries(Protocol):
-    """What can answer queries at points exactly, as a `Solid` does."""
+    """An object that answers queries at points exactly, as a `Solid` does."""
 
     @property
-    def triangles(self) -> Floats: ...  # (m, 3, 3) corners of all that distance is measured to
+    def triangles(self) -> Floats: ...  # (m, 3, 3) corners of the triangles that distance is measured to
     def distance(self, points: ArrayLike) -> Floats: ...  # (...) signed distances of (..., d) points
     def inside(self, points: ArrayLike) -> Bools: ...  # (...) whether points are inside
     def closest(self, points: ArrayLike) -> Closest: ...  # the nearest place for each of (..., d) points
@@ -73,7 +73,7 @@ class Scaled:
 
     @property
     def triangles(self) -> Floats:
-        """(m, 3, 3) corners of all that distance is measured to."""
+        """(m, 3, 3) corners of the triangles that distance is measured to."""
         return self.solid.triangles
 
     def distance(self, points: ArrayLike) -> Floats:

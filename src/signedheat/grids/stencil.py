@@ -28,7 +28,7 @@ def padded_shape(shape: tuple[int, ...]) -> tuple[int, int, int, int]:
 
 
 def divergence(directions: NDArray[np.floating], spacing: Floats) -> Floats:
-    """Return −∇·Y, b of Eq. 13: the flux between two nodes is the mean of theirs, that through walls zero."""
+    """Return −∇·Y, b of Eq. 13: the flux between two nodes is the mean of Y at both, and zero through walls."""
     shape = directions.shape[:-1]
     components = np.moveaxis(directions, -1, 0).reshape(-1, *padded_shape(shape))
     out = np.empty(padded_shape(shape))
@@ -81,7 +81,7 @@ def interpolation_stencil(positions: Floats, shape: tuple[int, ...]) -> tuple[In
 
 def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: Any) -> None:
     """Call ``kernel(*arguments, axis, start, stop)`` for slabs of a grid of four axes, in threads if it is large."""
-    axis = 0 if shape[0] > 1 else 1  # both have one node in the plane: its grids are one slab
+    axis = 0 if shape[0] > 1 else 1  # in the plane both axes have one node: its grids are one slab
     n = shape[axis]
     if np.prod(shape) < FEW_NODES:
         kernel(*arguments, axis, 0, n)
@@ -110,7 +110,7 @@ def _divide(eigenvalues: list[Floats], transformed: Floats, axis: int, start: in
 def _divergence(
     components: NDArray[np.floating], scales: Floats, out: Floats, axis: int, start: int, stop: int
 ) -> None:
-    """Write the divergence of a slab."""
+    """Write −∇·Y in a slab."""
     low, high = max(start - 1, 0), min(stop + 1, out.shape[axis])
     around = np.moveaxis(np.moveaxis(components, axis + 1, 0)[low:high], 0, axis + 1)
     sums = np.zeros(around.shape[1:])
