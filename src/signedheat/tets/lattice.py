@@ -127,7 +127,7 @@ def sample_points(shape: Shape, spacing: float) -> Floats:
 
 
 def _refuse_too_many(least: float, expected: float, resolution: float, power: int) -> None:
-    """Refuse a lattice too large for memory, and name a resolution that fits: tets grow with its `power`."""
+    """Raise if a lattice has too many tets, and name a resolution that fits: their number grows with its `power`."""
 
     def lower(fitting: int) -> str:
         most = resolution * (fitting / expected) ** (1 / power)
@@ -144,7 +144,7 @@ def _refuse_too_many(least: float, expected: float, resolution: float, power: in
 def _octree(
     samples: Any, origin: Floats, spacing: float, counts: Ints, depth: int, grading: float, resolution: float
 ) -> tuple[Ints, Ints]:
-    """Return lower corners and sizes of the leaves, in half cells of the finest level; distance needs no balancing."""
+    """Return lower corners and sizes of the leaves, in half cells of the finest level; they need no balancing."""
     size = 2 ** (depth + 1)
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3) * size
     octants = np.array(list(itertools.product((0, 1), repeat=3)))
@@ -209,7 +209,7 @@ def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
 
 
 def _box_around(shape: Any, resolution: int, padding: float | None) -> tuple[Floats, Floats, float]:
-    """Return the lower corner and the sides of the padded box of a shape, and the target edge length; check all."""
+    """Return the lower corner and the sides of the padded box of a shape, and the edge length; check the parameters."""
     lower, upper = bounds_around([shape])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:

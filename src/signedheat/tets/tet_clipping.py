@@ -61,7 +61,7 @@ class Planes(NamedTuple):
         normals /= np.where(twice_area > 0, twice_area, 1)[:, None]
         signs = np.sign(np.einsum("mki,mki->mk", normals[faces.tet_faces], mesh.area_vectors))
         turned = inside_out(mesh)
-        signs[turned] *= -1  # so that lines pass
+        signs[turned] *= -1  # so that lines of sight pass through these tets
         solid = (mesh.thickness > SOURCELESS_TET) & ~turned
         counts = np.bincount(faces.tet_faces[solid].ravel(), minlength=len(normals))
         return cls(
@@ -102,7 +102,7 @@ def containing_tets(mesh: TetShapes, planes: Planes, points: Floats) -> Ints:
 
 
 def _slack(mesh: TetShapes) -> Floats:
-    """Return (3,) how far beyond its box a tet is searched for, since rounding may put a point there."""
+    """Return (3,) by how much boxes of tets are enlarged in a search, since rounding may put a point outside."""
     lower, upper = mesh.search_tree.bounds[1].reshape(2, 3)
     return 1e-9 * (upper - lower)
 
@@ -113,7 +113,7 @@ def barycentric(mesh: TetShapes, tets: Ints, points: Floats) -> Floats:
     inward = -np.einsum("pki,pki->pk", mesh.area_vectors[tets], from_corner)
     inward = np.maximum(inward / np.maximum(np.abs(inward).max(axis=1, keepdims=True), np.finfo(float).tiny), 0)
     total = inward.sum(axis=1, keepdims=True)
-    middle = np.full_like(inward, 0.25)  # of flat tets
+    middle = np.full_like(inward, 0.25)  # for flat tets
     return np.divide(inward, total, out=middle, where=total > 0)
 
 
@@ -256,7 +256,7 @@ def stays_inside(
 
 @compiled
 def visible(planes: Planes, neighbors: Ints, starts: Floats, targets: Floats, slack: float) -> Bools:
-    """Return (m,) whether the segment from a point in each tet to its target stays in the mesh, up to a length."""
+    """Return (m,) whether the segment from a point in each tet to its target stays in the mesh, to within `slack`."""
     seen = np.empty(len(starts), dtype=np.bool_)
     for tet in range(len(starts)):
         x, y, z = starts[tet]

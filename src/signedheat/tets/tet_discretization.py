@@ -61,7 +61,7 @@ class TetDiscretization(DiffusesEach):
 
     @cached_property
     def unknowns(self) -> Ints:
-        """(m, 4) unknown of φ at each corner of each tet; heat flows through faces only, so parts share no unknown."""
+        """(m, 4) unknown of φ at each corner of each tet; heat flows through faces only, so parts share none."""
         parts = self.mesh.parts
         keys = self.mesh.tets * (parts.max() + 1) + parts[:, None]
         return np.unique(keys, return_inverse=True)[1].reshape(-1, 4)
@@ -73,7 +73,7 @@ class TetDiscretization(DiffusesEach):
 
     @cached_property
     def integration(self) -> TetIntegration:
-        """Step 3."""
+        """The solver of step 3, direct or by conjugate gradients."""
         matrix = upper_triangle(self.mesh.geometry.vertex_laplacian(self.unknowns, self.n_unknowns))
         strength = TET_SPRINGS / (3 * self.spacing)
         if self.n_unknowns <= DIRECT_VERTICES:
@@ -116,7 +116,7 @@ class TetDiscretization(DiffusesEach):
         return HeatSystem(matrix, self.direct)
 
     def _in_tets(self, stages: list[Stage]) -> tuple[Floats, Floats, Floats]:
-        """Return means of X in tets, by the last stage with all faces, gradients of its last column, and log scales."""
+        """Return mean X, gradient of its last column and log scale of each tet, by the last stage with its faces."""
         tet_faces = self.mesh.faces.tet_faces
         n = self.mesh.n_tets
         means, gradients, factors = np.zeros((n, stages[0].values.shape[1])), np.zeros((n, 3)), np.full(n, -np.inf)
@@ -173,7 +173,7 @@ class TetDiscretization(DiffusesEach):
 
 @dataclass(frozen=True, eq=False)
 class HeatSystem:
-    """Step 1, ``(M + tL) X = X₀``, for right-hand sides that X decays away from."""
+    """The system of step 1, ``(M + tL) X = X₀``, whose solutions decay away from the right-hand side."""
 
     matrix: sparse.csr_matrix  # (n, n) M + tL, whole
     direct: bool  # whether it is factorised; it is solved by conjugate gradients otherwise
@@ -232,7 +232,7 @@ class TetIntegration(SpringIntegration):
     gradients: Callable[[Floats], Floats] = np.zeros_like  # from φ at the unknowns to (n, 3) gradients there
 
     def corrected(self, levels: Floats, solve: Callable[[Floats], Floats], source: SourceTerm) -> tuple[Floats, Floats]:
-        """Return the levels minus the quadratic correction of a first φ, and the φ with these levels."""
+        """Return the levels minus the quadratic correction of a first solution, and the solution with these levels."""
         values = levels - self._quadratic_correction(solve(levels), source)
         return values, solve(values)
 
@@ -252,6 +252,6 @@ class TetIntegration(SpringIntegration):
         return super()._at_samples(values, source) + self._quadratic_correction(values, source)
 
     def _quadratic_correction(self, values: Floats, source: SourceTerm) -> Floats:
-        """Return (s,) φ minus its linear interpolant, on the source."""
+        """Return (s,) means of φ minus its linear interpolant, over the patches of the source."""
         assert isinstance(source, TetSource)
         return source.quadratic_correction @ self.gradients(np.nan_to_num(values)).ravel()

@@ -25,7 +25,7 @@ from ..validation import contiguous, finite_number, query_points, shaped
 from .tet_clipping import Planes, barycentric, containing_tets
 from .tet_mesh import TetMesh
 
-# By the bits of a mask of the corners below the level: an even permutation that puts these first, and their number.
+# By a bit mask of the corners below the level: an even permutation that puts these corners first, and their number.
 BELOW_FIRST = np.zeros((16, 4), dtype=np.int64)
 N_BELOW = np.array([bin(mask).count("1") for mask in range(16)])
 EVEN_PAIRS = {(0, 1): (2, 3), (0, 2): (3, 1), (0, 3): (1, 2), (1, 2): (0, 3), (1, 3): (2, 0), (2, 3): (0, 1)}
@@ -40,7 +40,7 @@ TET_CUTS = {
     2: [[(0, 2), (0, 3), (1, 3)], [(0, 2), (1, 3), (1, 2)]],
     3: [[(0, 1), (0, 3), (0, 2)]],
 }
-# The part of a boundary face below the level, likewise; (k, k) is corner k itself.
+# Likewise, triangles of the part of a boundary face below the level; (k, k) is corner k itself.
 FACE_LIDS = {
     1: [[(0, 0), (0, 1), (0, 2)]],
     2: [[(0, 0), (1, 1), (1, 2)], [(0, 0), (1, 2), (2, 0)]],
@@ -49,9 +49,9 @@ FACE_LIDS = {
 
 
 def closed_level_set(mesh: TetShapes, values: Floats, gradients: Floats, level: float) -> tuple[Floats, Ints]:
-    """Return vertices and triangles of the surface that separates mesh vertices below a level, closed at the boundary.
+    """Return vertices and triangles of the surface around the mesh vertices below a level, closed at the boundary.
 
-    Vertices lie where φ takes the level by values and gradients at ends of edges. Tets with a NaN corner are outside.
+    Vertices lie where φ, by values and gradients at the ends of edges, takes the level. Tets with NaN are left out.
     """
     tets = mesh.tets[~np.isnan(values[mesh.tets]).any(axis=1)]
     if not len(tets):
@@ -74,7 +74,7 @@ def closed_level_set(mesh: TetShapes, values: Floats, gradients: Floats, level: 
 
 
 def level_triangles(vertices: Floats, tets: Ints, values: Floats, level: float) -> tuple[Floats, Ints, Ints]:
-    """Return the level set of the linear interpolant, open at the boundary: positions, triangles, tet of each."""
+    """Return the level set of the linear interpolant, open at the boundary: positions, triangles, their tets."""
     finite = np.flatnonzero(~np.isnan(values[tets]).any(axis=1))
     keys, owners = _triangles(tets[finite], (values < level)[tets[finite]], len(vertices), TET_CUTS)
     return *_crossings(vertices, values, np.zeros_like(vertices), level, keys, 0.0), finite[owners]
@@ -83,9 +83,9 @@ def level_triangles(vertices: Floats, tets: Ints, values: Floats, level: float) 
 def _crossings(
     vertices: Floats, values: Floats, gradients: Floats, level: float, keys: Ints, clearance: float
 ) -> tuple[Floats, Ints]:
-    """Return where edges, by keys ``smaller · n + larger``, take the level, and the index of the place of each key.
+    """Return where edges, given by keys ``smaller · n + larger``, take the level, and the index of each key's place.
 
-    At the fraction s of e from a to b, φ is ``(1 − s) φ_a + s φ_b + ½ s (1 − s) (∇φ_a − ∇φ_b)·e``.
+    At the fraction s of the edge e from a to b, φ is ``(1 − s) φ_a + s φ_b + ½ s (1 − s) (∇φ_a − ∇φ_b)·e``.
     """
     crossings, triangles = np.unique(keys, return_inverse=True)
     low, high = crossings // len(vertices), crossings % len(vertices)
@@ -100,7 +100,7 @@ def _crossings(
 def _triangles(
     elements: Ints, below: Bools, n: int, table: dict[int, list[list[tuple[int, int]]]]
 ) -> tuple[Ints, Ints]:
-    """Return triangles by the keys of their corners (see `_crossings`), and the element of each."""
+    """Cut elements by a table: return (k, 3) triangles of keys of edges (see `_crossings`), and their elements."""
     corners = elements.shape[1]
     masks = below @ (1 << np.arange(corners))
     if corners == 4:
@@ -325,7 +325,7 @@ class TetField(Displayed, Combinable, Frozen):
         return TriangleTree.of(self.mesh.vertices[self.mesh.boundary.faces])
 
     def _place(self, points: Floats) -> tuple[Ints, Floats, Floats]:
-        """Return (k, 4) vertices and weights at the closest point of the mesh, and (k, 3) the way from there."""
+        """Return (k, 4) vertices and their weights at the closest point of the mesh, and (k, 3) vectors from there."""
         tets = containing_tets(self.mesh.geometry, self._planes, points)
         inside, outside = np.flatnonzero(tets >= 0), np.flatnonzero(tets < 0)
         corners = np.zeros((len(points), 4), dtype=np.int64)

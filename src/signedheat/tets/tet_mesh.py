@@ -152,7 +152,7 @@ class TetMesh(Displayed, Frozen):
 
     @classmethod
     def from_meshio(cls, mesh: meshio.Mesh) -> TetMesh:
-        """Convert the tets of a mesh of meshio; cells of other kinds are ignored.
+        """Convert the tets of a mesh of meshio; its faces, lines and vertices are left out.
 
         Parameters
         ----------

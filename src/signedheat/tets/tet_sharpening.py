@@ -59,7 +59,7 @@ def _(
     tolerance: float,
     report: Callable[[], None] | None,
 ) -> Nearest:
-    """Measure any-angle distance to the given faces, and to the zero set farther than `FAR_EDGES` from all of them.
+    """Measure any-angle distance to the given faces, and to parts of the zero set over `FAR_EDGES` from all of them.
 
     Within `SIDE_EDGES` of a face its side decides the sign, where the shape is closed and consistent around the nearest
     place.
@@ -106,7 +106,7 @@ class Vertices(NamedTuple):
     points: Floats  # (n, 3) positions relative to the centre of the mesh, as those of `Planes` are
     tets: Ints  # (m, 4) the vertices of each tet
     neighbors: Ints  # (m, 4) the tet beyond each face, or −1
-    # (n + 1,) and (4 m,): where the tets at each vertex begin in the second, and these tets
+    # (n + 1,) and (4 m,): the tets at vertex v are ``tets_at[first_tet[v] : first_tet[v + 1]]``
     first_tet: Ints
     tets_at: Ints
 
@@ -116,7 +116,7 @@ class SourceSurface(NamedTuple):
 
     rows: Floats  # (k, 16) see `triangle_rows`, relative to the centre of the mesh
     corners: Ints  # (k, 3) vertex ids; corners at one place have the same id
-    # where the triangles at each of these ids begin in the second, and these triangles
+    # the triangles at vertex id v are ``triangles_at[first_triangle[v] : first_triangle[v + 1]]``
     first_triangle: Ints
     triangles_at: Ints
     owners: Ints  # (k,) the tet that each triangle lies in; −1 for triangles that lie in several
@@ -125,9 +125,9 @@ class SourceSurface(NamedTuple):
 def _distance_around(
     lowered: TetDiscretization, points: Floats, values: Floats, positions: Floats, corners: Ints, owners: Ints
 ) -> tuple[Floats, Ints, int]:
-    """Return any-angle distances of all points with a value, the nearest triangles, and how many points see none.
+    """Return any-angle distances of points with a value, the nearest triangles, and how many points do not see them.
 
-    A curved φ vanishes ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k)`` over |∇φ| from the zero set of its interpolant.
+    A curved φ vanishes ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k) / |∇φ|`` away from the zero set of its linear interpolant.
     """
     mesh, planes, unknowns = lowered.mesh, lowered.planes, lowered.unknowns
     tree = TriangleTree.of(positions[corners])
@@ -150,7 +150,7 @@ def _distance_around(
 
 
 def _rows_with(ids: Ints, n: int) -> tuple[Ints, Ints]:
-    """Return where the rows that contain each of n ids begin, and these rows."""
+    """Return the rows that contain each of n ids, one id after another, preceded by (n + 1,) where each id's begin."""
     starts, places = grouped(ids.ravel(), n)
     return starts, places // ids.shape[1]
 
@@ -159,9 +159,9 @@ def _rows_with(ids: Ints, n: int) -> tuple[Ints, Ints]:
 def _any_angle(
     planes: Planes, vertices: Vertices, surface: SourceSurface, nearest: Ints, slack: float, queue: Queue
 ) -> tuple[Floats, Floats, int]:
-    """Return distances of vertices, where their paths start on the surface, and how many do not see that place.
+    """Return distances of vertices, where their paths start on the surface, and how many do not see the nearest place.
 
-    `nearest`, (n,), the nearest triangles through anything or −1, is overwritten; lines may be `slack` outside.
+    `nearest` (n,), the nearest triangles, in sight or not, or −1, is overwritten. Lines may be `slack` outside.
     """
     points, tets, _, first_tet, tets_at = vertices
     n = len(points)
@@ -174,7 +174,7 @@ def _any_angle(
             square, _, places[v, 0], places[v, 1], places[v, 2] = foot_on_triangle(surface.rows, nearest[v], x, y, z)
             if _sees(planes, vertices, v, places[v], slack):
                 distance[v], known[v] = np.sqrt(square), True
-    for i in range(len(surface.rows)):  # a triangle in a tet is visible from the tet's corners, if not nearest to them
+    for i in range(len(surface.rows)):  # each is visible from the corners of its tet, though it may not be the nearest
         for k in range(4):
             v = tets[surface.owners[i], k]
             if surface.owners[i] >= 0 and not known[v] and nearest[v] >= 0:

@@ -21,15 +21,15 @@ from .tet_mesh import TetMesh
 
 @dataclass(frozen=True, eq=False)
 class TetSource(Frozen):
-    """Sources on a tet mesh; a patch is all clipped polygons nearest to one vertex, or of faces of the mesh at one."""
+    """Sources on a tet mesh; a patch is all clipped polygons nearest to one vertex, and its thirds of covered faces."""
 
     vectors: Floats  # (f, 3) X₀ at the faces
     strengths: Floats  # (f,) the scalar source: areas without their normals, as for an unsigned distance
     centers: Floats  # (p, 3) centroids of the clipped polygons
     time: float  # t of Eq. 12
     interpolation: sparse.csr_matrix  # (s, n) row i averages φ over patch i
-    # (s, 3n) from the gradients of φ at the unknowns (x, y, z of each in turn) to the difference between the average of
-    # a quadratic φ and that of its linear interpolant
+    # (s, 3n) maps the gradients of φ at the unknowns (x, y, z of each in turn) to the average of a quadratic φ minus
+    # that of its linear interpolant
     quadratic_correction: sparse.csr_matrix
     weights: Floats  # (s,) area of each patch
     # (s,) connected component, and source, that each patch belongs to
@@ -90,7 +90,7 @@ def tet_source(
 
 
 def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygons:
-    """Clip triangles against the tets, or find the tets that contain points."""
+    """Clip the triangles of a source against the tets, or find the tets that contain its points."""
     if elements.corners.shape[1] == 3:
         polygons = clip_triangles(mesh.geometry, planes, elements.corners)
         sizes = np.linalg.norm(elements.vectors, axis=1)
@@ -105,7 +105,7 @@ def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygo
 def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> Floats:
     """Return (f, 4) X₀ at the faces (Sec. 8.1), and in the last column the scalar source.
 
-    A polygon goes to the faces of its tet as ψ = 1 − 3λ, where positive: negative shares emit waves of the wrong sign.
+    A polygon is shared by the faces of its tet as ψ = 1 − 3λ, if positive: negative shares emit waves of wrong sign.
     A plane wave decays by e^(−r/√t), so a face δ √t ahead emits e^δ times too much forward, e^−δ backward; weights that
     are a mean of e^−δ and e^δ correct both.
     """
@@ -128,7 +128,7 @@ def _patches(
 ) -> tuple[sparse.csr_matrix, sparse.csr_matrix, Floats, Ints]:
     """Return interpolation rows, quadratic corrections, areas and components of the patches.
 
-    Rows for all polygons are too many for linear functions. A quadratic φ at x is ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
+    Linear functions cannot satisfy a row per polygon. A quadratic φ at x is ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
     """
     corners = unknowns[polygons.tets]
     conforming = _on_whole_faces(mesh, polygons, components)
