@@ -31,7 +31,7 @@ class IncompleteCholesky:
 
     @classmethod
     def of(cls, matrix: sparse.csr_matrix, order: Ints) -> IncompleteCholesky:
-        """Factorise; if a pivot is not positive, again with a larger diagonal (Manteuffel 1980)."""
+        """Factorise a matrix; if a pivot is not positive, start again with a larger diagonal (Manteuffel 1980)."""
         chosen = sparse.csr_matrix(matrix[order][:, order])
         factor = sparse.csr_matrix(sparse.tril(chosen, -1))
         factor.sort_indices()
@@ -47,8 +47,8 @@ class IncompleteCholesky:
         """Solve for columns b, (n,) or (n, k), until ``‖r‖ ≤ relative · ‖b‖`` or ``|r_i| ≤ componentwise · A_ii
         |x_i|``.
 
-        The second keeps solutions accurate that fall by hundreds of orders of magnitude, if `order` is that of the
-        fall.
+        The second criterion keeps solutions accurate that decay by hundreds of orders of magnitude, if `order` follows
+        the decay.
         """
         b = np.asarray(rhs, dtype=np.float64)
         x = np.zeros((self.n, b[0].size))
@@ -91,7 +91,7 @@ def outward_order(matrix: sparse.csr_matrix, seeds: Ints) -> Ints:
 
 
 def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
-    """Factorise a system given by its upper triangle, with unknowns by distance from the first of each component."""
+    """Factorise a matrix given by its upper triangle, in order of distance from the first unknown of each component."""
     full = whole(upper)
     _, first = np.unique(sparse.csgraph.connected_components(full, directed=False)[1], return_index=True)
     return IncompleteCholesky.of(full, outward_order(full, first))

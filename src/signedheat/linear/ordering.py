@@ -13,7 +13,7 @@ from ..compiled import compiled
 
 
 def elimination_order(upper: Any) -> Ints:
-    """Order unknowns of a sparse symmetric matrix by nested dissection, for surfaces: ``order[k]`` is the k-th."""
+    """Order unknowns of a sparse symmetric matrix by nested dissection, for surfaces; ``order[k]`` is the k-th."""
     graph = whole(upper)
     return _dissect(graph.indptr, graph.indices)
 
@@ -22,7 +22,8 @@ def elimination_order(upper: Any) -> Ints:
 def _dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32]) -> Ints:
     """Order both sides of a small separator, each in the same way, then the separator, in one partitioned array.
 
-    It is the smallest level near the middle of a breadth-first search from the end of a long path (George 1973).
+    A separator is the smallest level near the middle of a breadth-first search from the end of a long path (George
+    1973).
     """
     n = len(starts) - 1
     order = np.arange(n)

@@ -46,7 +46,7 @@ class PardisoFactor:
             analysis.factorize(self._values)
 
     def like_this(self, upper: sparse.csr_matrix) -> PardisoFactor | None:
-        """Factorise a matrix with entries at the same places in the memory of this factor, or return None."""
+        """Factorise a matrix in the memory of this factor; return None if its entries are elsewhere or MKL cannot."""
         return self._again(upper) if self._analysis.fits(upper) and _makes_factors_anew() else None
 
     def _again(self, upper: sparse.csr_matrix) -> PardisoFactor:
@@ -86,7 +86,7 @@ class _Analysis:
         self.call(_ANALYZE)
 
     def factorize(self, values: NDArray[Any]) -> None:
-        """Factorise the matrix with these values, unless that was done last."""
+        """Factorise the matrix with these values, unless its factor is the one in memory."""
         if self._made is values:
             return
         self._made, self.call.values = None, values
@@ -177,7 +177,7 @@ def _library() -> ctypes.CDLL:
 
 @cache
 def _makes_factors_anew() -> bool:
-    """Return whether the library can: before 2026.2 two-level factors silently stay those of the first matrix."""
+    """Return whether MKL can reuse an analysis: before 2026.2 two-level factors silently stay those of the first."""
     one, two = (sparse.csr_matrix(np.array([[diagonal]])) for diagonal in (1.0, 2.0))
     half = PardisoFactor(one)._again(two).solve(np.ones(1))[0]
     return bool(abs(half - 0.5) < 0.25)  # the result is rounded on some processors

@@ -14,8 +14,8 @@ from ..arrays import Bools, Floats
 Solve = Callable[[NDArray[Any]], NDArray[Any]]
 """From right-hand sides (n, k) or (n,) to the solutions."""
 Forces = Callable[[NDArray[Any], Bools], tuple[Bools, NDArray[Any]]]
-"""From x, zero except on the faint rows, and these rows, to (n,) the rows that couple faint rows to others, and A x
-there."""
+"""From x, zero except on faint rows, where it is too small, and (n,) which these are, to (n,) which rows couple them to
+others, and A x there."""
 
 
 class Stage(NamedTuple):
@@ -28,14 +28,14 @@ class Stage(NamedTuple):
 def solve_with_restarts(solve: Solve, border_forces: Forces, loads: NDArray[Any], size: float = 1.0) -> list[Stage]:
     """Solve ``A x = loads`` for columns that decay exponentially away from the loads; return the stages of x.
 
-    Loads are scaled to `size`, about that of the diagonal; each stage has the rows on which those before are too small.
+    Loads are scaled to `size`, about that of the diagonal; each stage has the rows on which earlier ones are too small.
     """
     loads, logarithm = scaled(loads, size)
     return restart(solve, border_forces, loads, Stage(solve(loads), logarithm), size)
 
 
 def restart(solve: Solve, border_forces: Forces, loads: NDArray[Any], first: Stage, size: float = 1.0) -> list[Stage]:
-    """Return all stages, given the first: on faint rows x solves the same equation with a load along their border."""
+    """Return all stages, given the first: where x is too faint, it solves the same equation loaded along the border."""
     stages, unknown = [first], np.ones(len(loads), dtype=bool)
     while True:
         values, logarithm = stages[-1]

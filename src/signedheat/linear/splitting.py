@@ -18,13 +18,13 @@ class Round(NamedTuple):
     image: NDArray[Any]  # K x
     split: NDArray[Any]  # z
     before: NDArray[Any]  # z in the round before
-    scaled_dual: NDArray[Any]  # multipliers over the penalty; the next round uses it as changed in place
+    scaled_dual: NDArray[Any]  # multipliers over the penalty; changes made in place are used by the next round
 
 
 def split_rounds(
     proximal: Map, solve: Map, apply: Map, image: NDArray[Any], split: NDArray[Any], relaxation: float = 1.6
 ) -> Iterator[Round]:
-    """Yield the state after each round, without end; `image` and `split` are K x and z to begin with.
+    """Yield the state after each round, without end; `image` and `split` are the initial K x and z.
 
     `proximal` minimises f(z) + ρ/2 |z − v|², v = K x + u; `solve` minimises g(x) + ρ/2 |K x − v|², v = z − u.
     Rounds are fewest with a relaxation of 1.5 to 1.8.

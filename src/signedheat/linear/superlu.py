@@ -21,7 +21,7 @@ from .ordering import elimination_order, whole
 
 
 class SuperLUFactor:
-    """Factor ``L D Lᴴ`` of a Hermitian positive definite matrix, in an order: SuperLU's own takes minutes."""
+    """Factor ``L D Lᴴ`` of a Hermitian positive definite matrix, in an order found here: SuperLU's takes minutes."""
 
     backend = "superlu"
 
@@ -69,7 +69,7 @@ class SuperLUFactor:
 def _substitute(
     starts: NDArray[np.int32], rows: NDArray[np.int32], lower: NDArray[Any], pivots: Floats, x: NDArray[Any]
 ) -> None:
-    """Replace a right-hand side x (n,) by the solution of ``L D Lᴴ x``, L given by columns."""
+    """Replace the right-hand side x (n,) by the solution y of ``L D Lᴴ y = x``; L is given by columns."""
     for j in range(len(pivots)):
         for k in range(starts[j] + 1, starts[j + 1]):
             x[rows[k]] -= lower[k] * x[j]
@@ -85,7 +85,7 @@ def _substitute(
 def _substitute_columns(
     starts: NDArray[np.int32], rows: NDArray[np.int32], lower: NDArray[Any], pivots: Floats, x: NDArray[Any]
 ) -> None:
-    """Do the same for the columns of x (n, k) at once: each entry of L is read for all of them."""
+    """Do as `_substitute` for all columns of x (n, k) at once, so that each entry of L is read once for all."""
     for j in range(len(pivots)):
         for k in range(starts[j] + 1, starts[j + 1]):
             row, entry = rows[k], lower[k]

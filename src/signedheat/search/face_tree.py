@@ -30,15 +30,15 @@ FOLDED_EDGE = 0.02
 DISC_THICKNESS = 0.5
 """Thickness over radius up to which a disc is used besides the box."""
 FARTHEST_SEARCH = 1e7
-"""Distance, in sizes of a surface, at which farther points are searched for: rounding, which grows with distance, and
-the other angle then move the nearest place by at most 1e-7 of the size."""
+"""Distance, in sizes of a surface, to which farther points are moved before a search, since rounding grows with
+distance. Rounding and the changed angle then move the nearest place by at most 1e-7 of the size."""
 
 
 class FaceFeatures(NamedTuple):
     """Triangles with the normals of their features (Bærentzen & Aanæs 2005).
 
     An edge is regular if exactly two faces share it, run along it in opposite directions and do not lie on each other;
-    a vertex is regular if all edges around it are and its faces make one fan. There the sign of ``(x − y) · normal`` is
+    a vertex is regular if all edges around it are and its faces make one fan. There, the sign of ``(x − y) · normal`` is
     the side of a point x whose nearest place is y.
     """
 
@@ -49,8 +49,8 @@ class FaceFeatures(NamedTuple):
     edges: NDArray[np.int32]  # (m, 3) edges, from corner k to corner k + 1
     face_normals: Floats  # (m, 3) unit normals
     edge_normals: Floats  # (e, 3) sums of the unit normals of the faces at each edge
-    vertex_normals: Floats  # (n, 3) sums of these weighted by the angles of the faces
-    # (e,) and (n,) whether the surface is closed and consistent there
+    vertex_normals: Floats  # (n, 3) sums of the unit normals of the faces at each vertex, weighted by angles
+    # (e,) and (n,) whether each edge and vertex is regular: the surface is closed and consistent there
     edge_regular: Bools
     vertex_regular: Bools
     trusted: NDArray[np.float32]  # (m,) confidence in each face: 1 for given faces, less for completed ones
@@ -58,7 +58,7 @@ class FaceFeatures(NamedTuple):
 
     @classmethod
     def of(cls, vertices: Floats, faces: Ints, trusted: NDArray[np.float32] | None = None) -> FaceFeatures:
-        """Compute the features of (m, 3) faces; coincident vertices are one, and faces without extent and copies go."""
+        """Compute the features of (m, 3) faces: merge coincident vertices, drop faces without extent and copies."""
         faces = same_positions(vertices)[faces]
         trusted = np.ones(len(faces), dtype=np.float32) if trusted is None else trusted
         ids = np.arange(len(faces))
@@ -105,7 +105,7 @@ def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: in
     corners, fan = faces.ravel(), np.empty(n_vertices, dtype=np.int64)
     fan[corners] = fans
     vertices = np.ones(n_vertices, dtype=bool)
-    vertices[corners[fans != fan[corners]]] = False  # at which several cones touch
+    vertices[corners[fans != fan[corners]]] = False  # several cones touch at these
     vertices[table.vertices[~edges]] = False
     return edges, vertices
 
@@ -114,7 +114,7 @@ def _copies(faces: Ints, table: EdgeTable) -> Bools:
     """Return which faces repeat earlier ones, with the same corners in the same order of rotation."""
     copies, ahead = np.zeros(len(faces), dtype=bool), (table.face_counts + table.balance) // 2
     alike = np.where(table.forward, ahead[table.face_edges], (table.face_counts - ahead)[table.face_edges])
-    beside_others = np.flatnonzero((alike > 1).all(axis=1))  # others run along all their edges as they do
+    beside_others = np.flatnonzero((alike > 1).all(axis=1))  # along all edges of these, others run the same way
     if len(beside_others):
         first, reverse = coincident_faces(faces[beside_others].ravel(), np.arange(0, 3 * len(beside_others) + 1, 3))
         copies[beside_others] = same_rows(np.column_stack([first, reverse])) != np.arange(len(beside_others))
@@ -136,12 +136,12 @@ class FaceTree:
 
     @classmethod
     def of_triangles(cls, triangles: Floats, trusted: NDArray[np.float32] | None = None) -> FaceTree:
-        """Build the tree of (m, 3, 3) triangles, of which one has area; corners at one position are one vertex."""
+        """Build the tree of (m, 3, 3) triangles, at least one with area; corners at one position are one vertex."""
         return cls.of(FaceFeatures.of(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), trusted))
 
     @cached_property
     def discs(self) -> Floats:
-        """(2 · leaves, 8) centre, normal, radius and half thickness of the faces below each node; < 0 if not flat."""
+        """(2 · leaves, 8) centre, normal, radius, half thickness of a disc around the faces of each node; < 0 if none."""
         return _discs(self.features.corners, self.tree)
 
     def distances(self, points: Floats) -> Floats:
@@ -177,7 +177,7 @@ class FaceTree:
 
     def nearest(self, points: Floats) -> tuple[NDArray[np.int32], Floats]:
         """Return the nearest faces of points, and the squares of their distances."""
-        # a search starts again after 512 points: a part of those that a thread takes at a time
+        # a search starts afresh after 512 points, which divides what a thread takes at a time
         return nearest_faces(self.features.rows, self.tree, self.discs, points, 512)
 
 
@@ -231,14 +231,14 @@ class NearestFaces:
     distances: Floats  # (n,) its distance
     places: Floats  # (n, 3) the nearest place
     features: NDArray[np.int8]  # (n,) the feature that this place lies on, in the code of `foot_on_triangle`
-    # (n,) cosine of the angle between the normal and the way from the place to the point: positive in front of the face
+    # (n,) cosine of the angle between the normal and the vector from place to point: positive in front of the face
     cosines: NDArray[np.float32]
-    # (n,) whether that decides the side: the nearest place is inside a face, or on a regular edge or vertex
+    # (n,) whether its sign decides the side: the nearest place is inside a face, or on a regular edge or vertex
     regular: Bools
 
 
 def feet_on(features: FaceFeatures, faces: NDArray[np.int32], points: Floats) -> NearestFaces:
-    """Find the nearest place of each of (n,) faces to its own one of (n, 3) points."""
+    """Find the place on the k-th of (n,) faces that is nearest to the k-th of (n, 3) points, for all k."""
     return NearestFaces(faces, *_feet(features, faces, read_only(points)))
 
 
@@ -259,7 +259,7 @@ def _feet(
 
 @compiled
 def _facing(features: FaceFeatures, face: int, feature: int, dx: float, dy: float, dz: float) -> tuple[float, bool]:
-    """Return the cosine between a feature's normal and the way from a face, and whether it decides the side."""
+    """Return the cosine between a feature's normal and (dx, dy, dz), and whether its sign decides the side."""
     normals, row, regular = features.face_normals, np.int64(face), True
     if feature > 3:
         normals, row = features.vertex_normals, np.int64(features.faces[face, feature - 4])

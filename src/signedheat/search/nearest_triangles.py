@@ -16,18 +16,18 @@ from ..parallel import in_chunks
 # Feature codes of a foot: 0 inside the face; 1, 2, 3 on its edges (corner 0–1, 1–2, 2–0); 4, 5, 6 its corners 0, 1, 2.
 
 LEAST_HEIGHT = 1e-14
-"""Height of a triangle, relative to its length, up to which it counts as none: rounding would decide its direction."""
+"""Height of a triangle, relative to its length, up to which it counts as zero: rounding would decide its direction."""
 POINTS_TOGETHER = 8
 """Number of points that descend a tree together. With 16 a million points take a tenth less time on 20,000 faces, and a
-tenth more on 1.3 million, whose boxes are smaller than the distances between 16 random points; with 4 half as much
-again."""
+tenth more on 1.3 million, whose boxes are smaller than the distances between 16 random points; with 4 it is half as
+much again."""
 
 
 def triangle_rows(corners: Floats) -> Floats:
-    """Return (m, 16) what `foot_on_triangle` needs of (m, 9) corners, each in a plane of its own, from its first
-    corner.
+    """Return (m, 16) the rows that `foot_on_triangle` needs for triangles of (m, 9) corners, in coordinates of their
+    planes.
 
-    That corner; two axes, along the first side and across; its length; direction and length of sides 0–2 and 1–2.
+    Columns: first corner; axes along the first side and across; its length; direction and length of sides 0–2 and 1–2.
     """
     (rows,) = in_chunks(lambda chunk: (_rows(chunk),), corners)
     return rows
@@ -43,7 +43,7 @@ def _rows(corners: Floats) -> Floats:
     across = _dot(v, u)
     w = v - across * u
     flat = ~(np.sqrt(_dot(w, w)) > LEAST_HEIGHT * np.abs(across))
-    # the plane of flat ones is any through the side
+    # a flat triangle gets some plane through its first side
     w = np.where(flat, np.arange(3)[:, None] == np.abs(u).argmin(axis=0), w)
     for _ in range(2):  # twice, since the height of slivers has few accurate digits
         w = w - _dot(w, u) * u
@@ -65,7 +65,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 @compiled
 def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tuple[float, int, float, float, float]:
-    """Return the squared distance to triangle f, a feature code, and the three coordinates of the foot."""
+    """Return the squared distance to triangle f, and feature code and coordinates of the foot, its nearest point."""
     px, py, pz = x - rows[f, 0], y - rows[f, 1], z - rows[f, 2]
     p = px * rows[f, 3] + py * rows[f, 4] + pz * rows[f, 5]
     q = px * rows[f, 6] + py * rows[f, 7] + pz * rows[f, 8]
@@ -104,9 +104,9 @@ def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tupl
 
 @compiled
 def away_from_triangle(rows: Floats, f: int, places: Floats, at: int, out: Floats) -> None:
-    """Write squared distances of (3, n) places to a triangle, and ways from their feet, to ``out[at]``, (4, n).
+    """Write squared distances of (3, n) places to a triangle, and vectors from their feet, to ``out[at]`` (4, n).
 
-    This is `foot_on_triangle` without branches, for several places at once, if the compiler does not know their number.
+    This is `foot_on_triangle` without branches: many places are done at once if the compiler does not know how many.
     """
     ax, ay, az = rows[f, 0], rows[f, 1], rows[f, 2]
     ux, uy, uz = rows[f, 3], rows[f, 4], rows[f, 5]
@@ -152,7 +152,7 @@ def away_from_triangle(rows: Floats, f: int, places: Floats, at: int, out: Float
 
 @compiled
 def barycentric_on_triangles(rows: Floats, faces: NDArray[np.int32], points: Floats) -> Floats:
-    """Return (n, 3) barycentric coordinates of the place of a triangle that is nearest to each point."""
+    """Return (n, 3) barycentric coordinates of the place on the k-th of (n,) faces nearest to the k-th point."""
     weights = np.zeros((len(points), 3))
     for k in range(len(points)):
         f = np.int64(faces[k])
@@ -222,8 +222,8 @@ def _descend(
     """Find the nearest face of each point (n, 3), and the square of its distance, by descending a tree of boxes and
     discs.
 
-    Consecutive points descend together, as many as `best` is long, which the compiler must not know; every `run` points
-    the search starts again, in between from the face before.
+    Consecutive points descend together, as many as `best` is long, a number that the compiler must not know. A search
+    starts from the face found before; every `run` points it starts from none.
     """
     bounds, items = tree.bounds, tree.items
     out_faces, out_squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))

@@ -3,7 +3,7 @@
 Faces near a point count by their solid angles, faces far away by the moments of the nodes that contain them. Around a
 centre p, with offsets e and area vectors a, 4π times the winding number at ``p − d`` is, by Taylor's theorem, ``a·d /
 r³ + (tr M − 3 M(d) / r²) / r³ + (15 S(d) / r² − 3 tr S(d)) / 2 r⁵``, where ``M(d) = Σ (a·d) (e·d)`` and ``S(d) = Σ
-(a·d) (e·d)²`` are polynomials, whose symmetric parts are all that counts.
+(a·d) (e·d)²`` are polynomials, of which only the symmetric parts matter.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class WindingTree:
         return cls(triangles, BoxTree.around(triangles))
 
     def numbers(self, points: Floats) -> Floats:
-        """Return (n,) winding numbers around (n, 3) points, to some hundredths; on a face that of one of its sides."""
+        """Return (n,) winding numbers around (n, 3) points, to some hundredths; on a face those of one side."""
         corners = np.ascontiguousarray(self.triangles).reshape(-1, 9)
         points = np.ascontiguousarray(points)  # the kernel is compiled for one kind of array
         (numbers,) = in_chunks(lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk),), points)
@@ -87,7 +87,7 @@ def winding_sums(triangles: Floats, points: Floats) -> Floats:
 
 @compiled
 def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> Floats:
-    """Return (n,) winding numbers by solid angles in leaves, and far away by moments (`_moments`)."""
+    """Return (n,) winding numbers, by the solid angles of faces in near leaves and by the `_moments` of far nodes."""
     leaves = len(moments) // 2
     stack = np.empty(64, dtype=np.int64)
     result = np.zeros(len(points))
@@ -133,7 +133,7 @@ def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> F
 
 @compiled
 def solid_angle(corners: Floats, face: int, x: float, y: float, z: float) -> tuple[float, float]:
-    """Return a complex number with the argument of half a triangle's solid angle (van Oosterom & Strackee 1983)."""
+    """Return real and imaginary part whose argument is half a solid angle (van Oosterom & Strackee 1983)."""
     ax, ay, az = corners[face, 0] - x, corners[face, 1] - y, corners[face, 2] - z
     bx, by, bz = corners[face, 3] - x, corners[face, 4] - y, corners[face, 5] - z
     cx, cy, cz = corners[face, 6] - x, corners[face, 7] - y, corners[face, 8] - z
@@ -148,7 +148,7 @@ def solid_angle(corners: Floats, face: int, x: float, y: float, z: float) -> tup
 
 @compiled
 def mean_angle(corners: Floats, face: int, x: float, y: float, z: float) -> float:
-    """Return the signed solid angle of a triangle from a point, or 0, the mean of both sides, in its plane."""
+    """Return the signed solid angle of a triangle from a point; in its plane 0, the mean of those on both sides."""
     rest, volume = solid_angle(corners, face, x, y, z)
     scale = 1.0
     for c in range(0, 9, 3):
@@ -178,7 +178,7 @@ def _moments(triangles: Floats, tree: BoxTree) -> Floats:
     while True:
         rows = slice(level, 2 * level)
         low, high = tree.bounds[rows, :3].T, tree.bounds[rows, 3:].T
-        with np.errstate(invalid="ignore"):  # of empty nodes
+        with np.errstate(invalid="ignore"):  # for empty nodes
             box = np.linalg.norm(np.maximum(centres - low, high - centres), axis=0)
         radii = np.where(weights > 0, np.minimum(radii, box), 0.0)
         moments[rows, :3], moments[rows, 3:6], moments[rows, 6] = vectors.T, centres.T, (MOMENT_RADII * radii) ** 2
@@ -233,5 +233,5 @@ def _over(firsts: Floats, weights: Floats) -> Floats:
 
 
 def _of_pairs(values: Floats) -> Floats:
-    """Return (…, n / 2) sums of the two nodes below each."""
+    """Return (…, n / 2) sums over the two children of each node."""
     return values[..., ::2] + values[..., 1::2]
