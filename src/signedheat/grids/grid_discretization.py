@@ -36,7 +36,7 @@ SPACING_MARGIN = 1.08
 
 
 def memory_estimate(grid: Grid, per_node: float | None = None, extra: float = 0.0) -> int:
-    """Estimate the peak memory, in bytes, of work on a grid: a distance, or one of `per_node` and `extra` bytes."""
+    """Estimate the peak memory, in bytes, of a distance on a grid, or of work with `per_node` and `extra` bytes."""
     if per_node is None:
         per_node = BYTES_PER_GRID_NODE[grid.dimension]
     return int(per_node * grid.n_nodes + extra) + libraries()

@@ -122,7 +122,7 @@ def block_contour(
 
 
 def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Iterator[tuple[Ints, Floats, Ints]]:
-    """Yield, in order, the place of each window of blocks that the level set crosses, its vertices and faces."""
+    """Yield, in order, the place of each window of blocks that the level set crosses, and vertices and faces there."""
     least = CLEARANCE * float(spacing.min())
     capped = _reaches_walls(values, level)
     for window in np.unique(values.blocks.places // WINDOW, axis=0).astype(np.int64):

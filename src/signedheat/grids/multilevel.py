@@ -176,7 +176,7 @@ def _carried(level: Level, shape: tuple[int, ...], power: float) -> Guess | None
 def collapse(
     levels: list[Level], shape: tuple[int, ...], components: int, extract: Callable[..., None]
 ) -> NDArray[np.float32]:
-    """Return (components, *shape) ``extract(vectors, inside, out, …)`` of X, at each node of its finest valid level."""
+    """Return (components, *shape) ``extract(vectors, inside, out, …)`` of X on the finest level valid at each node."""
     shapes = [tuple(shape)]
     for level in levels[:-1]:
         shapes.append(_coarse_shape(shapes[-1], level.factors))

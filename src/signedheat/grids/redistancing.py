@@ -264,7 +264,10 @@ def distances_to(contour: Contour, places: Floats) -> Floats:
 
 
 def _around(contour: Contour, corners: Ints, distances: Floats, places: Floats) -> Floats:
-    """Correct (n,) distances to triangles of (n, 3) corners: where the nearest corner is smooth, to its circle's."""
+    """Return (n,) distances of places, given those to the nearest triangles, whose corners are (n, 3) crossings.
+
+    Where the nearest corner is smooth, its circle takes the place of the triangle, up to `uneven` nearer or farther.
+    """
     squares = np.empty(corners.shape)
     for k in range(3):
         away = places - contour.points[corners[:, k]]
@@ -342,7 +345,7 @@ def _between_others(vertices: Floats, faces: Ints, chosen: Bools) -> None:
 
 
 def _unevenness(curved: Crossings, linear: Floats, pairs: Ints) -> Floats:
-    """Return (c,) the larger of each crossing's way from the linear place, and its neighbours' from its paraboloid."""
+    """Return (c,) how far each crossing lies from its linear place, or its neighbours from its paraboloid, if more."""
     uneven: Floats = np.linalg.norm(curved.places - linear, axis=1)
     crossing, neighbor = np.concatenate([pairs, pairs[:, ::-1]]).T
     away = curved.places[neighbor] - curved.places[crossing]
