@@ -127,6 +127,7 @@ def beyond(planes: Planes, tet: int, k: int, x: float, y: float, z: float) -> fl
 
 @compiled
 def _locate(planes: Planes, points: Floats, starts: Ints, near: Ints) -> Ints:
+    """Return (k,) the tet, of those `near`, in which each point lies deepest; −1 if it lies in none."""
     tets = np.full(len(points), -1, dtype=np.int64)
     for p in range(len(points)):
         deepest = -np.inf

@@ -116,7 +116,10 @@ class TetDiscretization(DiffusesEach):
         return HeatSystem(matrix, self.direct)
 
     def _in_tets(self, stages: list[Stage]) -> tuple[Floats, Floats, Floats]:
-        """Return mean X, gradient of its last column and log scale of each tet, by the last stage with its faces."""
+        """Return (m, k) means of X in tets, (m, 3) gradients of its last column, and (m,) logarithms of their scales.
+
+        All are those of the last stage that has the four faces of a tet.
+        """
         tet_faces = self.mesh.faces.tet_faces
         n = self.mesh.n_tets
         means, gradients, factors = np.zeros((n, stages[0].values.shape[1])), np.zeros((n, 3)), np.full(n, -np.inf)

@@ -59,7 +59,7 @@ def _(
     tolerance: float,
     report: Callable[[], None] | None,
 ) -> Nearest:
-    """Measure any-angle distance to the given faces, and to parts of the zero set over `FAR_EDGES` from all of them.
+    """Measure any-angle distance to the given faces, and to the zero set where it is over `FAR_EDGES` from all.
 
     Within `SIDE_EDGES` of a face its side decides the sign, where the shape is closed and consistent around the nearest
     place.
@@ -150,7 +150,7 @@ def _distance_around(
 
 
 def _rows_with(ids: Ints, n: int) -> tuple[Ints, Ints]:
-    """Return the rows that contain each of n ids, one id after another, preceded by (n + 1,) where each id's begin."""
+    """Return (n + 1,) starts and a list of rows: those from ``starts[i]`` up to ``starts[i + 1]`` contain id i."""
     starts, places = grouped(ids.ravel(), n)
     return starts, places // ids.shape[1]
 

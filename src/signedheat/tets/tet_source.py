@@ -21,7 +21,11 @@ from .tet_mesh import TetMesh
 
 @dataclass(frozen=True, eq=False)
 class TetSource(Frozen):
-    """Sources on a tet mesh; a patch is all clipped polygons nearest to one vertex, and its thirds of covered faces."""
+    """Sources on a tet mesh.
+
+    A patch belongs to one vertex and one component: the clipped polygons nearest to the vertex, and a third of each
+    face of the mesh at the vertex that the component covers.
+    """
 
     vectors: Floats  # (f, 3) X₀ at the faces
     strengths: Floats  # (f,) the scalar source: areas without their normals, as for an unsigned distance
