@@ -62,8 +62,9 @@ def factorize(
     """Factorise a sparse Hermitian positive definite matrix, float64 or complex128; only its upper triangle is read.
 
     The back end is by default that of the environment variable ``SIGNEDHEAT_BACKEND``, or the fastest. ``order[k]`` is
-    eliminated k-th. If many systems will be solved (`reused`), PARDISO finds an order with which it uses all cores. A
-    factor `like`, of a matrix with entries at the same places, halves the time; both share the memory of one.
+    eliminated k-th. If many systems will be solved (`reused`), PARDISO finds an order with which it uses all cores. If
+    `like` is the factor of a matrix with entries at the same places, this takes half the time, and both factors share
+    the memory of one.
     """
     name = chosen_backend(backend)
     upper = upper_triangle(matrix)

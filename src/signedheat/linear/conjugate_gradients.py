@@ -24,7 +24,8 @@ def conjugate_gradients(
     range.
 
     Preconditioned conjugate gradients (Hestenes & Stiefel 1952), `precondition` P about A⁻¹. A column is done once ``rᵀ
-    P r ≤ tolerance² · max(r₀ᵀ P r₀, bᵀ P b)``, or if pᵀ A p ≤ 0; all are after `limit` steps or if `converged`.
+    P r ≤ tolerance² · max(r₀ᵀ P r₀, bᵀ P b)``, or if ``pᵀ A p ≤ 0``; all are done after `limit`
+    steps, or once ``converged(x, r)``.
     """
     apply_p = precondition or np.copy
     x = np.zeros_like(rhs) if start is None else start.copy()

@@ -59,6 +59,7 @@ class IncompleteCholesky:
         return x.reshape(b.shape)
 
     def _iterate(self, load: Floats, relative: float, componentwise: float) -> Floats:
+        """Solve for columns (k, c) whose rows are in the order of the factor."""
         shape, goal = load.shape, relative**2 * float(np.einsum("ij,ij->", load, load))
         diagonal, factor = self.matrix.diagonal(), self.factor
 

@@ -38,7 +38,7 @@ class FaceFeatures(NamedTuple):
     """Triangles with the normals of their features (Bærentzen & Aanæs 2005).
 
     An edge is regular if exactly two faces share it, run along it in opposite directions and do not lie on each other;
-    a vertex is regular if all edges around it are and its faces make one fan. There, the sign of ``(x − y) · normal`` is
+    a vertex is regular if all its edges are and its faces make one fan. At these the sign of ``(x − y) · normal`` is
     the side of a point x whose nearest place is y.
     """
 
@@ -114,7 +114,7 @@ def _copies(faces: Ints, table: EdgeTable) -> Bools:
     """Return which faces repeat earlier ones, with the same corners in the same order of rotation."""
     copies, ahead = np.zeros(len(faces), dtype=bool), (table.face_counts + table.balance) // 2
     alike = np.where(table.forward, ahead[table.face_edges], (table.face_counts - ahead)[table.face_edges])
-    beside_others = np.flatnonzero((alike > 1).all(axis=1))  # along all edges of these, others run the same way
+    beside_others = np.flatnonzero((alike > 1).all(axis=1))  # other faces run along all edges of these as they do
     if len(beside_others):
         first, reverse = coincident_faces(faces[beside_others].ravel(), np.arange(0, 3 * len(beside_others) + 1, 3))
         copies[beside_others] = same_rows(np.column_stack([first, reverse])) != np.arange(len(beside_others))
@@ -141,7 +141,7 @@ class FaceTree:
 
     @cached_property
     def discs(self) -> Floats:
-        """(2 · leaves, 8) centre, normal, radius, half thickness of a disc around the faces of each node; < 0 if none."""
+        """(2 · leaves, 8) centre, normal, radius and half thickness of each node's disc; < 0 if faces are not flat."""
         return _discs(self.features.corners, self.tree)
 
     def distances(self, points: Floats) -> Floats:
@@ -246,6 +246,7 @@ def feet_on(features: FaceFeatures, faces: NDArray[np.int32], points: Floats) ->
 def _feet(
     features: FaceFeatures, faces: NDArray[np.int32], points: Floats
 ) -> tuple[Floats, Floats, NDArray[np.int8], NDArray[np.float32], Bools]:
+    """Compute the columns of `NearestFaces`, without the faces."""
     n = len(points)
     distances, places, kinds = np.empty(n), np.empty((n, 3)), np.empty(n, dtype=np.int8)
     cosines, regular = np.empty(n, dtype=np.float32), np.empty(n, dtype=np.bool_)

@@ -42,7 +42,7 @@ class WindingTree:
         return cls(triangles, BoxTree.around(triangles))
 
     def numbers(self, points: Floats) -> Floats:
-        """Return (n,) winding numbers around (n, 3) points, to some hundredths; on a face those of one side."""
+        """Return (n,) winding numbers around (n, 3) points, to a few hundredths; on a face, those of one side."""
         corners = np.ascontiguousarray(self.triangles).reshape(-1, 9)
         points = np.ascontiguousarray(points)  # the kernel is compiled for one kind of array
         (numbers,) = in_chunks(lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk),), points)
@@ -133,7 +133,7 @@ def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> F
 
 @compiled
 def solid_angle(corners: Floats, face: int, x: float, y: float, z: float) -> tuple[float, float]:
-    """Return real and imaginary part whose argument is half a solid angle (van Oosterom & Strackee 1983)."""
+    """Return the parts of a complex number whose argument is half a solid angle (van Oosterom & Strackee 1983)."""
     ax, ay, az = corners[face, 0] - x, corners[face, 1] - y, corners[face, 2] - z
     bx, by, bz = corners[face, 3] - x, corners[face, 4] - y, corners[face, 5] - z
     cx, cy, cz = corners[face, 6] - x, corners[face, 7] - y, corners[face, 8] - z
