@@ -124,6 +124,7 @@ EVEN_SHARE = 1e-3
 
 
 def _around_disc(shares: Floats) -> Floats:
+    """(n, 2) points on the unit circle at shares of its circumference."""
     return np.stack([np.cos(2 * np.pi * shares), np.sin(2 * np.pi * shares)], axis=1)
 
 
@@ -379,7 +380,7 @@ def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
 
 
 def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple[_Run, _Run, _Run]] | None:
-    """Find the point near a loop where the planes of three runs meet that make it up, and these runs; or None."""
+    """Find three runs that make up a loop, whose planes meet near it: return this point, and the runs; or None."""
     following = {run.first: run for run in runs}
     for first in runs:
         second = following.get((first.first + first.count) % n_sides)

@@ -35,7 +35,7 @@ ALONG_A_CURVE = np.stack(
 def distances_in(
     tree: FaceTree, windings: Windings, grid: Grid, first: Ints, places: Ints
 ) -> tuple[Floats, NDArray[np.float32]]:
-    """Compute signed distances at nodes of blocks, in an (a, b, c) window from `first` on, or NaN; and confidence."""
+    """Compute (a, b, c) signed distances from node `first` on, NaN at nodes that are in no block; and confidence."""
     shape = np.minimum((places.max(axis=0) + 1) * BLOCK, grid.shape) - first
     squares, faces = np.full(tuple(shape), np.nan), np.full(tuple(shape), -1, dtype=np.int32)
     boxes = tree.features.rows, tree.tree.bounds, tree.discs, tree.tree.items
@@ -160,7 +160,7 @@ def _fill(
 def _nearest(
     rows: Floats, faces: NDArray[np.int32], count: int, places: Floats, away: Floats, best: Floats, which: Ints
 ) -> None:
-    """Write the squares of distances and vectors from all faces to places, and the least square and its face."""
+    """Write squared distances and vectors from all faces to places (`away`), and the nearest face with its square."""
     for e in range(len(best)):
         best[e], which[e] = np.inf, 0
     for c in range(count):

@@ -107,7 +107,7 @@ class Bodies:
 
     @classmethod
     def of(cls, pieces: Pieces, directed: Floats, groups: Ints, alone: Floats, given: Floats) -> Bodies:
-        """Find the bodies among directed pieces, of whose area `given` faces as it was given, less the rest."""
+        """Find the bodies among directed pieces; `given` is the area of each that faces as given, less the rest."""
         n = len(groups)
         itself = np.abs(alone) >= SHEET
         names, owners = np.unique(np.where(itself, n + np.arange(n), groups), return_inverse=True)

@@ -76,7 +76,7 @@ def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats
 
 
 def _slopes(phi: Floats, nodes: Ints, steps: Floats) -> Floats:
-    """(k, 3) differences of φ at nodes, one-sided at the walls."""
+    """(k, 3) gradients of φ at nodes by central differences, one-sided at the boundary of the grid."""
     slopes = np.empty((len(nodes), 3))
     for axis, step in enumerate(steps):
         low, high = nodes.copy(), nodes.copy()

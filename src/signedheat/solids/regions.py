@@ -75,7 +75,7 @@ class Regions:
 def cut_and_sided(
     cut: Callable[[float], Arrangement], closing: Bools, windings: Windings
 ) -> tuple[Arrangement, Regions]:
-    """Cut faces with the first tolerance with which those that bound the inside are closed, and find their regions.
+    """Cut faces with the first tolerance for which those that bound the inside are closed, and find their regions.
 
     If corners that should coincide are about a tolerance apart, edges stay open or sides contradict each other. Then
     larger tolerances are tried; if none works, that with the fewest faults is taken. `closing` tells which of the given

@@ -58,7 +58,7 @@ class Samples:
     radius: float
 
     def normalized(self) -> Samples:
-        """Move and scale the samples into the unit sphere; `center` and `radius` keep the original values.
+        """Move and scale the samples so that the shape fits the unit sphere; `center` and `radius` stay as they are.
 
         Returns
         -------

@@ -642,6 +642,7 @@ def still_true(notes: Sequence[Note], triangles: Floats, made: Bools) -> tuple[N
 
 
 def _mesh(triangles: Floats) -> TriangleMesh:
+    """Make a mesh of (m, 3, 3) triangles, with one vertex for each position."""
     if not len(triangles):
         raise SourceError("this part of the solid has no triangles", element="solid")
     points, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)

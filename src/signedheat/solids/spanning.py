@@ -14,7 +14,7 @@ from ..mesh.edges import edge_keys, edge_table
 LAYER_GROWTH = 0.35
 """Growth of triangles with their distance from the rim, relative to that distance."""
 MOST_TIES = 128
-"""Maximum number of equally distant points of a loop that are compared, and number of places that decide."""
+"""Maximum number of equally distant points of a loop that are compared, and number of places compared for each."""
 Frame = tuple[Floats, Floats]
 """Origin and (3, 2) axes of a plane."""
 
@@ -50,7 +50,7 @@ class Spanned:
 
 
 def frame_of(rim: Floats) -> Frame | None:
-    """Return the plane at right angles to a loop's area vector; None if its area is 0. There it is counterclockwise."""
+    """Return the plane of a loop's area vector, with axes in which it is counterclockwise; None if its area is 0."""
     normal = area_vector(rim)
     length = np.linalg.norm(normal)
     if not length > 1e-6 * np.linalg.norm(np.ptp(rim, axis=0)) ** 2:
@@ -94,7 +94,7 @@ def area_vector(loop: Floats) -> Floats:
 
 
 def spanned(loop: Floats, inner: Floats) -> Spanned | None:
-    """Make Delaunay triangles of a polygon in the plane and points inside it; return None if it crosses itself."""
+    """Make Delaunay triangles of a polygon in the plane and the `inner` points within it; None if it crosses itself."""
     count = len(loop)
     edges, shares = np.arange(count), np.zeros(count)
     for _ in range(8):  # until all edges of the rim, halved, are edges of the triangulation

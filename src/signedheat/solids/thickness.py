@@ -247,7 +247,7 @@ def thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
 
 
 def widths(shape: Mesh) -> Widths:
-    """Measure walls and gaps between opposite faces, not of folds, at places spread evenly over a shape."""
+    """Measure walls and gaps between opposite faces without a common corner, at places spread evenly over a shape."""
     mesh, exponent = shape.triangulation, int(np.frexp(np.abs(shape.bounds).max())[1])
     triangles = np.ldexp(mesh.vertices, -exponent)[mesh.faces]  # so that no product leaves the range of numbers
     size = float(np.ldexp(1.0, exponent))
