@@ -1,7 +1,7 @@
 """Division of triangles where others pass through them or lie in their planes, so that all meet in whole edges.
 
-Faces that meet have points in common: an edge and a face have one, two edges that touch, and three faces. Points nearer
-than rounding are one point, and pieces are made from these points alone, so that they share whole edges, whatever
+Faces meet in points: where an edge passes through a face, where two edges touch, and where three faces cross. Points
+closer than rounding are merged, and pieces are made from these points alone, so that they share whole edges, whatever
 rounding does, and what was closed stays closed. The time grows with the number of these points.
 """
 
@@ -24,12 +24,12 @@ from .welding import distinct_rows, welded
 SAME_POINT = 1e-8
 """Distance, relative to the size of a shape, below which points are one, since coordinates are rounded."""
 ON_LINE = 4.0
-"""Distance from a line within which common points of two faces lie on it, relative to that below which points are
-one."""
+"""Distance from a line within which the common points of two faces count as lying on it, in multiples of the distance
+below which points are one."""
 PARALLEL_EDGES = 1e-9
 """Sine of the angle between edges below which they are parallel."""
 COVERING_CELLS = 1e-4
-"""Relative difference in area and centroid up to which cells with one outline cover each other."""
+"""Relative difference in area and centroid up to which cells with the same outline count as covering each other."""
 ON_EDGE, IN_FACE, TWO_EDGES, EDGE_AND_FACE = range(4)
 """Kinds of meetings: a vertex lies on an edge or in a face, two edges touch, or an edge passes through a face."""
 
@@ -40,11 +40,11 @@ class Arrangement(NamedTuple):
     points: Floats  # (n, 3) the given points, followed by those where faces meet
     faces: Ints  # (p, 3) pieces, in order of the faces
     origins: Ints  # (p,) the face that each is a piece of, ascending
-    cells: Ints  # (p,) number of a cell: pieces of a face that are connected without a line between have the same
+    cells: Ints  # (p,) the cell of each piece: pieces of a face that no line separates are in one cell
 
 
 class Incidence(NamedTuple):
-    """Points that lie on lines or faces, as pairs of owner and point: each once, in order."""
+    """Points that lie on lines or in faces, as sorted pairs of owner (line or face) and point, without duplicates."""
 
     owners: Ints
     points: Ints
@@ -87,9 +87,9 @@ def meeting_faces(points: Floats, faces: Ints, touching: float = SAME_POINT) -> 
 
 
 def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, touching: float = SAME_POINT) -> Arrangement:
-    """Divide faces where pairs, (k, 2), by default all, meet, and where edges that do not cancel end on others.
+    """Divide faces where pairs of them, (k, 2), by default all, meet, and where unbalanced edges end on others.
 
-    Points nearer than `touching`, relative to the size of the shape, become one; thinner triangles are dropped.
+    Points are merged if closer than `touching`, relative to the size of the shape; thinner triangles are dropped.
     """
     slack = touching * float(np.ptp(points, axis=0).max())
     pairs = meeting_faces(points, faces, touching) if pairs is None else pairs
@@ -129,7 +129,7 @@ class Lines(NamedTuple):
     sides: Ints = np.zeros((0, 2), dtype=np.int64)  # (s, 2) the two faces of each segment
 
     def renamed(self, rename: Ints) -> Lines:
-        """Replace points by those that they have become one with."""
+        """Replace each point by the one that it was merged into, `rename` (n,)."""
         ends = rename[self.ends]
         on = Incidence.of((self.on.owners, rename[self.on.points]))
         on = on.select((on.points[:, None] != ends[on.owners]).all(axis=1))
@@ -137,7 +137,7 @@ class Lines(NamedTuple):
 
 
 def _welded(points: Floats, chosen: Ints, slack: float) -> Ints:
-    """Return (n,) the first of the chosen points at the place of each of them; all other points stay."""
+    """Return (n,) the point that each is merged into: of chosen points the first one at its place, else itself."""
     rename = np.arange(len(points))
     chosen = np.unique(chosen)
     rename[chosen] = chosen[welded(points[chosen], slack)]
@@ -145,7 +145,7 @@ def _welded(points: Floats, chosen: Ints, slack: float) -> Ints:
 
 
 def _with_new(points: Floats, names: Ints, places: Floats, new: Bools, ids: Ints) -> tuple[Floats, Ints]:
-    """Append one point for each different name among the new ones; return all, and the point of each name."""
+    """Append a point for each distinct `new` row of `names`; return all points, and `ids` with the new numbers."""
     numbers, first = distinct_rows(names[new])
     ids = ids.copy()
     ids[new] = len(points) + numbers
@@ -153,7 +153,7 @@ def _with_new(points: Floats, names: Ints, places: Floats, new: Bools, ids: Ints
 
 
 def _on_open_edges(points: Floats, table: EdgeTable, slack: float) -> tuple[Ints, Ints]:
-    """Return edges that do not cancel, and ends of others that lie on them."""
+    """Return pairs of an unbalanced edge and a vertex that lies on it and is an end of another unbalanced edge."""
     edges = np.flatnonzero(table.balance != 0)
     if not len(edges):
         return edges, edges
@@ -171,13 +171,13 @@ def _on_open_edges(points: Floats, table: EdgeTable, slack: float) -> tuple[Ints
 
 
 def _members(faces: Ints, table: EdgeTable, lines: Lines, chosen: Ints) -> Incidence:
-    """Return all points of chosen faces: corners, those on edges and those within."""
+    """Return all points of chosen faces: corners, points on edges and points inside."""
     sides, points = members_of(lines.on.starts(len(lines.ends)), lines.on.points, table.face_edges[chosen].ravel())
     return Incidence.of((np.repeat(chosen, 3), faces[chosen].ravel()), (chosen[sides // 3], points), lines.within)
 
 
 class Records(NamedTuple):
-    """Parts of lines that lie in faces, (r,) each: the face, the line, and the two points between which it does."""
+    """Parts of lines that lie in faces: (r,) face, line, and the two points at which each begins and ends."""
 
     faces: Ints
     lines: Ints
@@ -213,7 +213,7 @@ def _with_crossings(
     first, second = records.lines[crossing].T
     n_edges = len(lines.ends) - len(lines.sides)
     names = np.stack([np.minimum(first, second), np.maximum(first, second), np.full(len(first), -1)], axis=1)
-    three = names[:, 0] >= n_edges  # two segments: the face they lie in, and the other face of each
+    three = names[:, 0] >= n_edges  # two segments cross where three faces do, which name the point
     of_faces = np.sort(lines.sides[names[three][:, :2] - n_edges].reshape(-1, 4), axis=1)
     twice = np.append(of_faces[:, 1:] == of_faces[:, :-1], np.zeros((len(of_faces), 1), dtype=bool), axis=1)
     single = twice.sum(axis=1) == 1
@@ -228,7 +228,7 @@ def _with_crossings(
 def _divided(
     points: Floats, faces: Ints, origins: Ints, table: EdgeTable, lines: Lines, records: Records
 ) -> Arrangement:
-    """Triangulate all faces that have points on edges or lines within."""
+    """Triangulate all faces that have points on their edges, or points or lines inside; the others stay whole."""
     n_lines = len(lines.ends)
     on = lines.on.along(points, lines.ends)
     counts = np.bincount(on.owners, minlength=n_lines)
@@ -258,7 +258,7 @@ def _divided(
     chosen = np.flatnonzero(busy)
     if not len(chosen):
         return Arrangement(points, faces, origins, np.arange(len(faces)))
-    # the points on rims, in order
+    # the points on the boundary of each face, in order
     edges, forward = table.face_edges[chosen].ravel(), table.forward[chosen].ravel()
     side, place = members_of(starts, np.arange(starts[-1]), edges)
     backwards = ~forward[side]
@@ -311,7 +311,7 @@ def _divided(
 
 
 def _with_copies_alike(pieces: Arrangement) -> Arrangement:
-    """Give cells that cover each other the triangles of the first, reversed where they face the other way."""
+    """Give all cells that cover each other the triangles of the first one, reversed where they face the other way."""
     points, faces, origins, cells = pieces
     table = edge_table(faces)
     n = int(cells.max(initial=-1)) + 1
@@ -369,7 +369,7 @@ def _is_on(points: Floats, v: int, a: int, b: int, slack: float) -> bool:
 
 @compiled
 def _closest(points: Floats, a: int, b: int, c: int, d: int, place: Floats) -> float:
-    """Return the distance of two edges where they pass each other, and write the place; infinity if they do not."""
+    """Return the distance at which edges ab and cd pass each other, and write the middle; infinity if they do not."""
     u, v, w = points[b] - points[a], points[d] - points[c], points[c] - points[a]
     n, square, s, t = np.empty(3), 0.0, 0.0, 0.0
     for k in range(3):
@@ -419,7 +419,7 @@ def _is_over(points: Floats, x: Floats, face: Ints, n: Floats) -> bool:
 
 @compiled
 def _meet(points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Ints, slack: float) -> tuple[Ints, Floats]:
-    """Return (e, 3) meetings of pairs of faces: the kind and the two that meet; and the places of new points."""
+    """Return (e, 3) meetings of faces, as kind and the two elements that meet, and (e, 3) places of new points."""
     meetings, places = [(0, 0, 0)], [(0.0, 0.0, 0.0)]
     touch = np.empty((2, 3, 3), np.bool_)  # whether a corner of one lies on an edge of the other
     on, hit, heights = np.empty((2, 3), np.bool_), np.empty((2, 3), np.bool_), np.empty((2, 3))
@@ -483,7 +483,7 @@ class Chains(NamedTuple):
     """Lines with the points on them."""
 
     ends: Ints  # (l, 2)
-    # (l + 1,) where the points of each line begin in the second, and these points, in order of their numbers
+    # (l + 1,) where the points of each line begin in `points`, and these points, for each line in ascending order
     starts: Ints
     points: Ints
 
@@ -512,7 +512,7 @@ def _is_along(chains: Chains, line: int, p: int) -> bool:
 def _segments(
     points: Floats, starts: Ints, members: Ints, face_edges: Ints, chains: Chains, pairs: Ints, straight: float
 ) -> tuple[Ints, Ints]:
-    """Return parts of lines in faces, as rows of face, line and two ends; and the two faces of each new line."""
+    """Return (r, 4) parts of lines in faces, as rows of face, line and two ends, and (s, 2) the faces of new lines."""
     records, sides = [(0, 0, 0, 0)], [(0, 0)]
     ends = chains.ends
     for r in range(len(pairs)):
@@ -589,7 +589,7 @@ def _segments(
 def _cross(
     points: Floats, faces: Ints, lines: Ints, ends: Ints, starts: Ints, near: Ints, slack: float
 ) -> tuple[Ints, Ints, Floats]:
-    """Return lines and points on them; and pairs of parts of lines that cross within a face, and where."""
+    """Return (t, 2) pairs of a line and a point on it, (c, 2) pairs of parts that cross within a face, and where."""
     touching, crossing, places = [(0, 0)], [(0, 0)], [(0.0, 0.0, 0.0)]
     place = np.empty(3)
     for r in range(len(faces)):

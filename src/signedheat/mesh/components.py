@@ -10,12 +10,12 @@ from ..compiled import compiled
 
 
 def connected_components(n: int, tails: NDArray[np.integer], heads: NDArray[np.integer]) -> Ints:
-    """Return (n,) components of the nodes of a graph with edges from tails to heads, by first appearance."""
+    """Return (n,) the component of each node of a graph with edges tails to heads, numbered by first appearance."""
     return _labels(n, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (tails, heads)))
 
 
 def element_components(elements: Ints) -> Ints:
-    """Return (m,) components, by first appearance, of elements that share vertices, or edges if they name these."""
+    """Return (m,) the component of each of (m, k) elements, connected by common ids, numbered by first appearance."""
     links = np.repeat(elements[:, 0], elements.shape[1] - 1), elements[:, 1:].ravel()
     labels = connected_components(int(elements.max(initial=-1)) + 1, *links)[elements[:, 0]]
     return by_first_use(labels, int(labels.max(initial=-1)) + 1)[0]
@@ -33,7 +33,7 @@ def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
 
 @compiled
 def _labels(n: int, tails: Ints, heads: Ints) -> Ints:
-    """Join trees whose root is their least node; paths are halved on the way to it."""
+    """Return (n,) components by union-find: the root of each tree is its least node, and paths to it are halved."""
     parents = np.arange(n)
     for k in range(len(tails)):
         a, b = tails[k], heads[k]
@@ -55,7 +55,7 @@ def _labels(n: int, tails: Ints, heads: Ints) -> Ints:
 
 
 def grouped(groups: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
-    """Return (n + 1,) where the members of each of n groups begin, and the members in order."""
+    """Return (n + 1,) where the members of each of n groups begin, and the members, indices into `groups`, in order."""
     starts, members = _grouped(read_only(np.ascontiguousarray(groups, dtype=np.int64)), n)
     return starts, members
 
@@ -76,7 +76,7 @@ def places_among(ordered: NDArray[np.integer], keys: NDArray[np.integer]) -> Int
 
 
 def numbered(counts: Ints) -> tuple[Ints, Ints]:
-    """Return each of some groups as often as it has members, and the number of each member within its group."""
+    """Return the group of each member of groups of given sizes, and the number of each member within its group."""
     owners = np.repeat(np.arange(len(counts)), counts)
     return owners, np.arange(len(owners)) - (np.cumsum(counts) - counts)[owners]
 

@@ -28,7 +28,7 @@ Point = tuple[float, float]
 Edge = tuple[int, int]
 
 FLAT_AREA = 1e-14
-"""Twice the area below which a triangle is flat, and no flip makes it."""
+"""Twice the area of a triangle up to which it is flat; flips that would make such a triangle are not done."""
 
 
 def turn(a: Point, b: Point, c: Point) -> float:
@@ -44,14 +44,14 @@ def edges_of(triangle: Sequence[int]) -> tuple[Edge, Edge, Edge]:
 
 @dataclass(frozen=True)
 class _Line:
-    """A segment, and the fraction of it that is done, from its start."""
+    """A segment, and the fraction of it, from its start, along which there are edges already."""
 
     start: Point
     end: Point
     done: float = 0.0
 
     def share(self, x: Point) -> float:
-        """Return the fraction of the line at which its point nearest to a given point is."""
+        """Return the fraction of the segment at which its point nearest to x lies."""
         (px, py), (qx, qy) = self.start, self.end
         return ((x[0] - px) * (qx - px) + (x[1] - py) * (qy - py)) / ((qx - px) ** 2 + (qy - py) ** 2)
 
@@ -63,13 +63,13 @@ class _Line:
 
 @dataclass(frozen=True, eq=False)
 class Triangulation:
-    """Triangles on points of a triangle, whose corners are the first three points, counter-clockwise."""
+    """A triangulation of points in a triangle, whose corners are the first three points, counter-clockwise."""
 
     points: list[Point]  # positions
     # the corner opposite each directed edge, in the triangle that runs along it
     apex: dict[Edge, int] = field(default_factory=dict)
     leaving: dict[int, int] = field(default_factory=dict)  # the end of one of the directed edges that leave each point
-    # the points after the first along edges that are part of a segment: several where other segments cross them
+    # for each edge that is part of a segment, the points along it after the first: several if other segments cross it
     parts: dict[Edge, list[int]] = field(default_factory=dict)
 
     @classmethod
@@ -118,7 +118,7 @@ class Triangulation:
         return i
 
     def locate(self, x: Point) -> Sequence[int]:
-        """Find the triangle that contains a point by a walk over the edges that hide it, or by a search."""
+        """Find the triangle that contains a point by a walk across edges that it lies beyond, or else by a search."""
         points, apex = self.points, self.apex
         last = next(reversed(apex))
         triangle: Sequence[int] = (*last, apex[last])
@@ -148,7 +148,7 @@ class Triangulation:
     def connect(self, a: int, b: int) -> list[int]:
         """Make edges along a segment; return the points on it, with new ones where it crosses other segments.
 
-        They end before b if rounding is in the way for too long.
+        They end before b if rounding keeps edges from being made for too long.
         """
         way, line = [a], _Line(self.points[a], self.points[b])
         for _ in range(100 + len(self.apex)):
@@ -166,7 +166,7 @@ class Triangulation:
         return way
 
     def along(self, way: Sequence[int]) -> list[int]:
-        """Return the points along a way, with those that were put on it later."""
+        """Return the points along a path, including those that were put on its edges later."""
         points = [way[0]]
         for edge in pairwise(way):
             parts = self.parts[edge]
@@ -191,7 +191,7 @@ class Triangulation:
     def clear(self, a: int, b: int, edge: Edge, line: _Line) -> int:
         """Flip the edges that the segment from a to b crosses (Sloan 1993); return the point that it meets first.
 
-        Where rounding is in the way that is one near the segment; where it crosses another segment, at a new point, −1.
+        If rounding prevents flips, that is a point near the segment; at another segment, which gets a new point, −1.
         """
         points, apex = self.points, self.apex
         p, q = points[a], line.end
@@ -225,7 +225,7 @@ class Triangulation:
         return met if crossed is None else min(crossed, key=lambda i: abs(turn(p, q, points[i])))
 
     def _cross(self, p: Point, q: Point, u: int, w: int) -> None:
-        """Put a point where a segment crosses an edge along another one."""
+        """Put a point where the segment from p to q crosses edge uw, which is part of another segment."""
         r, s = self.points[u], self.points[w]
         right, left = turn(p, q, r), turn(p, q, s)
         t = right / (right - left)
@@ -246,7 +246,7 @@ class Triangulation:
 def refine_to_conform(
     triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
 ) -> tuple[IntrinsicMesh, list[list[CurveSegments]]]:
-    """Cut faces where unoriented curves cross them, with vertices at isolated points; return mesh and sources."""
+    """Cut faces that unoriented curves cross; points in cut faces become vertices. Return mesh and sources."""
     parts = [part for group in groups for part in group]
     if all(part.is_conforming for part in parts):
         return triangles, [list(group) for group in groups]
@@ -262,9 +262,9 @@ def cut_along(
     unfit: Sequence[bool] | None = None,
     begin: Ints | None = None,
 ) -> tuple[IntrinsicMesh, MergedSources, Bools, Ints]:
-    """Cut faces so that sources run along edges; return triangles, sources, which faces are new, and parents of all.
+    """Cut faces so that sources run along edges; return triangles, sources, which faces are new, and their parents.
 
-    Only `unfit` sources, by default all, must; others are cut where these are. Faces begin at a corner, `begin` (m,).
+    Only `unfit` sources (by default all) must; others do in faces that are cut. Face f begins at corner `begin[f]`.
     """
     merged = MergedSources.of(parts)
     faces, edges = affected_elements(triangles, merged, [True] * len(parts) if unfit is None else unfit)
@@ -275,7 +275,7 @@ def cut_along(
 
 
 def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Sequence[bool]) -> tuple[Ints, Ints]:
-    """Return the faces to cut and the edges to split: those of nonconforming sources, and those that these entail."""
+    """Return the faces to cut and the edges to split: those of `unfit` sources, and all that must then follow."""
     nodes, inside, m = merged.nodes, merged.edges < 0, triangles.n_faces
     last = m + triangles.n_edges
     face, end = np.repeat(merged.faces[inside], 2), merged.ends[inside].ravel()
@@ -349,7 +349,7 @@ class FaceCutter:
         return self.node_at[vertex]
 
     def cut_along(self, p: int, edge: int) -> None:
-        """Replace segment p, which lies on an edge that was split, by one between each two of its new vertices."""
+        """Replace segment p, which runs along a split edge, by a segment between each two successive vertices."""
         merged, (vertices, fractions, place) = self.merged, self.along_edge(edge)
         a, b = (place[self.vertex_of[i]] for i in merged.ends[p].tolist())
         step = 1 if a < b else -1
@@ -440,7 +440,7 @@ class FaceCutter:
             self.pieces.append(NewSegment(*ends, -1, edge, vector, self.merged.owners[p]))
 
     def assemble(self) -> tuple[IntrinsicMesh, MergedSources, Bools, Ints]:
-        """Return what `cut_along` returns."""
+        """Put the cut mesh and its sources together; see `cut_along` for what is returned."""
         triangles, merged = self.triangles, self.merged
         kept = np.setdiff1d(np.arange(triangles.n_faces), self.cut_faces)
         parents = np.concatenate([kept, [f.parent for f in self.faces]]).astype(np.int64)
@@ -488,7 +488,7 @@ class FaceCutter:
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """A face with the nodes on its sides, in the plane in which its corners are (0, 0), (1, 0) and (0, 1)."""
+    """A face and the nodes on its sides, in coordinates in which its corners are (0, 0), (1, 0) and (0, 1)."""
 
     points: list[Point]
     vertices: list[int]  # the vertex at each point
@@ -536,7 +536,7 @@ def points_on_elements(
 def flip_new_faces(
     triangles: IntrinsicMesh, merged: MergedSources, is_new: Bools
 ) -> tuple[IntrinsicMesh, MergedSources]:
-    """Flip edges of new faces to Delaunay, except those of segments, and of faces with one inside."""
+    """Flip edges of new faces to Delaunay, except edges with a segment or point, and of faces with one inside."""
     if not triangles.agree_on_lengths:
         return triangles, merged
     on_edge, nodes = merged.edges >= 0, merged.nodes

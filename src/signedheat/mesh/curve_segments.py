@@ -107,7 +107,7 @@ class MergedSources:
 def without_copies(parts: Sequence[CurveSegments], by_points: Bools) -> tuple[Ints, Ints]:
     """Find curves that repeat others: (u,) the first curve of each kind, and (k,) which of these each curve repeats.
 
-    Only those marked in `by_points` (k,), which join the same points in the same directions, do: normals may differ.
+    Curves in `by_points` (k,) repeat others that join the same points in the same directions; normals may differ.
     """
     merged = MergedSources.of(parts)
     bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
@@ -121,7 +121,7 @@ def without_copies(parts: Sequence[CurveSegments], by_points: Bools) -> tuple[In
 
 
 def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple[list[CurveSegments], Ints]:
-    """Join curves that `may_go_on` (k,), where no third ends, into lines; return lines, and the line of each curve."""
+    """Join curves that `may_go_on` (k,) into lines where no third curve ends; return lines, and that of each curve."""
     merged = MergedSources.of(parts)
     bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
     (tails, second), (last, heads) = merged.ends[bounds[:-1]].T, merged.ends[bounds[1:] - 1].T
@@ -173,7 +173,7 @@ def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegmen
 
 
 def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
-    """Return nodes, for each source, at which a segment goes straight on in another, and these two."""
+    """Return nodes at which one segment of a source goes straight on in another, and the segments before and after."""
     k = len(merged.ends)
     of_source = merged.owners[:, None] * len(merged.nodes) + merged.ends
     places, index = np.unique(of_source, return_inverse=True)
@@ -198,7 +198,7 @@ def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
 
 
 def _runs(k: int, before: Ints, after: Ints) -> tuple[Ints, Ints, Ints]:
-    """Return the run of each of k segments, in order of their first ones, and the two ends of each run."""
+    """Return the run of each of k segments, numbered by first segments, and the first and last segment of each run."""
     is_first, is_last = np.ones(k, dtype=bool), np.ones(k, dtype=bool)
     is_first[after] = False
     is_last[before] = False
@@ -214,7 +214,7 @@ def _runs(k: int, before: Ints, after: Ints) -> tuple[Ints, Ints, Ints]:
 def given_directions(
     triangles: IntrinsicMesh, positions: Floats, faces: Ints, edges: Ints, normals: Floats, name: str
 ) -> Complexes:
-    """Return unit vectors along normals projected into a face's layout, or, as a mean, the frame of an edge."""
+    """Return (k,) unit vectors along normals, projected into the layouts of faces, or averaged in edge frames."""
     largest = np.abs(normals).max(axis=1, initial=0.0)
     extreme = (largest > 1e100) | ((largest > 0) & (largest < 1e-100))  # their squares overflow or underflow
     normals = normals / np.where(extreme, largest, 1.0)[:, None]
@@ -244,7 +244,7 @@ def given_directions(
 
 
 def carried_left(triangles: IntrinsicMesh, faces: Ints, edges: Ints, lengths: Floats) -> Floats:
-    """Return −1 where the face that decides a segment's left is turned against those of most of the curve, else 1."""
+    """Return (k,) −1 where the face that decides which side is left is turned against most of the curve's, else 1."""
     telling, links, number = _agreement_around(triangles, faces, edges)
     signs = signs_of(links, int(number.max(initial=-1)) + 1)[number[telling]]
     most = float(np.sign(signs @ lengths)) or signs[0]
@@ -252,7 +252,7 @@ def carried_left(triangles: IntrinsicMesh, faces: Ints, edges: Ints, lengths: Fl
 
 
 def loses_orientation(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> bool:
-    """Return whether the faces around a curve cannot all be made to agree, as along the middle of a Möbius strip."""
+    """Return whether the faces around a curve cannot all be oriented alike, as along the middle of a Möbius strip."""
     _, links, number = _agreement_around(triangles, faces, edges)
     of_two = np.abs(links.weights) == 1  # of three faces around an edge two cannot agree
     links = Links(links.tails[of_two], links.heads[of_two], links.weights[of_two])
@@ -261,7 +261,7 @@ def loses_orientation(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> boo
 
 
 def _agreement_around(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> tuple[Ints, Links, Ints]:
-    """Return the face that decides the left of each segment, links between faces around a curve, and their numbers."""
+    """Return the face that decides each segment's left, links between faces around a curve, and the faces' numbers."""
     first = triangles.first_halfedges
     first_faces = np.zeros(triangles.n_edges, dtype=np.int64)
     first_faces[triangles.edges.face_edges.ravel()[first]] = first // 3
