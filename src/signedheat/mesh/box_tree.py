@@ -22,7 +22,7 @@ SPREAD_BITS = (
 )
 """Shifts and masks that spread the 21 low bits of a number so that each is followed by two zero bits."""
 LEAVES_AT_ONCE = 1 << 13
-"""Leaves whose slabs are computed at once; a power of two, with all nodes below `SLAB_LEVELS`."""
+"""Number of leaves whose slabs, on all `SLAB_LEVELS` levels above them, are computed at once; a power of two."""
 SLAB_LEVELS = 8
 """Levels of a tree over triangles, from the leaves up, that are bounded by slabs as well."""
 
@@ -34,10 +34,10 @@ class BoxTree(NamedTuple):
     bounds: Floats
     items: Ints  # (leaves · BOXES_PER_LEAF,) the boxes in each leaf, −1 where there are none
     groups: Ints  # (2 · leaves,) the group of all boxes below each node; −1 if they are of several
-    # (2 · leaves, 10) two directions, the mean normal and the one across long faces, each followed by the least and the
-    # largest extent along it of all below each node; or (0, 10)
+    # (2 · leaves, 10) for two directions, the mean normal of a node and one across it and a long side: the direction,
+    # and the least and the largest coordinate along it of all below the node; or (0, 10)
     slabs: Floats
-    triangles: Floats  # (n, 9) the triangles that the boxes are of, or (0, 9)
+    triangles: Floats  # (n, 9) the triangles that the boxes are around, or (0, 9)
 
     @classmethod
     def of(cls, lower: Floats, upper: Floats) -> BoxTree:
@@ -51,7 +51,7 @@ class BoxTree(NamedTuple):
 
     @classmethod
     def in_order(cls, lower: Floats, upper: Floats, order: Ints, groups: Ints | None = None) -> BoxTree:
-        """Build the tree over boxes in an order in which neighbours, and boxes of a group (−1: none), are together."""
+        """Build the tree over boxes in an order that keeps neighbours, and boxes of one group (−1: none), together."""
         n = len(lower)
         leaves = 1 << max(int(np.ceil(np.log2(max(n, 1) / BOXES_PER_LEAF))), 0)
         items = np.full(leaves * BOXES_PER_LEAF, -1, dtype=np.int64)
@@ -78,7 +78,7 @@ class BoxTree(NamedTuple):
 
     @classmethod
     def over(cls, triangles: Floats, order: Ints, groups: Ints | None = None) -> BoxTree:
-        """Build the tree over (n, 3, 3) triangles, bounded by slabs as well."""
+        """Build the tree over (n, 3, 3) triangles in a given order, as `in_order` does, with slabs."""
         tree = cls.in_order(*boxes_around(triangles), order, groups)
         corners = np.ascontiguousarray(triangles).reshape(-1, 9)
         return tree._replace(slabs=_slabs(triangles, tree.items), triangles=corners)
@@ -86,9 +86,9 @@ class BoxTree(NamedTuple):
     def meeting(
         self, triangles: Floats, slack: float | Floats = 0.0, groups: Ints | None = None, leaves: Ints | None = None
     ) -> tuple[Ints, Ints]:
-        """Find boxes near each of (n, 3, 3) triangles: (n + 1,) where those of each begin, and (k,) their numbers.
+        """Find boxes within `slack` of (n, 3, 3) triangles: (n + 1,) where those of each begin, and (k,) the boxes.
 
-        Nodes of the triangle's own group, (n,), are passed over; a search begins at its leaf, (n,), and goes right.
+        Nodes with only boxes of a triangle's own group, (n,), are skipped, and so are leaves before its own one, (n,).
         """
         corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(3, slack)
         own = np.full(len(corners), -1) if groups is None else np.ascontiguousarray(groups, dtype=np.int64)
@@ -104,7 +104,7 @@ class BoxTree(NamedTuple):
 
 @compiled
 def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, first: Ints, starts: Ints, out: Ints) -> None:
-    """Write the boxes near each triangle, as far as there is room, and where they begin."""
+    """Write the boxes near each triangle into `out`, as far as there is room, and where they begin into `starts`."""
     bounds, items, groups, slabs, triangles = tree
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
     lower, upper, ways, ends = np.empty(3), np.empty(3), np.empty((4, 3)), np.empty((4, 2))
@@ -134,7 +134,7 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, first: I
         if first[t] > 0:
             node = leaves + first[t]
             stack[0] = node
-            while node > 1:  # what lies to the right of its way up to the root
+            while node > 1:  # push all that lies to the right of the way up to the root
                 if node % 2 == 0:
                     stack[depth] = node + 1
                     depth += 1
@@ -202,7 +202,7 @@ def _is_beyond(triangle: Floats, lower: Floats, upper: Floats, ways: Floats, end
 
 
 def boxes_around(corners: Floats) -> tuple[Floats, Floats]:
-    """Return lower and upper corners of the boxes around (n, k, 3) corners: NumPy is slow along short axes."""
+    """Return (n, 3) lower and upper corners of the boxes around (n, k, 3) corners: NumPy is slow along short axes."""
     columns = corners.swapaxes(0, 1)
     return reduce(np.minimum, columns), reduce(np.maximum, columns)
 

@@ -14,9 +14,9 @@ Around a crossed edge from a to b lie four vertices, one in each cell. All trian
 four tetrahedra of the edge and two neighbouring vertices meet no triangle of another edge, since the tetrahedra of
 different edges do not overlap (Ju & Udeshi 2006, Sec. 4). On a regular grid the line between vertices of neighbouring
 cells always passes through the face between them, so that no vertices on faces are needed. Where neither diagonal stays
-within the tetrahedra, the four vertices are joined to the place where the edge is crossed. What may meet others are
-therefore triangles whose vertices have left their cells or have one in common with another piece, and those of flipped
-edges.
+within the tetrahedra, the four vertices are joined to the place where the edge is crossed. The only triangles that may
+meet others are therefore those with a vertex that has left its cell or shares it with another piece, and those of
+flipped edges.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class CrossedCells(NamedTuple):
     places: Ints  # (c, 3) first node of each
     edges: Ints  # (c, 12) number of each crossed edge; −1 where an edge is not crossed
     rows: Ints  # (e, 4) the cells around each crossed edge, counter-clockwise as seen from its end
-    sides: Ints  # (e, 4) which of their edges it is
+    sides: Ints  # (e, 4) which of the 12 edges of each of these cells it is
 
 
 def crossed_cells(crossings: Crossings, shape: tuple[int, ...]) -> CrossedCells:
@@ -87,7 +87,7 @@ def crossed_cells(crossings: Crossings, shape: tuple[int, ...]) -> CrossedCells:
 def dual_cells(
     crossings: Crossings, around: CrossedCells, shape: tuple[int, ...], inside: Callable[[Floats], Bools]
 ) -> DualCells:
-    """Find the pieces of a level set in the cells of a grid; `inside` is asked about the middles of faces, in cells."""
+    """Find the pieces of a level set in the cells of a grid; `inside` tells which points, in cells, are inside."""
     places, edges, rows, sides = around
     ways = np.zeros((len(places), 6), dtype=np.bool_)
     pieces = _pieces(edges, ways)
@@ -110,7 +110,7 @@ def dual_cells(
             double = np.flatnonzero((linked == linked[:, :1]).all(axis=1)[order].all(axis=1))
             if not len(double):
                 break
-            # one face of a cell at a time: each divides the pieces of both cells, two together may join them again
+            # one face of a cell at a time: each change divides the pieces of both cells, but two may join them again
             first_of = np.full(len(places), len(order))
             np.minimum.at(first_of, cells[order[double]], double[:, None])
             way[double[(first_of[cells[order[double]]] == double[:, None]).all(axis=1)]] ^= True
@@ -140,7 +140,7 @@ def _crossed_faces(edges: Ints) -> Ints:
 def _pieces(edges: Ints, ways: Bools) -> Ints:
     """Return (c, 12) the piece of each crossed edge, over all cells, or −1.
 
-    Of the four around a face, way 0 links the first with the last and the second with the third, way 1 the others.
+    Of four crossed edges of a face, way 0 links the first with the last, the second with the third; way 1 the others.
     """
     crossed, around = edges >= 0, _face_edges(np.arange(6))
     of_faces = crossed[:, around]
@@ -161,9 +161,9 @@ DIAGONAL_CLEARANCE = 1e-6
 def dual_triangles(
     cells: DualCells, crossings: Crossings, vertices: Floats, fanned: Bools
 ) -> tuple[Floats, Ints, Ints]:
-    """Join the vertices of pieces, (v, 3) in cells, to outward triangles (m, 3), by the better diagonals.
+    """Join the vertices of pieces, (v, 3) in cells, into outward triangles (m, 3), along the better diagonals.
 
-    Crossings of `fanned` edges, (e,), and without a possible diagonal, become vertices; these edges (k,) are returned.
+    Where an edge is `fanned`, (e,), or has no possible diagonal, its crossing becomes a vertex. These edges come last.
     """
     quads, axes, shares = cells.quads, crossings.axes, crossings.shares
     around = vertices[quads] - crossings.nodes[:, None]
@@ -194,7 +194,7 @@ def dual_triangles(
 def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) -> tuple[Floats, Ints]:
     """Return vertices and triangles that do not pass through each other, if possible, with edges along creases.
 
-    Vertices of those that do move from one of three `choices`, (3, v, 3), to the next, up to one inside the cells.
+    Vertices of triangles that do move on to the next of three `choices`, (3, v, 3), of which the last is in the cell.
     """
     count = choices.shape[1]
     chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(cells.quads), dtype=bool)
@@ -204,7 +204,7 @@ def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) 
         points, straight, centres = dual_triangles(cells, crossings, vertices, fanned)
         beside = np.zeros(len(centres), dtype=bool)
         faces = flipped_along_creases(points, straight, np.concatenate([chosen > 0, beside]))
-        # all others stay within the tetrahedra of their edges
+        # all other triangles stay within the tetrahedra of their edges
         out = np.concatenate([crowded | (np.floor(vertices) != cells.places[cells.owners]).any(axis=1), beside])
         asked = (faces != straight).any(axis=1) | out[faces].any(axis=1)
         meeting = np.unique(faces[self_intersections(points, faces, asked)])
@@ -217,7 +217,7 @@ def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) 
 
 
 def _safe(flat: Floats, height: Floats) -> tuple[Bools, Floats]:
-    """Return (n,) whether the diagonal from corner 0 to 2 of (n, 4, 2) stays in the tetrahedra, and its crossing."""
+    """Return (n,) whether the diagonal from corner 0 to 2 stays in the tetrahedra, and where its faces cut the edge."""
     p, r = flat[:, 0], flat[:, 2]
     side = _cross(p, r) > 0  # the origin is to the left of the diagonal, with the fourth corner
     rows = np.arange(len(flat))

@@ -13,7 +13,7 @@ from ..compiled import compiled
 from .components import connected_components, first_members, grouped
 
 CLEARANCE = 1e-3
-"""Least distance of crossings from the ends of edges, relative to these, so that no two vertices coincide."""
+"""Least distance of crossings from the ends of edges, relative to their lengths, so that no two vertices coincide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +22,7 @@ class HalfedgePairs:
 
     edges: Ints  # (h,) edge of each halfedge; −1 where it joins a vertex to itself or its face is left out
     counts: Ints  # (e,) halfedges of each edge
-    # (e,) the least halfedge of each edge and the next one; −1 where there is none
+    # (e,) the lowest and the second lowest halfedge of each edge; −1 where there is no second
     first: Ints
     second: Ints
 
@@ -34,7 +34,7 @@ class HalfedgePairs:
 
 @dataclass(frozen=True, eq=False)
 class FaceOrientation:
-    """Parts of faces that are connected across edges of two faces, and how the faces of each agree."""
+    """Parts of a surface that are connected across edges of two faces, and which of their faces to turn to agree."""
 
     parts: Ints  # (n_faces,) part of each face; parts are numbered by first appearance
     turned: Bools  # (n_faces,) whether each face must be turned; False in parts that cannot be oriented
@@ -57,7 +57,7 @@ def pair_halfedges(tails: Ints, heads: Ints, n_vertices: int, used: Bools | None
 
 
 def orient_faces(faces: Ints, weights: Floats, n_vertices: int, used: Bools | None = None) -> FaceOrientation:
-    """Make triangles agree across edges of two that are used; in each part the majority by weight stays."""
+    """Find which triangles to turn to agree across edges of two used ones; in each part the larger weight stays."""
     tails, owners = faces.ravel(), np.repeat(np.arange(len(faces)), 3)
     pairs = pair_halfedges(
         tails, np.roll(faces, -1, axis=1).ravel(), n_vertices, None if used is None else used[owners]
@@ -66,7 +66,7 @@ def orient_faces(faces: Ints, weights: Floats, n_vertices: int, used: Bools | No
     first, second = pairs.first[two], pairs.second[two]
     (f, g), n, disagree = (owners[first], owners[second]), len(weights), tails[first] == tails[second]
     parts = connected_components(n, f, g)
-    # each face is there twice, as it is and, n numbers farther on, turned over: faces that agree are connected
+    # the graph has each face f twice, as it is, f, and turned over, f + n: faces that agree are connected
     ways = np.concatenate([f, f + n]), np.concatenate([np.where(disagree, g + n, g), np.where(disagree, g, g + n)])
     cover = connected_components(2 * n, *ways)
     orientable = ~mask_of(int(parts.max(initial=-1)) + 1, parts[cover[:n] == cover[n:]])
@@ -77,7 +77,7 @@ def orient_faces(faces: Ints, weights: Floats, n_vertices: int, used: Bools | No
 
 
 def may_coincide(pairs: HalfedgePairs, tails: Ints, following: NDArray[np.integer]) -> bool:
-    """Return whether faces may be on the same corners; tails and following corners are (c,)."""
+    """Return whether two faces may have the same corners; tails and following corners are (c,)."""
     two = pairs.counts == 2
     first, second = pairs.first[two], pairs.second[two]
     preceding = np.empty_like(following)
@@ -108,15 +108,15 @@ class EdgeTable(Frozen):
         return read_only(2 * ahead - self.face_counts)
 
     def unbalanced(self, groups: Ints, weights: Ints | int = 1) -> tuple[Ints, Ints, Ints]:
-        """Return groups of faces, (m,), edges that do not cancel within them, and the excess of faces along these.
+        """Return (k,) groups of faces, (k,) edges that do not cancel in them, and (k,) excess of faces along these.
 
-        Groups ascend, and so do the edges of each; faces count `weights` times, (m,), negative against edges.
+        Groups (m,) ascend, and so do the edges of each; a face counts `weights` times, (m,), against an edge negative.
         """
         n, edges, owners = len(self.vertices), self.face_edges.ravel(), np.repeat(groups, 3)
         ways = (np.where(self.forward, 1, -1) * np.reshape(weights, (-1, 1))).ravel()
         is_open, last = np.bincount(edges, ways, n) != 0, np.empty(n, dtype=np.int64)
         last[edges] = owners
-        is_open[edges[owners != last[edges]]] = True  # of several groups; faces of one cancel
+        is_open[edges[owners != last[edges]]] = True  # faces of several groups; those of one group cancel
         rows = np.flatnonzero(is_open[edges])
         keys, which = np.unique(owners[rows] * n + edges[rows], return_inverse=True)
         excess = np.bincount(which, ways[rows], len(keys)).astype(np.int64)
@@ -144,7 +144,7 @@ class EdgeTable(Frozen):
         return read_only(np.stack([first, self.mates[first]], axis=1))
 
     def elimination_order(self, vertex_order: NDArray[np.integer]) -> Ints:
-        """Order unknowns at edges by their ends' order, ``order[k]`` k-th: separators of vertices separate edges."""
+        """Order edges for elimination by their ends' order, ``order[k]`` k-th: vertex separators separate edges."""
         a, b = np.argsort(vertex_order)[self.vertices].T  # the rank of each end
         return np.argsort((np.minimum(a, b) + 1) * len(vertex_order) - np.maximum(a, b), kind="stable")
 
@@ -168,7 +168,7 @@ def edge_keys(tails: NDArray[np.integer], heads: NDArray[np.integer]) -> Ints:
 def find_edges(tails: Ints, heads: Ints, used: Bools, n_vertices: int) -> tuple[Ints, Bools, Ints, Ints, Ints]:
     """Find edges of the used halfedges (h,): the edge of each, or −1, and whether it runs as the first along it does.
 
-    Also (e,) the number of halfedges of each edge, the first, and the second, or −1.
+    Also returns (e,) the number of halfedges of each edge, the first one, and the second one or −1.
     """
     degrees, last = np.zeros(n_vertices, dtype=np.int64), np.full(n_vertices, -1)
     for h in range(len(tails)):

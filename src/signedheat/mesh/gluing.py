@@ -43,7 +43,7 @@ class Gluing(NamedTuple):
     flips: Ints  # (e,) how often each edge has been flipped
     counts: Ints  # (5,) how many there are of each: see `N_FACES`
     steps: Ints  # (s, 4) the history: kind of each step, two halfedges or faces, and the new vertex
-    weights: Floats  # (s, 4) the affine dependency of the points of each step
+    weights: Floats  # (s, 4) coefficients of the affine dependency of the points of each step
     scratch: Ints  # work array
     unit: float  # unit of length
 
@@ -80,7 +80,7 @@ def tangent_at(g: Gluing, h: int) -> tuple[float, float]:
 
 @compiled
 def move(g: Gluing, old: tuple[int, ...], new: tuple[int, ...]) -> None:
-    """Renumber halfedges old[k] to new[k], a permutation of them, all at once; tails stay where they are."""
+    """Renumber halfedges old[k] to new[k], all at once; tails stay where they are."""
     successors, predecessors, edges, flags = g.scratch[0], g.scratch[1], g.scratch[2], g.scratch[3]
     for k in range(len(old)):
         after = g.sibling[old[k]]
@@ -115,7 +115,7 @@ def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float,
 
 @compiled
 def faces_around(steps: Ints, n: int, around: Ints, start: Ints) -> None:
-    """Write the faces that step n of a history has or makes, and the corner of each that its first point is at."""
+    """Write the faces that step n changes or makes, or −1, and the corner of each at the first point of the step."""
     kind = steps[n, 0]
     around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
     start[0] = start[1] = start[2] = 0
@@ -142,7 +142,7 @@ def turn_over(g: Gluing, face: int) -> None:
 def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
     """Unfold the two faces at an edge into one plane: ``h: i → j`` with apex a, its twin with apex b.
 
-    Returns the areas of jab, iab, twin and h, of which area_jab·i + area_iab·j = area_twin·a + area_h·b, and |ab|.
+    Returns the areas of jab, iab, twin and h, for which area_jab·i + area_iab·j = area_twin·a + area_h·b, and |ab|.
     """
     t = g.sibling[h]
     mirrored = g.forward[h] == g.forward[t]
@@ -167,7 +167,7 @@ def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
 
 @compiled
 def flip(g: Gluing, h: int) -> bool:
-    """Flip an interior edge of a strictly convex quadrilateral: h and its twin are then ``b → a``, ``a → b``."""
+    """Flip an interior edge: h is then ``b → a``, its twin ``a → b``; return False if it is not strictly convex."""
     t = g.sibling[h]
     if g.forward[h] == g.forward[t]:
         turn_over(g, t // 3)
@@ -202,7 +202,7 @@ def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
             continue
         n, d = tangent_at(g, preceding(h))
         m, c = tangent_at(g, preceding(t))
-        if not n * m > d * c * (1.0 + 1e-10) or not flip(g, h):  # the opposite angles sum to π at most
+        if not n * m > d * c * (1.0 + 1e-10) or not flip(g, h):  # Delaunay: the opposite angles sum to π at most
             continue
         g.flips[e] += 1
         t = g.sibling[h]
@@ -361,7 +361,7 @@ def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
 
 
 def flip_all(gluing: Gluing) -> Gluing:
-    """Flip all edges that are not fixed to Delaunay, in place; return the gluing, with room for its history."""
+    """Flip all edges that are not fixed to Delaunay, in place; return the gluing, with more room for its history."""
     n_edges = int(gluing.counts[N_EDGES])
     gluing.counts[N_STACKED] = n_edges
     stack, stacked = np.arange(n_edges)[::-1].copy(), np.ones(n_edges, dtype=bool)

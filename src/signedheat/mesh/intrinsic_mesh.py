@@ -21,7 +21,7 @@ from .triangles import Triangles
 
 Index = Ints | slice
 LEAST_AREA = 1e-18
-"""Area, relative to the square of the longest edge, that a flatter face counts as where it divides."""
+"""Least area, relative to the square of the longest edge, by which is divided; flatter faces count as having it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class IntrinsicMesh(Frozen):
 
     @cached_property
     def face_areas(self) -> Floats:
-        """(m,) areas, where rounding does not make them negative."""
+        """(m,) areas; zero where rounding would make them negative."""
         first, _, last = self.edge_vectors.T
         return np.maximum(-0.5 * (np.conj(first) * last).imag, 0.0)
 
@@ -142,12 +142,12 @@ class IntrinsicMesh(Frozen):
         return element_components(self.edges.face_edges)
 
     def in_edge_frames(self, vectors: Complexes, faces: Index = slice(None), sides: Index = slice(None)) -> Complexes:
-        """Express vectors of faces, (k, 3) or (k, 1), or (k,) on one of their sides, in frames of edges."""
+        """Express vectors in face layouts, (k, 3) or (k, 1), or (k,) for one side each, in frames of edges."""
         turned = np.conj(self.edge_directions[faces, sides]) * vectors
         return np.where(self.reflected[faces, sides], np.conj(turned), turned)
 
     def from_edge_frames(self, vectors: Complexes, faces: Index, sides: Index = slice(None)) -> Complexes:
-        """Express vectors of edges, in the shape of the sides of faces, in the layouts of these faces."""
+        """Express vectors in edge frames, shaped like ``edge_directions[faces, sides]``, in layouts of the faces."""
         return self.edge_directions[faces, sides] * np.where(self.reflected[faces, sides], np.conj(vectors), vectors)
 
     def in_face_frames(self, vectors: Complexes, faces: Index = slice(None)) -> Complexes:
@@ -177,7 +177,7 @@ TRIANGLE_MARGIN = 1e-14
 
 
 def mollify(lengths: Floats, margin: float) -> tuple[Floats, float]:
-    """Add the least length to all edges, (m, 3), for which ``a + b − c ≥ margin · mean``; return it, too."""
+    """Add the least amount to all lengths, (m, 3), for which ``a + b − c ≥ margin · mean``; return the amount, too."""
     longest = lengths.max(axis=1)
     slack = float((lengths.sum(axis=1) - 2.0 * longest).min())
     added = margin * float(lengths.mean()) - slack
@@ -243,6 +243,6 @@ def face_pairs(triangles: IntrinsicMesh) -> FacePairs:
 
 
 def split_corners(triangles: IntrinsicMesh, pairs: FacePairs, cut: Bools) -> Ints:
-    """Return (3m,) the vertex of each corner, from zero, once the surface is cut open between some pairs (p,)."""
+    """Return (3m,) the vertex of each corner, numbered from zero, once the surface is cut between some pairs (p,)."""
     ends = np.concatenate([pairs.tails[~cut], pairs.heads[~cut]])
     return connected_components(triangles.corner_vertices.size, *ends.T)
