@@ -15,8 +15,8 @@ DELAUNAY_SINE = 1e-10
 """Sine of the excess over π up to which two opposite angles satisfy Delaunay's condition."""
 
 FLIP_TRIES = 64
-"""Tries to flip edges, for each that a segment crosses, after which rounding is taken to prevent it. Segments that are
-not thinner than rounding took ten at most, also across a thousand edges."""
+"""Attempts to flip, per edge that a segment crosses, after which rounding is taken to prevent the flips. Where
+rounding did not, ten sufficed, even across a thousand edges."""
 
 
 class Planar(NamedTuple):
@@ -36,9 +36,10 @@ def triangulate_faces(
 ) -> tuple[Ints, Ints, Ints]:
     """Triangulate faces, each with points on its rim and within, so that segments between these become edges.
 
-    From ``starts[f]`` on, `members` are the points of a face, those on its rim first and in order; `corners`, (m, 3),
-    are the places of the second and third corner and the number on the rim; `segments`, (t, 2), join places. Returns
-    triangles (k, 3), the face of each, ascending, and (k, 3) the one across each edge, −1 across segments and rims.
+    The points of face f are `members` from ``starts[f]`` on, those on its rim first and in order. A row of `corners`,
+    (m, 3), has the places of its second and third corner in this list, and the number of points on the rim; `segments`,
+    (t, 2), join two places. Returns triangles (k, 3), the face of each, ascending, and (k, 3) the triangle across each
+    edge, −1 across segments and rims.
     """
     m = len(corners)
     total = np.int64(0)
@@ -75,7 +76,7 @@ def triangulate_faces(
 
 @compiled
 def _flattened(points: Floats, members: Ints, corners: Ints) -> Floats:
-    """Return (n, 2) the two coordinates along which a face is largest, counter-clockwise, from its first corner."""
+    """Return (n, 2) the two coordinates in which a face has most area, counter-clockwise, from its first corner."""
     a, b, c = members[0], members[corners[0]], members[corners[1]]
     normal = np.empty(3)
     for d in range(3):
@@ -147,7 +148,7 @@ def _split(mesh: Planar, t: int, k: int, i: int, new: int) -> None:
 
 @compiled
 def _flip(mesh: Planar, t: int, k: int) -> int:
-    """Replace edge k of a triangle by the one between the apexes: (c, a, d) and (d, b, c); return the second."""
+    """Flip edge k = ab between apexes c and d: its triangles become (c, a, d) and (d, b, c); return the second."""
     tri, adj, fixed, at = mesh.tri, mesh.adj, mesh.fixed, mesh.at
     s = adj[t, k]
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
@@ -261,7 +262,7 @@ def _convex(x: Floats, a: int, b: int, c: int, d: int, flat: float) -> bool:
 
 @compiled
 def _locate(mesh: Planar, count: int, i: int) -> tuple[int, int, float]:
-    """Return the triangle that contains a point, the edge that it is nearest to, and twice the area between."""
+    """Return the triangle that contains a point, and for it what `_side` returns."""
     x, tri, adj = mesh.x, mesh.tri, mesh.adj
     t = count - 1
     for _ in range(count):
@@ -282,7 +283,7 @@ def _locate(mesh: Planar, count: int, i: int) -> tuple[int, int, float]:
 
 @compiled
 def _side(x: Floats, tri: Ints, t: int, i: int) -> tuple[int, float]:
-    """Return the edge of a triangle that a point is farthest beyond, and twice the area between."""
+    """Return the edge of a triangle with which a point spans the least signed area, and twice this area."""
     side, depth = 0, np.inf
     for k in range(3):
         turn = _turn(x, tri[t, k], tri[t, (k + 1) % 3], i)
@@ -311,7 +312,7 @@ def _edge(mesh: Planar, u: int, v: int) -> int:
 
 @compiled
 def _connect(mesh: Planar, a: int, b: int) -> None:
-    """Make a segment edges through the points that it meets, by flips (Sloan 1993), unless rounding leaves no way."""
+    """Make edges from a to b through the points that the segment meets, by flips (Sloan 1993), if rounding allows."""
     fixed = mesh.fixed
     while a != b:
         t, k, goal = _aim(mesh, a, b)
@@ -330,7 +331,7 @@ def _connect(mesh: Planar, a: int, b: int) -> None:
 
 @compiled
 def _aim(mesh: Planar, a: int, b: int) -> tuple[int, int, int]:
-    """Return the triangle at a, and its edge, through which the segment to b leaves; or the neighbour it meets."""
+    """Return the triangle at a and its edge that the segment to b crosses, and the neighbour that it meets, or −1."""
     x, tri, adj, at, flat = mesh.x, mesh.tri, mesh.adj, mesh.at, mesh.flat
     first = at[a]
     t, back, length = first, False, _length(x, a, b)

@@ -16,13 +16,14 @@ from .triangles import AREA_ROUNDING
 manifold3d: Any = lazy_module("manifold3d", "drawings of closed outlines")
 
 FillRule: TypeAlias = Literal["nonzero", "evenodd"]
-"""Rule for the places that outlines fill: those around which they wind a number of times that is not zero, or odd."""
+"""Rule for the region that outlines fill: all points with a winding number that is not zero, or that is odd."""
 
 
 def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[tuple[Ints, Bools, bool]]:
-    """Join segments end to end into polylines, which end at nodes where not exactly two meet; others may be reversed.
+    """Join segments end to end into polylines, which end at nodes where not exactly two segments meet.
 
-    Returns the segments of each in order, which of them run from head to tail, and whether it is closed.
+    Returns the segments of each in order, which of them run from head to tail (none if `directed`), and whether it is
+    closed.
     """
     nodes, ends = np.unique(np.concatenate([tails, heads]), return_inverse=True)
     (tails, heads), n = ends.reshape(2, -1), len(nodes)
@@ -61,7 +62,7 @@ def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[
 
 
 def leaving(points: Floats, closed: bool, room: Floats) -> Ints:
-    """Return which of (n, d) points of a polyline are left for one beyond their `room` (n,), and the last if open."""
+    """Return which of (n, d) points of a polyline are farther than `room` (n,) from the next, and the last if open."""
     moves = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) > room
     if not closed:
         moves[-1] = True
@@ -71,7 +72,7 @@ def leaving(points: Floats, closed: bool, room: Floats) -> Ints:
 def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
     """Return the outlines, (n, 2) each, of the region that outlines fill: clockwise, those of holes counter-clockwise.
 
-    By "nonzero" one within another is a hole where it runs the other way; directions do not matter otherwise.
+    With "nonzero", an outline inside another is a hole if it runs the other way; otherwise directions do not matter.
     """
     chosen(rule, FillRule, "fill")
     points = np.concatenate([np.empty((0, 2)), *outlines])
@@ -90,8 +91,8 @@ def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
 
 
 def without_seams(segments: Floats) -> Floats:
-    """Cut (k, 2, 2) segments of outlines where corners lie on them, and leave out those along which others run back."""
-    # outlines that share lines bound what they fill by lines that run there and back, up to rounding
+    """Cut (k, 2, 2) segments of outlines where corners lie on them, and leave out parts along which others run back."""
+    # where outlines share a line, the boundary of the filled region runs along it there and back, up to rounding
     near = 1e-12 * float(np.ptp(segments.reshape(-1, 2), axis=0).max(initial=0.0))
     if near == 0:
         return segments
@@ -115,7 +116,7 @@ def without_seams(segments: Floats) -> Floats:
 
 
 def _united(outlines: list[Floats]) -> Any:
-    """Return what outlines fill by the rule "nonzero", after the outermost are turned alike, with all within."""
+    """Return the region that outlines fill by the rule "nonzero", once the outermost, with all inside, run alike."""
     nonzero = manifold3d.FillRule.NonZero
     parts = [manifold3d.CrossSection([outline], nonzero) for outline in outlines]
     boxes = np.array([[outline.min(axis=0), outline.max(axis=0)] for outline in outlines])

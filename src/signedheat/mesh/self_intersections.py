@@ -16,13 +16,13 @@ from .welding import same_positions
 TOUCHING_DEPTH = 1e-10
 """Depth, relative to the size of the mesh, up to which triangles only touch."""
 COVERING_FOLD = 1e-10
-"""One minus the cosine between two neighbours, as seen along their edge, up to which one covers the other."""
+"""One minus the cosine of the angle between two faces at their common edge, up to which one covers the other."""
 CROWD = 64
-"""Number of faces around a vertex above which their intersections are found around it, and not in space."""
+"""Number of faces around a vertex above which their intersections are found by directions from it, not in space."""
 
 
 def self_intersections(vertices: Floats, faces: Ints, asked: Bools | None = None) -> Ints:
-    """Return (k, 2) pairs of faces that intersect, overlap, or touch without a common vertex; one is `asked` for."""
+    """Return (k, 2) pairs of faces, one of them `asked` for, that intersect, overlap or touch without common vertex."""
     slack = TOUCHING_DEPTH * float(np.ptp(vertices, axis=0).max(initial=0.0))
     return overlapping_faces(vertices, same_positions(vertices)[faces], slack, -slack, asked)
 
@@ -30,7 +30,7 @@ def self_intersections(vertices: Floats, faces: Ints, asked: Bools | None = None
 def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float, asked: Bools | None = None) -> Ints:
     """Return (k, 2) pairs of faces that overlap by more than `depth`, or `slack` if they have a common vertex.
 
-    Along normals they may be `slack` apart; those with a common edge overlap if they are folded.
+    Along normals they may be `slack` apart. Faces with a common edge overlap if one is folded onto the other.
     """
     proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
     if len(proper) < len(faces):
@@ -43,7 +43,7 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float,
     hubs = _hubs(faces, len(vertices))
     if asked is None:
         order = _order(centred[faces], centred, hubs)
-    else:  # all look among those asked, which come first
+    else:  # all faces search among those asked for, which come first
         order = np.flatnonzero(asked)
         order = np.append(order[_order(centred[faces[order]], centred, hubs[order])], np.flatnonzero(~asked))
     ids, hubs = np.ascontiguousarray(faces[order], dtype=np.int64), hubs[order]
@@ -80,7 +80,7 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float,
 
 
 def _hubs(faces: Ints, n_vertices: int) -> Ints:
-    """Return (m,) the corner at which most faces meet, if more than `CROWD`, else −1: there only their arcs meet."""
+    """Return (m,) the corner of each face at which most faces meet, if these are more than `CROWD`, else −1."""
     valences = np.bincount(faces.ravel(), minlength=n_vertices)[faces]
     hubs = np.take_along_axis(faces, valences.argmax(axis=1)[:, None], axis=1)[:, 0]
     return np.where(valences.max(axis=1) > CROWD, hubs, -1)
@@ -96,7 +96,7 @@ def _order(corners: Floats, vertices: Floats, hubs: Ints) -> Ints:
 
 
 def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:
-    """Return (k, 3, 3) triangles around the arcs of faces as seen from their hubs, each hub in a place of its own."""
+    """Return (k, 3, 3) triangles around the arcs that faces cover as seen from their hubs, apart for different hubs."""
     corner = np.argmax(faces == hubs[:, None], axis=1)
     ends = [faces[np.arange(len(faces)), (corner + k) % 3] for k in (1, 2)]
     first, second = (unit(vertices[end] - vertices[hubs]) for end in ends)
@@ -109,11 +109,11 @@ def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:
 
 @compiled
 def _overlapping(corners: Floats, ids: Ints, first: Ints, second: Ints, slack: float, depth: float) -> Bools:
-    """Return (k,) whether triangles overlap, those with a common edge whether they are folded along it."""
+    """Return (k,) whether pairs of triangles overlap, or, if they have a common edge, are folded along it."""
     result, ways = np.empty(len(first), dtype=np.bool_), np.empty((10, 3))
     for k in range(len(first)):
         f, g = first[k], second[k]
-        shared, apex, beyond = 0, 3, 3  # the corners, less those in common, of which two leave one
+        shared, apex, beyond = 0, 3, 3  # apex and beyond: 0 + 1 + 2 less two common corners is the third
         for i in range(3):
             for j in range(3):
                 if ids[f, i] == ids[g, j]:
@@ -146,7 +146,7 @@ def _is_folded(p: Floats, q: Floats, apex: int, beyond: int) -> bool:
 
 @compiled
 def overlap(p: Floats, q: Floats, slack: float, depth: float, ways: Floats) -> bool:
-    """Return whether triangles, (9,), overlap by a depth along all axes, but a slack along normals; `ways` is room."""
+    """Return whether triangles (9,) overlap by `depth` along all axes, −`slack` along normals; `ways` is scratch."""
     for d in range(3):
         if min(p[d], p[3 + d], p[6 + d]) > max(q[d], q[3 + d], q[6 + d]) + slack:
             return False

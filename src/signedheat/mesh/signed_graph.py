@@ -46,8 +46,8 @@ class Links:
 def signs_of(links: Links, n_nodes: int) -> Floats:
     """Return (n,) signs s that make Σ w s_tail s_head large: turning no sign, and hardly any group, increases it.
 
-    Groups with the strongest links merge first (Keuper et al. 2015); taken apart in reverse, parts turn if that is
-    better.
+    Groups with the strongest links merge first (Keuper et al. 2015). Merges are then undone in reverse order, and after
+    each of these levels groups turn where that increases the sum.
     """
     levels = _contractions(_weights(links, n_nodes))
     result = np.ones(int(levels[-1][1].max()) + 1 if levels else n_nodes)
@@ -58,7 +58,7 @@ def signs_of(links: Links, n_nodes: int) -> Floats:
 
 
 def best_signs(weights: Floats, first: Floats) -> Floats:
-    """Return (n,) signs that make ``sᵀ W s`` large, W dense: from several starts, groups turn while that gains."""
+    """Return (n,) signs that make ``sᵀ W s`` large, W dense: groups turn while that gains, from several starts."""
     n = len(weights)
     weights = np.where(np.eye(n, dtype=bool), 0.0, weights)
     tails, heads = np.triu_indices(n, 1)
@@ -91,7 +91,7 @@ def _turned_in_groups(weights: Floats, groups: list[Ints], signs: Floats) -> Flo
 
 
 def _contractions(weights: sparse.csr_matrix) -> list[tuple[sparse.csr_matrix, Ints, Floats]]:
-    """Return the weights of each level, the group of each of its nodes and its sign there, until no link is left."""
+    """Merge nodes until no link is left; return for each level its weights, and the group and the sign of each node."""
     levels = []
     while weights.nnz:
         groups, within = _contraction(weights)
@@ -115,7 +115,7 @@ def _weights(links: Links, n_nodes: int) -> sparse.csr_matrix:
 
 
 def _contraction(weights: sparse.csr_matrix) -> tuple[Ints, Floats]:
-    """Return the group of each node, and its sign there: pairs of mutually strongest, and nodes that join one."""
+    """Return each node's group and sign in it; groups are mutually strongest pairs, and nodes most linked to one."""
     n, neighbors = weights.shape[0], weights.indices
     degrees = np.diff(weights.indptr)
     rows = np.repeat(np.arange(n), degrees)

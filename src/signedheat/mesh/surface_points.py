@@ -40,7 +40,7 @@ class LocatedPoints:
 
 
 def refuse_missing(kind: str, ids: Ints, n: int, name: str = "point") -> None:
-    """Refuse points at vertices, on edges or in faces of which there is none with their id, 0 to n - 1."""
+    """Refuse points that name a vertex, edge or face with an id that is not between 0 and n − 1."""
     missing = np.flatnonzero((ids < 0) | (ids >= n))
     if len(missing):
         first = ids[missing[0]]
@@ -131,7 +131,7 @@ def barycentric_in(triangles: IntrinsicMesh, faces: Ints, located: LocatedPoints
 
 
 def barycentric_on_edges(edges: EdgeTable, faces: Ints, sides: Ints, along: Floats) -> Floats:
-    """Return (n, 3) barycentric coordinates, in faces, of points at fractions along the edge on a side of each."""
+    """Return (n, 3) barycentric coordinates, in faces, of points at fractions along edges, given as sides."""
     return barycentric_on_sides(sides, np.where(edges.forward[faces, sides], along, 1 - along))
 
 

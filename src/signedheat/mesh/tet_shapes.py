@@ -97,10 +97,10 @@ class TetShapes:
 
 
 def inside_out(mesh: TetShapes) -> Bools:
-    """Return (m,) whether rounding turned each tet over, so that it lies on the side of a face where another does."""
+    """Return (m,) whether rounding turned each tet over, so that a neighbour lies on the same side of their face."""
     faces, m = mesh.faces, len(mesh.tets)
     a, b, c = np.moveaxis(mesh.tets[:, FACE_CORNERS], 2, 0)
-    way = np.sign(a - b) * np.sign(b - c) * np.sign(c - a)  # of the same three corners, as seen from outside
+    way = np.sign(a - b) * np.sign(b - c) * np.sign(c - a)  # parity of the corners' order, as seen from outside
     disagree = np.bincount(faces.tet_faces.ravel(), way.ravel(), len(faces.vertices)) != 0
     tet, k = np.nonzero(faces.tet_counts[faces.tet_faces] == 2)
     other = np.where(disagree[faces.tet_faces[tet, k]], m, 0) + faces.neighbors[tet, k]
@@ -143,12 +143,12 @@ class Tetrahedra(TetShapes):
 
     @cached_property
     def fading(self) -> Floats:
-        """(m,) factor of w in step 3, zero on flat tets: a curved φ has gradients without bound in them."""
+        """(m,) further factor beside w in step 3, zero on flat tets, in which a curved φ has unbounded gradients."""
         return self.weights**2
 
     @cached_property
     def ties(self) -> Floats:
-        """(m,) extra stiffness between any two faces or vertices of a flat tet, since some belong to no other."""
+        """(m,) extra stiffness between any two faces or vertices of a flat tet, since some belong to no other tet."""
         lengths = np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
         return FLAT_STIFFNESS * lengths * (1 - np.minimum(self.thickness / FLAT_TET, 1))
 

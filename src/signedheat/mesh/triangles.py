@@ -63,20 +63,20 @@ def corner_normals(triangles: Floats) -> Floats:
 def part_volumes(vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:
     """Return (m,) the connected part of each triangle, and the volume inside each part; negative for cavities."""
     parts = element_components(faces)
-    first = np.unique(parts, return_index=True)[1]  # a vertex of each part, so that nothing cancels far away
+    first = np.unique(parts, return_index=True)[1]  # a vertex of each part as origin, so that no digits cancel far away
     corners = vertices[faces] - vertices[faces[first, 0]][parts, None]
     return parts, np.bincount(parts, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6
 
 
 def divided_at(faces: Ints, rows: Ints, corners: Ints, points: Ints) -> Ints:
-    """Divide some faces by a point on the side that begins at a corner; their halves come last."""
+    """Divide the faces `rows` by points on the sides that begin at given corners; return all faces, the halves last."""
     a, b, c = (faces[rows, (corners + k) % 3] for k in range(3))
     halves = np.concatenate([np.stack([a, points, c], axis=1), np.stack([points, b, c], axis=1)])
     return np.concatenate([np.delete(faces, rows, axis=0), halves])
 
 
 def halved(triangles: Floats, sides: Ints) -> Floats:
-    """Return (2 m, 3, 3) halves of triangles, cut from the middle of one side each: all first ones, then the second."""
+    """Return (2 m, 3, 3) halves of triangles, cut from the middle of one side each: first halves, then second ones."""
     turn = (sides[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(triangles, turn[:, :, None], axis=1).swapaxes(0, 1)
     middle = 0.5 * (a + b)
@@ -84,7 +84,7 @@ def halved(triangles: Floats, sides: Ints) -> Floats:
 
 
 def gradients_along(sides: Floats, rises: Floats) -> Floats:
-    """Return (p, 3) gradients in the planes of sides (p, 2, 3) along which a function rises by (p, 2); else 0."""
+    """Return (p, 3) gradients in the planes of sides (p, 2, 3) along which functions rise by (p, 2); 0 if parallel."""
     normals = np.cross(sides[:, 0], sides[:, 1])
     square = np.einsum("pd,pd->p", normals, normals)
     across = rises[:, :1] * sides[:, 1] - rises[:, 1:] * sides[:, 0]
@@ -121,7 +121,7 @@ def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[F
 
 
 def cut_into_ears(polygon: Floats, normal: Floats, allowed: Callable[[int, int], bool] | None = None) -> Ints:
-    """Cut a simple polygon, counter-clockwise around its normal, into ears: (k − 2, 3), best first."""
+    """Return (k − 2, 3) ears of a simple polygon, counter-clockwise around a normal, best first, or (0, 3)."""
     upright = np.eye(3)[np.abs(normal).argmin()]
     first = np.cross(upright, normal)
     second = np.cross(normal, first)
@@ -188,10 +188,10 @@ def _creases(vertices: Floats, faces: Ints) -> tuple[EdgeTable, Floats, Ints]:
 
 
 def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> tuple[Ints, Ints, Ints]:
-    """Return (k,) faces to replace, no two pairs of which are neighbours; (k, 3) replacements; and vertices of gainful
-    pairs.
+    """Return (k,) faces to replace, (k, 3) their replacements, and the vertices of all pairs that would gain by a flip.
 
-    An edge ab becomes cd unless there is one; all faces of a, b and one of c, d must be given (`whole`).
+    No two replaced pairs are neighbours. Edge ab becomes cd unless there is such an edge; all faces around a, b and one
+    of c, d must be given, as `whole` tells.
     """
     table, normals, creases = _creases(vertices, faces)
     (first, second), (i, j) = (creases // 3).T, (creases % 3).T

@@ -17,7 +17,7 @@ ANGLE_ROUNDING = 1e-6
 
 
 def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
-    """Scale vectors to length one, by the largest component first: X's square underflows long before X."""
+    """Scale vectors to length one, first by the largest component, so that squares neither overflow nor underflow."""
     if np.iscomplexobj(vectors):
         length = np.abs(vectors)  # np.abs of complex numbers neither overflows nor underflows
         return vectors / np.where(length > 0, length, 1)

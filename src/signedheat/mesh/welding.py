@@ -10,23 +10,23 @@ from ..compiled import compiled
 from .edges import find_edges
 
 ONE_PLACE = 4.0
-"""Largest difference of coordinates of one place, in units of single precision of the size of a shape, or of the last
-places of its coordinates."""
+"""Largest difference between coordinates that count as one place, in units of single precision of the size of a shape,
+or in last places of its coordinates."""
 SEAM_UNITS, GAP_UNITS = 64.0, 1024.0
-"""Largest difference of coordinates of one vertex of a seam, and of two that are announced as nearly one, in units of
-single precision of the size of the surface. Halved, a vertex in a hundred is missed on two of twelve seams; doubled,
-nothing changes (`benchmarks/deciding_numbers.py`)."""
+"""Largest difference between coordinates of vertices that are joined along a seam, and of those that are reported as a
+gap, in units of single precision of the size of the surface. Halved, a vertex in a hundred is missed on two of twelve
+seams; doubled, nothing changes (`benchmarks/deciding_numbers.py`)."""
 SEAM_WIDTH = 0.25
 """Vertices farther apart than this share of the shortest edge at them are not joined as those of a seam."""
 _LOW = 0xFFFFFFFF
 
 
 def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:
-    """Return (n,) the first vertex at the place of each that is on a rim, as of a seam; all others stay.
+    """Return (n,) the vertex that each is joined to, as along seams: on rims the first at its place, else itself.
 
-    Rims are edges of the halfedges (h,) that an odd number of faces have. Places are one if they differ by `units` of
-    single precision of the size of what is given, or by `ONE_PLACE` last places of coordinates that make use of these,
-    but never so that an edge collapses. So what single precision parted is joined wherever double precision moved it.
+    Rims are edges with an odd number of halfedges (h,). Two vertices are at one place if they differ by `units` of
+    single precision of the size of the shape, or by `ONE_PLACE` last places where coordinates use all digits, but never
+    so that an edge collapses. So vertices that single precision separated are joined even if moved in double precision.
     """
     edges, _, counts, _, _ = find_edges(read_only(tails), read_only(heads), tails != heads, len(points))
     is_open = (edges >= 0) & (np.append(counts, 0)[edges] % 2 == 1)
@@ -88,14 +88,14 @@ def same_rows(rows: NDArray[np.integer]) -> Ints:
 
 
 def distinct_rows(rows: NDArray[np.integer]) -> tuple[Ints, Ints]:
-    """Return the number of each of (n, k) rows by first appearance, equal ones alike, and the first row of each."""
+    """Return the number of each of (n, k) rows, equal for equal rows, by first appearance; and the first row of each."""
     first = same_rows(rows)
     is_first = first == np.arange(len(first))
     return (np.cumsum(is_first) - 1)[first], np.flatnonzero(is_first)
 
 
 def coincident_faces(corners: Ints, offsets: Ints) -> tuple[Ints, Bools]:
-    """Return (p,) the first face on the same corners as each, and whether it runs the other way."""
+    """Return (p,) the first face on the same corners as each, or −1 if degenerate, and whether it is reversed."""
     sizes = np.diff(offsets)
     first, reverse = np.arange(len(sizes)), np.zeros(len(sizes), dtype=bool)
     for size in np.unique(sizes).tolist():
@@ -115,7 +115,7 @@ def coincident_faces(corners: Ints, offsets: Ints) -> tuple[Ints, Bools]:
 
 @compiled
 def mixed(a: int, b: int, c: int) -> int:
-    """Return a nonnegative hash of three integers: halves times odd numbers, so that no product exceeds 64 bits."""
+    """Return a nonnegative hash of three integers: 32-bit halves times odd numbers, so that products fit 64 bits."""
     x = ((a & _LOW) * 0x1E3779B1) ^ ((b & _LOW) * 0x2545F491) ^ ((c & _LOW) * 0x165667B1)
     x ^= (((a >> 32) & _LOW) * 0x27D4EB2F) ^ (((b >> 32) & _LOW) * 0x1B873593) ^ (((c >> 32) & _LOW) * 0x0CC9E2D5)
     x = ((x ^ (x >> 29)) & _LOW) * 0x3C6EF373
