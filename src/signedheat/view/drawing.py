@@ -67,7 +67,7 @@ def html_of(thing: object) -> str:
     try:
         figure = new_figure(3.4 * 1.25, 3.4)  # in inches
         drawn = draw(thing, figure.add_subplot())
-    except (MissingPackageError, GeometryError):  # the latter of fields without a value
+    except (MissingPackageError, GeometryError):  # fields without a value raise GeometryError
         return text
     if not drawn:
         return text

@@ -61,7 +61,7 @@ def distance_colors(low: float, high: float) -> ScalarMappable:
 
 
 def even_colors(reach: float) -> ScalarMappable:
-    """Make a scale of the same colours, linear from −reach to reach, and constant beyond."""
+    """Make a scale of the colours of `distance_colors`, linear from −reach to reach, and constant beyond."""
     return _scale_of(mpl_colors.Normalize(-reach, reach))
 
 
@@ -71,7 +71,7 @@ def _scale_of(norm: Any) -> ScalarMappable:
 
 
 def signed_root(values: Any) -> Any:
-    """√|x|, with the sign of x."""
+    """Return √|x| with the sign of x."""
     return np.sign(values) * np.sqrt(np.abs(values))
 
 
@@ -93,7 +93,7 @@ def isolines_between(low: float, high: float, most: int = 16) -> tuple[Floats, f
 
 
 def round_step(width: float) -> float:
-    """1, 2 or 5 times a power of ten, close to `width`."""
+    """Return 1, 2 or 5 times a power of ten, close to `width`."""
     if not width > 0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(width))
@@ -101,7 +101,7 @@ def round_step(width: float) -> float:
 
 
 def legible(ticks: Floats, low: float, high: float) -> list[float]:
-    """Zero, and ticks that are far enough from the previous one in the root of distance."""
+    """Return zero and the ticks that are far enough from the previous one in the root of distance, in order."""
     apart = 0.07 * float(signed_root(high) - signed_root(low))  # of the length of the bar
     kept = [0.0]
     for outwards in (ticks[ticks > 0], ticks[ticks < 0][::-1]):

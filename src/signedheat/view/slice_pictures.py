@@ -103,7 +103,7 @@ def draw_slices(
 
 
 def clearest_layer(field: GridField, axis: int) -> int:
-    """Choose the layer across an axis, near the middle, with most nodes inside or, if there are none, near zero."""
+    """Choose the layer across an axis with most nodes inside, or else near zero; of similar ones the most central."""
     inside = field.values < 0
     if not inside.any():
         inside = np.abs(field.values) < 1.5 * field.grid.spacing.max()
@@ -155,7 +155,7 @@ def _draw_panel(
     levels: Sequence[float],
     trusted: NDArray[np.float32] | None = None,
 ) -> None:
-    """Draw values on a plane, indexed [u, v], as colours and isolines; dashed levels where confidence is low."""
+    """Draw values on a plane, indexed [u, v], as colours and isolines; levels are dashed where confidence is low."""
     shown = np.ma.masked_invalid(values.T)
     shading: Literal["nearest", "gouraud"] = "nearest" if shown.mask.any() else "gouraud"
     panel.pcolormesh(u, v, shown, shading=shading, rasterized=True).set(cmap=colors.cmap, norm=colors.norm)
@@ -179,7 +179,7 @@ def _draw_panel(
 def level_pieces(
     u: Floats, v: Floats, values: Floats, level: float, trusted: NDArray[np.float32] | None = None
 ) -> dict[str, list[Floats]]:
-    """Lines of a level on a plane: solid on the shape, dashed on its completion."""
+    """Return the lines of a level on a plane: solid on the shape, dashed on its completion."""
     spacing = np.array([u[1] - u[0], v[1] - v[0]])
     pieces: dict[str, list[Floats]] = {"solid": [], "dashed": []}
     for line, _ in level_lines(values, np.zeros(2), np.ones(2), level):
@@ -196,7 +196,7 @@ def level_pieces(
 
 
 def cross_section(mesh: TriangleMesh, axis: int, position: float) -> Floats:
-    """(s, 2, 2) ends, in the other two coordinates, of the segments in which a plane across an axis cuts a mesh."""
+    """Return (s, 2, 2) ends, in the other coordinates, of the segments in which a plane across an axis cuts a mesh."""
     corners = mesh.vertices[mesh.faces]
     height = corners[:, :, axis] - position
     above = height >= 0

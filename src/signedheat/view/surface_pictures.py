@@ -1,4 +1,4 @@
-"""Shaded pictures: shapes, with inner sides red, distance on surfaces, with isolines, and deviations and thickness.
+"""Shaded pictures of shapes, with inner sides red, of distance on surfaces, and of deviations and thickness.
 
 A small software rasteriser finds depth, face and value at each pixel. Matplotlib sorts whole faces by depth, which is
 wrong where they pass through each other, as those of broken shapes do. VTK takes half a gigabyte, and needs a display,
@@ -64,7 +64,7 @@ class Camera:
 
     @classmethod
     def around(cls, points: Floats, direction: Floats, up: int = 2) -> Camera:
-        """Camera that views points from a direction, with axis `up` pointing up, so that they fill the picture."""
+        """Make a camera that views points from a direction, axis `up` pointing up, so that they fill the picture."""
         frame = looking(direction, up)
         seen = points @ frame[:2].T
         lower, upper = seen.min(axis=0), seen.max(axis=0)
@@ -73,19 +73,19 @@ class Camera:
         return cls(frame, lower, scale, width, height)
 
     def pixels(self, points: Floats) -> Floats:
-        """(n, 3) column, row and depth of points in space; larger depths are nearer."""
+        """Return (n, 3) column, row and depth of points in space; larger depths are nearer."""
         seen = points @ self.frame.T
         return np.column_stack([(seen[:, :2] - self.lower) * self.scale + MARGIN_PIXELS, seen[:, 2] * self.scale])
 
     def shades(self, area_vectors: Floats) -> Floats:
-        """(m,) brightness of faces, from 0.45 to 1, the same for both sides of a face."""
+        """Return (m,) brightness of faces, from 0.45 to 1, the same for both sides of a face."""
         normals = area_vectors @ self.frame.T
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
         return 0.45 + 0.55 * np.abs(normals @ LIGHT)
 
 
 def looking(direction: Floats, up: int = 2) -> Floats:
-    """(3, 3) axes right, up and towards the eye, for a direction towards the eye."""
+    """Return (3, 3) unit vectors right, up and towards the eye, for a direction towards the eye."""
     towards = np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)
     upwards = np.eye(3)[up] if abs(towards[up]) < 0.95 else np.eye(3)[up - 1]
     right = np.cross(upwards, towards)
@@ -94,13 +94,13 @@ def looking(direction: Floats, up: int = 2) -> Floats:
 
 
 def oblique(elevation: float, azimuth: float, up: int = 2) -> Floats:
-    """Direction to the eye from elevation and azimuth in degrees: above the plane across axis `up`, and around it."""
+    """Return the direction to the eye at an elevation above the plane across axis `up`, and an azimuth, in degrees."""
     e, a = np.radians([elevation, azimuth])
     return np.roll([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], up - 2)
 
 
 def rasterize(corners: Floats, values: Floats, width: int, height: int) -> tuple[Floats, Ints, Floats]:
-    """Draw triangles (m, 3, 3), in pixels and depth: depth, nearest face or −1, and value (m, 3) or NaN."""
+    """Draw triangles (m, 3, 3) in pixels and depth, with values (m, 3); return depth, face or −1, and value or NaN."""
     depth, face = np.full(height * width, -np.inf), np.full(height * width, -1)
     shown = np.full(height * width, np.nan)
     _draw(np.ascontiguousarray(corners), width, height, depth, face)
@@ -115,7 +115,7 @@ def rasterize(corners: Floats, values: Floats, width: int, height: int) -> tuple
 
 @compiled
 def _draw(corners: Floats, width: int, height: int, depth: Floats, face: Ints) -> None:
-    """Depth and face of the nearest triangle at each pixel; of a row it has those from one side to before the next."""
+    """Write depth and face of the nearest triangle at each pixel; in a row it covers its left end but not its right."""
     for t in range(len(corners)):
         ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
         bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
@@ -147,7 +147,7 @@ def _draw(corners: Floats, width: int, height: int, depth: Floats, face: Ints) -
 
 @compiled
 def _crossed(ax: float, ay: float, bx: float, by: float, y: float) -> float:
-    """Where a row crosses a side: the same number whichever way round the side is given."""
+    """Return where a row crosses a side: the same number whichever end of the side is given first."""
     if ay > by:
         ax, ay, bx, by = bx, by, ax, ay
     return ax + (bx - ax) * ((y - ay) / (by - ay))
@@ -168,7 +168,7 @@ def save_scene(shape: Shape | ForeignShape, path: PathLike, up: int = 2) -> None
     FileFormatError
         If the picture cannot be written.
     UnsupportedTypeError
-        If it is no shape.
+        If `shape` is not a shape.
     """
     with picture(path, 7, 6) as figure:
         draw_shape(shape, figure.add_subplot(), up=up)
@@ -181,7 +181,7 @@ def draw_shape(
     up: int = 2,
     colors: Floats | None = None,
 ) -> None:
-    """Draw a shape into axes, seen from an elevation and an azimuth in degrees; triangles in (m, 3) colours, if any."""
+    """Draw a shape into axes, seen from an elevation and an azimuth in degrees; triangles may have (m, 3) colours."""
     shape = outside_of(shape)
     direction = oblique(*view, up)
     axes.set_axis_off()
@@ -276,7 +276,7 @@ def draw_surface(
     up: int = 2,
     colors: ScalarMappable | None = None,
 ) -> None:
-    """Draw into axes, with isolines and a colour bar; in given colours, without them.
+    """Draw φ on a surface into axes, with isolines and a colour bar; with given `colors`, without either.
 
     `view` is a direction from the surface to the eye.
     """
@@ -399,14 +399,14 @@ def save_thickness(found: Thickness, path: PathLike) -> None:
 
 
 def _mixed(values: Floats, low: float, high: float, stops: Ints) -> NDArray[np.uint8]:
-    """(n, 3) colours of values between two limits."""
+    """Return (n, 3) colours of values between two limits."""
     places = np.linspace(low, high, len(stops))
     mixed = [np.interp(values, places, stops[:, channel]) for channel in range(3)]
     return np.stack(mixed, axis=1).round().astype(np.uint8)
 
 
 def _thickness_colors(found: Thickness) -> NDArray[np.uint8]:
-    """(m, 3) colours of faces: thin walls orange, thick ones blue, grey where nothing is opposite."""
+    """Return (m, 3) colours of faces: thin walls orange, thick ones blue, grey where nothing is opposite."""
     known = ~np.isnan(found.values)
     colors = np.full((len(known), 3), 190, dtype=np.uint8)
     if known.any():
@@ -415,13 +415,13 @@ def _thickness_colors(found: Thickness) -> NDArray[np.uint8]:
 
 
 def _limits(found: Thickness) -> tuple[float, float]:
-    """Thicknesses at which colours begin and end."""
+    """Return the thicknesses at which colours begin and end."""
     low, high = found.percentiles([0.0, 95.0]).tolist()
     return (low, high) if high > low + 1e-9 * high else (0.0, high)
 
 
 def _draw_thickness(found: Thickness, path: PathLike) -> None:
-    """Draw the faces in colours, and the area of each thickness."""
+    """Draw the faces in colours, and a histogram of area over thickness."""
     low, high = _limits(found)
     colors = _thickness_colors(found) / 255
     with picture(path, 12, 5) as figure:

@@ -93,7 +93,7 @@ def _(field: VertexField | PiecewiseField, plotter: Any) -> None:
 
 
 def _look(values: Any) -> dict[str, Any]:
-    """Colours centred on zero, and isolines."""
+    """Choose colours centred on zero, and isolines."""
     low, high = range_of(values)
     reach = max(abs(low), abs(high), 1e-300)
     levels = isolines_between(low, high)[0]
