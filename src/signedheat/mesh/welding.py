@@ -88,7 +88,7 @@ def same_rows(rows: NDArray[np.integer]) -> Ints:
 
 
 def distinct_rows(rows: NDArray[np.integer]) -> tuple[Ints, Ints]:
-    """Return the number of each of (n, k) rows, equal for equal rows, by first appearance; and the first row of each."""
+    """Return the number of each of (n, k) rows, alike for equal ones, by first appearance, and each first row."""
     first = same_rows(rows)
     is_first = first == np.arange(len(first))
     return (np.cumsum(is_first) - 1)[first], np.flatnonzero(is_first)
