@@ -160,9 +160,9 @@ def signed_distance(
     completion, lids, nested : str
         In space: see `complete`.
     constraint : Free, ZeroSet or Soft, optional
-        Constraint on φ at the source, where φ is computed; by default `ZeroSet`.
+        Constraint on φ at the source, if the signed heat method is used; by default `ZeroSet`.
     diffusion : float
-        τ in ``t = τ h²``, where φ is computed; larger values close gaps along rounder lines.
+        τ in ``t = τ h²``, if the signed heat method is used; larger values close gaps along rounder lines.
     fill : {"nonzero", "evenodd"}
         In the plane: the filling rule of closed outlines, as in SVG.
     as_oriented : bool

@@ -89,7 +89,7 @@ class Displayed:
         raise NotImplementedError
 
     def plotter(self) -> pyvista.Plotter:
-        """Draw this into a `pyvista.Plotter`, to add more to it, or to make a file of it.
+        """Draw this into a `pyvista.Plotter`, to which more can be added, and which can be saved to a file.
 
         Fields have the colours of all pictures here: blue for negative distance, orange for positive, light at zero;
         the surface or line of distance zero is drawn too. Of shapes, outer sides are light and inner sides red.
@@ -112,12 +112,12 @@ class Displayed:
         return windows.plotter_of(self)
 
     def plot(self) -> object:
-        """Show this in a window, or in the notebook, by PyVista; with trame installed, notebooks can turn it.
+        """Show this in a window or a notebook, by PyVista; in notebooks it can be turned if trame is installed.
 
         Returns
         -------
         object
-            What `pyvista.Plotter.show` returns: nothing after a window, what is displayed in a notebook.
+            What `pyvista.Plotter.show` returns: None after a window, and in a notebook what is displayed.
 
         Raises
         ------
@@ -232,7 +232,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Raises
         ------
         FileFormatError
-            If the format is another, has no place for such a shape, or the file cannot be written.
+            If the format is not one of these, or cannot hold such a shape, or the file cannot be written.
 
         Examples
         --------
@@ -252,12 +252,12 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Parameters
         ----------
         thing : object
-            `trimesh.Trimesh`, `trimesh.PointCloud`, or a `trimesh.Scene`, whose meshes are taken in their places.
+            `trimesh.Trimesh`, `trimesh.PointCloud`, or a `trimesh.Scene`, whose meshes are placed as in the scene.
 
         Returns
         -------
         TriangleMesh, PolygonMesh or PointCloud
-            Of the class that this was called on.
+            A shape of the class on which this was called.
 
         Examples
         --------
@@ -301,7 +301,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Returns
         -------
         TriangleMesh, PolygonMesh or PointCloud
-            Of the class that this was called on.
+            A shape of the class on which this was called.
 
         Examples
         --------
@@ -334,7 +334,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Returns
         -------
         TriangleMesh, PolygonMesh or PointCloud
-            Of the class that this was called on.
+            A shape of the class on which this was called.
 
         Examples
         --------
@@ -388,7 +388,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Returns
         -------
         TriangleMesh, PolygonMesh or PointCloud
-            Of the class that this was called on.
+            A shape of the class on which this was called.
 
         Examples
         --------

@@ -210,7 +210,7 @@ class Combinable(Arithmetic):
         Raises
         ------
         FileFormatError
-            If the format is another, or the file cannot be written.
+            If the format is not one of these, or the file cannot be written.
         MissingPackageError
             If the format needs meshio, and it is not installed.
 

@@ -115,9 +115,9 @@ def is_pair(thing: object) -> bool:
 def as_shape(thing: Shape | ForeignShape) -> Shape:
     """Convert an object of another package, a pair of arrays, a solid or an image to a shape.
 
-    Every function that takes a shape does this by itself. A shape is returned as it is, and of a `Solid` its
-    ``boundary``. Faces keep their number, order and defects. An object without faces becomes a `PointCloud`, one of
-    triangles alone a `TriangleMesh`, any other a `PolygonMesh`; tets become a `TetMesh`.
+    Every function that takes a shape does this by itself. A shape is returned as it is, and a `Solid` gives its
+    ``boundary``. Faces keep their number, order and defects. An object without faces becomes a `PointCloud`, one with
+    triangles only a `TriangleMesh`, and any other a `PolygonMesh`; tets become a `TetMesh`.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def as_shape(thing: Shape | ForeignShape) -> Shape:
     Raises
     ------
     UnsupportedTypeError
-        If it is no shape, such as lines, or an object of another package.
+        If the object is not a shape (lines, for instance), or comes from a package other than these.
     GeometryError
         If the shape is invalid.
 

@@ -238,8 +238,8 @@ class Geodesic(Method):
 class Convex(Method):
     """``max Σ A_i sign(φ⁰_i) φ_i`` where ``|∇φ| ≤ 1`` in every cell and φ = 0 on the source, by ADMM (Eq. 17, Eq. 18).
 
-    Corrects signs that a long diffusion has made wrong. The result is too small, since a function with gradients of
-    length at most one in every triangle or tet is a lower bound of distance: on fine meshes `Geodesic` is far more
+    This corrects signs that a long diffusion has made wrong. The result is too small, since a function with gradients
+    of length at most one in every triangle or tet is a lower bound of distance: on fine meshes `Geodesic` is far more
     accurate, and on tets the bias is larger than the error of the unsharpened field. One factorisation serves all
     rounds (Belyaev & Fayolle 2020).
 

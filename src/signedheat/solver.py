@@ -161,7 +161,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             On surfaces: `Curve`, `SurfacePoints`, or potpourri3d's lists of (element, coordinates). In space:
             `TriangleMesh`, `PolygonMesh`, `PointCloud`; in the plane: `Polyline`.
         constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-            Imposed on φ at the sources; `ZeroSet` by default.
+            Constraint on φ at the sources; `ZeroSet` by default.
 
         Returns
         -------
@@ -239,7 +239,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         sources : sequence
             Each entry is an argument of `distance`.
         constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-            Imposed on each; `ZeroSet` by default. `Free` shares most of the work.
+            Constraint on each φ; `ZeroSet` by default. With `Free`, the sources share most of the work.
 
         Returns
         -------
