@@ -238,7 +238,7 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
 
 
 def groups_of(content: dict[str, Any]) -> list[Group]:
-    """Parse curves with vertex ids and weights."""
+    """Parse curves and points that are given by vertex ids and weights."""
     base, groups = int(content.get("index_base", 0)), []
     for group in content["groups"]:
         nodes = [
@@ -315,7 +315,7 @@ def _groups_to_write(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -
 
 
 def write_json(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
-    """Write JSON with vertex ids and weights."""
+    """Return JSON with the vertex ids and weights of curves and points."""
     groups = []
     for group in _groups_to_write(curves, domain):
         nodes = [{"v": list(node.vertices), "w": list(node.weights)} for node in group.nodes]
@@ -325,7 +325,7 @@ def write_json(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
 
 
 def write_obj(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
-    """Write polylines in space."""
+    """Return OBJ text with a line element for each curve, and a point element for each set of points."""
     vertices: list[str] = []
     elements: list[str] = []
     for curve in curves:

@@ -191,7 +191,7 @@ def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
             raise damaged(f"a path goes on with '{data[position : position + 20].strip()}', which is not a command")
         numbers = []
         for place in range(ARGUMENTS[command.upper()]):
-            pattern = FLAG if command in "Aa" and place in (3, 4) else NUMBER  # no space need follow flags of arcs
+            pattern = FLAG if command in "Aa" and place in (3, 4) else NUMBER  # flags of arcs need no space after them
             number = pattern.match(data, position)
             if number is None:
                 raise damaged(

@@ -186,6 +186,7 @@ def load_vertex_field(path: PathLike) -> VertexField:
 
 
 def _load_tet_field(path: PathLike) -> TetField:
+    """Read a field on tets."""
     with reading(path):
         cells = load_cells(path)
         if VALUES_NAME not in cells.point_data:
@@ -195,6 +196,7 @@ def _load_tet_field(path: PathLike) -> TetField:
 
 
 def _load_band(path: PathLike) -> GridField:
+    """Read a field in a band from an archive, and refuse blocks that lie outside of its grid or are not in order."""
     needed = ("places", "values", "origin", "spacing", "shape", "width", "coarse_values", "coarse_spacing")
     with reading(path):
         arrays = read_npz(path, (CONFIDENCE,), needed)

@@ -176,6 +176,7 @@ def ensure_fits(size: int, path: PathLike) -> None:
 
 
 def _no_file(path: PathLike, mode: int) -> FileFormatError:
+    """Return the error for a path to something other than a regular file, as its mode tells."""
     kinds = ((stat.S_ISDIR, "folder"), (stat.S_ISFIFO, "pipe"), (stat.S_ISSOCK, "socket"))
     kind = next((name for test, name in kinds if test(mode)), "device")
     return FileFormatError(f"this is a {kind}", remedy="name a regular file", path=path)

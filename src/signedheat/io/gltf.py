@@ -109,8 +109,8 @@ class _Scene:
 def _read_scene(path: PathLike) -> _Scene:
     """Read the description of a scene, and its buffers: embedded in a ``.glb`` file, in data URIs, or in other files.
 
-    A ``.glb`` file has 12 bytes of header, the last four its size; the JSON; and at most one buffer. Before each of the
-    latter two stand 8 bytes: size and type.
+    A ``.glb`` file has a header of 12 bytes, of which the last four hold its size, the JSON, and at most one buffer.
+    Before the JSON and the buffer stand 8 bytes with their size and type.
     """
     data, embedded = contents(path), b""
     text = data

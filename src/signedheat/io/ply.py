@@ -166,6 +166,7 @@ def _unrolled(strip: Ints) -> Ints:
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
+    """Parse the header of a PLY file; return its format, its elements, and the data after it."""
     if not data.startswith(b"ply"):
         raise FileFormatError("it does not begin with 'ply': this is not a PLY file")
     end = data.find(b"end_header")
@@ -258,6 +259,7 @@ class _BinaryReader:
         }
 
     def _row_by_row(self, element: _Element) -> dict[str, Any]:
+        """Read the columns of an element whose lists may differ in length."""
         columns: dict[str, list[Any]] = {name: [] for name in element.properties}
         counts: dict[str, list[int]] = {name: [] for name in element.properties}
         for _ in range(element.count):
@@ -284,6 +286,7 @@ class _BinaryReader:
 
 
 def _text_reader(body: bytes) -> Any:
+    """Return a function that reads the columns of the next element from text, as `_BinaryReader.read` does."""
     lines = iter([line.decode("ascii", errors="replace") for line in body.splitlines() if line.strip()])
 
     def read(element: _Element) -> dict[str, Any]:

@@ -83,7 +83,7 @@ def read_3mf(path: PathLike) -> TriangleMesh:
         if not items:  # nothing says what to build: take each object that has a mesh
             keys = [_key(element, package.root, "id") for element in _all(root, "object")]
             items = [(key, np.eye(4, 3)) for key in keys if len(package.object(key).faces)]
-        ensure_fits(100 * sum(package.count(key)[0] for key, _ in items), path)  # for a triangle and its vertices
+        ensure_fits(100 * sum(package.count(key)[0] for key, _ in items), path)  # bytes for a triangle and its vertices
         return _joined([body for key, matrix in items for body in package.placed(key, matrix)])
 
 
@@ -192,6 +192,7 @@ def _key(element: ElementTree.Element, part: str, name: str = "objectid") -> Key
 
 
 def _matrix(element: ElementTree.Element) -> Floats:
+    """Return the (4, 3) transform of rows that an element states, by default the identity."""
     words = element.get("transform")
     if words is None:
         return np.eye(4, 3)

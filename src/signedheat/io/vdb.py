@@ -156,13 +156,13 @@ def _write_file(
     """Write the header, the offsets of the grid, of its voxels and of its end, and the grid."""
     kind = np.dtype("<f2" if half else "<f4")
     file.write(struct.pack("<qIIIB", VDB_MAGIC, VDB_VERSION, *VDB_LIBRARY, 1) + str(uuid.uuid4()).encode())
-    file.write(struct.pack("<II", 0, 1))  # no metadata of the file, and one grid
+    file.write(struct.pack("<II", 0, 1))  # numbers of metadata of the file, and of grids
     file.write(_text(VALUES_NAME) + _text("Tree_float_5_4_3" + ("_HalfFloat" if half else "")) + _text(""))
     offsets = file.tell()
     file.write(struct.pack("<qqq", 0, 0, 0))
     begin = file.tell()
     file.write(struct.pack("<I", ZIP_FLAG) + _metadata(metadata) + _transform(origin, spacing))
-    file.write(struct.pack("<I", 1) + np.float32(kind.type(tree.background)).tobytes())  # one buffer of values
+    file.write(struct.pack("<I", 1) + np.float32(kind.type(tree.background)).tobytes())  # number of buffers of values
     _write_topology(file, tree, kind)
     voxels = file.tell()
     for active, values in zip(tree.active, tree.values, strict=True):
@@ -177,7 +177,7 @@ def _write_topology(file: BinaryIO, tree: _Tree, kind: np.dtype) -> None:
     cube, top_size = VOXELS_PER_CHILD[0], CHILDREN_PER_EDGE[0] * VOXELS_PER_CHILD[0]
     cubes_of = _by_parent(tree.places // cube * cube, top_size)
     blocks_of = _by_parent(tree.places, cube)
-    file.write(struct.pack("<II", 0, len(cubes_of)))  # the root has no tiles, and as many children
+    file.write(struct.pack("<II", 0, len(cubes_of)))  # numbers of tiles and of children of the root
     masks = iter(tree.active)
     for top, cubes in cubes_of.items():
         file.write(struct.pack("<iii", *top) + _node(np.array(top), 0, cubes, tree.outside, kind))
@@ -221,6 +221,7 @@ def _text(given: str) -> bytes:
 
 
 def _mask(chosen: Bools) -> bytes:
+    """Return a mask as bytes, with bit n % 8 of byte n // 8 for entry n."""
     return np.packbits(chosen, bitorder="little").tobytes()
 
 

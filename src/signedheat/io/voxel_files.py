@@ -107,19 +107,19 @@ class LabelImage(Represented, Frozen):
 
     @property
     def grid(self) -> Grid:
-        """The centres of the voxels, along the axes of the image, the first one at 0."""
+        """The grid of the centres of the voxels, along the axes of the image; the first one is at 0."""
         return Grid((0.0, 0.0, 0.0), self.spacing, self.labels.shape)
 
     @property
     def matrix(self) -> Floats:
-        """(4, 4) from positions along the axes of the image to those in the world."""
+        """(4, 4) map from positions along the axes of the image to those in the world."""
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = self.axes / self.spacing, self.origin
         return matrix
 
     @property
     def boundary(self) -> TriangleMesh:
-        """The smooth surface around the voxels with the only label but 0, in the world: closed and manifold."""
+        """The smooth surface around the voxels with the only label other than 0, in the world: closed and manifold."""
         return self.to_world(self.surface())
 
     def surface(self, label: float | None = None) -> TriangleMesh:
