@@ -96,6 +96,7 @@ def _is_expected(error: BaseException) -> bool:
 
 
 def _one_line(error: BaseException) -> str:
+    """Describe an error in one line; an unexpected one is called a bug, with its place in the code."""
     if isinstance(error, MemoryError):
         return "there is not enough memory: choose a lower resolution or a smaller shape"
     if _is_expected(error):

@@ -285,7 +285,7 @@ def field_or_image(path: str) -> Any:
         return sh.load_field(path)
     try:
         image = sh.io.read_labels(path)
-    except FileFormatError:  # a field in the plane, or none
+    except FileFormatError:  # it holds a field in the plane, or no field
         return sh.load_field(path)
     along = np.array_equal(image.axes, np.diag(image.spacing))
     return sh.load_field(path) if along and image.labels.dtype.kind == "f" else image

@@ -41,7 +41,7 @@ class Parser(argparse.ArgumentParser):
     """An argument parser with one-line errors."""
 
     def error(self, message: str) -> NoReturn:
-        """Exit with status 2."""
+        """Print an error in one line, and exit with status 2."""
         say(f"{self.prog}: {message} (see {self.prog} --help)")
         raise SystemExit(2)
 
@@ -58,12 +58,12 @@ class Option:
 
     @property
     def attribute(self) -> str:
-        """The name of its value among the arguments."""
+        """The name of the value of the option among the arguments."""
         return str(self.settings.get("dest", self.names[-1].lstrip("-").replace("-", "_")))
 
     @property
     def default(self) -> Any:
-        """Its value where it is not given."""
+        """The value of the option where it is not given."""
         return self.settings.get("default", False if self.settings.get("action") == "store_true" else None)
 
 
@@ -94,7 +94,7 @@ class Command:
         return {option.names[-1]: option for options in groups for option in options}
 
     def add_to(self, commands: Any) -> None:
-        """Add it to the commands of a parser."""
+        """Add the command to the commands of a parser."""
         parser = commands.add_parser(self.name, help=self.help, description=self.description)
         if self.usage is not None:
             parser.usage = f"%(prog)s {self.usage}"
@@ -210,7 +210,7 @@ def is_quiet(arguments: Namespace) -> bool:
 
 
 def finite(word: str) -> float:
-    """Return a finite number."""
+    """Parse a finite number."""
     try:
         value = float(word)
     except ValueError:
@@ -221,7 +221,7 @@ def finite(word: str) -> float:
 
 
 def ending(word: str) -> str:
-    """Return the extension of a file, without its first dot."""
+    """Check that a word is an extension of files, and return it without its first dot."""
     if not re.fullmatch(r"\.?\w+(\.gz)?", word):
         raise argparse.ArgumentTypeError(f"{word!r} is not an extension of a file")
     return word.removeprefix(".")
@@ -266,7 +266,7 @@ def units(word: str) -> str:
 
 
 def constraint(word: str, known: tuple[str, ...] = CONSTRAINTS) -> str:
-    """Check that a word is one of the constraints that are known, and the weight of a soft one."""
+    """Check that a word is one of the known constraints; the weight of a soft one must be positive."""
     name, _, weight = word.partition(":")
     if name == "soft":
         if weight:

@@ -259,6 +259,7 @@ def standard_files(arguments: Namespace) -> Iterator[StandardFiles]:
 
 
 def _write(path: Path) -> None:
+    """Copy a file to standard output; if it does not exist, the result is in several files, which is refused."""
     if not path.is_file():
         raise FileFormatError(
             "the result is several files", remedy="name a file instead of standard output", path="standard output"
