@@ -94,7 +94,7 @@ def _reaching_out(chain: Chain, inner: Bools, outer: Bools, turned: Bools) -> Bo
 
 
 def _angles(positions: Floats, tails: Ints, heads: Ints, forward: Bools, normals: Floats) -> Floats:
-    """Angles of faces around their edges, right-handed about the direction from the lower vertex to the higher."""
+    """Return angles of faces around their edges, right-handed from the lower vertex to the higher; NaN if undefined."""
     along = unit(positions[heads] - positions[tails])
     into = np.cross(normals, along)
     angles = angles_around(along * np.where(forward, 1.0, -1.0)[:, None], into)

@@ -422,7 +422,7 @@ def strips(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints:
 
 
 def _rims(surface: _Surface) -> list[walls.Rim]:
-    """Rims of parts with more than one face."""
+    """List the rims of parts with more than one face."""
     if not surface.loops:
         return []
     counts = np.bincount(surface.parts)

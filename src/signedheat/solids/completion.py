@@ -80,7 +80,7 @@ BYTES_PER_LOOSE_FACE, BYTES_OF_HEAT = 3400, 150_000_000
 CELLS_PER_POINT_GAP = 2.0
 """Number of cells between neighbouring points of a cloud."""
 NOISE_RANGE = (1e-6, 0.75)
-"""Distances between corners that noise has separated, relative to the square root of their triangle's area."""
+"""Range of distances between corners that noise has separated, relative to the square root of their triangle's area."""
 TORN_LEVEL = 0.2
 """Loose pieces are completed by heat below this level, where a fifth to two fifths of a body are left, else by lids,
 which keep to the faces. For balls, tori and a cow without 45 % of their triangles, lids enclose .1 % too little and

@@ -158,7 +158,7 @@ class Heat:
 
 
 def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0.0) -> tuple[Floats, Ints] | None:
-    """Extract the closed zero set of φ around a shape, in cells of about a width (0: the finest); None if none."""
+    """Extract the closed zero set of φ in cells about `cell` wide (0: the finest); None if the shape bounds nothing."""
     bounds = shape.bounds
     side = float(np.ptp(bounds, axis=0).max())
     nodes = int(np.clip((1 + 2 * HEAT_PADDING) * side / cell, *HEAT_NODES)) if cell > 0 else HEAT_NODES[1]

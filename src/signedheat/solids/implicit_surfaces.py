@@ -301,7 +301,7 @@ def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, 
 
 
 def _slopes(values: Floats, axis: int) -> tuple[Floats, Floats]:
-    """Second-order differences along an axis, of the least bent of three parabolas (Harten 1987), and their change."""
+    """Second-order differences along an axis, of the least bent of three parabolas (Harten 1987), and its bend."""
     v = np.moveaxis(values, axis, 0)
     if len(v) < 3:
         return np.broadcast_to(np.moveaxis(v[1:] - v[:1], 0, axis), values.shape), np.zeros(values.shape)
