@@ -80,7 +80,8 @@ class CurvePieces:
         order = order_in_space(places)
         listed = [listed[k] for k in order]
         each = [part for (part,) in surface.segments([[curve] for curve in listed])]
-        by_points = np.array([curve.normals is None for curve in listed])  # not those with normals, which may differ
+        # curves with normals are neither joined nor taken for copies, since their normals may disagree
+        by_points = np.array([curve.normals is None for curve in listed])
         first, copy = without_copies(each, by_points)
         parts, stroke = joined_end_to_end([each[k] for k in first], by_points[first])
         movable = np.array([is_piece(surface.triangles, part) for part in parts])
@@ -138,15 +139,17 @@ class Decision:
         lengths = np.where(best.explained >= EXPLAINED, strokes.lengths, 0.0)
         turned, total = (np.bincount(strokes.group, lengths * way) for way in (best.signs < 0, 1))
         against = (turned > HALF * total)[strokes.group] & (best.signs < 0) & (lengths > 0)
-        few = lengths[against].sum() < TURNED * lengths[against | (best.signs > 0)].sum()  # others turned: no evidence
+        # other strokes that are turned count for neither side: they are no evidence of what is right
+        few = lengths[against].sum() < TURNED * lengths[against | (best.signs > 0)].sum()
         return self.pieces.curves(against & (not few))
 
     def worth_little(self, values: Floats) -> Ints:
         """Return the numbers of curves on which the inside depends, although they are worth little.
 
         A stroke is worth what the least cost rises by without it: an arc alone, its length less that of its gap; a
-        stray stroke little, because lines are added for it. The area that changes is that of the cut, and, away from
-        strokes, also where (n,) values of the field disagree: heat closes an arc by a larger bulge than lines do.
+        stray stroke little, because lines are added for it. The inside changes where the cut without the stroke does,
+        and, away from strokes, where that cut and (n,) values of the field disagree: heat closes an arc by a larger
+        bulge than lines do.
         """
         strokes, best, own = self.pieces.strokes, self.best, self.pieces.strokes.surface.restriction
         missing = cost(strokes, best) + strokes.lengths.sum()  # a stroke is worth its length less this, or more
@@ -174,12 +177,13 @@ def order_in_space(places: Sequence[Floats]) -> Ints:
 
 
 def likely_curves(ends: Floats, stroke: Ints) -> tuple[Ints, Floats]:
-    """Return (k,) the likely curve of each stroke, and (g,) the length of its gaps, from (2 j, 3) ends of its parts."""
+    """Return (k,) the likely curve of each stroke, and (g,) lengths of their gaps; from (2 j, 3) ends of curves."""
     j = len(stroke)
     nearest = nearest_others(ends)
     tails, heads = np.concatenate([nearest, np.stack([np.arange(j), j + stroke], axis=1)]).T
     group = np.unique(connected_components(j + int(stroke.max()) + 1, tails, heads)[j:], return_inverse=True)[1].ravel()
-    away = scipy.spatial.cKDTree(ends[::2]).query(ends[1::2])[0]  # from ends to beginnings: copies end together
+    # a gap is from the end of a curve to the nearest beginning: the nearest end may be that of a copy
+    away = scipy.spatial.cKDTree(ends[::2]).query(ends[1::2])[0]
     return group.astype(np.int64), np.bincount(group[stroke], away).astype(np.float64)
 
 

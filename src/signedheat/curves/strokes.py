@@ -1,4 +1,4 @@
-"""The inside that strokes bound, a set of vertices: its energy, and that of least energy, a minimum cut of a graph."""
+"""The energy of the inside that strokes bound, a set of vertices; and the inside of least energy, a minimum cut."""
 
 from __future__ import annotations
 

@@ -740,7 +740,7 @@ def first_waves(triangles: IntrinsicMesh, sources: GeodesicSources) -> Waves:
     along = (sources.beam_stops[:, None] - starts) / lengths
     tails, steps = triangles.corner_positions[faces] - starts, triangles.edge_vectors[faces]
     foot, rate, height, climb = (dot(v, way) for way in (along, 1j * along) for v in (tails, steps))
-    apart = np.abs(height) + np.abs(climb) > 1e-9 * np.abs(steps)  # from a segment on this side no beam crosses it
+    apart = np.abs(height) + np.abs(climb) > 1e-9 * np.abs(steps)  # no beam from a segment on this side crosses it
     beams = parts_within(apart, (-foot, -rate), (foot - lengths, rate), (-height, -climb))
 
     points = sources.fan_points[:, None]

@@ -235,7 +235,7 @@ def on_base(corners: Complexes, side: int, over: int, point: complex, a: complex
 
 @compiled
 def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tuple[list[int], list[int], float]:
-    """Return the portals at which the shortest path in a sleeve bends, at which of their ends, and its length."""
+    """Return the portals at which the shortest path in a sleeve bends, at which end (0: tail), and its length."""
     bends, ends = [0], [0]
     bends.pop()
     ends.pop()
