@@ -204,7 +204,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         Raises
         ------
         SourceError
-            If the field has no solid: it was read from a file, or computed otherwise.
+            If the field has no solid: it was computed otherwise, or read from a file without one.
 
         Examples
         --------

@@ -274,7 +274,7 @@ def unit_vectors(
     for component in components[1:]:
         np.maximum(sizes, np.abs(component), out=sizes)
     known = _nodes_of(inside[window], sizes.shape[3]) & (sizes >= LEAST_KNOWN)
-    factors = np.float32(1) / np.where(known, sizes, np.float32(1))  # squares without them would underflow
+    factors = np.float32(1) / np.where(known, sizes, np.float32(1))  # without these, squares would underflow
     squares = sum((factors * component) ** 2 for component in components[: len(out)])
     factors /= np.sqrt(np.where(known, squares, np.float32(1)))
     for component, into in zip(components, out, strict=False):

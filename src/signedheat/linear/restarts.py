@@ -15,7 +15,7 @@ Solve = Callable[[NDArray[Any]], NDArray[Any]]
 """From right-hand sides (n, k) or (n,) to the solutions."""
 Forces = Callable[[NDArray[Any], Bools], tuple[Bools, NDArray[Any]]]
 """From x, zero except on the faint rows (where the stages so far are too small), and the (n,) mask of these rows: to
-the (n,) mask of the rows that couple faint rows to others, and A x."""
+the (n,) mask of the rows that couple faint rows to others, and A x on these."""
 
 
 class Stage(NamedTuple):

@@ -21,7 +21,7 @@ from .ordering import elimination_order, whole
 
 
 class SuperLUFactor:
-    """Factor ``L D Lᴴ`` of a Hermitian positive definite matrix, in an order found here: SuperLU's takes minutes."""
+    """Factor ``L D Lᴴ`` of a Hermitian positive definite matrix, by nested dissection: other orders take minutes."""
 
     backend = "superlu"
 
