@@ -37,7 +37,7 @@ from ..mesh.unit_vectors import ANGLE_ROUNDING
 class Lines(NamedTuple):
     """Straight lines, one row for each face that one of them crosses, in order along each line."""
 
-    owners: Ints  # (r,) which line
+    owners: Ints  # (r,) id of the line
     faces: Ints  # (r,) the face crossed
     starts: Floats  # (r, 3) barycentric coordinates of where the line enters the face
     ends: Floats  # (r, 3) barycentric coordinates of where it leaves the face
@@ -66,7 +66,7 @@ class History(Frozen):
         return self._transferred(self._earlier, faces, rows_of(barycentric, vectors))
 
     def inserted(self) -> tuple[Ints, Floats]:
-        """Places, on `before`, of the vertices that were inserted, in order: faces, and barycentric coordinates."""
+        """Locate the inserted vertices, in order, on `before`; return faces and barycentric coordinates."""
         vertex = self.steps[:, 3]
         rows = np.flatnonzero((vertex >= 0) & (np.diff(vertex, prepend=-1) != 0))  # several steps split one edge
         is_edge = self.steps[rows, 0] == SPLIT_EDGE
@@ -257,7 +257,7 @@ def exchange(
 
 @compiled
 def squared_length(g: Gluing, f: int, v: Floats) -> tuple[float, float]:
-    """Squared length of a vector in a face, and the sum of the sizes of its terms."""
+    """Squared length of a vector in a face, from differences of barycentric coordinates, and the sum of |terms|."""
     square, size = 0.0, 0.0
     for k in range(3):
         term = v[k] * v[(k + 1) % 3] * g.length[g.edge[3 * f + k]] ** 2

@@ -55,7 +55,7 @@ def refine_all(
     if status == REFINED and coarsest < np.inf:
         mean_radius = float(np.sqrt(4 / 27**0.5 * lay_out(gluing).face_areas.mean())) / gluing.unit
         goal = goal._replace(radius=coarsest * mean_radius)
-        report = None if progress is None else lambda _: progress(1.0)  # it may cancel
+        report = None if progress is None else lambda _: progress(1.0)  # the callback may cancel
         gluing, agenda, status = refined(gluing, agenda, goal, report)
     n_edges = int(gluing.counts[N_EDGES])
     origin = np.full(n_edges, -1)
@@ -165,7 +165,7 @@ class Goal(NamedTuple):
 
 @compiled
 def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
-    """Insert vertices until every face meets the goal, where possible; pause after `patience` of them."""
+    """Insert vertices until all faces meet the goal, if possible; pause after `patience`; return why it stopped."""
     pause = g.counts[N_VERTICES] + patience
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     while flip_until_delaunay(g, agenda.stack, agenda.stacked):

@@ -56,7 +56,7 @@ PROPOSED_AT_ONCE = 65536
 
 @dataclass(frozen=True, eq=False)
 class LocalTriangulations:
-    """Triangles on points."""
+    """Triangles on points, and the normals by which they are oriented."""
 
     faces: Ints  # (m, 3) point ids, oriented alike as far as the surface allows
     normals: Floats  # (n, 3) unit normals, on the side from which the faces at each point run counter-clockwise
@@ -254,7 +254,7 @@ def accepted_triangles(planes: TangentPlanes, proposals: Sequence[tuple[Ints, In
 
 
 def well_shaped_triangles(points: Floats, triangles: Ints, reach: Floats) -> tuple[Ints, Floats]:
-    """Ids of triangles with area whose circumradius is within the reach of all their corners, and the radii."""
+    """Ids of triangles with positive area and a circumradius within the reach of all corners, and these circumradii."""
     a, b, c = points[triangles].transpose(1, 0, 2)
     u, v, w = b - a, c - b, a - c
     twice_area = np.linalg.norm(np.cross(u, w), axis=1)

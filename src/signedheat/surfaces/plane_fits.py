@@ -44,7 +44,7 @@ TRIED_POINTS = 2000
 
 @dataclass(frozen=True, eq=False)
 class PlaneFits:
-    """Planes near points."""
+    """Planes fitted near points."""
 
     axes: Floats  # (n, 3) unit normals, up to sign
     places: Floats  # (n, 3) the points themselves; where they are noisy, the nearest points of the planes
@@ -191,7 +191,7 @@ def least_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, zz:
 
 @compiled
 def weighted_plane(offsets: Floats, weights: Floats, count: int, axis: Floats, center: Floats) -> float:
-    """Write normal and weighted mean of the first `count` points; return their mean squared height."""
+    """Fit a plane to the first `count` points; write its normal and their mean, return their mean squared height."""
     total = x = y = z = 0.0
     for j in range(count):
         total += weights[j]

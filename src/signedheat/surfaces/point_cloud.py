@@ -345,7 +345,7 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> Outward
 
 
 def _lone(places: Floats, reaches: Floats) -> Bools:
-    """(n,) outliers: points farther from their neighbours than these are from theirs."""
+    """(n,) whether a point is an outlier, much farther from its neighbours than these are from theirs."""
     near = scipy.spatial.cKDTree(places).query(places, k=min(DIRECT_NEIGHBORS + 1, len(places)), workers=-1)[1]
     return reaches > OUTLIER_DISTANCE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
 
@@ -403,7 +403,7 @@ def _ball_links(places: Floats, axes: Floats, tets: Ints) -> Links:
 
 
 def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> Links:
-    """Link faces of the hull with the outside: flat tets behind them do not tell the inner side."""
+    """Link corners of the hull with the outside, which faces away from the mean: tets behind faces may be flat."""
     tet, opposite = np.nonzero(tets.neighbors < 0)
     faces = tets.simplices[tet[:, None], (opposite[:, None] + [1, 2, 3]) % 4].astype(np.int64)
     a, b, c = places[faces].transpose(1, 0, 2)

@@ -193,13 +193,13 @@ def given_curves(domain: object, sources: list[Any]) -> tuple[list[Any], Without
 
 
 def numbers_kept(n: int, left_out: WithoutLength | None) -> Ints:
-    """(n,) numbers of the n sources that were kept among all that were given."""
+    """(n,) positions, among all sources that were given, of the n that were kept."""
     clicks = [] if left_out is None else left_out.without_length
     return np.setdiff1d(np.arange(n + len(clicks)), clicks)
 
 
 def numbers_given(sources: Sequence[Any], left_out: WithoutLength | None) -> Ints:
-    """(n,) numbers of the n curves that were kept, like `numbers_kept`, but counting every curve of a group."""
+    """(n,) positions of the n curves that were kept, like `numbers_kept`, but counting every curve of a group."""
     kept = numbers_kept(len(sources), left_out)
     counts = np.ones(kept.max(initial=-1) + 1, dtype=np.int64)
     counts[kept] = [len(source) if isinstance(source, Sequence) else 1 for source in sources]
@@ -231,14 +231,14 @@ ONE_PIECE = 0.15
 
 @dataclass(frozen=True, eq=False)
 class CurveGroups:
-    """Groups of open oriented curves."""
+    """Groups of open oriented curves, each group taken for the pieces of one interrupted curve."""
 
     lengths: Floats  # (g,) total length of the pieces of each group
     scales: Floats  # (g,) mean length of the pieces, weighted by length; of a single one `ONE_PIECE` times its length
 
     @classmethod
     def of(cls, mesh: TriangleMesh, curves: Sequence[Any]) -> CurveGroups:
-        """Link each end of a piece to the nearest end of another; single straight pieces are left out."""
+        """Group open oriented curves by linking each end to the nearest end of another; drop single straight ones."""
         listed = [curve for item in curves for curve in (item if isinstance(item, Sequence) else [item])]
         pieces = [curve for curve in listed if isinstance(curve, Curve) and curve.oriented and not curve.closed]
         if not pieces:

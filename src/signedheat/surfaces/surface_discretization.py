@@ -43,7 +43,7 @@ class SurfaceDiscretization:
     # Positions in space, for curves with given normals: (n_vertices, 3), or (m, 3, 3) of the corners if every face lies
     # in a plane of its own, up to translation. By default those of the domain's triangulation.
     positions: Floats | None = None
-    triangulation: IntrinsicTriangulation | None = None  # of the domain, whose field is kept as well
+    triangulation: IntrinsicTriangulation | None = None  # of the domain; the field on it is kept, too
     spacing: float = math.nan  # h: by default half the mean edge length, the distance between midpoints of edges
     notes: tuple[Note, ...] = ()  # on repairs made in building the triangles, for the diagnostics of every field
     # by diffusion time, of which there is a second one where curves end
@@ -80,7 +80,7 @@ class SurfaceDiscretization:
         """Refine the triangles to conform to unoriented curves; choose frames at nonmanifold edges."""
         triangles, segments = refine_to_conform(self.triangles, self.segments(sources))
         surface = self
-        if triangles is not self.triangles:  # their first vertices are the present ones
+        if triangles is not self.triangles:  # the present vertices come first in them
             notes = *self.notes, VerticesAdded(triangles.n_vertices - self.triangles.n_vertices)
             surface = replace(self, triangles=triangles, transfer=None, notes=notes)
         triangles, groups = nonmanifold_frames(triangles, segments)
@@ -175,7 +175,7 @@ Measured on 20,000 to 310,000 triangles with one diffusion time."""
 
 
 def memory_estimate(n_triangles: int) -> float:
-    """Estimate the bytes of a first distance on so many triangles."""
+    """Estimate the memory, in bytes, that the first distance on `n_triangles` triangles takes."""
     each, per_doubling = BYTES_PER_TRIANGLE[chosen_backend()]
     return n_triangles * (each + per_doubling * math.log2(max(n_triangles, 2)))
 
@@ -199,7 +199,7 @@ SOFT_STRENGTH = 10.0
 
 @dataclass(frozen=True, eq=False)
 class SurfaceIntegration(SpringIntegration):
-    """Step 3 on the vertices of a surface: `fit` is exact for sources at vertices only, and uses springs for others."""
+    """Step 3 on the vertices of a surface: `fit` is exact if all samples are vertices, and uses springs otherwise."""
 
     @property
     def soft_weight(self) -> float:
@@ -211,7 +211,7 @@ class SurfaceIntegration(SpringIntegration):
         return self._pulled_factor(source.interpolation, DirectIntegration.springs(self, source))
 
     def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, Floats]:
-        """Put springs at the two Gauss points of each segment, which are exact for linear functions, and at points."""
+        """Put springs at two Gauss points per segment (exact for linear φ), and at points; see `SpringIntegration`."""
         assert isinstance(source, SurfaceSource)
         n, springs = len(source.weights), self.springs(source)
         ends, lengths = ends_among(source.parts, np.arange(n)), np.concatenate([p.lengths for p in source.parts])

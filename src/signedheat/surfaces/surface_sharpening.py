@@ -69,9 +69,9 @@ def _(
 
 
 def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> Floats:
-    """Values at the vertices of the surface's triangles; averages of neighbours at those that the domain lacks."""
+    """Values at the vertices of the surface's triangles, by `on_triangulation`, or with NaN where it lacks them."""
     if isinstance(field.domain, IntrinsicTriangulation):
-        return field.values  # it has the vertices of its triangles
+        return field.values  # its vertices are those of the triangles
     values = field.domain.on_triangulation(field.values)
     if len(values) != surface.triangles.n_vertices:
         values = np.full(surface.triangles.n_vertices, np.nan)
@@ -100,7 +100,7 @@ def _(
 def nearest_zero(
     surface: SurfaceDiscretization, values: Floats, source: SourceTerm | None, tolerance: float, report: Report | None
 ) -> Nearest:
-    """Measure to the nearest of the zero set of φ, and of the unoriented curves and points that φ was computed from."""
+    """Measure distance to the zero set of φ, and to the unoriented curves and points that φ was computed from."""
     unsided = [part for part in source.parts if not part.oriented] if isinstance(source, SurfaceSource) else []
     sides = np.zeros(len(values), dtype=np.int64)
     if not isinstance(source, SurfaceSource) or not unsided:
@@ -134,7 +134,7 @@ def nearest_curve(
     tolerance: float,
     report: Report | None,
 ) -> Nearest:
-    """Measure to the nearest of curves and points, and of the zero set of φ where oriented curves are missing.
+    """Measure distance to curves and points, and to the zero set of φ where oriented curves are missing.
 
     Curves decide sides in regions that they bound, and next to them; far from them the zero set of φ counts.
     """

@@ -33,7 +33,7 @@ class SurfaceSource(Frozen):
 
     vectors: csr_array  # (1, e) X₀, in the frames of the edges
     time: float  # t of Eq. 12
-    interpolation: csr_matrix  # (s, n_vertices) φ at the samples, which are the distinct points of every source
+    interpolation: csr_matrix  # (s, n_vertices) interpolates φ at the samples, the distinct points of every source
     weights: Floats  # (s,) length of curve that belongs to each sample; h for isolated points
     components: Ints  # (s,) connected component of the union of all sources, numbered by first appearance
     source_ids: Ints  # (s,) source that each sample belongs to

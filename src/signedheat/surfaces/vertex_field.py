@@ -210,7 +210,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return field.domain.level_set(field.values, level)
 
     def combined_with(self, other: VertexField[Surface], rule: Rule) -> VertexField[Surface]:
-        # also on the finer triangles of one of them
+        # combine φ on the finer triangles of either field, too
         result = self.with_values(rule(self.values, other.values))
         finer = [field.finer for field in (self, other) if field.finest is field.finer]
         if not finer:
