@@ -21,7 +21,10 @@ from .ordering import elimination_order, whole
 
 
 class SuperLUFactor:
-    """Factor ``L D Lᴴ`` of a Hermitian positive definite matrix, by nested dissection: other orders take minutes."""
+    """Factor ``L D Lᴴ`` of a Hermitian positive definite matrix.
+
+    Unknowns are eliminated in a given order, or else by nested dissection: SuperLU's own order takes minutes.
+    """
 
     backend = "superlu"
 
