@@ -394,6 +394,7 @@ def _closest(points: Floats, a: int, b: int, c: int, d: int, place: Floats) -> f
 
 @compiled
 def _normal(points: Floats, face: Ints) -> tuple[float, float, float]:
+    """Return the unit normal of a face, (3,) vertex ids."""
     u, v = points[face[1]] - points[face[0]], points[face[2]] - points[face[0]]
     x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
     length = np.sqrt(x * x + y * y + z * z)

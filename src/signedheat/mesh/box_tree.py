@@ -214,7 +214,7 @@ def _slabs(triangles: Floats, items: Ints) -> Floats:
     slabs, size = (
         np.tile([0.0, 0.0, 0.0, -np.inf, np.inf], (2 * leaves, 2)),
         min(leaves, LEAVES_AT_ONCE),
-    )  # bound nothing
+    )  # slabs without bounds
     for begin in range(0, leaves if last >= 0 else 0, size):
         batch = items[begin * BOXES_PER_LEAF : (begin + size) * BOXES_PER_LEAF]
         corners = triangles[np.where(batch < 0, items[last], batch)]

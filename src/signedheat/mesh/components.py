@@ -103,6 +103,7 @@ def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -
 
 @compiled
 def _grouped(groups: Ints, n: int) -> tuple[Ints, Ints]:
+    """Do the work of `grouped` by a counting sort."""
     starts = np.zeros(n + 1, dtype=np.int64)
     for group in groups:
         starts[group + 1] += 1

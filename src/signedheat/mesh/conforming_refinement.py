@@ -334,10 +334,12 @@ class FaceCutter:
             self.cut_face(face, inside[face])
 
     def new_vertex(self) -> int:
+        """Return the id of a new vertex."""
         self.n_vertices += 1
         return self.n_vertices - 1
 
     def new_edge(self) -> int:
+        """Return the id of a new edge."""
         self.n_edges += 1
         return self.n_edges - 1
 
@@ -502,22 +504,22 @@ class Outline:
 class NewFace(NamedTuple):
     """A part of a face that was cut."""
 
-    parent: int
-    corners: Sequence[int]
-    edges: Sequence[int]
-    ahead: Sequence[bool]
-    positions: Complexes
+    parent: int  # the face that it is a part of
+    corners: Sequence[int]  # three vertices
+    edges: Sequence[int]  # three edges, from corner k to corner k + 1
+    ahead: Sequence[bool]  # whether it runs along each edge from tail to head
+    positions: Complexes  # (3,) corners in the layout of the parent
 
 
 class NewSegment(NamedTuple):
     """A segment, or part of one; `face` has no meaning where it runs along an edge."""
 
-    start: int
+    start: int  # nodes at its ends
     end: int
     face: int
-    edge: int
-    vector: complex
-    owner: int
+    edge: int  # −1 inside a face
+    vector: complex  # normal times length, as in `CurveSegments`
+    owner: int  # its source
 
 
 def points_on_elements(

@@ -54,7 +54,7 @@ class CurveSegments:
 
     @property
     def is_conforming(self) -> bool:
-        """Whether the triangles can represent it without being cut: all but unoriented curves that cross faces."""
+        """Whether triangles can represent the source without being cut: all but unoriented curves that cross faces."""
         return self.oriented or bool((self.nodes.kinds[self.ends] == VERTEX).all() and (self.edges >= 0).all())
 
 
@@ -98,7 +98,7 @@ class MergedSources:
         return parts
 
     def part(self, own: Ints, nodes: Ints, oriented: bool) -> CurveSegments:
-        """Return the source with some of the segments and nodes."""
+        """Return a source that consists of some of the segments and nodes."""
         distinct, first = np.unique(nodes, return_index=True)
         ends = first[np.searchsorted(distinct, self.ends[own])]
         return CurveSegments(self.nodes[nodes], ends, self.faces[own], self.edges[own], self.vectors[own], oriented)
@@ -261,7 +261,7 @@ def loses_orientation(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> boo
 
 
 def _agreement_around(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> tuple[Ints, Links, Ints]:
-    """Return the face that decides each segment's left, links between faces around a curve, and the faces' numbers."""
+    """Return the face that decides each segment's left, links between faces near a curve, and (m,) the faces' nodes."""
     first = triangles.first_halfedges
     first_faces = np.zeros(triangles.n_edges, dtype=np.int64)
     first_faces[triangles.edges.face_edges.ravel()[first]] = first // 3

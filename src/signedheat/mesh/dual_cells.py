@@ -35,7 +35,7 @@ from .triangles import flipped_along_creases
 CELLS_AROUND = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 """β and γ of an edge in the four cells around it, counter-clockwise as seen from the end of the edge."""
 AXES_AFTER = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
-"""Each axis, with those that follow it."""
+"""Each axis, followed by the two that come after it cyclically."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +163,7 @@ def dual_triangles(
 ) -> tuple[Floats, Ints, Ints]:
     """Join the vertices of pieces, (v, 3) in cells, into outward triangles (m, 3), along the better diagonals.
 
-    Where an edge is `fanned`, (e,), or has no possible diagonal, its crossing becomes a vertex. These edges come last.
+    Where an edge is `fanned`, (e,), or has no possible diagonal, its crossing is a vertex; these edges are returned.
     """
     quads, axes, shares = cells.quads, crossings.axes, crossings.shares
     around = vertices[quads] - crossings.nodes[:, None]
@@ -242,4 +242,5 @@ def _safe(flat: Floats, height: Floats) -> tuple[Bools, Floats]:
 
 
 def _cross(u: Floats, v: Floats) -> Floats:
+    """Return (n,) cross products of (n, 2) vectors."""
     return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]

@@ -110,7 +110,7 @@ class EdgeTable(Frozen):
     def unbalanced(self, groups: Ints, weights: Ints | int = 1) -> tuple[Ints, Ints, Ints]:
         """Return (k,) groups of faces, (k,) edges that do not cancel in them, and (k,) excess of faces along these.
 
-        Groups (m,) ascend, and so do the edges of each; a face counts `weights` times, (m,), against an edge negative.
+        Results ascend by group and edge. Face f is in `groups[f]` and counts `weights[f]` times, negative if against.
         """
         n, edges, owners = len(self.vertices), self.face_edges.ravel(), np.repeat(groups, 3)
         ways = (np.where(self.forward, 1, -1) * np.reshape(weights, (-1, 1))).ravel()

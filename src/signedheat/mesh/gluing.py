@@ -167,7 +167,7 @@ def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
 
 @compiled
 def flip(g: Gluing, h: int) -> bool:
-    """Flip an interior edge: h is then ``b → a``, its twin ``a → b``; return False if it is not strictly convex."""
+    """Flip an edge, so that h is ``b → a``; return False unless the two faces form a strictly convex quadrilateral."""
     t = g.sibling[h]
     if g.forward[h] == g.forward[t]:
         turn_over(g, t // 3)
@@ -361,7 +361,7 @@ def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
 
 
 def flip_all(gluing: Gluing) -> Gluing:
-    """Flip all edges that are not fixed to Delaunay, in place; return the gluing, with more room for its history."""
+    """Flip all edges that are not fixed to Delaunay, in place; return the gluing, its history enlarged if full."""
     n_edges = int(gluing.counts[N_EDGES])
     gluing.counts[N_STACKED] = n_edges
     stack, stacked = np.arange(n_edges)[::-1].copy(), np.ones(n_edges, dtype=bool)
@@ -385,4 +385,5 @@ def lay_out(gluing: Gluing) -> IntrinsicMesh:
 
 
 def doubled(array: NDArray[Number]) -> NDArray[Number]:
+    """Return an array with as many rows of zeros appended as it has."""
     return np.concatenate([array, np.zeros_like(array)])

@@ -21,7 +21,7 @@ from .triangles import Triangles
 
 Index = Ints | slice
 LEAST_AREA = 1e-18
-"""Least area, relative to the square of the longest edge, by which is divided; flatter faces count as having it."""
+"""Least area of a face as a divisor, relative to the square of its longest edge; flatter faces count as having it."""
 
 
 @dataclass(frozen=True, eq=False)

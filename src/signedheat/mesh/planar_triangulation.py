@@ -102,6 +102,7 @@ def _turn(x: Floats, a: int, b: int, c: int) -> float:
 
 @compiled
 def _length(x: Floats, a: int, b: int) -> float:
+    """Return the distance between two points."""
     return np.sqrt((x[b, 0] - x[a, 0]) ** 2 + (x[b, 1] - x[a, 1]) ** 2)
 
 
@@ -357,6 +358,7 @@ def _aim(mesh: Planar, a: int, b: int) -> tuple[int, int, int]:
 
 @compiled
 def _place(tri: Ints, t: int, a: int) -> int:
+    """Return which corner of triangle t is vertex a."""
     k = 0
     while tri[t, k] != a:
         k += 1

@@ -140,5 +140,6 @@ def _united(outlines: list[Floats]) -> Any:
 
 
 def _doubled_area(outline: Floats) -> float:
+    """Return twice the signed area that an outline (n, 2) encloses."""
     x, y = (outline - outline[0]).T
     return float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)

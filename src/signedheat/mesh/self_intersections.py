@@ -127,7 +127,7 @@ def _overlapping(corners: Floats, ids: Ints, first: Ints, second: Ints, slack: f
 
 @compiled
 def _is_folded(p: Floats, q: Floats, apex: int, beyond: int) -> bool:
-    """Return whether two triangles, (9,) each, lie on the same side of the edge opposite to a corner of each."""
+    """Return whether triangles (9,) are folded along their common edge, opposite to corners `apex` and `beyond`."""
     start, end = 3 * ((apex + 1) % 3), 3 * ((apex + 2) % 3)
     square, height, other = 0.0, 0.0, 0.0
     for d in range(3):

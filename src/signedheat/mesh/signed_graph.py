@@ -23,7 +23,7 @@ class Links:
     # (m,) the two nodes
     tails: Ints
     heads: Ints
-    weights: Floats  # (m,) how sure that is; weights of the same pair add up
+    weights: Floats  # (m,) how sure the evidence is; weights of the same pair add up
 
     @classmethod
     def joined(cls, *parts: Links) -> Links:

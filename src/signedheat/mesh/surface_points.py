@@ -14,6 +14,7 @@ from .edges import EdgeTable
 from .intrinsic_mesh import IntrinsicMesh
 
 VERTEX, EDGE, FACE = 0, 1, 2
+"""Kinds of elements that a point can lie on."""
 
 ZERO_COORDINATE = 1e-9
 """Barycentric coordinate, or distance in these, below which it counts as zero: the point then lies on the edge, at the

@@ -116,7 +116,7 @@ def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[F
             for d in range(3):
                 normal[d] += away[d - 2] * after[d - 1] - away[d - 1] * after[d - 2]  # a cross product, cyclically
         areas[f] = 0.5 * np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
-        degenerate[f] |= areas[f] <= 4.0 * 2.0**-52 * radius * largest  # units in the last place
+        degenerate[f] |= areas[f] <= 4.0 * 2.0**-52 * radius * largest  # 4 units in the last place
     return areas, degenerate
 
 
@@ -175,7 +175,7 @@ def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = No
         if not len(rows):
             break
         result[chosen[rows]] = replacements
-        # all others gained nothing, and nothing changes around them
+        # all other pairs gain nothing by a flip, and nothing changes around them
         near = mask_of(len(vertices), result[mask_of(len(vertices), hopeful)[result].any(axis=1)])
     return result
 

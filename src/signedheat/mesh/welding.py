@@ -19,6 +19,7 @@ seams; doubled, nothing changes (`benchmarks/deciding_numbers.py`)."""
 SEAM_WIDTH = 0.25
 """Vertices farther apart than this share of the shortest edge at them are not joined as those of a seam."""
 _LOW = 0xFFFFFFFF
+"""Mask of the low 32 bits."""
 
 
 def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:
@@ -124,6 +125,7 @@ def mixed(a: int, b: int, c: int) -> int:
 
 @compiled
 def _weld(points: Floats, tolerances: Floats) -> Ints:
+    """Do the work of `welded` with a hash table of cells 16 tolerances wide."""
     n = len(points)
     bits = 4
     while (1 << bits) < 2 * n:
@@ -131,7 +133,7 @@ def _weld(points: Floats, tolerances: Floats) -> Ints:
     mask = (1 << bits) - 1
     heads, following = np.full(1 << bits, -1, dtype=np.int32), np.full(n, -1, dtype=np.int32)
     owner = np.empty(n, dtype=np.int64)
-    (near_x, near_y, near_z), (side_x, side_y, side_z) = tolerances, 16.0 * tolerances  # few points are near a wall
+    (near_x, near_y, near_z), (side_x, side_y, side_z) = tolerances, 16.0 * tolerances  # few points are near cell walls
     for p in range(n):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         low = (np.floor((x - near_x) / side_x), np.floor((y - near_y) / side_y), np.floor((z - near_z) / side_z))
@@ -159,6 +161,7 @@ def _weld(points: Floats, tolerances: Floats) -> Ints:
 
 @compiled
 def _same_rows(rows: Ints) -> Ints:
+    """Do the work of `same_rows` with a hash table of rows."""
     count, width = rows.shape
     size = 16
     while size < 2 * count:

@@ -66,6 +66,7 @@ def even_colors(reach: float) -> ScalarMappable:
 
 
 def _scale_of(norm: Any) -> ScalarMappable:
+    """Make a scale of the colours from inside to outside with a Matplotlib norm."""
     colors = mpl_colors.LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
     return mpl_cm.ScalarMappable(norm, colors)
 

@@ -213,6 +213,7 @@ def cross_section(mesh: TriangleMesh, axis: int, position: float) -> Floats:
 
 
 def _draw_section(panel: Axes, given: Any, axis: int, position: float, spacing: float) -> None:
+    """Draw in red where a plane across an axis cuts a shape, or the points within a spacing of the plane."""
     shape = None if given is None else outside_of(given)
     if isinstance(shape, PointCloud):
         near = shape.points[np.abs(shape.points[:, axis] - position) < spacing]

@@ -109,6 +109,7 @@ def _add_colors(plotter: Any, mesh: Any, look: dict[str, Any], **options: Any) -
 
 
 def _add_isolines(plotter: Any, mesh: Any, look: dict[str, Any]) -> None:
+    """Add isolines, and a heavier line at zero."""
     for levels, width in ((look["levels"], 1.0), ([0.0] if look["zero"] else [], 4.0)):
         lines = mesh.contour(list(levels), scalars=VALUES_NAME) if len(levels) else None
         if lines is not None and lines.n_points:
@@ -118,6 +119,7 @@ def _add_isolines(plotter: Any, mesh: Any, look: dict[str, Any]) -> None:
 
 
 def _add_zero_set(plotter: Any, field: Any) -> None:
+    """Add the surface φ = 0, translucent."""
     with suppress(OutsideError, GeometryError):  # the zero set may be empty
         plotter.add_mesh(field.contour(0.0).to_pyvista(), color=BODY, opacity=0.6)
 
