@@ -66,7 +66,7 @@ class ZeroSet(Constraint):
     ----------
     hard : bool
         Impose φ = 0 at every sample of the source. By default, φ is zero on surfaces along curves that follow edges;
-        where a curve crosses faces, springs keep |φ| below some hundredths of h, since a linear function that is zero
+        where a curve crosses faces, springs keep it within some hundredths of h, since a linear function that is zero
         there would be constant around the curve. On grids a smooth function, and on tets springs, correct φ to about
         zero along the source, which is cheaper and, on broken input, more accurate.
 

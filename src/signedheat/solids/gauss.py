@@ -124,7 +124,8 @@ class Matrix:
             matrix[own, piece] = tree.behind(rank[faces[own]] - begin, places[own]) - 0.5
         counts = np.bincount(owners, minlength=k)
         normals = unit(area_vectors(pieces.triangles[faces]))
-        return cls(matrix, places, normals, owners, pieces.areas[owners] / counts[owners], np.zeros(len(owners)))
+        areas = pieces.areas[owners] / counts[owners]
+        return cls(matrix, places, normals, owners, areas, within=np.zeros(len(owners)))
 
     def chosen(self, kept: Bools) -> Matrix:
         """Restrict the system to some of the pieces, which are renumbered."""

@@ -149,7 +149,7 @@ def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
                 continue
             lids = float(np.linalg.norm(larger.opening) + np.linalg.norm(smaller.opening))
             if lids > LARGE_OPENING * areas[np.unique(np.concatenate([larger.parts, smaller.parts]))].sum():
-                (area, onward), (again, back) = _way(larger, smaller), _way(smaller, larger)
+                (area, onward), (again, back) = _strip_areas(larger, smaller), _strip_areas(smaller, larger)
                 if area + again <= 2 * lids * (NARROW + (1 - NARROW) * (onward + back) / max(area + again, 1e-300)):
                     widths.append(((area + again) / lids, i, j))
     best: list[tuple[int, int]] = []
@@ -161,8 +161,11 @@ def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
     return best
 
 
-def _way(rim: Rim, other: Rim) -> tuple[float, float]:
-    """Return the area between a rim and another, and how much of it continues the surface straight on."""
+def _strip_areas(rim: Rim, other: Rim) -> tuple[float, float]:
+    """Estimate the area of the strip between a rim and another one, and of it as seen along the surface at the rim.
+
+    The second is negative if the strip leads back over the surface. Each edge counts times the way from its middle.
+    """
     along = np.roll(rim.corners, -1, axis=0) - rim.corners
     lengths = np.linalg.norm(along, axis=1)
     edges, shares = cut_to_pieces(other.corners)
@@ -172,9 +175,9 @@ def _way(rim: Rim, other: Rim) -> tuple[float, float]:
     base /= np.maximum(steps, 1e-300)[:, None]
     middles = rim.corners + 0.5 * along
     nearest = scipy.spatial.cKDTree(places).query(middles)[1]
-    way = places[nearest] - middles
-    way -= np.clip((way * base[nearest]).sum(axis=1), -steps[nearest], steps[nearest])[:, None] * base[nearest]
-    return float(lengths @ np.linalg.norm(way, axis=1)), float(lengths @ (way * rim.onward).sum(axis=1))
+    across = places[nearest] - middles
+    across -= np.clip((across * base[nearest]).sum(axis=1), -steps[nearest], steps[nearest])[:, None] * base[nearest]
+    return float(lengths @ np.linalg.norm(across, axis=1)), float(lengths @ (across * rim.onward).sum(axis=1))
 
 
 def strip(one: Rim, other: Rim) -> Ints:

@@ -120,9 +120,10 @@ def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -
 
 
 def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments], spacing: float) -> csr_array:
-    """(1, e) vectors away from curves along edges ij, and from free ends (App. A.2, Eq. 11 and Eq. 19).
+    """(1, e) vectors away from curves along edges, and from free ends, where one such edge ends alone (App. A.2).
 
-    A face, with i before j in its order, adds i(p_j − p_i) to its other edges; on ij the two sides cancel.
+    A face beside an edge jk adds p_k − p_j, turned by 90 degrees into the face, to its other edges; on the edge itself
+    the two sides cancel (Eq. 11, Eq. 19).
     """
     curves = [p for p in parts if len(p.ends) and not p.oriented]
     if not curves:
