@@ -216,7 +216,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         if self.solid is None:
             raise SourceError(
                 "the field holds no solid",
-                remedy="take it from signed_distance or Solid.field, not from a file",
+                remedy="take it from signed_distance or Solid.field; of files, only .npz keep it",
                 element="field",
             )
         return self.solid.closest(points)
