@@ -40,9 +40,6 @@ from .validation import finite_number, positive_number
 
 ADDED_SLOPE_ERROR = 0.1
 """Increase of `LinearElements.bounded_slope_error` that sharpening may cause without a warning; .08 on triangles."""
-CURVE_TOLERANCE = 1e-5
-"""Tolerance of distance to curves, a tenth of that of `Geodesic`: the order of faces then changes distance by less
-than 1e-6 of its range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -355,7 +352,8 @@ def sharpened(
     if source is None:
         run = partial(method.sharpened, discretization, elements, values, field.source, progress)
     else:
-        run = partial(distance_to_nearest, discretization, values, field.source, source, CURVE_TOLERANCE, progress)
+        tolerance = 0.1 * Geodesic.tolerance  # the order of faces then changes distance by less than 1e-6 of its range
+        run = partial(distance_to_nearest, discretization, values, field.source, source, tolerance, progress)
     new, diagnostics = timed(run, field.diagnostics, progress)
     worse = elements.bounded_slope_error(new) > 1.5 * elements.bounded_slope_error(values) + ADDED_SLOPE_ERROR
     errors = SlopeErrors(elements.slope_error(values), elements.slope_error(new), worse)

@@ -36,9 +36,6 @@ TOGETHER_COST = 0.5
 WEAK_TURNING_COST = 0.02
 """Cost of turning a stroke of mean length in `smooth_signs`. If two follow each other, with a gap of half of their
 length, the energy is less by 0.05. Halved and doubled, none of 46 drawings changes."""
-MOST_UNEXPLAINED = 0.5
-"""If more than this share of the length of all strokes bounds nothing, none is left out. Halved and doubled, none of 46
-drawings changes."""
 TRIED_SINGLY = 16
 """Number of strokes, the longest first, that are turned or left out one by one where they explain nothing; limited for
 speed. Halved and doubled, none of 46 drawings changes."""
@@ -243,8 +240,8 @@ def altered(signs: Floats, rows: list[int], factor: float) -> Floats:
 
 def mostly_loose(strokes: Strokes, inside: Inside) -> bool:
     """Whether most of the length of strokes bounds nothing: probably more of the curves is missing than there is."""
-    lengths = strokes.lengths
-    return bool(lengths[inside.explained < EXPLAINED].sum() > MOST_UNEXPLAINED * lengths.sum())
+    unexplained = inside.explained < EXPLAINED
+    return bool(strokes.lengths[unexplained].sum() > strokes.lengths[~unexplained].sum())
 
 
 def cost(strokes: Strokes, inside: Inside) -> float:

@@ -213,9 +213,6 @@ def _adopted(
     return True
 
 
-REWARD = 1.0
-"""Reward for explaining a stroke, relative to its length: at most 1, since a line around a stroke is as long again.
-From 0.8 to 1.0 the table of damaged curves does not change."""
 STROKE_WIDTH, WIDEST_STROKE = 2.0, 0.01
 """Distance from a stroke up to which vertices count for whether it is explained: the first in edges of the mesh, but at
 most the second, a share of the length of all strokes. So a stroke drawn twice counts as one. Of 46 drawings none
@@ -241,8 +238,8 @@ class Inside:
     sides: Floats  # (n,) 1 or −1 at every vertex
     # (k,) how far each stroke bounds the inside: 1 all along, 0 nowhere, −1 all along but the wrong way round
     explained: Floats
-    # the length of the boundary of the inside where no stroke is, less `REWARD` times the length of strokes that is
-    # explained
+    # the length of the boundary of the inside where no stroke is, less the length of strokes that is explained: a
+    # larger reward would pay for a line around a stroke, which is as long again
     energy: float
 
 
@@ -338,7 +335,7 @@ class Strokes:
         if key not in self._found:
             sides, boundary = self._cut(signs, -1.0)
             explained = signs * (self.means @ sides)
-            energy = boundary - REWARD * float(self.lengths @ explained)
+            energy = boundary - float(self.lengths @ explained)
             self._found[key] = Inside(signs, sides, explained, energy)
         return self._found[key]
 
@@ -358,7 +355,7 @@ class Strokes:
         along = self.crossed.multiply(signs[:, None]).tocsr()
         covered = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
         falling, rising = (np.where(mask, 0.0, self.costs) for mask in covered)
-        pull = self.means.T @ (REWARD * self.lengths * signs)
+        pull = self.means.T @ (self.lengths * signs)
         ties = larger * EQUAL_COSTS * self.lengths.sum() / self.areas.sum() * self.areas
         sides = self.graph.cut(falling, rising, pull, ties)
         first, second = sides[self.surface.triangles.edges.vertices].T

@@ -166,9 +166,9 @@ measure: Any = lazy_module("skimage.measure", "contours")
 SIGN_BLUR = 1.0
 """Standard deviation, in cells, of the Gaussian that smooths arrays of signs. Distances of balls, half spaces and boxes
 24 to 96 nodes wide are best with .7 to 1; more rounds the edges of boxes."""
-LEAST_SIGN, LARGEST_SIGN = 0.3, 0.6
-"""Bounds of smoothed signs, with which contours cross the middle third of an edge: signs contain no more. With the
-middle three fifths balls and half spaces come out a tenth better, and boxes a tenth worse."""
+LEAST_SIGN = 0.3
+"""Smoothed signs are between this and twice as much, with which contours cross the middle third of an edge: signs
+contain no more. With the middle three fifths balls and half spaces come out a tenth better, and boxes a tenth worse."""
 SMOOTH_CROSSING = 0.05
 """Distance, in cells, from the neighbours' paraboloids up to which a crossing is smooth. Distances of balls of four
 cells' radius are wrong by at most .04 cells, with .1 by .01; those of clipped balls by .07 and .12."""
@@ -213,7 +213,7 @@ class Contour(NamedTuple):
 def smoothed_signs(signs: Floats) -> Floats:
     """Return values with the given signs, ±1, whose contour is smoother."""
     agreement = scipy.ndimage.gaussian_filter(signs, SIGN_BLUR, mode="nearest") * signs
-    return signs * np.clip(agreement, LEAST_SIGN, LARGEST_SIGN)
+    return signs * np.clip(agreement, LEAST_SIGN, 2 * LEAST_SIGN)
 
 
 def zero_contour(values: Floats, steps: Floats) -> Contour:

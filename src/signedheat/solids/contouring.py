@@ -113,8 +113,6 @@ OUTSIDE_CELL = 0.6
 """Distance, in cells, by which a vertex may leave its cell."""
 VERTEX_SPACING = 0.2
 """Least distance, in cells, between vertices that have left their cells."""
-CHECKED_BEND = np.deg2rad(5.0)
-"""Angle between two faces above which their edge is checked; the angle is small where a corner is missing."""
 CHORD_ERROR = 0.02
 """Distance from the level, in cells, above which an edge along a crease is divided."""
 DIVISIONS = 6
@@ -263,7 +261,8 @@ def _creases_off(
     step = float(spacing.max())
     near = np.flatnonzero(mask_of(len(vertices), faces[new])[faces].any(axis=1))
     normals, edges = unit(area_vectors(vertices[faces[near]])), edge_table(faces[near]).pairs
-    bent = normals[edges // 3].prod(axis=1).sum(axis=1) < np.cos(CHECKED_BEND)
+    # planes that do not count as one: the angle between faces is small where a corner is missing
+    bent = normals[edges // 3].prod(axis=1).sum(axis=1) < np.cos(2 * np.arctan(CREASE_TANGENT))
     edges = edges[bent & new[near[edges // 3]].any(axis=1)]
     edges = 3 * near[edges // 3] + edges % 3
     tails, heads = faces.ravel()[edges[:, 0]], faces.ravel()[edges[:, 1]]

@@ -16,8 +16,6 @@ from .surface_source import SurfaceSource
 
 FINE_EXTENT = 263.0
 """Extent of a surface, in h, above which τ grows: that of 20,000 vertices in equilateral triangles."""
-TIME_AT_ENDS = 1 / 3
-"""τ where curves end, relative to that of the extrapolation; by default it is then 1, as in the paper."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +86,7 @@ def lowered_for_times(discretization: Discretization, sources: Sequence[Any], di
         raise UnsupportedTypeError(
             "directions are extrapolated in time on surfaces only", remedy="pass a number", element="diffusion"
         )
-    at_ends = replace(source, time=TIME_AT_ENDS * source.time)
+    at_ends = replace(source, time=source.time / Extrapolated.tau)  # by default τ is then 1, as in the paper
     if all(source.ending[part.nodes.faces].all() for part in source.parts):  # no part has closed curves alone
         return [at_ends]
     everywhere = replace(source, extrapolated=True)

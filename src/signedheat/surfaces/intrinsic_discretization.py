@@ -13,15 +13,14 @@ from ..discretization import discretize
 from ..errors import GeometryError, SignedHeatError
 from ..jobs import Progress
 from ..mesh.intrinsic_mesh import IntrinsicMesh, mollify
-from .intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
+from .intrinsic_triangulation import LARGEST_ANGLE, IntrinsicTriangulation, intrinsic_delaunay
 from .source_segments import CurveGroups
 from .surface_discretization import SurfaceDiscretization, refuse_too_many, vertices_joined
 from .triangle_mesh import TriangleMesh
 
 LARGE_ANGLE_SHARE = 0.0015
-"""Fraction of the area in triangles with an angle above `LARGE_ANGLE`, from which a mesh is refined."""
-LARGE_ANGLE = 120.0
-"""Angle in degrees."""
+"""Fraction of the area in triangles with an angle that is larger than all angles where none is below `LARGEST_ANGLE`,
+120°, from which a mesh is refined."""
 SMALL_ANGLE_SHARE = 0.1
 """Fraction of the area in triangles with an angle below `SMALL_ANGLE`, from which a mesh is refined."""
 SMALL_ANGLE = 10.0
@@ -96,7 +95,7 @@ def is_spoiled(mesh: TriangleMesh) -> bool:
     a, b, c = np.sort(mesh.edge_lengths[mesh.edges.face_edges], axis=1).T
     areas = mesh.face_areas
     total = max(float(areas.sum()), 1e-300)
-    large = c**2 - a**2 - b**2 > -2 * np.cos(np.radians(LARGE_ANGLE)) * a * b
+    large = c**2 - a**2 - b**2 > -2 * np.cos(np.radians(180 - 2 * LARGEST_ANGLE)) * a * b
     small = b**2 + c**2 - a**2 > 2 * np.cos(np.radians(SMALL_ANGLE)) * b * c
     return bool(areas[large].sum() >= LARGE_ANGLE_SHARE * total or areas[small].sum() >= SMALL_ANGLE_SHARE * total)
 

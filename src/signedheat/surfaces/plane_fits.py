@@ -34,8 +34,6 @@ MERGED_SHARE = 0.03
 spacings of noise at most .014 are such; of plates, bowls, lenses and tubes whose sides are merged .25 to 1."""
 ONE_SIDE = 0.02
 """Root mean square distance from a quadric, in spacings, up to which neighbours are taken for those of one side."""
-QUADRIC_NEIGHBORS = 24
-"""Number of neighbours to which a quadric is fitted."""
 STARTS = 5
 """Number of planes from which the fit to points on a surface starts, since it ends at the nearest of several sheets."""
 TRIED_POINTS = 2000
@@ -98,7 +96,7 @@ def point_spacing(distances: Floats, k: int) -> Floats:
 
 def share_of_two_sides(points: Floats, normals: Floats) -> float:
     """Share of points whose neighbours lie at two heights over a quadric, as on plates thinner than the spacing."""
-    k = min(QUADRIC_NEIGHBORS, len(points) - 1)
+    k = min(2 * CLEAN_NEIGHBORS, len(points) - 1)  # a quadric has twice as many coefficients as a plane
     tree = scipy.spatial.cKDTree(points)
 
     def two_sided(tried: Ints) -> tuple[Bools]:

@@ -27,7 +27,16 @@ from ..mesh.signed_graph import Links, signs_of
 from ..mesh.welding import same_rows
 from ..validation import coordinates, finite_rows, frozen, numbers, whole_number
 from .local_triangulations import SAME_SIDE_HEIGHT, LocalTriangulations, local_triangulations, turned_alike
-from .plane_fits import MERGED_SHARE, PlaneFits, fit_planes, noise_scale, noisy_sizes, point_spacing, share_of_two_sides
+from .plane_fits import (
+    CLEAN_NEIGHBORS,
+    MERGED_SHARE,
+    PlaneFits,
+    fit_planes,
+    noise_scale,
+    noisy_sizes,
+    point_spacing,
+    share_of_two_sides,
+)
 from .surface import Surface
 from .triangle_mesh import TriangleMesh
 
@@ -43,8 +52,6 @@ of points, above which there is a warning. On scans, CAD and a box with up to .1
 where parts of thin plates face the wrong way mostly .41 to .96."""
 STEEP = 0.7
 """Cosine between a normal and the direction to a neighbour above which the neighbour lies on another side."""
-EDGE_NEIGHBORS = 13
-"""Number of points near an edge that are searched for another side: about twice its own neighbourhood."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +230,7 @@ def edges_turned(points: Floats, normals: Floats, faces: Ints) -> int:
     halfedges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     edges, uses = np.unique(halfedges, axis=0, return_counts=True)
     twice = edges[uses > 1]
-    near = scipy.spatial.cKDTree(points).query(points[twice], k=min(EDGE_NEIGHBORS, len(points)))[1]
+    near = scipy.spatial.cKDTree(points).query(points[twice], k=min(1 + CLEAN_NEIGHBORS, len(points)))[1]
     offsets = points[near] - points[twice][:, :, None]
     over = np.abs((offsets * normals[twice][:, :, None]).sum(axis=3)) > STEEP * np.linalg.norm(offsets, axis=3)
     return int(over.any(axis=(1, 2)).sum())

@@ -225,8 +225,6 @@ def _is_point(domain: Surface, curve: Curve) -> bool:
 
 NEARLY_CLOSED = 0.5
 """A single piece is a curve with a gap if the distance between its ends, relative to its length, is less than this."""
-ONE_PIECE = 0.15
-"""Scale of a single piece, relative to its length: about the radius of a circle of that length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +232,7 @@ class CurveGroups:
     """Groups of open oriented curves, each group taken for the pieces of one interrupted curve."""
 
     lengths: Floats  # (g,) total length of the pieces of each group
-    scales: Floats  # (g,) mean length of the pieces, weighted by length; of a single one `ONE_PIECE` times its length
+    scales: Floats  # (g,) mean length of the pieces, weighted by length; of a single one the radius of a circle as long
 
     @classmethod
     def of(cls, mesh: TriangleMesh, curves: Sequence[Any]) -> CurveGroups:
@@ -252,7 +250,7 @@ class CurveGroups:
         groups, lengths = np.unique(groups[used], return_inverse=True)[1].ravel(), lengths[used]
         totals = np.bincount(groups, lengths).astype(np.float64)
         means = np.bincount(groups, lengths**2) / np.maximum(totals, 1e-300)
-        return cls(totals, np.where(np.bincount(groups) > 1, means, ONE_PIECE * totals))
+        return cls(totals, np.where(np.bincount(groups) > 1, means, totals / (2 * np.pi)))
 
 
 def nearest_others(ends: Floats) -> Ints:
