@@ -27,13 +27,11 @@ from .mesh.components import element_components
 from .mesh.triangles import AREA_ROUNDING, area_vectors
 from .mesh.unit_vectors import unit
 from .mesh.welding import same_positions
+from .surfaces.plane_fits import POINT_NEIGHBORS
 from .surfaces.point_cloud import PointCloud
 from .surfaces.polygon_mesh import PolygonMesh
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
-
-AREA_NEIGHBORS = 8
-"""Number of neighbours from which the area of an oriented point is estimated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +128,7 @@ def point_areas(points: Floats) -> Floats:
     """Estimate (n,) areas of points: that of the disk up to the k-th neighbour, over k; coinciding points share one."""
     places, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     dimension = points.shape[1] - 1
-    k = min(AREA_NEIGHBORS, len(places) - 1)
+    k = min(POINT_NEIGHBORS, len(places) - 1)
     if dimension == 0 or k == 0:
         return np.ones(len(points)) / counts[which.ravel()]
     reach = scipy.spatial.cKDTree(places).query(places, k=[k + 1], workers=-1)[0][:, 0]

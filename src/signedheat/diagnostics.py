@@ -11,7 +11,8 @@ import numpy as np
 from .arrays import Frozen, Ints, ShortRepr
 
 SMALL_SHARE = 0.005
-"""Fraction of the surface below which its completion, or parts that bound nothing, are not important."""
+"""Fraction of the surface up to which its completion, and parts that bound nothing or that a contour misses, are not
+important."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

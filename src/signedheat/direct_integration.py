@@ -19,8 +19,8 @@ from .errors import ConstraintError
 from .linear import Factor, PardisoFactor, factorize, upper_triangle, whole
 from .linear.conjugate_gradients import conjugate_gradients
 
-SOFTEST_SPRING, STIFFEST_SPRING = 1e-10, 1e10
-"""Strengths of springs, relative to C, below and above which their strength makes no difference beyond rounding."""
+STIFFEST_SPRING = 1e10
+"""Strength of springs, relative to C, above which, and below whose inverse, it makes no difference beyond rounding."""
 COLUMNS_AT_ONCE = 32
 """Right-hand sides solved at a time."""
 PIN_STIFFNESS = 1e6
@@ -90,7 +90,7 @@ class DirectIntegration(Frozen):
     def penalize(self, divergence: Floats, source: SourceTerm, strength: float) -> Floats:
         """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the line or area elements, up to λ = ∞."""
         rows, stiffest = source.interpolation, float(self.stiffness.diagonal().max())
-        if strength * float(source.weights.sum()) < SOFTEST_SPRING * stiffest:
+        if strength * float(source.weights.sum()) < stiffest / STIFFEST_SPRING:
             return self.solve(divergence, source)
         strength = min(strength, STIFFEST_SPRING * stiffest / float(source.weights.max()))
         return self._reached(self._pulled_factor(rows, strength * source.weights).solve(divergence), rows)

@@ -17,6 +17,7 @@ from .geodesics.exact_distance import shortest_arcs
 from .grids.grid_discretization import GridDiscretization, GridSource
 from .grids.grid_field import GridField
 from .mesh.components import connected_components
+from .surfaces.plane_fits import POINT_NEIGHBORS
 from .surfaces.point_cloud import PointCloud
 from .surfaces.surface_discretization import SurfaceDiscretization
 from .surfaces.surface_source import SurfaceSource, joined
@@ -32,8 +33,6 @@ AnyField = TypeVar("AnyField", GridField, VertexField, TetField, Field)
 SMALL_LOOP = 3.5
 """Length of a loop, in side lengths of the triangles that it crosses, below which at least a quarter of its heat
 cancels."""
-JOINED_NEIGHBORS = 8
-"""Number of nearest points to which `spread` joins a point: on a surface about six lie around a point."""
 
 
 @singledispatch
@@ -137,10 +136,10 @@ def spread(points: Floats, values: Floats, used: Bools) -> Floats:
     """Continue (n,) signed distances to `used` points where they are NaN, by shortest paths between neighbours."""
     lacking = np.isnan(values) & used
     ids = np.flatnonzero(used)
-    if not lacking.any() or len(ids) <= JOINED_NEIGHBORS:
+    if not lacking.any() or len(ids) <= POINT_NEIGHBORS:
         return values
-    far, near = scipy.spatial.cKDTree(points[ids]).query(points[ids], k=JOINED_NEIGHBORS + 1)
-    rows = np.repeat(np.arange(len(ids)), JOINED_NEIGHBORS)
+    far, near = scipy.spatial.cKDTree(points[ids]).query(points[ids], k=POINT_NEIGHBORS + 1)
+    rows = np.repeat(np.arange(len(ids)), POINT_NEIGHBORS)
     graph = sparse.csr_matrix(
         (np.maximum(far[:, 1:].ravel(), 1e-300), (rows, near[:, 1:].ravel())), shape=(len(ids),) * 2
     )

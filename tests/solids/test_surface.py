@@ -228,7 +228,7 @@ def test_faces_are_kept_where_heat_completes_them():
 
 
 def test_where_faces_do_not_join_the_surface_is_contoured_within_a_cell():
-    solid = complete(samples.without_faces(samples.sphere(3), 0.75), completion="heat")
+    solid = complete(samples.without_faces(samples.sphere(3), 0.75, 1), completion="heat")
     with pytest.warns(InexactWarning):
         surface = solid.surface(keep_faces=True, spacing=0.1)
     assert_closed_edges(surface)

@@ -20,7 +20,7 @@ from ..arrays import Floats, Ints
 from ..discretization import DiffusesEach, Levels, SolvesEach, discretize
 from ..errors import MemoryLimitError, SourceError
 from ..linear.conjugate_gradients import conjugate_gradients
-from ..memory import available_memory, libraries, refuse_beyond_memory
+from ..memory import REMEDY_MARGIN, available_memory, libraries, refuse_beyond_memory
 from .grid import Grid
 from .multilevel import Level, collapse, diffuse_multilevel, quotients, skip_finest, unit_vectors
 from .node_sources import NodeSources
@@ -31,8 +31,6 @@ BYTES_PER_GRID_NODE, BYTES_PER_CELL = {1: 42, 2: 42, 3: 25, 4: 42}, 930
 space."""
 MOST_BYTES_PER_NODE = 22
 """Most bytes that surface adds for each node: where it fills the whole grid."""
-SPACING_MARGIN = 1.08
-"""Factor by which the suggested spacing is larger than needed, since free memory changes from run to run."""
 
 
 def memory_estimate(grid: Grid, per_node: float | None = None, extra: float = 0.0) -> int:
@@ -56,7 +54,7 @@ def refuse_large_grid(grid: Grid, per_node: float | None = None, extra: float = 
     needed += int(bytes_of_area(area, grid.spacing, grid.n_nodes))
     if available is None or needed <= available:
         return
-    fitting = SPACING_MARGIN * fitting_spacing(grid, available, per_node, extra, area)
+    fitting = REMEDY_MARGIN * fitting_spacing(grid, available, per_node, extra, area)
     spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting))
     coarser = f"choose a spacing of {spacing} or more, or a lower resolution"
     some_nodes = (fitting < grid.upper - grid.origin).all()

@@ -14,6 +14,8 @@ from ..parallel import n_threads
 
 ANGLE_ROUNDING = 1e-6
 """Angles up to this, in radians, and differences of unit vectors, are rounding errors."""
+SAME_WAY = 0.75
+"""Cosine above which two directions count as the same, 41° apart, and below whose negative as opposite ones."""
 
 
 def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:

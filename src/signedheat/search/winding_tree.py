@@ -20,8 +20,8 @@ from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..mesh.triangles import area_vectors
 from ..parallel import ROWS_PER_TASK, in_chunks
 
-BEHIND_FACE = 1e-5
-"""Offset behind a face, relative to its size."""
+OFF_FACE = 1e-6
+"""Offset of the points in front of a face and behind it that are tested, relative to its size."""
 APEX_IN_PLANE = 1e-9
 """Volume of the cone to a triangle, relative to the product of its edges at the apex, up to which the apex is in its
 plane."""
@@ -50,12 +50,12 @@ class WindingTree:
 
     def levels(self, places: Floats, normals: Floats, areas: Floats) -> Floats:
         """Return (n,) means of the numbers on both sides of places on faces with these unit normals and areas."""
-        steps = BEHIND_FACE * np.sqrt(areas)[:, None] * normals
+        steps = OFF_FACE * np.sqrt(areas)[:, None] * normals
         return 0.5 * (self.numbers(places - steps) + self.numbers(places + steps))
 
     def behind(self, faces: NDArray[np.integer], places: Floats) -> Floats:
         """Return (n,) winding numbers just behind places (n, 3) in faces (n,), away from their rims."""
-        return self.numbers(places - steps_off(self.triangles[faces], BEHIND_FACE))
+        return self.numbers(places - steps_off(self.triangles[faces], OFF_FACE))
 
     @cached_property
     def _moments(self) -> Floats:

@@ -20,6 +20,7 @@ import numpy as np
 import scipy
 
 from ..arrays import Bools, Floats, Ints, mask_of
+from ..diagnostics import SMALL_SHARE
 from ..errors import InexactWarning, MemoryLimitError, OutsideError, warn_user
 from ..field_levels import ON_LEVEL, NodeValues, on_level
 from ..grids.blocks import BLOCK, WINDOW, Blocks, BlockValues
@@ -301,9 +302,6 @@ IN_BLOCK = np.array(list(np.ndindex(BLOCK, BLOCK, BLOCK)))
 """(512, 3) offsets of the nodes of a block."""
 CONTOUR_PLACES = 4096
 """Number of places on a surface at which its contour is looked for, besides one for each part."""
-MISSED_SHARE = 0.01
-"""A warning is given if a contour misses a larger share of the surface. Most parts have edges and tips thinner than a
-cell, but no such walls."""
 STEEPEST_HEIGHT = 2.0
 """Largest slope of the height above a surface at which blocks near it are found from coarse to fine. Distance has slope
 1; where a varying distance is steeper, blocks are found by following the surface."""
@@ -364,7 +362,7 @@ def announce_lost(offset: Offset, grid: Grid, vertices: Floats) -> None:
     parts, lost = _lost(offset, grid, vertices)
     n_parts = len(np.unique(parts))
     gone = n_parts - len(np.unique(parts[~lost]))
-    if gone == 0 and lost.sum() <= MISSED_SHARE * len(lost):
+    if gone == 0 and lost.sum() <= SMALL_SHARE * len(lost):  # most parts have edges and tips thinner than a cell
         return
     missing = f"{gone} of {n_parts} parts" if gone else f"{lost.mean():.0%} of the surface"
     remedy = "make the cells smaller, or keep the faces" if offset.level == 0 else "make the cells smaller"

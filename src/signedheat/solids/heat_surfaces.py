@@ -20,7 +20,7 @@ from ..compiled import compiled
 from ..constraints import Constraint, ZeroSet
 from ..discretization import discretize
 from ..errors import OutsideError
-from ..grids.grid import Grid
+from ..grids.grid import Grid, room_around
 from ..grids.grid_discretization import GridSource
 from ..grids.marching import closed_surface
 from ..grids.stencil import solve_poisson
@@ -137,8 +137,6 @@ def _far_field(places: Floats, dipoles: Floats, strengths: Floats, axis: int, co
     return value, slope
 
 
-HEAT_PADDING = 0.15
-"""Room around the shape, relative to its longest side. The surface stays within it, however large later grids are."""
 HEAT_NODES = (32, 144)
 """Least and most nodes along the longest side."""
 SURE_WINDING = 0.4
@@ -161,8 +159,9 @@ def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0
     """Extract the closed zero set of φ in cells about `cell` wide (0: the finest); None if the shape bounds nothing."""
     bounds = shape.bounds
     side = float(np.ptp(bounds, axis=0).max())
-    nodes = int(np.clip((1 + 2 * HEAT_PADDING) * side / cell, *HEAT_NODES)) if cell > 0 else HEAT_NODES[1]
-    grid = Grid.around(bounds, nodes, HEAT_PADDING * side)
+    room = room_around(bounds)  # the surface stays within it, however large later grids are
+    nodes = int(np.clip((side + 2 * room) / cell, *HEAT_NODES)) if cell > 0 else HEAT_NODES[1]
+    grid = Grid.around(bounds, nodes, room)
     samples = sample_on_grid([shape], grid)
     winding = winding_numbers(samples)
     areas = np.linalg.norm(samples.vectors, axis=1)

@@ -14,7 +14,7 @@ from scipy import sparse
 from ..arrays import Floats, Ints
 from ..mesh.components import numbered, sums_of
 from ..mesh.triangles import area_vectors, face_areas
-from ..mesh.unit_vectors import unit
+from ..mesh.unit_vectors import SAME_WAY, unit
 from . import spanning
 from .rims import corners_of
 from .spanning import Frame, Spanned, area_vector, frame_of, points_inside, side_lengths, spanned
@@ -279,9 +279,8 @@ def running_mean(values: Floats, reach: int) -> Floats:
 
 
 COPLANAR = 0.01
-"""Distance from a plane, relative to their size, below which points lie in it."""
-FOLDED_LID = -0.8
-"""Cosine between the normals of a lid and of the surface at its rim below which the lid is folded back."""
+"""Height over a plane, relative to the length of what rises over it, up to which something lies in it: points, relative
+to their size, a unit vector along a side, and one of three unit normals, whose planes then meet in no point."""
 FLAT_LID_CORNERS = 256
 """Number of corners above which a flat lid gets inner points, to avoid slivers."""
 MOST_PLANAR_RUNS = 16
@@ -373,7 +372,7 @@ def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
         places = np.concatenate([*(side.points for side in chosen), sides[(first + count) % n].points[:1]])
         opening = area_vector(points[places])
         surface = np.sum([side.normal for side in chosen], axis=0)
-        folded = opening @ surface <= FOLDED_LID * np.linalg.norm(opening) * np.linalg.norm(surface)
+        folded = opening @ surface <= -SAME_WAY * np.linalg.norm(opening) * np.linalg.norm(surface)
         if is_flat(points[places]) and not (folded and surface.any()):
             runs.append(_Run(first, count, places, opening))
     return sorted(runs, key=lambda run: -float(np.linalg.norm(run.opening)))

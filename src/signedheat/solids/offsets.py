@@ -17,7 +17,7 @@ from ..foreign import as_list
 from ..grids.grid import Grid
 from ..kinds import Shapes
 from ..mesh.box_tree import BOXES_PER_LEAF
-from ..mesh.unit_vectors import unit
+from ..mesh.unit_vectors import SAME_WAY, unit
 from ..mesh.welding import indexed
 from ..parallel import in_chunks
 from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
@@ -175,8 +175,6 @@ def _steepest(
     return heights, faces
 
 
-SMOOTH_RIM = np.cos(np.deg2rad(40.0))
-"""A rim is smooth between two sides if the cosine between the directions away from them is above this."""
 OFF_SYMMETRY = 1e-7
 """Places are moved off planes of symmetry by this share of a cell before they are measured."""
 
@@ -223,7 +221,7 @@ class SheetWall:
         at_ends = np.stack([outward, outward], axis=1)
         for end, other in ((0, 0), (1, 1)):  # mean directions where the rim is smooth
             mates = around[ends[on_rim][:, end], other]
-            smooth = (mates >= 0) & (np.einsum("ni,ni->n", outward, outward[mates]) > SMOOTH_RIM)
+            smooth = (mates >= 0) & (np.einsum("ni,ni->n", outward, outward[mates]) > SAME_WAY)
             at_ends[smooth, end] = unit(outward[smooth] + outward[mates[smooth]])
         rim = TriangleTree.of(places[:, [0, 1, 1]]) if len(places) else None
         outward = np.concatenate([at_ends, np.zeros((1, 2, 3))])

@@ -20,7 +20,8 @@ from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.triangles import area_vectors, face_areas, heights
 from ..mesh.unit_vectors import angles_around, unit
 from ..mesh.welding import coincident_faces
-from .winding import INSIDE_WINDING, OFF_FACE, Windings
+from ..search.winding_tree import OFF_FACE
+from .winding import INSIDE_WINDING, Windings
 
 TOLERANCES: tuple[float, ...] = (SAME_POINT, 10 * SAME_POINT, 100 * SAME_POINT, 1000 * SAME_POINT)
 """Distances below which points are one, relative to the size of a shape, tried until what bounds the inside is closed.

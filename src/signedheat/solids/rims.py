@@ -12,7 +12,7 @@ from ..compiled import compiled
 from ..mesh.components import grouped, sums_of
 from ..mesh.edges import edge_table
 from ..mesh.triangles import corner_normals
-from ..mesh.unit_vectors import angles_around, unit
+from ..mesh.unit_vectors import SAME_WAY, angles_around, unit
 
 EDGE_PLACES = 8
 """Number of places on an edge from which edges that run along it are searched for, nearer together than
@@ -22,8 +22,6 @@ ALONG_EDGE = 0.1
 .05 apart if it has 16 or more."""
 SHARED_PLACES = 3
 """Number of places of one of two edges that lie along the other. Edges that only meet at a corner share fewer."""
-OPPOSITE_EDGES = -0.7
-"""Edges run in opposite directions if their cosine is at most this; with 0, leaves that cross are one part."""
 STRAIGHT_RIM = 1e-5
 """A vertex is no corner if the angle between its two edges is at most this, in radians."""
 
@@ -148,5 +146,5 @@ def meeting_edges(ends: Floats) -> tuple[Ints, Ints, Bools]:
     first, second = np.unique(np.sort(pairs, axis=1), axis=0).T
     cosines = (ways[first] * ways[second]).sum(axis=1)
     alike = np.where((cosines < 0)[:, None, None], ends[second, ::-1], ends[second])
-    meeting = (np.abs(cosines) > -OPPOSITE_EDGES) & (ends[first] != alike).any(axis=(1, 2))
+    meeting = (np.abs(cosines) > SAME_WAY) & (ends[first] != alike).any(axis=(1, 2))
     return first[meeting], second[meeting], cosines[meeting] < 0

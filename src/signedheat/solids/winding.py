@@ -11,14 +11,12 @@ from ..arrays import Bools, Floats, Frozen
 from ..errors import GeometryError
 from ..mesh.edges import edge_table
 from ..mesh.welding import same_positions
-from ..search.winding_tree import WindingTree, steps_off, winding_sums
+from ..search.winding_tree import OFF_FACE, WindingTree, steps_off, winding_sums
 
 INSIDE_WINDING = 0.5
 """Winding number above which a point is inside; exact winding numbers are integers."""
 SUMMED_POINTS = 16
 """At this many points or fewer, sums over all triangles take less time and memory than a tree."""
-OFF_FACE = 1e-6
-"""Offset of the points in front of a face and behind it that are tested, relative to its size."""
 
 
 @dataclass(frozen=True, eq=False)

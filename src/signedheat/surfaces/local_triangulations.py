@@ -32,7 +32,7 @@ from ..mesh.unit_vectors import unit
 from ..mesh.welding import distinct_rows
 from ..parallel import in_chunks
 from ..search.nearest_triangles import TriangleTree
-from .plane_fits import point_spacing
+from .plane_fits import POINT_NEIGHBORS, point_spacing
 
 NORMAL_DISTANCE = 2.0
 """Spacings by which neighbours count as farther (by Pythagoras) per unit of distance between their normals and the
@@ -48,8 +48,6 @@ OWN_NORMAL_WEIGHT = 0.03
 """Weight of a point's own normal in its tangent plane, relative to that of its neighbours: it decides where these lie
 along a line, as on the narrow side of a plate. With 0.01 there are 44 % more edges at holes; with 0.1 6 % fewer, but 3
 of 12 balls of 200 random points have a hole."""
-SPACING_NEIGHBORS = 7
-"""Number of neighbours from which spacing is estimated."""
 PROPOSED_AT_ONCE = 65536
 """Number of points that propose triangles at once."""
 
@@ -127,7 +125,7 @@ class TangentPlanes:
     def of(cls, points: Floats, normals: Floats, n_neighbors: int) -> TangentPlanes:
         """Fit planes to the neighbours on the same side, since the normals of scans often belong to another mesh."""
         k, many = (min(size, len(points) - 1) for size in (n_neighbors, 2 * n_neighbors))
-        nearest = min(SPACING_NEIGHBORS, many)
+        nearest = min(POINT_NEIGHBORS, many)
         tree = scipy.spatial.cKDTree(points)
 
         def fitted(rows: Floats) -> tuple[NDArray[Any], ...]:

@@ -12,6 +12,8 @@ from ..compiled import compiled
 from ..mesh.unit_vectors import axes_across
 from ..parallel import in_chunks
 
+POINT_NEIGHBORS = 8
+"""Number of nearest points that count as the neighbours of a point: on a surface about six lie around it."""
 CLEAN_NEIGHBORS = 12
 """Number of neighbours to which a plane is fitted where there is no noise."""
 NOISY_NEIGHBORS = (12, 24, 48, 96, 192)

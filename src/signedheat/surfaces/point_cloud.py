@@ -24,12 +24,14 @@ from ..compiled import compiled
 from ..errors import GeometryError, InexactWarning, warn_user
 from ..exchange import Elements, Exchangeable
 from ..mesh.signed_graph import Links, signs_of
+from ..mesh.unit_vectors import SAME_WAY
 from ..mesh.welding import same_rows
 from ..validation import coordinates, finite_rows, frozen, numbers, whole_number
 from .local_triangulations import SAME_SIDE_HEIGHT, LocalTriangulations, local_triangulations, turned_alike
 from .plane_fits import (
     CLEAN_NEIGHBORS,
     MERGED_SHARE,
+    POINT_NEIGHBORS,
     PlaneFits,
     fit_planes,
     noise_scale,
@@ -50,8 +52,6 @@ BAD_SEAM = 0.35
 """Number of edges next to another side across which triangles face opposite ways, relative to the root of the number
 of points, above which there is a warning. On scans, CAD and a box with up to .15 spacings of noise it is at most .07,
 where parts of thin plates face the wrong way mostly .41 to .96."""
-STEEP = 0.7
-"""Cosine between a normal and the direction to a neighbour above which the neighbour lies on another side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +232,8 @@ def edges_turned(points: Floats, normals: Floats, faces: Ints) -> int:
     twice = edges[uses > 1]
     near = scipy.spatial.cKDTree(points).query(points[twice], k=min(1 + CLEAN_NEIGHBORS, len(points)))[1]
     offsets = points[near] - points[twice][:, :, None]
-    over = np.abs((offsets * normals[twice][:, :, None]).sum(axis=3)) > STEEP * np.linalg.norm(offsets, axis=3)
+    # a neighbour straight above or below lies on another side
+    over = np.abs((offsets * normals[twice][:, :, None]).sum(axis=3)) > SAME_WAY * np.linalg.norm(offsets, axis=3)
     return int(over.any(axis=(1, 2)).sum())
 
 
@@ -245,8 +246,9 @@ KEPT_SPACING = 0.35
 """Least distance between the noisy points that are kept, in reaches: larger than the noise that planes leave."""
 MOST_TET_POINTS = 100_000
 """Largest number of points for which tets are made; the others take the signs of their neighbours."""
-GIVEN_SIGN_WEIGHT = 0.1
-"""Weight of given signs, relative to half the typical sum of the weights of all links of a point."""
+WEAK_WEIGHT = 0.1
+"""Weight of what tells sides less surely than balls do: of a link between neighbours, relative to that of a ball (with
+noisy points they weigh the same), and of given signs, relative to half the typical sum of all links of a point."""
 MOST_WRONG = 3.0
 """Given signs stay unless the share that seems wrong exceeds this many times the share of contradictions."""
 COHERENCE_GAIN = 0.0015
@@ -258,10 +260,6 @@ BALL_COSINE = 0.5
 OUTLIER_DISTANCE = 4.0
 """Distance from a point to its neighbours, relative to that from these to theirs, above which it is an outlier. It is
 up to 1.4 where spacing is even, and 1.6 where density halves within three spacings."""
-DIRECT_NEIGHBORS = 8
-"""Number of neighbours with which a point is compared directly."""
-DIRECT_WEIGHT = 0.1
-"""Weight of a link between neighbours, relative to that of a ball; with noisy points they weigh the same."""
 UPWARD = np.array([0.01, 0.1, 1.0])
 """Outward direction where nothing decides it, as for points in a plane: up, and on vertical planes along the second
 axis. If a component is halved or doubled, planes keep their sides."""
@@ -298,7 +296,7 @@ def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
 
     They are kept if, all over the cloud, near points with opposite normals are each below the other, or each above.
     """
-    k = min(DIRECT_NEIGHBORS, len(points) - 1)
+    k = min(POINT_NEIGHBORS, len(points) - 1)
     distances, near = scipy.spatial.cKDTree(points).query(points, k=k + 1)
     flat = SAME_SIDE_HEIGHT * point_spacing(distances[:, k:], k)
     offsets = points[near] - points[:, None]
@@ -337,7 +335,7 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> Outward
     if given or not sided:
         typical = 0.5 * float(np.median(links.strength(m + 1)[:m]))
         own = np.ones(m) if given else axes[chosen] @ UPWARD
-        links = Links.joined(links, Links(np.arange(m), np.full(m, m + 1), GIVEN_SIGN_WEIGHT * typical * own))
+        links = Links.joined(links, Links(np.arange(m), np.full(m, m + 1), WEAK_WEIGHT * typical * own))
     # signs of the chosen points, relative to the outside or to the given signs; others follow their neighbours
     decision = signs_of(links, m + 2)
     signs = np.zeros(n)
@@ -353,7 +351,7 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> Outward
 
 def _lone(places: Floats, reaches: Floats) -> Bools:
     """(n,) whether a point is an outlier, much farther from its neighbours than these are from theirs."""
-    near = scipy.spatial.cKDTree(places).query(places, k=min(DIRECT_NEIGHBORS + 1, len(places)), workers=-1)[1]
+    near = scipy.spatial.cKDTree(places).query(places, k=min(POINT_NEIGHBORS + 1, len(places)), workers=-1)[1]
     return reaches > OUTLIER_DISTANCE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
 
 
@@ -368,7 +366,7 @@ def _followed(places: Floats, normals: Floats, others: Floats, axes: Floats) -> 
 
 def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = False) -> tuple[Links, bool]:
     """Link signs of axes (n, 3) by neighbours, balls and the hull (to the outside, node n); tell if there are balls."""
-    near = _neighbor_links(places, axes, 1.0 if noisy else DIRECT_WEIGHT)
+    near = _neighbor_links(places, axes, 1.0 if noisy else WEAK_WEIGHT)
     moves = np.random.default_rng(0).uniform(-1, 1, places.shape) * (JOGGLE * reaches[:, None])
     try:
         tets = scipy.spatial.Delaunay(places + moves)
@@ -423,7 +421,7 @@ def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> L
 
 def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
     """Link neighbours as if on a circle: reflection in the plane midway between them maps one axis to the other."""
-    n, k = len(places), min(DIRECT_NEIGHBORS, len(places) - 1)
+    n, k = len(places), min(POINT_NEIGHBORS, len(places) - 1)
     neighbors = scipy.spatial.cKDTree(places).query(places, k=k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), neighbors.ravel()
     step = places[heads] - places[tails]

@@ -34,10 +34,9 @@ from .tet_clipping import SIGHT_OUTSIDE, Planes, barycentric, beyond, stays_insi
 from .tet_discretization import TetDiscretization, lowered_tets
 from .tet_field import TetField, level_triangles
 
-SIDE_EDGES = 2.0
-"""Distance from a face, in mean edges, within which the face's side decides the sign."""
-FAR_EDGES = 1.5
-"""Distance from all faces, in mean edges, beyond which the zero set completes the shape."""
+FACE_EDGES = 2.0
+"""Distance from a face, in mean edges, within which its side decides the sign, and beyond which from all faces the zero
+set completes the shape."""
 
 
 @sharpen_field.register
@@ -59,9 +58,9 @@ def _(
     tolerance: float,
     report: Callable[[], None] | None,
 ) -> Nearest:
-    """Measure any-angle distance to the given faces, and to the zero set where it is over `FAR_EDGES` from all.
+    """Measure any-angle distance to the given faces, and to the zero set where it is over `FACE_EDGES` from all.
 
-    Within `SIDE_EDGES` of a face its side decides the sign, where the shape is closed and consistent around the nearest
+    Within `FACE_EDGES` of a face its side decides the sign, where the shape is closed and consistent around the nearest
     place.
     """
     points = lowered.mesh.vertices[lowered.vertices] - lowered.planes.center
@@ -71,7 +70,7 @@ def _(
     features = None if given is None else _faces_of(given, lowered.planes.center)
     if features is not None:
         face_tree, n_faces = FaceTree.of(features), len(features.rows)
-        missing = face_tree.distances(positions[corners].mean(axis=1)) > FAR_EDGES * lowered.spacing
+        missing = face_tree.distances(positions[corners].mean(axis=1)) > FACE_EDGES * lowered.spacing
         corners = np.concatenate([features.faces, corners[missing] + len(features.vertices)])
         owners = np.concatenate([np.full(n_faces, -1), owners[missing]])
         positions = np.concatenate([features.vertices, positions])
@@ -85,7 +84,7 @@ def _(
     distances, triangles, hidden = run_cancellable(measured, report)
     if features is not None:
         near = face_tree.search(points)
-        decided = near.regular & (near.distances < SIDE_EDGES * lowered.spacing)
+        decided = near.regular & (near.distances < FACE_EDGES * lowered.spacing)
         decided &= (triangles < n_faces) & (distances <= near.distances * (1 + 1e-9))
         sides[decided] = np.where(near.cosines < 0, -1, 1)[decided]
     return Nearest(distances, sides, (RoundCorners(hidden), *notes))
