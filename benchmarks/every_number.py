@@ -85,9 +85,9 @@ def values(*fields: Any) -> Floats:
 
 
 def solid(shape: Any, **options: Any) -> Floats:
-    """Distances and volume of a solid."""
+    """Distances and volume of a solid, and how sure its triangles are."""
     found = sh.complete(shape, **options)
-    return np.append(found.distance(PLACES), found.volume)
+    return np.append(found.distance(PLACES), [found.volume, found.confidence.mean()])
 
 
 def strokes(turned: bool) -> Floats:
@@ -114,6 +114,13 @@ def on_a_surface() -> Floats:
     return values(
         field, sh.sharpen(field), sh.sharpen(field, method=sh.Convex()), sh.sharpen(field, method=sh.Geodesic())
     )
+
+
+def on_thin_triangles() -> Floats:
+    """Distance to a point, and the method's own to a line, on triangles thirty times as long as they are wide."""
+    mesh = stretched()
+    line = mesh.level_set(mesh.vertices[:, 2] + mesh.vertices[:, 0], 0.1)
+    return values(sh.signed_distance(mesh.points_at(5), mesh), sh.SignedHeatSolver(mesh).distance(line))
 
 
 def on_tets() -> Floats:
@@ -177,7 +184,7 @@ CASES: dict[str, Callable[[], Floats]] = {
     "drawing": drawing,
     "jumps": lambda: values(sh.piecewise_distance(SURFACE, [ring(SURFACE, 0, 0.6), ring(SURFACE, 0.1, 0.3, 1.0)])),
     "surface": on_a_surface,
-    "thin triangles": lambda: values(sh.signed_distance(stretched().points_at(5), stretched())),
+    "thin triangles": on_thin_triangles,
     "point cloud": on_points,
     "voxels": on_voxels,
     "tets": on_tets,
