@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..parallel import ROWS_PER_TASK, n_threads
-from .box_tree import BOXES_PER_LEAF, BoxTree, morton_codes
+from .box_tree import BOXES_PER_LEAF, BoxTree, boxes_around, morton_codes
 from .unit_vectors import unit
 from .welding import same_positions
 
@@ -42,12 +42,12 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float,
     centred = np.ascontiguousarray(vertices - vertices.mean(axis=0), dtype=np.float64)
     hubs = _hubs(faces, len(vertices))
     if asked is None:
-        order = _order(centred[faces], centred, hubs)
+        order = _order(centred.take(faces, axis=0), centred, hubs)
     else:  # all faces search among those asked for, which come first
         order = np.flatnonzero(asked)
         order = np.append(order[_order(centred[faces[order]], centred, hubs[order])], np.flatnonzero(~asked))
     ids, hubs = np.ascontiguousarray(faces[order], dtype=np.int64), hubs[order]
-    corners = centred[ids]
+    corners = centred.take(ids, axis=0)
     flat = corners.reshape(-1, 9)
     fans = np.flatnonzero(hubs >= 0)
     places = np.arange(len(ids))
@@ -88,7 +88,8 @@ def _hubs(faces: Ints, n_vertices: int) -> Ints:
 
 def _order(corners: Floats, vertices: Floats, hubs: Ints) -> Ints:
     """Return (m,) the order of triangles along a space-filling curve, with those around one hub together."""
-    middles = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
+    lower, upper = boxes_around(corners)
+    middles = 0.5 * (lower + upper)
     if not (hubs >= 0).any():
         return np.argsort(morton_codes(middles), kind="stable")
     places = np.where((hubs >= 0)[:, None], vertices[hubs], middles)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
 
     def scale(rows: slice) -> None:
         part = vectors[rows]
-        largest = np.abs(part).max(axis=-1, keepdims=True)
+        largest = reduce(np.maximum, np.moveaxis(np.abs(part), -1, 0))[..., None]  # NumPy is slow along short axes
         scaled = part / np.where(largest > 0, largest, 1)
         length = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., None]
         np.divide(scaled, np.where(length > 0, length, 1), out=result[rows])

@@ -140,7 +140,7 @@ class Chain(Frozen):
     @cached_property
     def triangles(self) -> Floats:
         """(m, 3, 3) corners."""
-        return self.positions[self.faces]
+        return self.positions.take(self.faces, axis=0)
 
     @cached_property
     def areas(self) -> Floats:

@@ -57,7 +57,7 @@ class Regions:
         first = np.where(first < 0, np.arange(len(first)), first)  # triangles on fewer than three points
         distinct, groups = np.unique(first, return_inverse=True)
         times = np.bincount(groups, np.where(reverse, -1, 1), len(distinct)).astype(np.int64)
-        vectors = area_vectors(pieces.points[pieces.faces])
+        vectors = area_vectors(pieces.points.take(pieces.faces, axis=0))
         parents = unit(sums_of(vectors, pieces.origins, int(pieces.origins.max(initial=-1)) + 1))
         normals = parents[pieces.origins[distinct]]
         step = PROBE_DISTANCE * touching * float(np.ptp(pieces.points, axis=0).max())
@@ -113,11 +113,12 @@ def _windings(
     levels, labels, contradictions = _levels(times, sides, facing_sides)
     levels, labels = levels.reshape(-1, 2), labels[::2]
     # the widest faces of each part
-    order = np.lexsort((-heights(points[faces]), labels))
+    thickness = heights(points.take(faces, axis=0))
+    order = np.lexsort((-thickness, labels))
     starts = np.searchsorted(labels[order], np.arange(int(labels.max(initial=-1)) + 1))
     chosen = order[np.arange(n) - starts[labels[order]] < PROBED_FACES]
     corners = points[faces[chosen]]
-    away = np.minimum(np.maximum(OFF_FACE * np.sqrt(face_areas(corners)), step), 0.05 * heights(corners))
+    away = np.minimum(np.maximum(OFF_FACE * np.sqrt(face_areas(corners)), step), 0.05 * thickness[chosen])
     away, centres = away[:, None] * normals[chosen], corners.mean(axis=1)
     sampled = windings.numbers_once(np.concatenate([centres - away, centres + away]))
     offsets, owners = sampled - levels[chosen].T.ravel(), np.tile(labels[chosen], 2)
