@@ -97,9 +97,12 @@ def smooth(mesh: sh.TriangleMesh, random: Random, waves: float = 1.0) -> np.ndar
 
 def whole(mesh: sh.TriangleMesh, random: Random, least: float = 20.0, most: int = 3) -> Whole:
     """Closed curves of at least some edges each, whose regions have at least a twentieth of the vertices."""
+    rim = mesh.edges.vertices[mesh.edges.face_counts == 1]
     while True:
         values = smooth(mesh, random, random.choice([0.3, 0.5, 0.8]))
         values = values - np.quantile(values, random.uniform(0.2, 0.8))
+        if np.diff(values[rim] >= 0, axis=1).any():
+            continue  # a curve is open
         curves = mesh.level_set(values)
         if 1 <= len(curves) <= most and all(c.closed and length(mesh, c) > least * edge_length(mesh) for c in curves):
             return Whole(mesh, values, curves)
