@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import subprocess
@@ -35,6 +36,11 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         done = subprocess.run([sys.executable, "-m", "signedheat", "warmup", "--quiet"], check=False)
         if done.returncode:  # it says why on standard error; what it could not compile, tests would report many times
             pytest.exit(f"signedheat warmup failed with status {done.returncode}", returncode=1)
+
+
+def pytest_collection_finish() -> None:
+    """Spare the garbage collector what packages and tests hold until the end, a million objects."""
+    gc.freeze()
 
 
 @pytest.fixture
