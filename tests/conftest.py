@@ -25,6 +25,7 @@ settings.register_profile(
 settings.register_profile("search", max_examples=500, deadline=None, suppress_health_check=list(HealthCheck))
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 
+gc.set_threshold(50_000)  # while tests are collected, it would look at them again and again
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as shells leave it to what they start in the background
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -49,3 +50,19 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     from batch_jobs import Here  # imports NumPy, which must know the number of threads
 
     monkeypatch.setattr("signedheat.batches.pool.Worker", Here)
+
+
+@pytest.fixture
+def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures have a tenth of their pixels, which take as long as what they show."""
+    from matplotlib.figure import Figure
+
+    from signedheat.view import surface_pictures
+
+    save = Figure.savefig
+
+    def smaller(figure: Figure, path: object, *, dpi: float = 100, **options: object) -> None:
+        save(figure, path, dpi=dpi / 3, **options)
+
+    monkeypatch.setattr(Figure, "savefig", smaller)
+    monkeypatch.setattr(surface_pictures, "LONGER_SIDE", surface_pictures.LONGER_SIDE // 3)

@@ -67,6 +67,7 @@ def test_every_example_is_expected_to_measure_something():
     assert set(EXPECTED) == {path.stem for path in FOLDER.glob("*.py")}
 
 
+@pytest.mark.usefixtures("small_pictures")
 @pytest.mark.parametrize("name", EXPECTED)
 def test_example(tmp_path, monkeypatch, name):
     if name in NEEDED:

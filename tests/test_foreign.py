@@ -93,6 +93,7 @@ def test_they_are_taken_wherever_a_shape_is(take):
         assert np.array_equal(take(given), expected)
 
 
+@pytest.mark.usefixtures("small_pictures")
 def test_they_are_saved_and_drawn_and_hold_the_curves_of_files(tmp_path):
     pictures, field = {}, sh.signed_distance(BALL, resolution=12)
     for name, given in {"own": BALL, "trimesh": BALL.to_trimesh(), "arrays": (BALL.vertices, BALL.faces)}.items():

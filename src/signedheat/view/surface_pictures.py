@@ -44,6 +44,8 @@ from .figures import (
     range_of,
 )
 
+LONGER_SIDE = 900
+"""Width or height of the pictures of surfaces, whichever is larger, in pixels."""
 MARGIN_PIXELS = 10
 """Width of the empty margin in pixels."""
 VIEW_ANGLES = (22, -58)
@@ -68,7 +70,7 @@ class Camera:
         frame = looking(direction, up)
         seen = points @ frame[:2].T
         lower, upper = seen.min(axis=0), seen.max(axis=0)
-        scale = (900 - 2 * MARGIN_PIXELS) / max(float((upper - lower).max()), 1e-300)  # 900 along the longer side
+        scale = (LONGER_SIDE - 2 * MARGIN_PIXELS) / max(float((upper - lower).max()), 1e-300)
         width, height = (np.ceil((upper - lower) * scale).astype(int) + 2 * MARGIN_PIXELS).tolist()
         return cls(frame, lower, scale, width, height)
 
