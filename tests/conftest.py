@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -50,6 +51,15 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     from batch_jobs import Here  # imports NumPy, which must know the number of threads
 
     monkeypatch.setattr("signedheat.batches.pool.Worker", Here)
+
+
+@pytest.fixture
+def forked_parsers() -> Iterator[None]:
+    """Parsers of other packages are forked, which saves them a start; `tests/io/test_sandbox.py` starts them."""
+    from fuzz.forked import forked
+
+    with forked():
+        yield
 
 
 @pytest.fixture

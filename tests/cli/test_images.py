@@ -10,6 +10,8 @@ from signedheat import samples
 from signedheat.cli import main
 from signedheat.io.image_files import write_nrrd
 
+pytestmark = pytest.mark.usefixtures("forked_parsers")
+
 CENTER, RADIUS = np.array([12.0, 10.0, 8.0]), 6.0
 TURN = np.array([[np.cos(0.4), -np.sin(0.4), 0], [np.sin(0.4), np.cos(0.4), 0], [0, 0, 1]]) * [-1, 1, 1]
 ORIGIN = np.array([10.0, -5.0, 3.0])

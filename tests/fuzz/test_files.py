@@ -11,9 +11,10 @@ from fuzz.forked import forked
 from fuzz.frame import families, run
 from signedheat import SignedHeatError
 
-CASES = 12
+CASES = 8
 
 
+@pytest.mark.usefixtures("forked_parsers")
 @pytest.mark.parametrize("kind", KINDS)
 def test_files_that_are_right_are_read(tmp_path, kind):
     read, variants = KINDS[kind]

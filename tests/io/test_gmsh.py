@@ -10,6 +10,8 @@ import signedheat as sh
 from refusals import refused
 from shapes.tet_cases import boxes
 
+pytestmark = pytest.mark.usefixtures("forked_parsers")
+
 BOX = boxes((3, 2, 2), 0.3)
 VALUES = np.linspace(-1.0, 2.0, len(BOX.vertices))
 

@@ -13,6 +13,8 @@ from signedheat.cli import main
 from signedheat.inspection import inspect
 from signedheat.solids.completion import complete
 
+pytestmark = pytest.mark.usefixtures("forked_parsers")
+
 nibabel = pytest.importorskip("nibabel")
 
 CENTER = np.array([6.0, 7.0, 5.0])

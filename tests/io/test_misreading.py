@@ -13,6 +13,8 @@ from refusals import refused
 from signedheat import samples
 from signedheat.errors import FileFormatError, MemoryLimitError
 
+pytestmark = pytest.mark.usefixtures("forked_parsers")
+
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "<f4")
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], "<u2")
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"

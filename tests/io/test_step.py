@@ -26,6 +26,7 @@ def drilled(tmp_path):
     return tmp_path / "drilled.step"
 
 
+@pytest.mark.usefixtures("forked_parsers")
 def test_faces_of_the_part(drilled):
     mesh, owners = sh.io.read_step(drilled, deflection=0.002)
     assert len(owners) == mesh.n_faces and len(np.unique(owners)) == 7
@@ -37,6 +38,7 @@ def test_faces_of_the_part(drilled):
     assert owners[on[0]] == owners[on[1]] != owners[on[2]]
 
 
+@pytest.mark.usefixtures("forked_parsers")
 def test_as_any_shape(drilled):
     mesh = sh.read(drilled)
     assert isinstance(mesh, sh.TriangleMesh)
@@ -55,6 +57,7 @@ def test_entities_that_are_damaged_do_not_end_the_process(drilled):
             assert error.path == str(drilled)
 
 
+@pytest.mark.usefixtures("forked_parsers")
 def test_what_is_no_step_file_is_refused(tmp_path, capfd):
     pytest.importorskip("OCP")
     (tmp_path / "part.step").write_text("solid part\n")

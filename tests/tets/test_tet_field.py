@@ -10,6 +10,8 @@ from refusals import refused
 from shapes.grid_cases import assert_closed_manifold, enclosed_volume
 from shapes.tet_cases import boxes, lattice, rectangle, rms, sphere
 
+pytestmark = pytest.mark.usefixtures("forked_parsers")
+
 
 @pytest.fixture(scope="module")
 def ball():
