@@ -6,7 +6,7 @@ import math
 import mmap
 import sys
 from collections.abc import Callable
-from functools import wraps
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -113,22 +113,32 @@ def _free() -> int | None:
 
 def _containers() -> list[int]:
     """Return the bytes that each control group around this process leaves, from its own up to the root."""
-    lines = [line.split(":", 2) for line in _text(CGROUPS).splitlines() if line.count(":") > 1]
-    own = {controllers: path for _, controllers, path in lines}
     left = []
-    for controllers, names in CGROUP_FILES.items():
-        root = CGROUP_ROOT / controllers
-        group = root / own.get(controllers, "/").lstrip("/")
-        for place in (group, *(parent for parent in group.parents if parent.is_relative_to(root))):
-            limit, used = (_text(place / name).strip() for name in names)
-            if limit.isdigit() and used.isdigit():
-                left.append(int(limit) - int(used) + _cached(place))
+    for limit_file, used_file, details in _files_of_groups(_text(CGROUPS), CGROUP_ROOT):
+        limit = _text(limit_file).strip()
+        used = _text(used_file).strip() if limit.isdigit() else ""
+        if used.isdigit():
+            left.append(int(limit) - int(used) + _cached(details))
     return left
 
 
-def _cached(group: Path) -> int:
+@cache
+def _files_of_groups(listed: str, folder: Path) -> list[tuple[str, str, str]]:
+    """Return the files with the limit, the usage and the details of each control group around this process."""
+    lines = [line.split(":", 2) for line in listed.splitlines() if line.count(":") > 1]
+    own = {controllers: path for _, controllers, path in lines}
+    found = []
+    for controllers, (limit, used) in CGROUP_FILES.items():
+        root = folder / controllers
+        group = root / own.get(controllers, "/").lstrip("/")
+        for place in (group, *(parent for parent in group.parents if parent.is_relative_to(root))):
+            found.append((str(place / limit), str(place / used), str(place / "memory.stat")))
+    return found
+
+
+def _cached(details: str) -> int:
     """Return the bytes of cached files in a group, which the system can free."""
-    words = dict(line.split(maxsplit=1) for line in _text(group / "memory.stat").splitlines() if " " in line)
+    words = dict(line.split(maxsplit=1) for line in _text(details).splitlines() if " " in line)
     total = "total_" if "total_inactive_file" in words else ""
     return sum(int(words.get(f"{total}{name}", 0)) for name in ("inactive_file", "active_file"))
 
@@ -152,7 +162,8 @@ def _own_limits() -> list[int]:
 def _text(path: Path | str) -> str:
     """Read a system file; return an empty text if that fails."""
     try:
-        return Path(path).read_text()
+        with open(path) as file:
+            return file.read()
     except OSError:
         return ""
 
