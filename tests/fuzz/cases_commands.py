@@ -9,6 +9,7 @@ from argparse import Action
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -117,6 +118,7 @@ def build(random: Random, folder: Path) -> Command:
     return Command(tuple(arguments), folder)
 
 
+@cache
 def _subparsers() -> dict[str, Any]:
     return next(action.choices for action in parser_of(DECLARED)._actions if getattr(action, "choices", None))
 

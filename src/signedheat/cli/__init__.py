@@ -11,12 +11,14 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 
 from .. import __version__
 from ..errors import SignedHeatError, printable
 from .options import (
+    Parser,
     parser_of,
     refuse_contradictions,
     refuse_output_over_input,
@@ -48,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> int:
     """Import the commands, inside the caller's error handling, and run one."""
-    parser = parser_of(import_module(f"{__name__}.shell").COMMANDS)
+    parser = _parser()
     if "_ARGCOMPLETE" in os.environ:  # set by argcomplete's shell function
         import_module("argcomplete").autocomplete(parser)
     arguments = parser.parse_args(without_exponents(sys.argv[1:] if argv is None else argv))
@@ -72,6 +74,12 @@ def _run(argv: Sequence[str] | None) -> int:
     elif text and not (arguments.quiet or standard.takes_output):
         write_out(standard.named(text))
     return EXIT_FAILED if summary.get("failed") else 0  # some of many inputs failed
+
+
+@cache
+def _parser() -> Parser:
+    """Make the parser of the whole command line, once."""
+    return parser_of(import_module(f"{__name__}.shell").COMMANDS)
 
 
 def _say_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
