@@ -52,7 +52,7 @@ def test_balls_stay_balls(operation, radius):
 
 def test_a_broken_ball_grows_as_if_it_were_whole():
     broken = samples.with_flipped_faces(samples.without_patches(BALL, 4, 0.35), 0.05)
-    grown = sh.morphology.dilate(broken, 0.3, resolution=64)
+    grown = sh.morphology.dilate(broken, 0.3, resolution=40)
     assert_closed_manifold(grown)
     # Holes of angular radius 0.35 leave 1 − cos 0.35 = 0.06 open to interpretation.
     assert np.quantile(np.abs(radii(grown) - 1.3), 0.99) < 0.06
@@ -84,7 +84,7 @@ def test_on_tets_faces_are_turned():
 
 @pytest.mark.parametrize("operation", [sh.morphology.opening, sh.morphology.closing])
 def test_a_second_time_changes_nothing_beyond_a_cell(operation):
-    grid = sh.Grid.around(np.array([[-1.5, -0.5, -0.5], [1.5, 0.5, 0.5]]), resolution=60, padding=0.5)
+    grid = sh.Grid.around(np.array([[-1.5, -0.5, -0.5], [1.5, 0.5, 0.5]]), resolution=40, padding=0.5)
     once = operation(box_with_arms(), 0.2, grid)
     twice = operation(once, 0.2, grid)
     distance = sh.sharpen(sh.SignedHeatSolver(grid).distance(once))
@@ -301,8 +301,8 @@ def test_reflex_edges_are_mitred_inside():
 
 
 def test_distances_may_vary():
-    slope = sh.offset(BALL, lambda places: 0.2 + 0.1 * places[:, 2], resolution=32)
-    same = sh.offset(BALL, 0.2 + 0.1 * BALL.vertices[:, 2], resolution=32)
+    slope = sh.offset(BALL, lambda places: 0.2 + 0.1 * places[:, 2], resolution=24)
+    same = sh.offset(BALL, 0.2 + 0.1 * BALL.vertices[:, 2], resolution=24)
     for made in (slope, same):
         assert_closed_manifold(made)
         assert not len(self_intersections(made.vertices, made.faces))

@@ -194,7 +194,7 @@ def test_info_of_shapes_and_fields(tmp_path, ball, capsys):
 
 
 def test_info_tells_which_way_parts_face(tmp_path, capsys):
-    outer, inner = samples.sphere(2), samples.sphere(2, radius=0.8)
+    outer, inner = samples.sphere(1), samples.sphere(1, radius=0.8)
     flat = sh.TriangleMesh([[2, 0, 0], [3, 0, 0], [2, 1, 0]], [[0, 1, 2]])
     wall = sh.TriangleMesh([[0, 0, 3], [1, 0, 3], [0, 1, 3]], [[0, 1, 2], [0, 2, 1]])
     shapes = {
@@ -314,6 +314,7 @@ def test_tiles_go_on_where_they_were_and_give_what_the_band_gives(tmp_path, ball
     fail(capsys, "volume", ball, "-o", output, *options, "--tiles", store, "--workers", "2", "--scheduler", "x", code=2)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_archives_of_solids_and_fields_are_taken_for_shapes(tmp_path, ball, capsys):
     """Nothing is completed again, so that there is nothing to say of them."""
     solid = sh.complete(sh.read(ball))

@@ -46,7 +46,7 @@ def solid(request):
 @pytest.mark.filterwarnings("ignore:cells of")  # .04 below the faces of the plate are .02 left, a third of a cell
 @pytest.mark.parametrize("level", [0.0, 0.06, -0.04])
 def test_closed_and_apart(solid, level):
-    surface = solid.surface(level, resolution=34)
+    surface = solid.surface(level, resolution=28)
     assert_closed_manifold(surface)
     assert not len(self_intersections(surface.vertices, surface.faces))
 
@@ -61,7 +61,7 @@ def test_what_is_thinner_than_a_cell_is_announced(shape, level, sharp):
     solid = complete(turned(shape))
     with pytest.warns(InexactWarning, match="smaller"):
         solid.surface(level, sharp=sharp, spacing=0.07)
-    solid.surface(level, sharp=sharp, spacing=0.009)
+    solid.surface(level, sharp=sharp, spacing=0.012)
 
 
 def test_tips_and_edges_are_not_announced():
