@@ -144,6 +144,20 @@ def on_points() -> Floats:
     return values(sh.signed_distance(ring(cloud, 0, 0.9), cloud))
 
 
+def on_points_with_normals() -> Floats:
+    """Share of edges at holes, and distance on points of both sides of a plate; a ball with normals of which some are
+    turned."""
+    random = np.random.default_rng(2)
+    points = random.uniform(-1, 1, (1200, 3)) * [1, 1, 0]
+    up = np.where(np.arange(1200) % 2, 1.0, -1.0)[:, None] * [0, 0, 1]
+    plate = sh.PointCloud(points + 0.03 * up, up)
+    edges = np.sort(plate.triangulation.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    uses = np.unique(edges, axis=0, return_counts=True)[1]
+    turned = np.where(random.random(BALL.n_vertices) < 0.2, -1, 1)[:, None] * BALL.vertices
+    ball = solid(sh.PointCloud(BALL.vertices, turned))
+    return np.concatenate([values(sh.signed_distance(plate.points_at(1), plate)), ball, [5 * (uses == 1).mean()]])
+
+
 def on_voxels() -> Floats:
     """Distance to a face of voxels, and where the corners of the smooth surface are."""
     squares = sh.DigitalSurface(np.linalg.norm(np.indices((15, 15, 15)) - 7, axis=0) < 6.3)
@@ -186,6 +200,7 @@ CASES: dict[str, Callable[[], Floats]] = {
     "surface": on_a_surface,
     "thin triangles": on_thin_triangles,
     "point cloud": on_points,
+    "points with normals": on_points_with_normals,
     "voxels": on_voxels,
     "tets": on_tets,
     "grid": on_a_grid,
