@@ -31,8 +31,6 @@ from .strokes import EQUAL_COSTS, EXPLAINED, Inside, Strokes
 TURNING_COST = 0.5
 """Cost of turning a stroke, relative to its length. Halved or doubled, one of 46 drawings changes on more than 2 % of
 the area."""
-TOGETHER_COST = 0.5
-"""Cost of turning all strokes of a curve, relative to that of turning one by one."""
 WEAK_TURNING_COST = 0.02
 """Cost of turning a stroke of mean length in `smooth_signs`. If two follow each other, with a gap of half of their
 length, the energy is less by 0.05. Halved and doubled, none of 46 drawings changes."""
@@ -245,14 +243,12 @@ def mostly_loose(strokes: Strokes, inside: Inside) -> bool:
 
 
 def cost(strokes: Strokes, inside: Inside) -> float:
-    """Return the energy and the cost of turning, which is less for all strokes of a loop: they may be one curve."""
-    turned, total = (np.bincount(strokes.group, strokes.lengths * way) for way in (inside.signs < 0, inside.signs != 0))
-    together = (turned == total) & strokes.is_loop & (np.bincount(strokes.group) > 1)
-    return inside.energy + TURNING_COST * float((np.where(together, TOGETHER_COST, 1.0) * turned).sum())
+    """Return the energy and the cost of turning."""
+    return inside.energy + TURNING_COST * float(strokes.lengths[inside.signs < 0].sum())
 
 
 def misfit(strokes: Strokes, inside: Inside) -> float:
-    """Return the `cost`, and for loops that bound nothing as much as for turning all of their strokes one by one."""
+    """Return the `cost`, and for loops that bound nothing as much as for turning all of their strokes."""
     loose = strokes.whole_loops((inside.signs > 0) & (inside.explained < EXPLAINED))[strokes.group]
     return cost(strokes, inside) + TURNING_COST * float(strokes.lengths[loose].sum())
 
