@@ -90,30 +90,27 @@ def dual_cells(
     """Find the pieces of a level set in the cells of a grid; `inside` tells which points, in cells, are inside."""
     places, edges, rows, sides = around
     ways = np.zeros((len(places), 6), dtype=np.bool_)
-    pieces = _pieces(edges, ways)
-    crossed = _crossed_faces(edges)
-    cells, faces = np.nonzero(crossed == 4)
-    if len(cells):
-        across, side = faces // 2, faces % 2
-        first = places[cells].copy()
-        first[np.arange(len(cells)), across] += side
-        keys = np.ravel_multi_index(tuple(first.T), shape) * 3 + across
-        order = np.argsort(keys, kind="stable").reshape(-1, 2)  # the two cells at each face
-        middles = first[order[:, 0]] + 0.5 * (np.arange(3) != across[order[:, 0], None])
-        # whether the first corner of the face is inside
-        corner = crossings.rising[edges[cells, 4 * AXES_AFTER[across, 1] + side]]
-        way = inside(middles) == corner[order[:, 0]]
-        while True:
-            ways[cells[order], faces[order]] = way[:, None]
-            pieces = _pieces(edges, ways)
-            linked = pieces[cells[:, None], _face_edges(faces)]
-            double = np.flatnonzero((linked == linked[:, :1]).all(axis=1)[order].all(axis=1))
-            if not len(double):
-                break
-            # one face of a cell at a time: each change divides the pieces of both cells, but two may join them again
-            first_of = np.full(len(places), len(order))
-            np.minimum.at(first_of, cells[order[double]], double[:, None])
-            way[double[(first_of[cells[order[double]]] == double[:, None]).all(axis=1)]] ^= True
+    cells, faces = np.nonzero(_crossed_faces(edges) == 4)
+    across, side = faces // 2, faces % 2
+    first = places[cells]
+    first[np.arange(len(cells)), across] += side
+    keys = np.ravel_multi_index(tuple(first.T), shape) * 3 + across
+    order = np.argsort(keys, kind="stable").reshape(-1, 2)  # the two cells at each face
+    middles = first[order[:, 0]] + 0.5 * (np.arange(3) != across[order[:, 0], None])
+    # whether the first corner of the face is inside
+    corner = crossings.rising[edges[cells, 4 * AXES_AFTER[across, 1] + side]]
+    way = inside(middles) == corner[order[:, 0]]
+    while True:
+        ways[cells[order], faces[order]] = way[:, None]
+        pieces = _pieces(edges, ways)
+        linked = pieces[cells[:, None], _face_edges(faces)]
+        double = np.flatnonzero((linked == linked[:, :1]).all(axis=1)[order].all(axis=1))
+        if not len(double):
+            break
+        # one face of a cell at a time: each change divides the pieces of both cells, but two may join them again
+        first_of = np.full(len(places), len(order))
+        np.minimum.at(first_of, cells[order[double]], double[:, None])
+        way[double[(first_of[cells[order[double]]] == double[:, None]).all(axis=1)]] ^= True
     owners = np.empty(int(pieces.max(initial=-1)) + 1, dtype=np.int64)
     crossed_cells, side = np.nonzero(edges >= 0)
     owners[pieces[crossed_cells, side]] = crossed_cells
@@ -138,20 +135,30 @@ def _crossed_faces(edges: Ints) -> Ints:
 
 
 def _pieces(edges: Ints, ways: Bools) -> Ints:
-    """Return (c, 12) the piece of each crossed edge, over all cells, or −1.
+    """Return (c, 12) the piece of each crossed edge, over all cells, or −1: see `_pieces_of_cell`."""
+    crossed = edges >= 0
+    codes = np.concatenate([crossed, ways], axis=1) @ (1 << np.arange(18))
+    _, first, kinds = np.unique(codes, return_index=True, return_inverse=True)  # few cells differ in these
+    pieces = _pieces_of_cell(crossed[first], ways[first])
+    counts = (pieces.max(axis=1, initial=-1) + 1)[kinds]
+    return np.where(crossed, pieces[kinds] + (np.cumsum(counts) - counts)[:, None], -1)
+
+
+def _pieces_of_cell(crossed: Bools, ways: Bools) -> Ints:
+    """Return (c, 12) the piece of each crossed edge, from 0 on in each cell, or −1.
 
     Of four crossed edges of a face, way 0 links the first with the last, the second with the third; way 1 the others.
     """
-    crossed, around = edges >= 0, _face_edges(np.arange(6))
+    around = _face_edges(np.arange(6))
     of_faces = crossed[:, around]
     cells, faces, edge = np.nonzero(of_faces)
     way = np.where(ways[cells, faces], edge ^ 1, 3 - edge)
     linked = np.where(of_faces[cells, faces].all(axis=1), way, of_faces[cells, faces].argmax(axis=1))
-    numbers = np.cumsum(crossed).reshape(edges.shape) - 1
+    numbers = np.cumsum(crossed).reshape(crossed.shape) - 1
     links = (numbers[cells, around[faces, end]] for end in (edge, linked))
-    result = np.full(edges.shape, -1, dtype=np.int64)
-    result[crossed] = connected_components(int(crossed.sum()), *links)
-    return result
+    result = np.full(crossed.shape, crossed.size)
+    result[crossed] = connected_components(int(crossed.sum()), *links)  # numbered by their first edges, cell by cell
+    return np.where(crossed, result - result.min(axis=1)[:, None], -1)
 
 
 DIAGONAL_CLEARANCE = 1e-6
