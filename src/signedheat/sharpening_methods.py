@@ -13,7 +13,6 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from scipy import sparse
-from threadpoolctl import threadpool_limits
 
 from .arrays import Floats, Ints
 from .diagnostics import ConvexRounds, Diagnostics, Note, SlopeErrors
@@ -32,6 +31,7 @@ from .field_kinds import Field
 from .geodesics.exact_distance import Report
 from .jobs import Progress
 from .linear.splitting import split_rounds
+from .linear.threads import one_blas_thread
 from .mesh.intrinsic_mesh import IntrinsicMesh
 from .mesh.tet_shapes import Tetrahedra
 from .surfaces.vertex_field import VertexField
@@ -286,7 +286,7 @@ class Convex(Method):
         integration = discretization.integration
         assert isinstance(integration, DirectIntegration)  # as on surfaces and tets, which have linear elements
         sizes, total = elements.sizes, elements.sizes.sum()
-        with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they gain
+        with one_blas_thread():  # threads cost a triangular solve of this size more than they gain
             factor = integration.anchored(source)
             phi = np.nan_to_num(values)
             reach = max(float(np.ptp(phi)), typical_size(sizes, elements.slopes(phi).shape[1]))

@@ -15,6 +15,7 @@ from signedheat import linear
 from signedheat.discretization import discretize
 from signedheat.jobs import Announcement
 from signedheat.linear import available_backends, elimination_order, factorize, pardiso, upper_triangle, whole
+from signedheat.linear.threads import one_blas_thread
 from signedheat.surfaces.vector_heat import vector_heat_matrix
 
 backends = pytest.mark.parametrize("backend", available_backends())
@@ -75,6 +76,16 @@ def test_factors_are_freed(backend):
     before = peak_after(2)
     entries = factorize(matrix, backend, np.arange(n)).nonzeros
     assert 1024 * (peak_after(10) - before) < 4 * 8 * entries  # ten kept factors would be more than twice that
+
+
+def test_blas_has_one_thread_where_more_would_wait():
+    """That of MKL too, which is loaded with its first factor."""
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    for backend in available_backends():
+        with threadpool_limits(2, "blas"), one_blas_thread():
+            assert {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"} == {1}
+            factorize(sparse.identity(4, format="csr"), backend).solve(np.ones(4))
 
 
 def test_an_unknown_backend_is_refused():

@@ -15,11 +15,11 @@ from itertools import islice
 
 import numpy as np
 from scipy import sparse
-from threadpoolctl import threadpool_limits
 
 from ..arrays import Bools, Complexes, Floats, Ints, mask_of
 from ..linear import factorize
 from ..linear.splitting import split_rounds
+from ..linear.threads import one_blas_thread
 from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, split_corners
 from ..mesh.polylines import assemble_polylines
@@ -107,7 +107,7 @@ def minimize(
     spring = problem.weights / problem.weights.mean()
     incidence = problem.incidence()
     transposed = sparse.csr_matrix(incidence.T)
-    with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they gain
+    with one_blas_thread():  # threads cost a triangular solve of this size more than they gain
         factor = factorize(_grounded_laplacian(incidence, spring))
         constants = factor.solve(transposed @ (spring * (0.5 * (low + high))))
         step = problem.differences(constants)

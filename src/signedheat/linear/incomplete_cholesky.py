@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
-from threadpoolctl import threadpool_limits
 
 from ..arrays import Floats, Ints
 from ..compiled import compiled
 from .conjugate_gradients import conjugate_gradients
 from .ordering import whole
+from .threads import one_blas_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class IncompleteCholesky:
             small = np.einsum("i,i->", r, r) <= goal
             return bool(small or _settled(diagonal, x.reshape(shape), r.reshape(shape), componentwise))
 
-        with threadpool_limits(1, "blas"):  # threads only wait between the inner products
+        with one_blas_thread():  # threads only wait between the inner products
             solution = conjugate_gradients(
                 multiply, load.ravel(), precondition, tolerance=0.0, limit=5000, converged=converged
             )

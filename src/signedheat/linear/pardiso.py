@@ -183,6 +183,11 @@ def _makes_factors_anew() -> bool:
     return bool(abs(half - 0.5) < 0.25)  # the result is rounded on some processors
 
 
+def is_loaded() -> bool:
+    """Return whether the MKL library has been loaded."""
+    return _library.cache_info().currsize > 0
+
+
 def is_available() -> bool:
     """Return whether the MKL library can be loaded."""
     try:

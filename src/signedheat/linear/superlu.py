@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
-from threadpoolctl import threadpool_limits
 
 from ..arrays import Floats
 from ..compiled import compiled
 from ..errors import FactorizationError
 from .ordering import elimination_order, whole
+from .threads import one_blas_thread
 
 
 class SuperLUFactor:
@@ -33,7 +33,7 @@ class SuperLUFactor:
         self.dtype: np.dtype[Any] = upper.dtype
         self._order = elimination_order(upper) if order is None else order
         matrix = whole(upper)[self._order][:, self._order]
-        with threadpool_limits(1, "blas"):  # its dense blocks are tiny: threads cost ten times what they gain
+        with one_blas_thread():  # its dense blocks are tiny: threads cost ten times what they gain
             try:
                 factor = splu(
                     sparse.csc_matrix(matrix),

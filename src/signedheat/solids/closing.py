@@ -13,10 +13,10 @@ from functools import cached_property
 
 import numpy as np
 import scipy
-from threadpoolctl import threadpool_limits
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..compiled import compiled
+from ..linear.threads import one_blas_thread
 from ..mesh.box_tree import BoxTree
 from ..mesh.components import connected_components, element_components, sums_of
 from ..mesh.edges import EdgeTable, edge_keys, edge_table
@@ -278,7 +278,7 @@ def closed_by(vertices: Floats, faces: Ints, *, bent: bool = True, outlines: Int
     chain = np.concatenate([faces, small_lids(positions, faces, outlines)])
     chain = np.concatenate([chain, strips(positions, chain, outlines)])
     surface = _Surface(positions, chain, outlines)
-    with threadpool_limits(1, "blas"):  # systems of a few hundred unknowns: threads would only wait
+    with one_blas_thread():  # systems of a few hundred unknowns: threads would only wait
         new, count = [vertices], len(vertices)
         triangles = [chain]
         for loop in surface.loops:
