@@ -221,6 +221,7 @@ def test_info_tells_which_way_parts_face(tmp_path, capsys):
     assert told["thickness"]["spacing"] == told["thickness"]["wall"] / 2
 
 
+@pytest.mark.usefixtures("small_pictures")
 def test_pictures(tmp_path, ball, capsys):
     import matplotlib.image
 
@@ -232,6 +233,7 @@ def test_pictures(tmp_path, ball, capsys):
     succeed(capsys, "view", field, "-o", slices)
 
 
+@pytest.mark.usefixtures("small_pictures")
 def test_demo_needs_no_file(tmp_path, capsys):
     assert main(["demo", "-o", str(tmp_path / "demo"), "--resolution", "24", "--json"]) == 0
     out, err = capsys.readouterr()
