@@ -7,11 +7,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
 from shapes import small_runs
-from signedheat.compiled import compiled
+from signedheat.compiled import allocation_free, compiled
 
 
 def test_the_same_values_without_compiling(tmp_path):
@@ -52,7 +53,21 @@ def test_a_number_written_in_a_kernel_needs_no_compilation_of_its_own():
         return half(4) * half(half(x))
 
     assert quarters(12) == 6
-    assert len(half.dispatcher.signatures) == 1
+    assert len(half.part.signatures) == 1
+
+
+def test_what_makes_arrays_is_not_free_of_allocation():
+    @compiled
+    def both(x):
+        return np.array([x, x])
+
+    @allocation_free
+    def twice(x):
+        return both(x)[0] + both(x)[1]
+
+    with pytest.raises(numba.TypingError):
+        twice(1.0)
+    assert both(1.0).sum() == 2.0
 
 
 def test_kernels_are_compiled_once():
@@ -65,7 +80,8 @@ warnings.simplefilter("ignore")
 for job in JOBS.values():
     job()
 for kernel in compiled.made:
-    print(kernel.__name__, len(kernel.dispatcher.overloads))
+    for made in {vars(kernel).get("dispatcher"), vars(kernel).get("part")} - {None}:
+        print(kernel.__name__, len(made.overloads))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     counts = {name: int(count) for name, count in map(str.split, done.stdout.splitlines())}

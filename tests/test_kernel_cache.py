@@ -54,8 +54,8 @@ def shifted(tmp_path, monkeypatch):
         (tmp_path / "shifting.py").write_text(SHIFTING.format(shift=shift))
         importlib.invalidate_caches()
         shifting = importlib.import_module("shifting")
-        value, kernels = shifting.shifted(3.0), (shifting.scaled, shifting.shifted)
-        return value, [kernel.__name__ for kernel in kernels if kernel.dispatcher.stats.cache_misses]
+        value, made = shifting.shifted(3.0), (shifting.scaled.part, shifting.shifted.dispatcher)
+        return value, [kernel.__name__ for kernel in made if kernel.stats.cache_misses]
 
     monkeypatch.setattr(sys, "dont_write_bytecode", True)  # files of the same size and second are told apart
     return make
