@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..compiled import compiled
+from ..compiled import allocation_free
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..mesh.triangles import area_vectors
 from ..parallel import ROWS_PER_TASK, in_chunks
@@ -45,8 +45,13 @@ class WindingTree:
         """Return (n,) winding numbers around (n, 3) points, to a few hundredths; on a face, those of one side."""
         corners = np.ascontiguousarray(self.triangles).reshape(-1, 9)
         points = np.ascontiguousarray(points)  # the kernel is compiled for one kind of array
-        (numbers,) = in_chunks(lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk),), points)
-        return numbers
+
+        def of_some(chunk: Floats) -> tuple[Floats]:
+            found = np.zeros(len(chunk))
+            _winding(corners, self.tree.items, self._moments, chunk, np.empty(64, dtype=np.int64), found)
+            return (found,)
+
+        return in_chunks(of_some, points)[0]
 
     def levels(self, places: Floats, normals: Floats, areas: Floats) -> Floats:
         """Return (n,) means of the numbers on both sides of places on faces with these unit normals and areas."""
@@ -85,12 +90,10 @@ def winding_sums(triangles: Floats, points: Floats) -> Floats:
     return numbers
 
 
-@compiled
-def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> Floats:
-    """Return (n,) winding numbers, by the solid angles of faces in near leaves and by the `_moments` of far nodes."""
+@allocation_free
+def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats, stack: Ints, out: Floats) -> None:
+    """Write (n,) winding numbers, by the solid angles of faces in near leaves and by the `_moments` of far nodes."""
     leaves = len(moments) // 2
-    stack = np.empty(64, dtype=np.int64)
-    result = np.zeros(len(points))
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         total, depth = 0.0, 1
@@ -127,11 +130,10 @@ def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> F
                             total += 2.0 * np.arctan2(volume, rest)
                 if imaginary != 0.0:
                     total += 2.0 * np.arctan2(imaginary, real)
-        result[p] = total / (4.0 * np.pi)
-    return result
+        out[p] = total / (4.0 * np.pi)
 
 
-@compiled
+@allocation_free
 def solid_angle(corners: Floats, face: int, x: float, y: float, z: float) -> tuple[float, float]:
     """Return the parts of a complex number whose argument is half a solid angle (van Oosterom & Strackee 1983)."""
     ax, ay, az = corners[face, 0] - x, corners[face, 1] - y, corners[face, 2] - z
@@ -146,7 +148,7 @@ def solid_angle(corners: Floats, face: int, x: float, y: float, z: float) -> tup
     return rest, volume
 
 
-@compiled
+@allocation_free
 def mean_angle(corners: Floats, face: int, x: float, y: float, z: float) -> float:
     """Return the signed solid angle of a triangle from a point; in its plane 0, the mean of those on both sides."""
     rest, volume = solid_angle(corners, face, x, y, z)

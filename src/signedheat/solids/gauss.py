@@ -23,7 +23,7 @@ import scipy
 from scipy import sparse
 
 from ..arrays import Bools, Floats, Frozen, Ints
-from ..compiled import compiled
+from ..compiled import allocation_free, compiled
 from ..linear.conjugate_gradients import conjugate_gradients
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, morton_codes
 from ..mesh.components import numbered, sums_of
@@ -200,7 +200,7 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
     return faces, a + u[:, None] * (b - a) + v[:, None] * (c - a)
 
 
-@compiled
+@allocation_free
 def _small_pieces(
     corners: Floats, starts: Ints, vectors: Floats, balls: Floats, places: Floats, own: Ints, matrix: Floats
 ) -> None:
