@@ -169,8 +169,7 @@ def find_edges(tails: Ints, heads: Ints, used: Bools, n_vertices: int) -> tuple[
 
     Also returns (e,) the number of halfedges of each edge, the first one, and the second one or −1.
     """
-    degrees = np.bincount(tails, minlength=n_vertices) + np.bincount(heads, minlength=n_vertices)
-    last, following = np.full(n_vertices, -1), np.empty_like(tails)
+    degrees, last, following = np.zeros(n_vertices, dtype=np.int64), np.full(n_vertices, -1), np.empty_like(tails)
     edges, forward, counts = np.full(len(tails), -1), np.zeros(len(tails), dtype=np.bool_), np.zeros_like(tails)
     first, second = np.empty_like(tails), np.full(len(tails), -1)
     n = _find_edges(tails, heads, used, degrees, last, following, edges, forward, counts, first, second)
@@ -195,6 +194,9 @@ def _find_edges(
 
     The `last` edge of each vertex (n,), and the one `following` each, list the edges of the end of smaller degree.
     """
+    for h in range(len(tails)):
+        degrees[tails[h]] += 1
+        degrees[heads[h]] += 1
     n_edges = 0
     for h in range(len(tails)):
         if not used[h]:
