@@ -207,12 +207,12 @@ def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
         g.flips[e] += 1
         t = g.sibling[h]
         for side in (following(h), preceding(h), following(t), preceding(t)):
-            look_at(g, stack, stacked, g.edge[side])
+            push_edge(g, stack, stacked, g.edge[side])
     return True
 
 
 @allocation_free
-def look_at(g: Gluing, stack: Ints, stacked: Bools, e: int) -> None:
+def push_edge(g: Gluing, stack: Ints, stacked: Bools, e: int) -> None:
     """Push an edge on the stack of edges that may have to be flipped, unless it is there already."""
     if not stacked[e]:
         stack[g.counts[N_STACKED]] = e

@@ -27,8 +27,8 @@ from ..mesh.gluing import (
     flip_until_delaunay,
     following,
     lay_out,
-    look_at,
     preceding,
+    push_edge,
     sibling_count,
     split_edge,
     split_face,
@@ -353,14 +353,14 @@ def has_room(g: Gluing, agenda: Agenda, ring: int) -> bool:
 
 
 @allocation_free
-def look_around(g: Gluing, agenda: Agenda, step: int) -> None:
+def push_edges_of(g: Gluing, agenda: Agenda, step: int) -> None:
     """Push onto the stack the edges of all faces that steps of the history, from number `step` on, have changed."""
     for n in range(step, g.counts[N_STEPS]):
         faces_around(g.steps, n, agenda.around, agenda.starts)
         for k in range(9):
             f: int = agenda.around[k // 3]
             if f >= 0:
-                look_at(g, agenda.stack, agenda.stacked, g.edge[3 * f + k % 3])
+                push_edge(g, agenda.stack, agenda.stacked, g.edge[3 * f + k % 3])
 
 
 @allocation_free
@@ -389,7 +389,7 @@ def insert(g: Gluing, agenda: Agenda, f: int, p: complex) -> None:
     new = g.counts[N_VERTICES] - 1
     agenda.on_segment[new] = agenda.group[new] = -1
     agenda.narrow[new] = False
-    look_around(g, agenda, step)
+    push_edges_of(g, agenda, step)
 
 
 @allocation_free
@@ -467,7 +467,7 @@ def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool
         for k in range(g.counts[N_EDGES] - 1 - ring, g.counts[N_EDGES]):
             agenda.segment[k] = segment
     agenda.narrow[new] = False
-    look_around(g, agenda, step)
+    push_edges_of(g, agenda, step)
     list_face(g, agenda, f, goal)
     return True
 
