@@ -12,6 +12,7 @@ import signedheat as sh
 from refusals import refused
 from signedheat import samples
 from signedheat.errors import FileFormatError, MemoryLimitError
+from signedheat.io.scenes import scale_to, unit_of
 
 pytestmark = pytest.mark.usefixtures("forked_parsers")
 
@@ -361,6 +362,25 @@ def test_dae_is_placed_by_its_nodes(tmp_path):
     (tmp_path / "a.dae").write_bytes(ball.export(file_type="dae")[:-500])
     with refused(FileFormatError):
         sh.read(tmp_path / "a.dae")
+
+
+@pytest.mark.parametrize(
+    ("asset", "unit"),
+    [
+        ('<unit meter="0.0254" name="zoll"/><up_axis>Z_UP</up_axis>', "inch"),
+        ('<up_axis>Z_UP</up_axis><unit name="millimeter" meter="1e-3"/>', "mm"),
+        ("<unit/>", "m"),
+        ('<unit meter="0.7" name="ell"/>', None),
+        ("", None),
+    ],
+)
+def test_dae_states_its_unit_by_its_length(tmp_path, asset, unit):
+    (tmp_path / "a.dae").write_text(
+        '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">'
+        f'<asset>{asset}</asset><library_nodes><asset><unit meter="0.01"/></asset></library_nodes></COLLADA>'
+    )
+    assert unit_of(tmp_path / "a.dae") == unit
+    assert scale_to(tmp_path / "a.dae", "cm:mm") == pytest.approx({"inch": 25.4, "mm": 1, "m": 1000, None: 10}[unit])
 
 
 def test_vtk_structured_points_are_no_more_than_the_file_can_hold(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import posixpath
 import zipfile
 from collections.abc import Iterator, Sequence
@@ -88,17 +89,29 @@ def read_3mf(path: PathLike) -> TriangleMesh:
 
 
 def unit_of(path: PathLike) -> str | None:
-    """Return the unit of length of a file: that of 3MF, m for glTF, mm for STEP, None for formats without."""
-    if extension(path) in (".glb", ".gltf", ".step", ".stp"):
-        return "mm" if extension(path).startswith(".st") else "m"
-    if extension(path) != ".3mf":
-        return None
+    """Return the unit of length that a file states, m for glTF, mm for STEP; None if it states none, or another."""
+    kind = extension(path)
+    if kind not in (".3mf", ".dae"):
+        return {".glb": "m", ".gltf": "m", ".step": "mm", ".stp": "mm"}.get(kind)
     with reading(path):
+        if kind == ".dae":
+            return _collada_unit(contents(path))
         package = _Package(path)
         unit = package.model(package.root).get("unit", "millimeter")
         if unit not in METRES:
             raise damaged(f"it has the unit '{unit}', which does not exist in 3MF")
         return unit
+
+
+def _collada_unit(data: bytes) -> str | None:
+    """Return the unit in the first ``<asset>`` of a COLLADA file: any name may stand beside its length in metres."""
+    for _, element in ElementTree.iterparse(io.BytesIO(data)):
+        if element.tag.endswith("}unit"):
+            metres = float(element.get("meter", 1))
+            return next((unit for unit, length in METRES.items() if math.isclose(metres, length, rel_tol=1e-4)), None)
+        if element.tag.endswith("}asset"):
+            break
+    return None
 
 
 def scale_to(path: PathLike, units: str) -> float:
