@@ -41,9 +41,9 @@ def read_bodies(path: PathLike) -> list[Body]:
         )
     places = list(_places(scene.tree))
     meshes = scene.tree.get("meshes", [])
-    counts = {mesh: _corner_count(scene.tree, meshes[mesh]) for mesh in {mesh for mesh, _ in places}}
-    ensure_fits(200 * sum(counts[mesh] for mesh, _ in places), path)  # measured, for a triangle and its vertices
-    bodies = {mesh: [scene.body(primitive) for primitive in meshes[mesh]["primitives"]] for mesh in counts}
+    sizes = {mesh: _size(scene.tree, meshes[mesh]) for mesh in {mesh for mesh, _ in places}}
+    ensure_fits(sum(sizes[mesh] for mesh, _ in places), path)
+    bodies = {mesh: [scene.body(primitive) for primitive in meshes[mesh]["primitives"]] for mesh in sizes}
     return [placed(body, matrix) for mesh, matrix in places for body in bodies[mesh] if len(body[1])]
 
 
@@ -153,10 +153,16 @@ def _triangles(corners: Ints, mode: int) -> Ints:
     return faces[distinct]  # strips are joined by triangles with equal corners
 
 
-def _corner_count(tree: dict[str, Any], mesh: dict[str, Any]) -> int:
-    """Return the number of corners that the primitives of a mesh announce."""
-    named = [part.get("indices", part["attributes"].get("POSITION")) for part in mesh["primitives"]]
-    return sum(tree["accessors"][index]["count"] for index in named if index is not None)
+def _size(tree: dict[str, Any], mesh: dict[str, Any]) -> int:
+    """Estimate the bytes that a mesh takes while it is read, from the numbers that its accessors announce."""
+    size = 0
+    for part in mesh["primitives"]:
+        points = part["attributes"].get("POSITION")
+        counts = [tree["accessors"][index]["count"] for index in (points, part.get("indices")) if index is not None]
+        corners = counts[-1] if counts else 0
+        per_triangle = 3 if part.get("mode", TRIANGLE_MODE) == TRIANGLE_MODE else 1
+        size += 60 * min(counts, default=0) + 70 * (corners // per_triangle)  # measured, for a vertex and a triangle
+    return size
 
 
 def _places(tree: dict[str, Any]) -> Iterator[tuple[int, Floats]]:
