@@ -32,7 +32,8 @@ def field(kind):
 def test_operators_change_the_values_and_nothing_else(kind):
     phi = field(kind)
     for changed, expected in (
-        (-phi, -phi.values), (2 * phi, 2 * phi.values), (phi * np.float64(0.5), phi.values / 2),
+        (-phi, -phi.values), (abs(phi), abs(phi.values)), (2 * phi, 2 * phi.values),
+        (phi * np.float64(0.5), phi.values / 2),
         (phi + 1, phi.values + 1), (1 - phi, 1 - phi.values), (phi - 0.25, phi.values - 0.25),
         (phi / 4, phi.values / 4), (np.float64(3) * phi, 3 * phi.values), (np.float32(1) + phi, 1 + phi.values),
     ):  # fmt: skip

@@ -55,7 +55,7 @@ Solid = TypeVar("Solid", bound=SolidField)
 
 
 class Arithmetic:
-    """A field with arithmetic: ``-field``, ``2 * field``, ``field / 2`` and ``field + 1`` are fields again.
+    """A field with arithmetic: ``-field``, ``abs(field)``, ``2 * field``, ``field / 2`` and ``field + 1`` are fields.
 
     So ``field - 0.1`` is the offset by 0.1, and ``-field`` the field of the other side. NumPy's functions treat a field
     as the array of its values. A `GridField` that is exact between its nodes, since it holds its solid, stays so when
@@ -78,6 +78,9 @@ class Arithmetic:
 
     def __neg__(self: AnyField) -> AnyField:
         return self._scaled(-1.0)
+
+    def __abs__(self: AnyField) -> AnyField:
+        return self._mapped(np.abs)
 
     def __mul__(self: AnyField, factor: Number) -> AnyField:
         return self._scaled(float(factor)) if isinstance(factor, NUMBER_TYPES) else NotImplemented
