@@ -191,7 +191,7 @@ def signed_distance(
     GeometryError
         If resolution, spacing and padding do not define a grid.
     MemoryLimitError
-        If the grid does not fit in memory. Raised before anything is allocated.
+        If the grid does not fit in memory: known once the shape is complete, before the field is allocated.
     UnsupportedTypeError
         If an option does not apply to this kind of source, or to a domain that is given.
 
