@@ -178,6 +178,9 @@ def test_info_of_a_solid_says_that_nothing_is_left_to_mend(tmp_path, ball, capsy
     found = json.loads(capsys.readouterr().out)
     assert found["verdict"].startswith("a solid: closed") and "orientation" not in found
     assert found["thickness"]["wall"] > 0.1
+    in_batch = sh.batches.Job(info=True)(tmp_path / "solid.npz", tmp_path / "made")["info"]
+    assert all(found[name] == pytest.approx(value) for name, value in in_batch.items() if name != "thickness")
+    assert in_batch["thickness"]["wall"] == found["thickness"]["wall"] and "orientation" not in in_batch
 
 
 def test_curves_lie_on_the_surface_of_a_solid(tmp_path, capsys):

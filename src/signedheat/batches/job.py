@@ -22,12 +22,11 @@ from ..errors import (
     SourceError,
     UnsupportedTypeError,
 )
-from ..foreign import as_shape
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_field import GridField
 from ..io.field_files import BAND_FORMATS, FIELD_FORMATS
 from ..io.files import distinct_names, extension
-from ..io.key_figures import describe, shape_figures
+from ..io.key_figures import describe, inspected, shape_figures
 from ..io.numpy_files import write_npz
 from ..io.scenes import METRES, scale_to, unit_of
 from ..io.shape_files import SHAPE_FORMATS, read, save
@@ -231,7 +230,7 @@ class Job:
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
         """Write the results of one shape to files that begin with `stem`; return figures and important notes."""
         shape = read(path)
-        figures: dict[str, object] = {"info": shape_figures(as_shape(shape))} if self.info else {}
+        figures: dict[str, object] = {"info": shape_figures(shape, *inspected(shape))} if self.info else {}
         if not self._measures:
             return figures
         if isinstance(shape, DigitalSurface):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -15,18 +14,18 @@ from ..area_elements import bounds_around
 from ..errors import SourceError, printable
 from ..geodesics.shortest_paths import gaps
 from ..grids.grid_discretization import fitting_spacing, memory_estimate
-from ..inspection import CloudReport, SurfaceReport, TetReport, inspect
+from ..inspection import CloudReport, SurfaceReport, TetReport
 from ..io import read
 from ..io.files import extension
+from ..io.key_figures import inspected, shape_figures
 from ..io.mesh_files import read_obj_elements
 from ..io.scenes import unit_of
 from ..memory import available_memory
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import EDGE, FACE, VERTEX, locate_points
 from ..mesh.triangles import face_areas
-from ..mesh.welding import indexed
-from ..solids.mesh_orientation import Orientation, orientation
-from ..solids.thickness import Widths, widths
+from ..solids.mesh_orientation import Orientation
+from ..solids.thickness import Widths
 from ..solids.tiles import BYTES_AT_WORK, BYTES_PER_DENSE_NODE
 from ..surfaces.source_segments import segments_of
 from .operands import describe, field_or_image, labels_of
@@ -53,25 +52,17 @@ def report(file: str, arguments: Namespace) -> Summary:
         return lines_report(file)
     held = read(file)
     shape = sh.as_shape(held)
-    counts = inspect(shape)
-    solid = held if isinstance(held, sh.Solid) else None
-    found = orientation(shape) if solid is None and isinstance(shape, sh.TriangleMesh | sh.PolygonMesh) else None
-    told = verdict(counts, found) if solid is None else verdict_of_solid(solid)
-    summary = {"verdict": told, "file": file, "kind": type(held).__name__, **asdict(counts)}
+    counts, found, measured = inspected(held)
+    told = verdict_of_solid(held) if isinstance(held, sh.Solid) else verdict(counts, found)
+    summary = {"verdict": told, "file": file, **shape_figures(held, counts, found, measured)}
     if (unit := unit_of(file)) is not None:
         summary["units"] = unit
     if extension(file) == ".obj":
         summary["line_elements"] = len(read_obj_elements(file)[1])
-    rows = dict(summary)
+    rows = {name: value for name, value in summary.items() if name != "thickness"}
     if found is not None:
-        summary["orientation"] = found.summary
         rows["orientation"] = orientation_text(found)
-    outwards = None if found is None else found.shape
-    if solid is not None and solid.bounding.any():
-        outwards = sh.TriangleMesh(*indexed(solid.outward))
-    if outwards is not None:
-        measured = widths(outwards)
-        summary["thickness"] = {**asdict(measured), "spacing": measured.spacing}
+    if measured is not None:
         rows |= _width_rows(measured)
     summary["memory_bytes"] = sizes = {str(n): _memory(shape, n) for n in arguments.resolution}
     summary["least_spacing"] = least = _least_spacing(shape)

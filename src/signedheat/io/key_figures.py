@@ -9,13 +9,17 @@ from typing import Any
 import numpy as np
 
 from ..diagnostics import SampledSource
+from ..foreign import as_shape
 from ..grids.grid_field import GridField
-from ..inspection import inspect
-from ..kinds import Shape
-from ..solids.mesh_orientation import orientation
-from ..solids.thickness import widths
+from ..inspection import CloudReport, SurfaceReport, TetReport, inspect
+from ..mesh.welding import indexed
+from ..solids.mesh_orientation import Orientation, orientation
+from ..solids.solid import Solid
+from ..solids.thickness import Widths, widths
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
+
+Report = SurfaceReport | CloudReport | TetReport
 
 
 def describe(field: Any) -> dict[str, Any]:
@@ -54,12 +58,24 @@ def snake(name: str) -> str:
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
 
 
-def shape_figures(shape: Shape) -> dict[str, object]:
-    """Return counts and defects of a shape; for meshes also their orientation, walls and gaps."""
-    figures: dict[str, object] = {"kind": type(shape).__name__, **asdict(inspect(shape))}
-    if isinstance(shape, TriangleMesh | PolygonMesh):
-        oriented = orientation(shape)
-        found_widths = widths(oriented.shape)
-        figures["orientation"] = oriented.summary
-        figures["thickness"] = {**asdict(found_widths), "spacing": found_widths.spacing}
+def inspected(thing: Any) -> tuple[Report, Orientation | None, Widths | None]:
+    """Count what a shape or a solid has; also how a mesh is oriented, and the walls and gaps of a mesh or a solid."""
+    shape, found, outwards = as_shape(thing), None, None
+    if isinstance(
+        thing, Solid
+    ):  # nothing is left to orient: its completion has edges of three faces, and lies anywhere
+        outwards = TriangleMesh(*indexed(thing.outward)) if thing.bounding.any() else None
+    elif isinstance(shape, TriangleMesh | PolygonMesh):
+        found = orientation(shape)
+        outwards = found.shape
+    return inspect(shape), found, None if outwards is None else widths(outwards)
+
+
+def shape_figures(thing: Any, counts: Report, found: Orientation | None, measured: Widths | None) -> dict[str, Any]:
+    """Return as one what was `inspected`."""
+    figures = {"kind": type(thing).__name__, **asdict(counts)}
+    if found is not None:
+        figures["orientation"] = found.summary
+    if measured is not None:
+        figures["thickness"] = {**asdict(measured), "spacing": measured.spacing}
     return figures
