@@ -49,6 +49,9 @@ class HasFields(Protocol):
     def field_on(self, field: Any) -> Any:
         """Compute distance at the nodes of a field."""
 
+    def _surface_on(self, grid: Grid[Any], level: float) -> Any:
+        """Extract the surface at a distance in the cells of a grid, with its edges and corners."""
+
 
 AnyField = TypeVar("AnyField", bound=HasValues)
 Solid = TypeVar("Solid", bound=SolidField)

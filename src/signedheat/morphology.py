@@ -7,7 +7,7 @@ one side only.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, Protocol, TypeAlias, cast, overload
+from typing import Literal, Protocol, TypeAlias, cast, overload
 
 import numpy as np
 import scipy
@@ -29,7 +29,7 @@ from .field_arithmetic import smooth_difference, smooth_intersection, smooth_uni
 from .field_kinds import Field
 from .foreign import as_list, as_shape, converted
 from .grids.grid import RESOLUTION, Grid, room_around
-from .grids.grid_field import GridField, values_at_walls
+from .grids.grid_field import GridField
 from .grids.polyline import Polyline
 from .jobs import Progress
 from .kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
@@ -289,15 +289,6 @@ def offset(
         bounds = solid.bounds + sides * MITRE_LIMITS[corners] * max(largest, 0.0)
         grid = Grid.around(bounds, padding=2 * float(grid.spacing.max()), spacing=grid.spacing)
     return sharp_surface(Offset(solid, reach, MITRE_LIMITS[corners]), grid, progress)
-
-
-def offset_of(field: Any, distance: float) -> Any:
-    """Extract the level set of a field at a distance, with sharp edges if the field holds its solid and is no band."""
-    if isinstance(field, GridField) and isinstance(field.solid, Solid) and field.blocks is None:
-        distance = finite_number(distance, "the distance")
-        if np.nanmin(field.values) < distance < np.nanmin(values_at_walls(field)):
-            return sharp_surface(Offset(field.solid, distance), field.grid)
-    return field.contour(distance) if isinstance(field, VertexField) else field.offset(distance)
 
 
 @within_memory
@@ -577,7 +568,8 @@ def _offsets(
     domain = _given_or_room(domain, shape, distance if 1 in signs else 0.0, resolution)
     for sign in signs:
         field = (measure or signed_distance)(shape, domain)
-        shape = boundary = offset_of(field, sign * distance)
+        level = sign * distance
+        shape = boundary = field.contour(level) if isinstance(field, VertexField) else field.offset(level)
     return boundary
 
 

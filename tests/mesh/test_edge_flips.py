@@ -37,7 +37,7 @@ def field():
 
 def test_the_crease_between_two_balls_has_no_teeth(field):
     """Around the circle at which the two offsets meet the surface bends by their angle, and teeth bend more."""
-    made = field.offset(0.3)
+    made = field.contour(0.3)
     grid = field.grid
     toothed = sh.TriangleMesh(
         *closed_surface(
@@ -56,7 +56,7 @@ def test_the_crease_between_two_balls_has_no_teeth(field):
 
 
 def test_it_stays_a_closed_surface_on_the_same_vertices(field):
-    made = field.offset(0.3)
+    made = field.contour(0.3)
     counts = edge_table(made.faces).face_counts
     assert (counts == 2).all()
     forward = edge_table(made.faces)

@@ -9,11 +9,12 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import signedheat as sh
 from refusals import refused
 from shapes.bodies import box, sheet
-from shapes.grid_cases import assert_closed_manifold
+from shapes.grid_cases import assert_closed_manifold, enclosed_volume
 from signedheat import memory, samples
 from signedheat.search.nearest_triangles import away_from_triangle
 from signedheat.solids.completion import complete
@@ -93,11 +94,20 @@ def test_places_between_nodes_are_exact_too(solid):
 def test_contours_lie_on_the_level(level):
     solid = complete(SHAPES["holes"]())
     field = solid.field(resolution=30)
-    surface = field.offset(level)
+    surface = field.contour(level)
     assert_closed_manifold(surface)
     off = np.abs(solid.distance(surface.vertices) - level) / field.grid.spacing[0]
     assert np.quantile(off, 0.99) < 2e-3  # but for the few points that marching cubes puts inside cells
     assert off.max() < 0.5
+
+
+def test_offsets_of_a_field_have_the_edges_of_the_offset():
+    """As those of its solid have; contours of the same field cut them off."""
+    turn = Rotation.from_euler("xyz", [0.3, 0.5, 0.7]).as_matrix()
+    cube = box((-1, -1, -1), (1, 1, 1))
+    field = sh.signed_distance(sh.TriangleMesh(cube.vertices @ turn.T, cube.faces), resolution=24)
+    assert enclosed_volume(field.offset(-0.2)) == pytest.approx(1.6**3, rel=1e-4)  # most edges exact to 1e-3 of a cell
+    assert enclosed_volume(field.contour(-0.2)) < 0.999 * 1.6**3
 
 
 def test_moves_with_the_solid():
@@ -166,7 +176,7 @@ def test_contours_of_bands_are_those_of_whole_grids():
     whole = solid.field(resolution=44)
     band = solid.field(grid=whole.grid, band=4 * float(whole.grid.spacing[0]))
     for level in (0.0, 0.9 * band.width, -band.width):
-        ours, theirs = band.offset(level), whole.offset(level)
+        ours, theirs = band.offset(level), whole.contour(level)
         assert_closed_manifold(ours)
         assert (ours.n_vertices, ours.n_faces) == (theirs.n_vertices, theirs.n_faces)
         np.testing.assert_allclose(np.sort(ours.vertices, axis=0), np.sort(theirs.vertices, axis=0), atol=1e-5)

@@ -36,7 +36,6 @@ from ..mesh.components import element_components
 from ..mesh.edges import edge_table
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import face_areas, part_volumes
-from ..morphology import offset_of
 from ..search.face_tree import FaceTree
 from ..solids.completion import Completion, Lids, complete
 from ..solids.heat_surfaces import Heat
@@ -243,7 +242,7 @@ class Job:
             phi.save(f"{stem}{self.volume}")
         surfaces = []
         for distance, name in zip(self.offsets, distinct_names(self.offsets), strict=True):
-            surface = offset_of(phi, distance)
+            surface = phi.offset(distance)
             save(surface, f"{stem}_{name}{self.surfaces}")
             surfaces.append({"distance": distance, "vertices": surface.n_vertices, "faces": surface.n_faces})
         if surfaces:

@@ -153,7 +153,7 @@ def offset(arguments: Namespace) -> Summary:
     image = shapes.image_of(arguments)
     shape, field = shapes.measured(arguments, image, max(map(abs, arguments.distances)))
     with shapes.prefix_errors(arguments.shape):
-        surfaces = [sh.morphology.offset_of(field, distance) for distance in arguments.distances]
+        surfaces = [field.offset(distance) for distance in arguments.distances]
     for what, path in zip(surfaces, outputs, strict=True):
         shapes.save_level(what, path, image, field)
     if arguments.preview:

@@ -16,7 +16,7 @@ from ..arrays import Floats, Frozen
 from ..diagnostics import Diagnostics
 from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError
 from ..exchange import Displayed, with_values
-from ..field_arithmetic import Combinable, Rule
+from ..field_arithmetic import Combinable, HasFields, Rule
 from ..field_levels import on_level, refuse_beyond_walls
 from ..memory import within_memory
 from ..mesh.triangles import flipped_along_creases
@@ -395,7 +395,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     @overload
     def offset(self, distance: float) -> TriangleMesh | list[Polyline]: ...
     def offset(self, distance: float) -> TriangleMesh | list[Polyline]:
-        """Offset the shape by a signed distance: `contour`, but refused if the grid is too small for it.
+        """Offset the shape by a signed distance, and refuse that if the grid is too small for it.
 
         Parameters
         ----------
@@ -405,7 +405,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         Returns
         -------
         TriangleMesh, or list of Polyline
-            As `contour`.
+            With the edges and corners of the offset if the field holds its solid and is no band; else as `contour`.
 
         Raises
         ------
@@ -422,7 +422,11 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         """
         distance = finite_number(distance, "distance")
         padding = f"use a padding of more than {abs(distance):g}, or a larger diffusion where wide gaps stay open"
-        refuse_beyond_walls(values_at_walls(self), distance, "grid", padding)
+        walls = np.concatenate([self.whole.values.take([0, -1], k).ravel() for k in range(self.grid.dimension)])
+        if isinstance(self.solid, HasFields) and self.blocks is None:
+            if np.nanmin(self.values) < distance < np.nanmin(walls):
+                return self.solid._surface_on(self.grid, distance)
+        refuse_beyond_walls(walls, distance, "grid", padding)
         return self.contour(distance)
 
     def combined_with(self, other: GridField[Dimension], rule: Rule) -> GridField[Dimension]:
@@ -575,8 +579,3 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             return f"GridField({how} between nodes, {self.grid!r}, {band})"
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
         return f"GridField({how} between nodes, {self.grid!r}, values from {low:.4g} to {high:.4g})"
-
-
-def values_at_walls(field: GridField[Dimension]) -> Floats:
-    """Return the values at the boundary of the grid of a field, in no particular order."""
-    return np.concatenate([field.whole.values.take([0, -1], axis).ravel() for axis in range(field.grid.dimension)])
