@@ -173,7 +173,7 @@ def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = No
     """Return (m, 3) faces with edges flipped where the surface then bends less, but not at `held` vertices (n,)."""
     if not 0 < len(faces) <= MOST_CREASED_FACES:
         return faces
-    _, _, sharp = _creases(vertices, faces)
+    _, _, sharp = bent_edges(vertices, faces)
     if not len(sharp):
         return faces
     near = mask_of(len(vertices), faces[sharp // 3])
@@ -189,11 +189,11 @@ def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = No
     return result
 
 
-def _creases(vertices: Floats, faces: Ints) -> tuple[EdgeTable, Floats, Ints]:
-    """Return edges and unit normals of faces, and both halfedges of the edges with an angle above `CREASE_ANGLE`."""
+def bent_edges(vertices: Floats, faces: Ints, angle: float = CREASE_ANGLE) -> tuple[EdgeTable, Floats, Ints]:
+    """Return edges and unit normals of faces, and both halfedges of the edges at which faces bend by more than this."""
     table, normals = edge_table(faces), unit(area_vectors(vertices[faces]))
     first, second = normals[table.pairs // 3].swapaxes(0, 1)
-    return table, normals, table.pairs[np.einsum("ij,ij->i", first, second) < np.cos(CREASE_ANGLE)]
+    return table, normals, table.pairs[np.einsum("ij,ij->i", first, second) < np.cos(angle)]
 
 
 def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> tuple[Ints, Ints, Ints]:
@@ -202,7 +202,7 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
     No two replaced pairs are neighbours. Edge ab becomes cd unless there is such an edge; all faces around a, b and one
     of c, d must be given, as `whole` tells.
     """
-    table, normals, creases = _creases(vertices, faces)
+    table, normals, creases = bent_edges(vertices, faces)
     (first, second), (i, j) = (creases // 3).T, (creases % 3).T
     a, b = faces[first, i], faces[first, (i + 1) % 3]
     c, d = faces[first, (i + 2) % 3], faces[second, (j + 2) % 3]

@@ -29,10 +29,9 @@ from ..jobs import Progress
 from ..memory import available_memory, libraries
 from ..mesh.components import element_components, sums_of
 from ..mesh.dual_cells import Crossings, DualCells, crossed_cells, dual_cells, open_cells, separate_triangles
-from ..mesh.edges import CLEARANCE, edge_table
+from ..mesh.edges import CLEARANCE
 from ..mesh.self_intersections import self_intersections
-from ..mesh.triangles import MOST_CREASED_FACES, area_vectors, divided_at
-from ..mesh.unit_vectors import unit
+from ..mesh.triangles import MOST_CREASED_FACES, bent_edges, divided_at
 from ..surfaces.triangle_mesh import TriangleMesh
 from .gauss import Pieces, sampled
 from .node_distances import solved
@@ -261,11 +260,10 @@ def _creases_off(
     """
     step = float(spacing.max())
     near = np.flatnonzero(mask_of(len(vertices), faces[new])[faces].any(axis=1))
-    normals, edges = unit(area_vectors(vertices[faces[near]])), edge_table(faces[near]).pairs
     # planes that do not count as one: the angle between faces is small where a corner is missing
-    bent = normals[edges // 3].prod(axis=1).sum(axis=1) < np.cos(2 * np.arctan(CREASE_TANGENT))
-    edges = edges[bent & new[near[edges // 3]].any(axis=1)]
+    _, _, edges = bent_edges(vertices, faces[near], 2 * np.arctan(CREASE_TANGENT))
     edges = 3 * near[edges // 3] + edges % 3
+    edges = edges[new[edges // 3].any(axis=1)]
     tails, heads = faces.ravel()[edges[:, 0]], faces.ravel()[edges[:, 1]]
     middles = 0.5 * (vertices[tails] + vertices[heads])
     off = np.abs(offset.distance(middles))

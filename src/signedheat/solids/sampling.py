@@ -12,8 +12,7 @@ from ..errors import OutsideError, SignedHeatError, SourceError
 from ..grids.grid_field import GridField
 from ..kinds import Shapes
 from ..memory import refuse_beyond_memory, within_memory
-from ..mesh.edges import edge_table
-from ..mesh.triangles import face_areas
+from ..mesh.triangles import bent_edges, face_areas
 from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import finite_number, whole_number
@@ -146,8 +145,8 @@ def training_points(
         center, radius = np.zeros(3), 1.0
     solid = complete(surface, as_oriented=True)
     places, faces = evenly_on(surface.vertices[surface.faces], n, random)
-    normals = unit(surface.face_area_vectors)
-    on = {"random_surface": (places, normals[faces]), "sharp_surface": _on_sharp_edges(surface, normals, n, random)}
+    directions = unit(surface.face_area_vectors)[faces]
+    on = {"random_surface": (places, directions), "sharp_surface": _on_sharp_edges(surface, n, random)}
     around = {"vol": center + radius * random.uniform(-1.0, 1.0, (n, 3))}
     for name, (middles, _) in zip(("random_near", "sharp_near"), on.values(), strict=True):
         widths = radius * np.resize(NOISE_WIDTHS, len(middles))
@@ -159,12 +158,9 @@ def training_points(
     return kept, {name: values.astype(np.float32) for name, values in labelled.items()}
 
 
-def _on_sharp_edges(
-    surface: TriangleMesh, normals: Floats, n: int, random: np.random.Generator
-) -> tuple[Floats, Floats]:
+def _on_sharp_edges(surface: TriangleMesh, n: int, random: np.random.Generator) -> tuple[Floats, Floats]:
     """(n, 3) places uniform along sharp edges, and (n, 3) mean normals of both sides; none without such edges."""
-    pairs = edge_table(surface.faces).pairs
-    pairs = pairs[normals[pairs // 3].prod(axis=1).sum(axis=1) < np.cos(SHARP_ANGLE)]
+    _, normals, pairs = bent_edges(surface.vertices, surface.faces, SHARP_ANGLE)
     if not len(pairs):
         return np.zeros((0, 3)), np.zeros((0, 3))
     tails, heads = surface.vertices[surface.faces.ravel()[pairs]].swapaxes(0, 1)  # halfedges run opposite ways
