@@ -143,7 +143,7 @@ def spread(points: Floats, values: Floats, used: Bools) -> Floats:
     graph = sparse.csr_matrix(
         (np.maximum(far[:, 1:].ravel(), 1e-300), (rows, near[:, 1:].ravel())), shape=(len(ids),) * 2
     )
-    graph = sparse.csr_matrix(graph.minimum(graph.T))  # points are joined if each is a neighbour of the other
+    graph = sparse.csr_matrix(graph.minimum(graph.T))  # else coarse sheets join fine ones beside them
     finite = np.flatnonzero(~lacking[ids])
     start = np.abs(values[ids[finite]])
     pairs, source = graph.tocoo(), np.full(len(finite), len(ids))

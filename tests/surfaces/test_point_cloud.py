@@ -10,6 +10,7 @@ import signedheat as sh
 from refusals import refused
 from shapes import domain_cases as cases
 from signedheat.diagnostics import PointsLeftOut
+from signedheat.field_kinds import spread
 from signedheat.samples import sphere
 from signedheat.solids.point_orientation import orient_points
 from signedheat.surfaces.local_triangulations import hole_fillings, local_triangulations
@@ -190,6 +191,19 @@ def test_outliers_get_no_distance_and_disturb_no_one():
         completed = sh.signed_distance([cloud.path(piece) for piece in pieces], cloud)
     assert np.isnan(completed.values[-3:]).all()
     assert cases.error(completed.values[:-3], exact) < 2e-3
+
+
+def test_distance_goes_on_within_a_sheet_and_not_to_a_finer_one_beside_it():
+    """Of the nearest points of a coarse sheet half lie on the fine one below it, whose own all lie on itself."""
+    sheets = []
+    for spacing, z in ((0.1, 0.0), (0.02, -0.1)):
+        x, y = np.meshgrid(np.arange(0, 1, spacing), np.arange(0, 1, spacing), indexing="ij")
+        sheets.append(np.column_stack([x.ravel(), y.ravel(), np.full(x.size, z)]))
+    points, coarse = np.concatenate(sheets), len(sheets[0])
+    values = np.where(np.arange(len(points)) < coarse // 2, points[:, 0] - 0.7, np.nan)
+    found = spread(points, values, np.ones(len(points), dtype=bool))
+    assert np.isfinite(found[:coarse]).all() and (found[:coarse] < 0).all()
+    assert np.isnan(found[coarse:]).all()
 
 
 def test_a_mobius_strip_of_points_is_like_one_of_triangles():
