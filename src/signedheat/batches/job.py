@@ -36,6 +36,7 @@ from ..mesh.components import element_components
 from ..mesh.edges import edge_table
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import face_areas, part_volumes
+from ..mesh.welding import indexed
 from ..search.face_tree import FaceTree
 from ..solids.completion import Completion, Lids, complete
 from ..solids.heat_surfaces import Heat
@@ -417,7 +418,4 @@ def _places(triangles: Floats) -> Floats:
 
 def _openings(completion: Floats) -> int:
     """Count the connected parts of a completion, (m, 3, 3) triangles."""
-    if not len(completion):
-        return 0
-    _, faces = np.unique(completion.reshape(-1, 3), axis=0, return_inverse=True)
-    return int(element_components(faces.reshape(-1, 3)).max()) + 1
+    return int(element_components(indexed(completion)[1]).max(initial=-1)) + 1

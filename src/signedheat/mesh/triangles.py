@@ -43,6 +43,11 @@ def area_vectors(triangles: Floats) -> Floats:
     return np.stack([0.5 * (uy * vz - uz * vy), 0.5 * (uz * vx - ux * vz), 0.5 * (ux * vy - uy * vx)], axis=1)
 
 
+def side_lengths(triangles: Floats) -> Floats:
+    """Return (m, 3) lengths of the sides that begin at each corner of (m, 3, 3) triangles."""
+    return np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+
+
 def face_areas(triangles: Floats) -> Floats:
     """Return (m,) areas of (m, 3, 3) triangles."""
     vectors = area_vectors(triangles)
@@ -51,9 +56,7 @@ def face_areas(triangles: Floats) -> Floats:
 
 def heights(triangles: Floats) -> Floats:
     """Return (m,) heights of (m, 3, 3) triangles above their longest sides."""
-    a, b, c = triangles.transpose(1, 0, 2)
-    longest = np.max([np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c)], axis=0)
-    return 2.0 * face_areas(triangles) / np.maximum(longest, 1e-300)
+    return 2.0 * face_areas(triangles) / np.maximum(side_lengths(triangles).max(axis=1), 1e-300)
 
 
 def corner_normals(triangles: Floats) -> Floats:
@@ -78,9 +81,9 @@ def divided_at(faces: Ints, rows: Ints, corners: Ints, points: Ints) -> Ints:
     return np.concatenate([np.delete(faces, rows, axis=0), halves])
 
 
-def halved(triangles: Floats, sides: Ints) -> Floats:
-    """Return (2 m, 3, 3) halves of triangles, cut from the middle of one side each: first halves, then second ones."""
-    turn = (sides[:, None] + np.arange(3)) % 3
+def halved(triangles: Floats) -> Floats:
+    """Return (2 m, 3, 3) halves of triangles, cut at the middle of the longest side: first halves, then second."""
+    turn = (side_lengths(triangles).argmax(axis=1)[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(triangles, turn[:, :, None], axis=1).swapaxes(0, 1)
     middle = 0.5 * (a + b)
     return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])

@@ -18,6 +18,7 @@ from ..arrays import Floats, Ints
 from ..compiled import allocation_free
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..mesh.triangles import area_vectors
+from ..mesh.unit_vectors import unit
 from ..parallel import ROWS_PER_TASK, in_chunks
 
 OFF_FACE = 1e-6
@@ -70,8 +71,7 @@ class WindingTree:
 def steps_off(triangles: Floats, depth: float) -> Floats:
     """Return (m, 3) steps along the normals of triangles, as long as `depth` times the root of twice their areas."""
     normals = 2.0 * area_vectors(triangles)
-    areas = np.linalg.norm(normals, axis=1)
-    return (depth * np.sqrt(areas) / np.where(areas > 0, areas, 1.0))[:, None] * normals
+    return depth * np.sqrt(np.linalg.norm(normals, axis=1))[:, None] * unit(normals)
 
 
 def winding_sums(triangles: Floats, points: Floats) -> Floats:

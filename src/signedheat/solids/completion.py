@@ -24,6 +24,7 @@ from ..memory import refuse_beyond_memory, within_memory
 from ..mesh.components import numbered
 from ..mesh.triangles import face_areas
 from ..mesh.unit_vectors import axes_across
+from ..mesh.welding import indexed
 from ..search.face_tree import FaceTree
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -281,8 +282,7 @@ def _completed_by_heat(
     """Complete a torn body by the zero set of φ, which replaces the faces if they scatter (`scatter` > 0)."""
     triangles = vertices[faces]
     given = TriangleGroup(triangles, faces, origins, False)
-    names, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    made = heat_surface(TriangleMesh(names, corners.reshape(-1, 3)), method, scatter)
+    made = heat_surface(TriangleMesh(*indexed(triangles)), method, scatter)
     if made is None:
         return [given]
     if scatter:

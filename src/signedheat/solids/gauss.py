@@ -27,7 +27,7 @@ from ..compiled import allocation_free, compiled
 from ..linear.conjugate_gradients import conjugate_gradients
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, morton_codes
 from ..mesh.components import numbered, sums_of
-from ..mesh.triangles import area_vectors, face_areas, halved
+from ..mesh.triangles import area_vectors, face_areas, halved, side_lengths
 from ..mesh.unit_vectors import unit
 from ..parallel import in_chunks
 from ..search.winding_tree import WindingTree, mean_angle
@@ -161,12 +161,10 @@ def without_slender(pieces: Pieces) -> Pieces:
     """Halve slender triangles, up to six times and to `MOST_DIPOLES`."""
     triangles, labels = pieces.triangles, pieces.labels
     for _ in range(6):
-        lengths = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
-        slender = lengths.max(axis=1) ** 2 > SLENDER_TRIANGLE * face_areas(triangles)
+        slender = side_lengths(triangles).max(axis=1) ** 2 > SLENDER_TRIANGLE * face_areas(triangles)
         if not slender.any() or len(triangles) + slender.sum() > MOST_DIPOLES:
             break
-        halves = halved(triangles[slender], lengths[slender].argmax(axis=1))
-        triangles = np.concatenate([triangles[~slender], halves])
+        triangles = np.concatenate([triangles[~slender], halved(triangles[slender])])
         labels = np.concatenate([labels[~slender], labels[slender], labels[slender]])
     return Pieces(triangles, labels)
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import GeometryError, InexactWarning, warn_user
 from ..mesh.self_intersections import self_intersections
-from ..mesh.triangles import halved
+from ..mesh.triangles import halved, side_lengths
 from ..packages import lazy_module
 from ..search.face_tree import FaceFeatures, FaceTree, feet_on
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -73,7 +73,6 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
 
 def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
     """(k, 3, 3) parts of (n, 3, 3) pieces, cut by planes upright on a side of the nearest triangles, or halved."""
-    sides = np.linalg.norm(np.roll(pieces, -1, axis=1) - pieces, axis=2)
     relative = pieces - rows[:, None, :3]
     p = (relative * rows[:, None, 3:6]).sum(axis=2)
     q = (relative * rows[:, None, 6:9]).sum(axis=2)
@@ -82,9 +81,9 @@ def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
     shorter = np.minimum(beyond.max(axis=2), -beyond.min(axis=2))
     side = shorter.argmax(axis=1)
     row = np.arange(len(pieces))
-    large = sides.max(axis=1) > 3.0 * rows[:, [9, 12, 15]].max(axis=1)
+    large = side_lengths(pieces).max(axis=1) > 3.0 * rows[:, [9, 12, 15]].max(axis=1)
     cut = ~large & (shorter[row, side] > least)
-    return np.concatenate([_cut(pieces[cut], beyond[row, side][cut]), halved(pieces[~cut], sides[~cut].argmax(axis=1))])
+    return np.concatenate([_cut(pieces[cut], beyond[row, side][cut]), halved(pieces[~cut])])
 
 
 def _cut(pieces: Floats, heights: Floats) -> Floats:

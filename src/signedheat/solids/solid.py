@@ -23,6 +23,7 @@ from ..jobs import Progress
 from ..memory import within_memory
 from ..mesh.box_tree import order_in_space
 from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.welding import indexed
 from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
@@ -648,8 +649,7 @@ def _mesh(triangles: Floats) -> TriangleMesh:
     """Make a mesh of (m, 3, 3) triangles, with one vertex for each position."""
     if not len(triangles):
         raise SourceError("this part of the solid has no triangles", element="solid")
-    points, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    return TriangleMesh(points, corners.reshape(-1, 3))
+    return TriangleMesh(*indexed(triangles))
 
 
 @transformed.register

@@ -321,11 +321,10 @@ def _cut(triangles: Floats, longest: float) -> tuple[Floats, Ints]:
     """Halve triangles at their longest sides until none exceeds half a square; return them, and their originals."""
     owners, kept, whose = np.arange(len(triangles)), [], []
     while len(triangles):
-        sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
         small = face_areas(triangles) <= 0.5 * longest * longest
         kept.append(triangles[small])
         whose.append(owners[small])
-        triangles, owners = halved(triangles[~small], sides[~small].argmax(axis=1)), np.tile(owners[~small], 2)
+        triangles, owners = halved(triangles[~small]), np.tile(owners[~small], 2)
     order = np.argsort(np.concatenate(whose), kind="stable")
     return np.concatenate(kept)[order], np.concatenate(whose)[order]
 

@@ -24,7 +24,7 @@ from ..compiled import compiled
 from ..errors import GeometryError, InexactWarning, warn_user
 from ..exchange import Elements, Exchangeable
 from ..mesh.signed_graph import Links, signs_of
-from ..mesh.unit_vectors import SAME_WAY
+from ..mesh.unit_vectors import SAME_WAY, unit
 from ..mesh.welding import same_rows
 from ..validation import coordinates, finite_rows, frozen, numbers, whole_number
 from .local_triangulations import SAME_SIDE_HEIGHT, LocalTriangulations, local_triangulations, turned_alike
@@ -412,9 +412,8 @@ def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> L
     tet, opposite = np.nonzero(tets.neighbors < 0)
     faces = tets.simplices[tet[:, None], (opposite[:, None] + [1, 2, 3]) % 4].astype(np.int64)
     a, b, c = places[faces].transpose(1, 0, 2)
-    outward = np.cross(b - a, c - a)
-    length = np.linalg.norm(outward, axis=1) * np.sign((outward * (a - places.mean(axis=0))).sum(axis=1))
-    outward /= np.where(length != 0, length, np.inf)[:, None]
+    outward = unit(np.cross(b - a, c - a))
+    outward *= np.sign((outward * (a - places.mean(axis=0))).sum(axis=1))[:, None]
     weights = _confidence(np.einsum("fj,fkj->fk", outward, axes[faces]))
     return Links(faces.ravel(), np.full(faces.size, len(places)), weights.ravel())
 
@@ -424,9 +423,7 @@ def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
     n, k = len(places), min(POINT_NEIGHBORS, len(places) - 1)
     neighbors = scipy.spatial.cKDTree(places).query(places, k=k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), neighbors.ravel()
-    step = places[heads] - places[tails]
-    length = np.linalg.norm(step, axis=1)
-    step /= np.where(length > 0, length, 1.0)[:, None]
+    step = unit(places[heads] - places[tails])
     first, second = axes[tails], axes[heads]
     cosines = (first * second).sum(axis=1) - 2 * (first * step).sum(axis=1) * (second * step).sum(axis=1)
     return Links(tails, heads, weight * _confidence(cosines))

@@ -21,6 +21,7 @@ from ..memory import refuse_beyond_memory
 from ..mesh.conforming_refinement import refine_to_conform
 from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import IntrinsicMesh, laid_out, mollify
+from ..mesh.triangles import side_lengths
 from .cotan import cotan_matrix, divergence
 from .digital_surface import DigitalSurface, count_surfels, separated_edges
 from .intrinsic_triangulation import IntrinsicTriangulation
@@ -289,8 +290,7 @@ def _(domain: DigitalSurface) -> SurfaceDiscretization:
     refuse_too_many(4 * faces, faces, "faces of voxels", more=BYTES_PER_VOXEL * domain.volume.size)
     mesh, corners = domain.triangulation, domain.smooth_vertices
     positions = np.concatenate([corners, corners[domain.surfels.corners].mean(axis=1)])
-    placed = positions[mesh.faces]
-    sides = np.linalg.norm(np.roll(placed, -1, axis=1) - placed, axis=2)
+    sides = side_lengths(positions[mesh.faces])
     if not sides.any():
         raise GeometryError(
             "the faces of the voxels are so small that their corners fall together",
