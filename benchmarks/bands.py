@@ -20,8 +20,8 @@ import numpy as np
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.grids.blocks import BLOCK, Blocks
-from signedheat.grids.marching import block_contour
+from signedheat.grids.blocks import BLOCK, Blocks, BlockValues
+from signedheat.grids.marching import contour_parts
 
 CELLS = 4.0
 """Half width of the band, in cells."""
@@ -86,7 +86,8 @@ def libigl(mesh: sh.TriangleMesh, grid: sh.Grid) -> Surface:
     values = np.concatenate(
         [igl.signed_distance(points[k : k + 500_000], vertices, faces, kind)[0] for k in range(0, len(points), 500_000)]
     )
-    low, cells = block_contour(blocks, values.astype(np.float32).reshape(-1, BLOCK, BLOCK, BLOCK), steps, 0.0)
+    blocks_of = BlockValues(blocks, values.astype(np.float32).reshape(-1, BLOCK, BLOCK, BLOCK))
+    low, cells = map(np.concatenate, zip(*contour_parts(blocks_of, steps, 0.0), strict=True))
     return grid.origin + low * steps, cells
 
 

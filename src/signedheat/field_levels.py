@@ -38,12 +38,12 @@ def refuse_beyond_walls(walls: Floats, distance: float, domain: str, remedy: str
 def on_level(
     distance: Callable[[Floats], Floats], points: Floats, values: NodeValues, grid: Grid, level: float
 ) -> Floats:
-    """Move (n, 3) points along edges of a grid to the exact level, by regula falsi (Dowell & Jarratt 1971)."""
-    cells = (points - grid.origin) / grid.spacing
-    near = np.rint(cells)
-    cells = np.where(np.abs(cells - near) < 0.5 * CLEARANCE, near, cells)
-    base = np.floor(cells).astype(np.int64)
-    fraction = cells - base
+    """Move (n, d) points, given in cells, along edges of a grid to the exact level; return their places in space.
+
+    This is regula falsi (Dowell & Jarratt 1971).
+    """
+    base = np.floor(points).astype(np.int64)
+    fraction = points - base
     axis = fraction.argmax(axis=1)
     upper = base.copy()
     upper[np.arange(len(points)), axis] += 1
@@ -52,7 +52,7 @@ def on_level(
     low, high = (values[tuple(at[movable].T)] - level for at in (base, upper))
     crossed = (low < 0) != (high < 0)
     movable, low, high = movable[crossed], low[crossed], high[crossed]
-    moved = np.array(points, dtype=np.float64)
+    moved = grid.origin + points * grid.spacing
     base, axis, far = base[movable], axis[movable], ON_LEVEL * float(grid.spacing.min())
     start, stop, last = np.zeros(len(base)), np.ones(len(base)), np.zeros(len(base), dtype=np.int8)
     active = np.arange(len(base))

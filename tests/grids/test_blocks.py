@@ -2,7 +2,7 @@ import numpy as np
 
 from shapes.grid_cases import sphere
 from signedheat.grids.blocks import BLOCK, BLOCK_NODES, Blocks, BlockValues
-from signedheat.grids.marching import block_contour, closed_surface
+from signedheat.grids.marching import closed_surface, contour_parts
 from signedheat.search.face_tree import FaceFeatures, FaceTree
 
 
@@ -67,10 +67,11 @@ def test_contour_is_that_of_the_whole_grid():
     for row, place in enumerate(blocks.places * BLOCK):
         part = dense[tuple(slice(p, p + BLOCK) for p in place)]
         values[row][tuple(slice(0, n) for n in part.shape)] = part
-    vertices, faces = block_contour(BlockValues(blocks, values), spacing, 0.3)
-    whole, others = closed_surface(dense.astype(np.float64), np.zeros(3), spacing, 0.3)
+    parts = contour_parts(BlockValues(blocks, values), spacing, 0.3)
+    vertices, faces = (np.concatenate(part) for part in zip(*parts, strict=True))
+    whole, others = closed_surface(dense.astype(np.float64), spacing, 0.3)
     assert faces.shape == others.shape
-    one, two = (np.sort(v.round(4).view([("", v.dtype)] * 3).ravel()) for v in (vertices * spacing, whole))
+    one, two = (np.sort(v.round(4).view([("", v.dtype)] * 3).ravel()) for v in (vertices * spacing, whole * spacing))
     np.testing.assert_allclose(one.view(np.float64), two.view(np.float64), atol=2e-4)
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()

@@ -10,7 +10,7 @@ from signedheat.grids.redistancing import smoothed_signs
 
 
 def test_a_level_line_ends_at_the_box():
-    [(points, closed)] = level_lines(np.array([[0.0] * 3, [1.0] * 3]), np.zeros(2), np.ones(2), 0.5)
+    [(points, closed)] = level_lines(np.array([[0.0] * 3, [1.0] * 3]), np.ones(2), 0.5)
     assert points.tolist() == [[0.5, 2.0], [0.5, 1.0], [0.5, 0.0]] and not closed
 
 

@@ -39,15 +39,8 @@ def test_the_crease_between_two_balls_has_no_teeth(field):
     """Around the circle at which the two offsets meet the surface bends by their angle, and teeth bend more."""
     made = field.contour(0.3)
     grid = field.grid
-    toothed = sh.TriangleMesh(
-        *closed_surface(
-            field.values,
-            grid.origin,
-            grid.spacing,
-            0.3,
-            lambda p: on_level(field.solid.distance, p, field.values, grid, 0.3),
-        )
-    )
+    points, faces = closed_surface(field.values, grid.spacing, 0.3)
+    toothed = sh.TriangleMesh(on_level(field.solid.distance, points, field.values, grid, 0.3), faces)
     assert np.array_equal(toothed.vertices, made.vertices)
     exact = 2 * np.pi * np.sqrt(1.3**2 - 1.1**2) * 2 * np.arcsin(1.1 / 1.3)
     before, after = (bends(mesh)[sharp(mesh)].sum() / exact for mesh in (toothed, made))
@@ -70,7 +63,7 @@ def test_it_stays_a_closed_surface_on_the_same_vertices(field):
 @pytest.mark.parametrize("width", [0.5, 0.8])
 def test_narrow_necks_of_noise_stay_closed_and_manifold(width, integers):
     rough = scipy.ndimage.gaussian_filter(np.random.default_rng(1).normal(size=(24, 24, 24)), width)
-    vertices, faces = closed_surface(rough, np.zeros(3), np.ones(3), 0.0)
+    vertices, faces = closed_surface(rough, np.ones(3), 0.0)
     flipped = flipped_along_creases(vertices, faces.astype(integers))
     assert (flipped != faces).any()
     table = edge_table(flipped)

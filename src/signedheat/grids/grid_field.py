@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
@@ -26,7 +27,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import contiguous, finite_number, query_points, shaped
 from .blocks import BLOCK, Blocks, BlockValues
 from .grid import Dimension, Grid
-from .marching import Refine, block_contour, closed_surface, contour_parts, level_lines
+from .marching import Part, closed_surface, contour_parts, level_lines
 from .polyline import Polyline
 from .solid_queries import Closest, SolidQueries, scaled
 
@@ -279,44 +280,34 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         (True, 0.75)
         """
         grid, level = self.grid, finite_number(level, "level")
-        refine = self._onto_level(level)
         if grid.dimension == 2:
-            lines = level_lines(self.values, grid.origin, grid.spacing, level)
-            return [Polyline(points if refine is None else refine(points), closed) for points, closed in lines]
-        if self.blocks is None:
-            vertices, faces = closed_surface(self.values, grid.origin, grid.spacing, level, refine)
-        else:
-            self._refuse_beyond_band(level)
-            values = BlockValues(self.blocks, self.values)
-            vertices, faces = block_contour(values, grid.spacing, level, self._into_space(refine))
-        if refine is not None:  # points of the solid's level, which has creases, unlike what is interpolated
+            lines = level_lines(self.values, grid.spacing, level)
+            return [Polyline(self._placed(points, level), closed) for points, closed in lines]
+        vertices, faces = (np.concatenate(part) for part in zip(*self._parts(level), strict=True))
+        if self.solid is not None:  # its level has creases, unlike what is interpolated
             faces = flipped_along_creases(vertices, faces)
         return TriangleMesh(vertices, faces)
 
-    def _onto_level(self, level: float) -> Refine | None:
-        """Return a function that moves points of a level onto it; None if the field has no solid."""
-        if self.solid is None:
-            return None
-        distance = self.solid.distance
-        values = self.values if self.blocks is None else BlockValues(self.blocks, self.values)
-        return lambda points: on_level(distance, points, values, self.grid, level)
-
-    def _into_space(self, refine: Refine | None) -> Refine:
-        """Return a function from points in cells to places in space, moved onto the level if `refine` does that."""
-
-        def placed(cells: Floats) -> Floats:
-            points = self.grid.origin + cells * self.grid.spacing
-            return points if refine is None else refine(points)
-
-        return placed
-
-    def _refuse_beyond_band(self, level: float) -> None:
-        if abs(level) > self.width:
+    def _parts(self, level: float) -> Iterator[Part]:
+        """Yield vertices and faces of a level in space, in a band window by window."""
+        if self.blocks is None:
+            pieces = iter([closed_surface(self.values, self.grid.spacing, level)])
+        elif abs(level) > self.width:
             raise OutsideError(
                 f"level {level:g} lies outside the band, which reaches to {self.width:g}",
                 remedy=f"use a band of at least {abs(level):g}",
                 element=f"level {level:g}",
             )
+        else:
+            pieces = contour_parts(BlockValues(self.blocks, self.values), self.grid.spacing, level)
+        return ((self._placed(points, level), faces) for points, faces in pieces)
+
+    def _placed(self, points: Floats, level: float) -> Floats:
+        """Return the places in space of points of a level, which are given in cells; on it exactly if solid."""
+        if self.solid is None:
+            return self.grid.origin + points * self.grid.spacing
+        values = self.values if self.blocks is None else BlockValues(self.blocks, self.values)
+        return on_level(self.solid.distance, points, values, self.grid, level)
 
     def save_contour(self, path: str | PathLike[str], level: float = 0.0) -> tuple[int, int]:
         """Write the level set φ = level in space to a file; that of a band part by part, so that it may exceed memory.
@@ -355,12 +346,8 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             surface = self.contour(level)
             if not isinstance(surface, TriangleMesh):
                 raise GeometryError("a field in the plane has lines", remedy="use contour and sh.io.write_polylines")
-            parts = iter([(surface.vertices, surface.faces)])
-        else:
-            self._refuse_beyond_band(level)
-            placed = self._into_space(self._onto_level(level))
-            parts = contour_parts(BlockValues(self.blocks, self.values), self.grid.spacing, level, placed)
-        return ply.write_parts(parts, path)
+            return ply.write_parts(iter([(surface.vertices, surface.faces)]), path)
+        return ply.write_parts(self._parts(level), path)
 
     def dense(self) -> GridField[Dimension]:
         """Return the field at all nodes of its grid; nodes beyond a band are interpolated from the coarse field.

@@ -1,11 +1,11 @@
-"""Level sets on grids: closed manifold surfaces in space, polylines in the plane.
+"""Level sets on grids: closed manifold surfaces in space, polylines in the plane; their points are given in cells.
 
 On sparse grids marching cubes runs window by window, and vertices of neighbouring windows are merged.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -26,10 +26,8 @@ LARGEST_VALUE = 1e30
 """Bound of the numbers that marching cubes is given, and of their inverses: it computes in single precision."""
 
 
-def closed_surface(
-    values: Floats, origin: Floats, spacing: Floats, level: float, refine: Callable[[Floats], Floats] | None = None
-) -> tuple[Floats, Ints]:
-    """Extract a closed, manifold, outward surface by marching cubes; `refine` moves its (n, 3) points along edges."""
+def closed_surface(values: Floats, spacing: Floats, level: float) -> tuple[Floats, Ints]:
+    """Extract the vertices and faces of a closed, manifold, outward surface by marching cubes."""
     if values.ndim != 3:
         raise GeometryError(
             f"fields are contoured in 2 and 3 dimensions, and this grid has {values.ndim}", element="field"
@@ -45,15 +43,13 @@ def closed_surface(
     if wall_signs(height) == {True, False}:
         height, shift = capped(height), 1
     vertices, faces, _, _ = measure.marching_cubes(height, 0.0, gradient_direction="descent")
-    positions = origin + (vertices.astype(np.float64) - shift) * spacing
-    return positions if refine is None else refine(positions), faces
+    return vertices.astype(np.float64) - shift, faces
 
 
-def level_lines(values: Floats, origin: Floats, spacing: Floats, level: float) -> list[tuple[Floats, bool]]:
+def level_lines(values: Floats, spacing: Floats, level: float) -> list[tuple[Floats, bool]]:
     """Return points (k, 2) of each line of a level set, greater values to the left, and whether it closes."""
     lines = measure.find_contours(heights_above(values, spacing, level), 0.0, positive_orientation="high")
-    closed = [len(line) > 3 and bool((line[0] == line[-1]).all()) for line in lines]
-    return [(origin + line * spacing, closes) for line, closes in zip(lines, closed, strict=True)]
+    return [(line, len(line) > 3 and bool((line[0] == line[-1]).all())) for line in lines]
 
 
 def heights_above(values: Floats, spacing: Floats, level: float) -> Floats:
@@ -110,15 +106,6 @@ def capped(height: Floats) -> Floats:
 
 INDEX_BITS = 20
 """Bits of the index of a node along an axis."""
-Refine = Callable[[Floats], Floats]
-
-
-def block_contour(
-    values: BlockValues, spacing: Floats, level: float, refine: Refine | None = None
-) -> tuple[Floats, Ints]:
-    """Extract the level set in cells with values, facing greater values, and closed `CAP` cells outside the grid."""
-    vertices, faces = zip(*contour_parts(values, spacing, level, refine), strict=True)
-    return np.concatenate(vertices), np.concatenate(faces)
 
 
 def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Iterator[tuple[Ints, Floats, Ints]]:
@@ -200,8 +187,11 @@ _Seam = tuple[Ints, Ints]
 """Keys of the vertices on the walls of a window, ascending, and the numbers of these vertices."""
 
 
-def contour_parts(values: BlockValues, spacing: Floats, level: float, refine: Refine | None = None) -> Iterator[Part]:
-    """Yield vertices and faces of `block_contour` window by window: new vertices, and faces of new and old ones."""
+def contour_parts(values: BlockValues, spacing: Floats, level: float) -> Iterator[Part]:
+    """Yield new vertices, and faces of new and old ones, window by window, of the level set in cells with values.
+
+    It faces greater values, and is closed `CAP` cells outside the grid.
+    """
     seams: dict[tuple[int, ...], _Seam] = {}
     count = 0
     for window, points, triangles in window_surfaces(values, spacing, level):
@@ -220,7 +210,7 @@ def contour_parts(values: BlockValues, spacing: Floats, level: float, refine: Re
         seams[tuple(window.tolist())] = keys[order], numbers[order]
         for passed in [place for place in seams if place[0] < window[0] - 1]:
             del seams[passed]
-        yield points[new] if refine is None else refine(points[new]), numbers[triangles]
+        yield points[new], numbers[triangles]
     if not count:
         raise OutsideError(
             f"the values of the band do not take level {level:g}", remedy="choose another level or a wider band"

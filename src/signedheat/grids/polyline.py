@@ -101,8 +101,8 @@ class Polyline(Displayed, Frozen):
         steps = positive_steps(spacing, 2)
         start = coordinates(np.atleast_2d(numbers(origin, "origin")), "origin", 2)[0]
         padded = np.pad(inside, 1)
-        lines = level_lines(np.float64(0.5) - padded.astype(np.float64), start - steps, steps, 0.0)
-        return [cls(points, closed) for points, closed in lines]
+        lines = level_lines(np.float64(0.5) - padded.astype(np.float64), steps, 0.0)
+        return [cls(start + (points - 1) * steps, closed) for points, closed in lines]
 
     @property
     def n_points(self) -> int:

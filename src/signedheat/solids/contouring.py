@@ -345,7 +345,7 @@ def traced(
     nodes, axes = crossings.nodes, crossings.axes
     guesses = nodes.astype(np.float64)
     guesses[np.arange(len(nodes)), axes] += np.clip(crossings.shares, CLEARANCE, 1 - CLEARANCE)
-    points = on_level(offset.distance, grid.origin + guesses * grid.spacing, values, grid, 0.0)
+    points = on_level(offset.distance, guesses, values, grid, 0.0)
     shares = ((points - grid.origin) / grid.spacing - nodes)[np.arange(len(nodes)), axes]
     report(0.6, "vertices")
     choices = placed(offset, grid, cells, points)

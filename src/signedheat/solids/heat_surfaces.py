@@ -182,6 +182,7 @@ def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0
     if isinstance(shape, PointCloud) and shape.normals is not None:
         phi = fitted_to_points(phi, steps, shape.points - grid.origin, shape.normals)
     try:
-        return closed_surface(phi, grid.origin, steps, 0.0)
+        points, faces = closed_surface(phi, steps, 0.0)
     except OutsideError:
         return None
+    return grid.origin + points * steps, faces

@@ -211,10 +211,8 @@ def contour(
     if (values[np.ix_(*within)] < 0).all():
         raise OutsideError(f"the function is below level {height:g} everywhere", remedy="choose another level")
     if not is_sharp:
-        vertices, faces = closed_surface(
-            values, grid.origin, grid.spacing, 0.0, lambda at: on_level(surface.distance, at, values, grid, 0.0)
-        )
-        return TriangleMesh(vertices, faces)
+        points, faces = closed_surface(values, grid.spacing, 0.0)
+        return TriangleMesh(on_level(surface.distance, points, values, grid, 0.0), faces)
     crossings = joined_crossings(crossings_in(values, np.zeros(3, dtype=np.int64)))
     around = crossed_cells(crossings, grid.shape)
     pieces = dual_cells(crossings, around, grid.shape, lambda at: surface.distance(grid.origin + at * grid.spacing) < 0)

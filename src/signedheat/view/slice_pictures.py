@@ -182,7 +182,7 @@ def level_pieces(
     """Return the lines of a level on a plane: solid on the shape, dashed on its completion."""
     spacing = np.array([u[1] - u[0], v[1] - v[0]])
     pieces: dict[str, list[Floats]] = {"solid": [], "dashed": []}
-    for line, _ in level_lines(values, np.zeros(2), np.ones(2), level):
+    for line, _ in level_lines(values, np.ones(2), level):
         places = line * spacing + [u[0], v[0]]
         visible = np.ones(len(line), dtype=bool)
         if trusted is not None:
