@@ -41,7 +41,8 @@ def closed_surface(values: Floats, spacing: Floats, level: float) -> tuple[Float
     height = np.copysign(np.maximum(np.abs(height), 1 / LARGEST_VALUE), height)  # each keeps its sign
     shift = 0
     if wall_signs(height) == {True, False}:
-        height, shift = capped(height), 1
+        limit, height, shift = np.array(height.shape), np.pad(height, 1), 1
+        _close_at_walls(height, np.full(3, -1), limit)
     vertices, faces, _, _ = measure.marching_cubes(height, 0.0, gradient_direction="descent")
     return vertices.astype(np.float64) - shift, faces
 
@@ -92,16 +93,6 @@ def wall_signs(height: Floats) -> set[bool]:
     """Return signs of the nodes on the walls of the box: {True} if all are positive, {False} if none is, or both."""
     walls = [height.take(end, axis=axis) for axis in range(height.ndim) for end in (0, -1)]
     return {bool(sign) for wall in walls for sign in ((wall > 0).any(), (wall > 0).all())}
-
-
-def capped(height: Floats) -> Floats:
-    """Add a layer of positive nodes all around, so that crossings lie `CAP` cells outside the walls."""
-    padded = np.pad(height, 1, mode="edge")
-    for axis in range(height.ndim):
-        for end in (0, -1):
-            layer = np.moveaxis(padded, axis, 0)[end]
-            np.copyto(layer, -layer * (1 / CAP - 1), where=layer < 0)
-    return padded
 
 
 INDEX_BITS = 20
@@ -170,13 +161,13 @@ def _reaches_walls(values: BlockValues, level: float) -> bool:
     return len(signs) == 2
 
 
-def _close_at_walls(height: NDArray[np.float32], first: Ints, limit: Ints) -> None:
+def _close_at_walls(height: NDArray[Any], first: Ints, limit: Ints) -> None:
     """Make the layer of nodes beyond the walls positive, so that crossings lie `CAP` cells beyond the walls."""
     for axis in range(3):
         for beyond, wall in ((-1, 0), (int(limit[axis]), int(limit[axis]) - 1)):
             target, source = beyond - int(first[axis]), wall - int(first[axis])
             if 0 <= target < height.shape[axis] and 0 <= source < height.shape[axis]:
-                layers: NDArray[np.float32] = np.moveaxis(height, axis, 0)
+                layers: NDArray[Any] = np.moveaxis(height, axis, 0)
                 layer = layers[source]
                 layers[target] = np.where(layer < 0, -layer * np.float32(1 / CAP - 1), layer)
 
