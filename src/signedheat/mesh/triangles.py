@@ -43,9 +43,9 @@ def area_vectors(triangles: Floats) -> Floats:
     return np.stack([0.5 * (uy * vz - uz * vy), 0.5 * (uz * vx - ux * vz), 0.5 * (ux * vy - uy * vx)], axis=1)
 
 
-def side_lengths(triangles: Floats) -> Floats:
-    """Return (m, 3) lengths of the sides that begin at each corner of (m, 3, 3) triangles."""
-    return np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+def side_lengths(polygons: Floats) -> Floats:
+    """Return (..., k) lengths of the sides that begin at each corner of (..., k, d) closed polygons."""
+    return np.linalg.norm(np.roll(polygons, -1, axis=-2) - polygons, axis=-1)
 
 
 def face_areas(triangles: Floats) -> Floats:

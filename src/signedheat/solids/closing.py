@@ -20,12 +20,12 @@ from ..linear.threads import one_blas_thread
 from ..mesh.box_tree import BoxTree
 from ..mesh.components import connected_components, element_components, sums_of
 from ..mesh.edges import EdgeTable, edge_keys, edge_table
-from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.triangles import area_vectors, face_areas, side_lengths
 from ..mesh.unit_vectors import ANGLE_ROUNDING, SAME_WAY, unit
 from . import lids, walls
 from .lids import Lid, running_mean, vertex_normals
 from .rims import boundary, corners_of, loops, open_edges
-from .spanning import Frame, frame_of, side_lengths
+from .spanning import Frame, frame_of
 
 STRIP_WIDTH = 0.25
 """Width of the strip of surface around an opening that is sampled, relative to the opening's width."""

@@ -15,6 +15,7 @@ from ..foreign import ForeignShape, converted
 from ..memory import within_memory
 from ..mesh.components import element_components
 from ..mesh.edges import edge_table
+from ..mesh.triangles import side_lengths
 from ..mesh.welding import same_positions
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -24,7 +25,6 @@ from .chain import Chain
 from .closing import NO_EDGES, closed_by
 from .completion import Completion, Lids
 from .rims import boundary, loops
-from .spanning import side_lengths
 
 Rims = Sequence[Ints]
 

@@ -13,11 +13,11 @@ from scipy import sparse
 
 from ..arrays import Floats, Ints
 from ..mesh.components import numbered, sums_of
-from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.triangles import area_vectors, face_areas, side_lengths
 from ..mesh.unit_vectors import SAME_WAY, unit
 from . import spanning
 from .rims import corners_of
-from .spanning import Frame, Spanned, area_vector, frame_of, points_inside, side_lengths, spanned
+from .spanning import Frame, Spanned, area_vector, frame_of, points_inside, spanned
 
 LOOP_POINTS = 128
 """Number of points of the loop that a lid spans. Half or twice as many change the volume by less than 1 %."""

@@ -10,6 +10,7 @@ import scipy
 from ..arrays import Bools, Floats, Ints
 from ..mesh.components import connected_components
 from ..mesh.edges import edge_keys, edge_table
+from ..mesh.triangles import side_lengths
 
 LAYER_GROWTH = 0.35
 """Growth of triangles with their distance from the rim, relative to that distance."""
@@ -73,11 +74,6 @@ def farthest(loop: Floats, away: Floats) -> int:
     onward = (starts[ties, None] + np.arange(MOST_TIES) / MOST_TIES) % 1.0
     far = np.interp(onward, starts, np.append(away, away[0])) / max(float(away.max()), 1e-300)
     return int(ties[np.lexsort(np.rint(1e6 * far).T[::-1])[-1]])
-
-
-def side_lengths(loop: Floats) -> Floats:
-    """(n,) lengths of the sides of a closed loop."""
-    return np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
 
 
 def shares_of(loop: Floats) -> tuple[Floats, float]:
