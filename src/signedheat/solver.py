@@ -104,8 +104,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     @cached_property
     def discretization(self) -> Adaptable:
         """The discretisation of the domain."""
-        progress = self.progress
-        report = None if progress is None else lambda share, _: progress((1 + share) / 5, "refine")
+        report = within(self.progress, 0.2, 0.4)
         if self.intrinsic == "auto":
             return lowered_by_angles(self.domain, report)
         return Retriangulated(triangle_mesh(self.domain), report) if self.intrinsic else discretize(self.domain)

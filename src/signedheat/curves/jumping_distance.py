@@ -8,7 +8,7 @@ jumps on a cut that is short and runs where Y is not integrable. On the surface 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -19,7 +19,7 @@ from ..arrays import Bools, Complexes, Floats
 from ..diagnostics import Diagnostics, Jumps
 from ..errors import GeometryError, InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..foreign import ForeignShape, as_list, converted
-from ..jobs import Progress, Stopwatch
+from ..jobs import Progress, Stopwatch, within
 from ..linear import chosen_backend
 from ..memory import refuse_beyond_memory, within_memory
 from ..mesh.curve_segments import CurveSegments
@@ -144,7 +144,7 @@ def piecewise_distance(
         slopes = corner_slopes(triangles, directions)
         problem = jump_problem(triangles, pairs, slopes, guarded_edges(triangles, parts))
         continuous = partial(is_continuous, triangles, pairs, slopes, directions)
-        solution = minimize(problem, progress=part_of(progress, 0.4, 0.6, "integrate"), enough=continuous)
+        solution = minimize(problem, progress=within(progress, 0.4, 0.6), enough=continuous)
         values = slopes + solution.constants[:, None]
     with stopwatch("cut"):
         cut = high_jumps(triangles, pairs, values)
@@ -164,11 +164,6 @@ def piecewise_distance(
         )
     notes = (jumps_of(phi, solution, error), *discretization.notes, *([left_out] if left_out else []))
     return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
-
-
-def part_of(progress: Progress | None, start: float, stop: float, step: str) -> Callable[[float], None] | None:
-    """Return a function that reports progress, given the fraction done of a part of a step; None without `progress`."""
-    return None if progress is None else lambda share: progress(start + (stop - start) * share, step)
 
 
 def jumps_of(phi: PiecewiseField, solution: JumpSolution, error: float) -> Jumps:

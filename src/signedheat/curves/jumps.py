@@ -17,6 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from ..arrays import Bools, Complexes, Floats, Ints, mask_of
+from ..jobs import Progress
 from ..linear import factorize
 from ..linear.splitting import split_rounds
 from ..linear.threads import one_blas_thread
@@ -94,7 +95,7 @@ class JumpSolution:
 
 def minimize(
     problem: JumpProblem,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
     enough: Callable[[Floats], bool] | None = None,
 ) -> JumpSolution:
     """Minimise ``Σ 2w dist(z, [a, b])`` with z = K c by ADMM until the gap is certified, or constants are `enough`.
@@ -139,7 +140,7 @@ def minimize(
                 threshold *= THRESHOLD_GROWTH
                 scaled *= THRESHOLD_GROWTH  # so that the unscaled multipliers stay the same
             if progress is not None:
-                progress(rounds / MOST_SPLITTING_ROUNDS)
+                progress(rounds / MOST_SPLITTING_ROUNDS, "integrate")
     moved = regions_moved(problem, best)
     return JumpSolution(moved, problem.objective(moved), bound, rounds)
 

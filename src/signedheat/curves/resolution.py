@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from ..discretization import discretize
 from ..errors import CancellingNormalsError, GeometryError, SourceError
 from ..foreign import as_list
-from ..jobs import Progress
+from ..jobs import Progress, within
 from ..kinds import SurfaceDomain
 from ..solver import SignedHeatSolver
 from ..surfaces.extrapolation import Diffusion
@@ -90,6 +90,5 @@ def for_zero_set(
 ) -> SignedHeatSolver[TriangleMesh]:
     """Return a solver with ``intrinsic=True`` and diffusion times that suit the pieces, however small they are."""
     solver = SignedHeatSolver(mesh, diffusion, progress, intrinsic=True)
-    report = None if progress is None else lambda share, _: progress((1 + share) / 5, "refine")
-    solver.__dict__["discretization"] = RetriangulatedForZeroSet(mesh, report)
+    solver.__dict__["discretization"] = RetriangulatedForZeroSet(mesh, within(progress, 0.2, 0.4))
     return solver

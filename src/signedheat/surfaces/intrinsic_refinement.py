@@ -7,13 +7,13 @@ segment (an edge that must not be flipped) or in its diametral circle, the segme
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arrays import Bools, Complexes, Floats, Ints
 from ..compiled import allocation_free, compiled
+from ..jobs import Progress, within
 from ..mesh.gluing import (
     N_EDGES,
     N_FACES,
@@ -42,12 +42,12 @@ TO_GROW = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "
 
 
 def refine_all(
-    gluing: Gluing, angle: float, coarsest: float, max_vertices: int, progress: Callable[[float], None] | None = None
+    gluing: Gluing, angle: float, coarsest: float, max_vertices: int, progress: Progress | None = None
 ) -> tuple[Gluing, Ints, Bools, bool]:
     """Refine a Delaunay triangulation, in place, until no face is thin, then none large: see `intrinsic_delaunay`.
 
     Returns it; for each edge (e,) the fixed edge of the input that it is part of, or −1; the result of `close_faces`;
-    and whether refinement ended before the limit on the number of vertices. `progress` gets the fraction done.
+    and whether refinement ended before the limit on the number of vertices.
     """
     segments, agenda = agenda_of(gluing)
     goal = Goal(np.tan(angle / 2) ** 2, np.inf, max_vertices)
@@ -55,8 +55,7 @@ def refine_all(
     if status == REFINED and coarsest < np.inf:
         mean_radius = float(np.sqrt(4 / 27**0.5 * lay_out(gluing).face_areas.mean())) / gluing.unit
         goal = goal._replace(radius=coarsest * mean_radius)
-        report = None if progress is None else lambda _: progress(1.0)  # the callback may cancel
-        gluing, agenda, status = refined(gluing, agenda, goal, report)
+        gluing, agenda, status = refined(gluing, agenda, goal, within(progress, 1.0, 1.0))  # the callback may cancel
     n_edges = int(gluing.counts[N_EDGES])
     origin = np.full(n_edges, -1)
     fixed = np.flatnonzero(gluing.fixed[:n_edges])
@@ -64,9 +63,7 @@ def refine_all(
     return gluing, origin, close_faces(gluing, agenda), status != LIMIT_REACHED
 
 
-def refined(
-    gluing: Gluing, agenda: Agenda, goal: Goal, progress: Callable[[float], None] | None
-) -> tuple[Gluing, Agenda, int]:
+def refined(gluing: Gluing, agenda: Agenda, goal: Goal, progress: Progress | None) -> tuple[Gluing, Agenda, int]:
     """Refine until the goal or the vertex limit is reached; return the arrays, perhaps longer, and why it ended."""
     list_all(gluing, agenda, goal)
     listed = np.flatnonzero(agenda.bins >= 0)  # the largest faces come first, so the current list shows progress
@@ -75,7 +72,7 @@ def refined(
         status = refine(gluing, agenda, goal, 5000)  # vertices take some hundredths of a second
         if status == PAUSED and progress is not None:
             done = max(done, float(listed[-1] - agenda.seen[1]) / len(listed))
-            progress(min(done, 1.0))
+            progress(min(done, 1.0), "refine")
         if status == ARRAYS_FULL:
             grown: dict[str, Any] = {k: doubled(getattr(gluing, k)) for k in (*PER_FACE, *PER_EDGE, "steps", "weights")}
             gluing = gluing._replace(**grown)

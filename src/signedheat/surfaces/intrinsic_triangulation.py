@@ -21,7 +21,7 @@ from ..arrays import Bools, Floats, Frozen, Ints
 from ..errors import GeometryError
 from ..exchange import Displayed
 from ..foreign import ForeignShape, converted
-from ..jobs import Progress, Stopwatch
+from ..jobs import Progress, Stopwatch, within
 from ..memory import within_memory
 from ..mesh.curve_segments import CurveSegments, without_straight_nodes
 from ..mesh.gluing import N_STEPS, flip_all, glue, lay_out
@@ -448,7 +448,7 @@ def intrinsic_delaunay(
         close = np.zeros(refinement.triangles.n_faces, dtype=bool)
     with stopwatch("refine"):
         if refine:
-            inner = None if progress is None else lambda share: progress((2 + share) / 3, "refine")
+            inner = within(progress, 2 / 3, 1.0)
             limit = 20 * refinement.triangles.n_vertices + 10_000 if max_vertices is None else int(max_vertices)
             gluing, origin, close, complete = refine_all(gluing, np.radians(angle), float(coarsest), limit, inner)
             marked = np.append(marked, False)[origin]
