@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import socket
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from .jobs import run_limited
 from .packages import lazy_module
 
 distributed: Any = lazy_module("distributed", "Dask clusters")
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 ROWS_PER_TASK = 1 << 13
 """Number of rows that a thread processes at a time."""
@@ -47,11 +51,25 @@ def in_chunks(
             result[start : start + len(part)] = part
 
     fill(0, first)
-    with ThreadPoolExecutor(n_threads()) as pool:
-        starts = range(ROWS_PER_TASK, len(rows), ROWS_PER_TASK)
-        for job in [pool.submit(lambda k: fill(k, function(rows[k : k + ROWS_PER_TASK])), start) for start in starts]:
-            job.result()
+    starts = range(ROWS_PER_TASK, len(rows), ROWS_PER_TASK)
+    list(in_threads(lambda start: fill(start, function(rows[start : start + ROWS_PER_TASK])), starts))
     return results
+
+
+def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    """Yield the results of a function in the order of its arguments, from all threads, and hold few at a time."""
+    with ThreadPoolExecutor(n_threads()) as pool:
+        jobs: deque[Future[Result]] = deque()
+        try:
+            for item in items:
+                jobs.append(pool.submit(function, item))
+                if len(jobs) > 2 * n_threads():
+                    yield jobs.popleft().result()
+            while jobs:
+                yield jobs.popleft().result()
+        finally:
+            for job in jobs:
+                job.cancel()
 
 
 def connected(address: str) -> Any:

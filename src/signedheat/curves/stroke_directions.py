@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import cast
 
@@ -18,7 +17,7 @@ from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at, joined_end_to_end, without_copies
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.signed_graph import best_signs
-from ..parallel import n_threads
+from ..parallel import in_threads
 from ..solver import SignedHeatSolver
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
 from ..surfaces.source_segments import NEARLY_CLOSED, as_curves, nearest_others
@@ -271,8 +270,7 @@ def longest_of(strokes: Strokes, rows: Ints) -> Ints:
 
 def settled_from(strokes: Strokes, starts: list[Floats], movable: Bools) -> list[Inside]:
     """Return what `settled` finds from each start, on all cores."""
-    with ThreadPoolExecutor(n_threads()) as pool:
-        return list(pool.map(lambda signs: settled(strokes, signs, movable), starts))
+    return list(in_threads(lambda signs: settled(strokes, signs, movable), starts))
 
 
 def settled(strokes: Strokes, signs: Floats, movable: Bools) -> Inside:

@@ -6,7 +6,6 @@ Everything is second order, in any dimension. For kernels on four axes, axes of 
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..parallel import n_threads
+from ..parallel import in_threads, n_threads
 
 FEW_NODES = 100_000
 """Number of nodes below which a grid is worked on by one thread."""
@@ -86,10 +85,7 @@ def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: An
     if np.prod(shape) < FEW_NODES:
         kernel(*arguments, axis, 0, n)
         return
-    with ThreadPoolExecutor(n_threads()) as pool:
-        jobs = [pool.submit(kernel, *arguments, axis, start, min(start + SLAB, n)) for start in range(0, n, SLAB)]
-        for job in jobs:
-            job.result()
+    list(in_threads(lambda start: kernel(*arguments, axis, start, min(start + SLAB, n)), range(0, n, SLAB)))
 
 
 def slab(axis: int, start: int, stop: int) -> tuple[slice, ...]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..parallel import ROWS_PER_TASK, n_threads
+from ..parallel import ROWS_PER_TASK, in_threads
 from .box_tree import BOXES_PER_LEAF, BoxTree, boxes_around, morton_codes
 from .unit_vectors import unit
 from .welding import same_positions
@@ -72,10 +70,9 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float,
         chosen = (near > owners) & (hubs[fans[owners]] == hubs[fans[near]])
         return overlapping(fans[owners[chosen]], fans[near[chosen]])
 
-    with ThreadPoolExecutor(n_threads()) as pool:
-        parts = list(pool.map(of_tree, range(0, len(ids), ROWS_PER_TASK)))
-        pairs = np.concatenate(parts + list(pool.map(of_fans, range(0, int((fans < count).sum()), ROWS_PER_TASK))))
-    pairs = np.sort(order[pairs], axis=1)
+    parts = list(in_threads(of_tree, range(0, len(ids), ROWS_PER_TASK)))
+    parts += in_threads(of_fans, range(0, int((fans < count).sum()), ROWS_PER_TASK))
+    pairs = np.sort(order[np.concatenate(parts)], axis=1)
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from functools import reduce
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..parallel import n_threads
+from ..parallel import in_threads
 
 ANGLE_ROUNDING = 1e-6
 """Angles up to this, in radians, and differences of unit vectors, are rounding errors."""
@@ -37,8 +36,7 @@ def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
     if vectors.ndim == 1 or len(vectors) <= count:
         scale(slice(None))
     else:
-        with ThreadPoolExecutor(n_threads()) as pool:
-            list(pool.map(scale, (slice(begin, begin + count) for begin in range(0, len(vectors), count))))
+        list(in_threads(scale, (slice(begin, begin + count) for begin in range(0, len(vectors), count))))
     return result
 
 

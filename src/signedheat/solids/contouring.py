@@ -32,11 +32,12 @@ from ..mesh.dual_cells import Crossings, DualCells, crossed_cells, dual_cells, o
 from ..mesh.edges import CLEARANCE
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import MOST_CREASED_FACES, bent_edges, divided_at
+from ..parallel import in_threads
 from ..surfaces.triangle_mesh import TriangleMesh
 from .gauss import Pieces, sampled
 from .node_distances import solved
 from .offsets import Offset
-from .tiles import blocks_where, in_threads, prepared, tiles_of
+from .tiles import blocks_where, prepared, tiles_of
 
 CREASE_TANGENT = 0.05
 """Planes count as one if the tangent of half the angle between them is below this. Creases of 5.7° are cut off by a

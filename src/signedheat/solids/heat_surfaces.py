@@ -7,7 +7,6 @@ nodes around them. On the walls of the box w is the far field of the area vector
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +25,7 @@ from ..grids.marching import closed_surface
 from ..grids.stencil import solve_poisson
 from ..mesh.components import sums_of
 from ..method import diffuse, integrate, normalize
-from ..parallel import n_threads
+from ..parallel import in_threads
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
 from .point_orientation import fitted_to_points
@@ -52,14 +51,13 @@ def winding_numbers(samples: AreaSamples) -> Floats:
     dipoles, strengths = blocks_of_dipoles(samples.positions + below, samples.vectors)
     walls = [_wall(axis, end, size) for axis in range(3) for end in (0, 1)]
     core = DIPOLE_CORE * float(spacing.max())
-    with ThreadPoolExecutor(n_threads()) as pool:
-        jobs = [
-            pool.submit(_far_field, lattice.reshape(-1, 3) * spacing, dipoles * spacing, strengths, axis, core)
-            for axis, _, lattice in walls
-        ]
+
+    def far_field(wall: tuple[int, int, Floats]) -> tuple[Floats, Floats]:
+        axis, _, lattice = wall
+        return _far_field(lattice.reshape(-1, 3) * spacing, dipoles * spacing, strengths, axis, core)
+
     fields = []
-    for (axis, end, lattice), job in zip(walls, jobs, strict=True):
-        w, flux = job.result()
+    for (axis, end, lattice), (w, flux) in zip(walls, in_threads(far_field, walls), strict=True):
         flux = _refined(flux.reshape(lattice.shape[:-1]), size, axis) / spacing[axis]
         layer = np.moveaxis(right, axis, 0)[-1 if end else 0]
         layer += flux if end else -flux

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import os
 import shutil
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -18,7 +17,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, Protocol, TypeAlias, TypeVar, cast
+from typing import Any, Literal, Protocol, TypeAlias, cast
 
 import numpy as np
 from numpy.lib.format import open_memmap
@@ -35,7 +34,7 @@ from ..grids.solid_queries import SolidQueries
 from ..jobs import Progress
 from ..memory import available_memory, libraries
 from ..packages import lazy_module
-from ..parallel import connected, n_threads
+from ..parallel import connected, in_threads, n_threads
 from ..search.face_tree import FaceTree
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import positive_number
@@ -54,7 +53,6 @@ COARSE_NODES = 65
 """Approximate maximum of nodes along the coarse grid of a band, whose cells are 2, 4, 8, … times as long."""
 FOLLOWED_CUBES, COUNT_FACTOR = 1024, 1.5
 """Number of cubes of each size followed to estimate the number of blocks, and factor by which this may be wrong."""
-Result = TypeVar("Result")
 
 
 class Evaluated(SolidQueries, Protocol):
@@ -214,22 +212,6 @@ def prepared(solid: Evaluated) -> tuple[FaceTree, Windings]:
     _ = tree.discs
     windings.inside(np.zeros((1, 3)))
     return tree, windings
-
-
-def in_threads(solve: Callable[[Ints], Result], places: Iterable[Ints]) -> Iterator[Result]:
-    """Yield the results of `solve` in the order of `places`, from threads, and hold few at a time."""
-    with ThreadPoolExecutor(n_threads()) as pool:
-        jobs: deque[Future[Result]] = deque()
-        try:
-            for place in places:
-                jobs.append(pool.submit(solve, place))
-                if len(jobs) > 2 * n_threads():
-                    yield jobs.popleft().result()
-            while jobs:
-                yield jobs.popleft().result()
-        finally:
-            for job in jobs:
-                job.cancel()
 
 
 distributed: Any = lazy_module("distributed", "Dask clusters")
