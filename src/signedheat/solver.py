@@ -109,9 +109,6 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             return lowered_by_angles(self.domain, report)
         return Retriangulated(triangle_mesh(self.domain), report) if self.intrinsic else discretize(self.domain)
 
-    def _times(self, discretization: Discretization) -> Diffusion:
-        return default_diffusion(discretization) if self.diffusion is None else self.diffusion
-
     def with_diffusion(self, diffusion: Diffusion | None) -> SignedHeatSolver[AnyDomain]:
         """Make a solver with another τ, which shares everything that does not depend on τ, such as the factor of C.
 
@@ -208,7 +205,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         kept = numbers_kept(len(listed), left_out)
         _warn_of_one_sided_curves(self.domain, listed, kept)
         discretization, adapted = self.discretization.adapt(listed)
-        terms = lowered_for_times(discretization, adapted, self._times(discretization))
+        times = default_diffusion(discretization) if self.diffusion is None else self.diffusion
+        terms = lowered_for_times(discretization, adapted, times)
         if isinstance(constraint, LevelValues):
             if len(constraint.values) == len(kept) + (0 if left_out is None else len(left_out.without_length)):
                 last = int(terms[0].source_ids.max())  # later sources lie outside the domain

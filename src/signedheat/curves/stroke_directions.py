@@ -21,7 +21,6 @@ from ..parallel import in_threads
 from ..solver import SignedHeatSolver
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
 from ..surfaces.source_segments import NEARLY_CLOSED, as_curves, nearest_others
-from ..surfaces.surface import Surface
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from ..surfaces.surface_discretization import SurfaceDiscretization
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
@@ -69,7 +68,7 @@ class CurvePieces:
         listed = [cast("Curve", curves[k]) for k in numbers]
         if not listed:
             return None
-        domain = given_domain(surface)
+        domain = surface.domain.mesh if isinstance(surface.domain, IntrinsicTriangulation) else surface.domain
         places = [domain.positions(curve) for curve in listed]
         order = order_in_space(places)
         listed = [listed[k] for k in order]
@@ -181,12 +180,6 @@ def likely_curves(ends: Floats, stroke: Ints) -> tuple[Ints, Floats]:
     return group.astype(np.int64), np.bincount(group[stroke], away).astype(np.float64)
 
 
-def given_domain(surface: SurfaceDiscretization) -> Surface:
-    """Return the surface that the curves were given on."""
-    domain: Surface = surface.domain.mesh if isinstance(surface.domain, IntrinsicTriangulation) else surface.domain
-    return domain
-
-
 def is_piece(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
     """Whether a stroke has an end away from the boundary of the surface, and from nonmanifold edges."""
     if part.ends[0, 0] == part.ends[-1, 1]:
@@ -213,7 +206,8 @@ def decide(pieces: CurvePieces) -> Decision:
         if better is best:
             break
         best = better
-    if mostly_loose(strokes, best):
+    loose = best.explained < EXPLAINED
+    if strokes.lengths[loose].sum() > strokes.lengths[~loose].sum():  # more of the curves is missing than there is
         return Decision(pieces, strokes.inside(smooth), bounds_nothing=True)
     most = misfit(strokes, best) + EQUAL_COSTS * strokes.lengths.sum()
     rivals = [inside for inside in strokes.seen if misfit(strokes, inside) <= most]
@@ -233,12 +227,6 @@ def altered(signs: Floats, rows: list[int], factor: float) -> Floats:
     result: Floats = signs.copy()
     result[rows] *= factor
     return result
-
-
-def mostly_loose(strokes: Strokes, inside: Inside) -> bool:
-    """Whether most of the length of strokes bounds nothing: probably more of the curves is missing than there is."""
-    unexplained = inside.explained < EXPLAINED
-    return bool(strokes.lengths[unexplained].sum() > strokes.lengths[~unexplained].sum())
 
 
 def cost(strokes: Strokes, inside: Inside) -> float:

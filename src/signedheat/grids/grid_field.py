@@ -27,7 +27,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import contiguous, finite_number, query_points, shaped
 from .blocks import BLOCK, Blocks, BlockValues
 from .grid import Dimension, Grid
-from .marching import Part, closed_surface, contour_parts, level_lines
+from .marching import Part, closed_surface, contour_parts, level_lines, values_at_walls
 from .polyline import Polyline
 from .solid_queries import Closest, SolidQueries, scaled
 
@@ -409,7 +409,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         """
         distance = finite_number(distance, "distance")
         padding = f"use a padding of more than {abs(distance):g}, or a larger diffusion where wide gaps stay open"
-        walls = np.concatenate([self.whole.values.take([0, -1], k).ravel() for k in range(self.grid.dimension)])
+        walls = values_at_walls(self.whole.values)
         if isinstance(self.solid, HasFields) and self.blocks is None:
             if np.nanmin(self.values) < distance < np.nanmin(walls):
                 return self.solid._surface_on(self.grid, distance)

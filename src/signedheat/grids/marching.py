@@ -40,7 +40,8 @@ def closed_surface(values: Floats, spacing: Floats, level: float) -> tuple[Float
         height = height / largest
     height = np.copysign(np.maximum(np.abs(height), 1 / LARGEST_VALUE), height)  # each keeps its sign
     shift = 0
-    if wall_signs(height) == {True, False}:
+    walls = values_at_walls(height)
+    if walls.min() < 0 < walls.max():
         limit, height, shift = np.array(height.shape), np.pad(height, 1), 1
         _close_at_walls(height, np.full(3, -1), limit)
     vertices, faces, _, _ = measure.marching_cubes(height, 0.0, gradient_direction="descent")
@@ -89,10 +90,9 @@ def closed_without_values(height: Floats) -> Floats:
     return np.where(unknown, filling, height)
 
 
-def wall_signs(height: Floats) -> set[bool]:
-    """Return signs of the nodes on the walls of the box: {True} if all are positive, {False} if none is, or both."""
-    walls = [height.take(end, axis=axis) for axis in range(height.ndim) for end in (0, -1)]
-    return {bool(sign) for wall in walls for sign in ((wall > 0).any(), (wall > 0).all())}
+def values_at_walls(values: NDArray[Any]) -> NDArray[Any]:
+    """Return the values at the nodes on the walls of the box, in no particular order."""
+    return np.concatenate([values.take([0, -1], axis).ravel() for axis in range(values.ndim)])
 
 
 INDEX_BITS = 20

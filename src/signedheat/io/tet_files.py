@@ -73,7 +73,7 @@ def load_cells(path: PathLike) -> Any:
 
 def store_cells(mesh: Any, path: PathLike) -> None:
     """Write a `meshio.Mesh`."""
-    module = _module(path)
+    module = require(f"meshio.{format_for(path, MESHIO_MODULES, 'a tet mesh')}", "tet meshes")
     with writing(path), tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), redirect_stderr(StringIO()):
         warnings.simplefilter("ignore")
         made = Path(folder, f"mesh{extension(path)}")
@@ -87,10 +87,6 @@ def _files(path: PathLike) -> list[Path]:
     """Return the named file, preceded by the other file of a pair."""
     named = Path(path)
     return [*(named.with_suffix(end) for end in TETGEN if extension(path) in TETGEN and end != extension(path)), named]
-
-
-def _module(path: PathLike) -> Any:
-    return require(f"meshio.{format_for(path, MESHIO_MODULES, 'a tet mesh')}", "tet meshes")
 
 
 def _refuse_announcements(path: PathLike) -> None:

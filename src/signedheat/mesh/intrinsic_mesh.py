@@ -150,10 +150,6 @@ class IntrinsicMesh(Frozen):
         """Express vectors in edge frames, shaped like ``edge_directions[faces, sides]``, in layouts of the faces."""
         return self.edge_directions[faces, sides] * np.where(self.reflected[faces, sides], np.conj(vectors), vectors)
 
-    def in_face_frames(self, vectors: Complexes, faces: Index = slice(None)) -> Complexes:
-        """Return (k, 3) the vectors of an (e,) edge array in the layouts of faces."""
-        return self.from_edge_frames(vectors[self.edges.face_edges[faces]], faces)
-
     def sums_in_faces(self, vectors: Complexes) -> Complexes:
         """Return (m, c) sums of an (e, c) edge array over the edges of each face, in its layout: 3 × Sec. 6."""
         straight, mirrored = self._face_sums

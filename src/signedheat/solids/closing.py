@@ -416,7 +416,8 @@ def strips(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints:
     surface = _Surface(vertices, chain, outlines)
     rims = _rims(surface)
     areas = np.bincount(surface.parts, surface.areas).astype(np.float64) if rims else np.zeros(0)
-    return np.concatenate([chain, *walls.wall_ends(rims, areas)])[len(faces) :]
+    ends = [walls.strip(rims[i], rims[j]) for i, j in walls.facing(rims, areas)]  # as of a bowl without its lip
+    return np.concatenate([chain, *ends])[len(faces) :]
 
 
 def _rims(surface: _Surface) -> list[walls.Rim]:

@@ -130,11 +130,6 @@ def _places(rim: Rim, corners: Ints, sides: Ints) -> Ints:
     return (begin + np.arange(count + 1)) % len(rim.ids)
 
 
-def wall_ends(rims: list[Rim], areas: Floats) -> list[Ints]:
-    """Return strips, as (k, 3) triangles, between whole rims that are near all around, as of a bowl without its lip."""
-    return [strip(rims[i], rims[j]) for i, j in facing(rims, areas)]
-
-
 def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
     """Find pairs of rims that run opposite ways and are near enough for a strip, given the areas of their parts."""
     if len(rims) < 2:

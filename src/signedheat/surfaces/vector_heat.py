@@ -127,7 +127,7 @@ def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matr
 def vector_heat_forces(triangles: IntrinsicMesh, time: float, vectors: Complexes, faces: Ints) -> Complexes:
     """``(M + t L) X`` of Eq. 12, summed over some faces: complete at edges all of whose faces are among them."""
     diagonal, factor = _local_entries(triangles, time, faces)
-    x = triangles.in_face_frames(vectors, faces)
+    x = triangles.from_edge_frames(vectors[triangles.edges.face_edges[faces]], faces)
     forces = diagonal * x + factor * np.roll(x, -1, axis=1) + np.roll(factor * x, 1, axis=1)
     sums = np.zeros(len(vectors), dtype=np.complex128)
     np.add.at(sums, triangles.edges.face_edges[faces], triangles.in_edge_frames(forces, faces))
