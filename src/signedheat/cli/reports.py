@@ -124,10 +124,10 @@ def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation 
     Examples
     --------
     >>> from signedheat import samples
-    >>> verdict(inspect(samples.sphere(2)), orientation(samples.sphere(2)))
+    >>> verdict(*inspected(samples.sphere(2))[:2])
     'whole: closed and oriented; distance to it is exact'
     >>> broken = samples.without_faces(samples.sphere(2), 0.1)
-    >>> verdict(inspect(broken), orientation(broken))
+    >>> verdict(*inspected(broken)[:2])
     'broken: 24 holes to complete; every command takes it as it is'
     """
     if isinstance(counts, CloudReport):
@@ -179,7 +179,7 @@ def orientation_text(found: Orientation) -> str:
     Examples
     --------
     >>> from signedheat import samples
-    >>> orientation_text(orientation(samples.with_flipped_faces(samples.sphere(2), 0.1)))
+    >>> orientation_text(inspected(samples.with_flipped_faces(samples.sphere(2), 0.1))[1])
     '1 part, closed; faces disagree at 89 edges: 33 faces to turn (10.2 % of the area)'
     """
     closed = "closed" if found.closed_parts == found.n_parts else f"{found.closed_parts} closed"
