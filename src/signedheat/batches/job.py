@@ -243,7 +243,7 @@ class Job:
             phi.save(f"{stem}{self.volume}")
         surfaces = []
         for distance, name in zip(self.offsets, distinct_names(self.offsets), strict=True):
-            surface = phi.offset(distance)
+            surface = cast("TriangleMesh", phi.offset(distance))
             save(surface, f"{stem}_{name}{self.surfaces}")
             surfaces.append({"distance": distance, "vertices": surface.n_vertices, "faces": surface.n_faces})
         if surfaces:

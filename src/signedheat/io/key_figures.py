@@ -60,10 +60,9 @@ def snake(name: str) -> str:
 
 def inspected(thing: Any) -> tuple[Report, Orientation | None, Widths | None]:
     """Count what a shape or a solid has; also how a mesh is oriented, and the walls and gaps of a mesh or a solid."""
-    shape, found, outwards = as_shape(thing), None, None
-    if isinstance(
-        thing, Solid
-    ):  # nothing is left to orient: its completion has edges of three faces, and lies anywhere
+    shape, found = as_shape(thing), None
+    outwards: TriangleMesh | PolygonMesh | None = None
+    if isinstance(thing, Solid):  # there is nothing left to orient, and its completion is no defect
         outwards = TriangleMesh(*indexed(thing.outward)) if thing.bounding.any() else None
     elif isinstance(shape, TriangleMesh | PolygonMesh):
         found = orientation(shape)
