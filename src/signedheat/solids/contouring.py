@@ -261,8 +261,8 @@ def _creases_off(
     """
     step = float(spacing.max())
     near = np.flatnonzero(mask_of(len(vertices), faces[new])[faces].any(axis=1))
-    # planes that do not count as one: the angle between faces is small where a corner is missing
-    _, _, edges = bent_edges(vertices, faces[near], 2 * np.arctan(CREASE_TANGENT))
+    # half of the angle at which planes count as one, since it is small where a corner is missing
+    _, _, edges = bent_edges(vertices, faces[near], np.arctan(CREASE_TANGENT))
     edges = 3 * near[edges // 3] + edges % 3
     edges = edges[new[edges // 3].any(axis=1)]
     tails, heads = faces.ravel()[edges[:, 0]], faces.ravel()[edges[:, 1]]
