@@ -7,12 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 
 from shapes import small_runs
-from signedheat.compiled import allocation_free, compiled
+from signedheat.compiled import compiled
 
 
 def test_the_same_values_without_compiling(tmp_path):
@@ -54,20 +53,6 @@ def test_a_number_written_in_a_kernel_needs_no_compilation_of_its_own():
 
     assert quarters(12) == 6
     assert len(half.part.signatures) == 1
-
-
-def test_what_makes_arrays_is_not_free_of_allocation():
-    @compiled
-    def both(x):
-        return np.array([x, x])
-
-    @allocation_free
-    def twice(x):
-        return both(x)[0] + both(x)[1]
-
-    with pytest.raises(numba.TypingError):
-        twice(1.0)
-    assert both(1.0).sum() == 2.0
 
 
 def test_kernels_are_compiled_once():

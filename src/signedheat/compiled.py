@@ -128,14 +128,6 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     return lambda function: Kernel(function, options)
 
 
-def allocation_free(function: Callable[Parameters, Returned]) -> Kernel[Parameters, Returned]:
-    """Make a function a kernel that makes no arrays, as all that it calls: compiling refuses others.
-
-    References to arrays are not counted in it, so that it takes less long to compile and to run.
-    """
-    return Kernel(function, {"_nrt": False})
-
-
 def cache_folder() -> Path:
     """Return the folder for compiled code; if it is not writable, Numba uses that of the source, or its own cache."""
     wanted = os.environ.get("NUMBA_CACHE_DIR")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..compiled import allocation_free
+from ..compiled import compiled
 
 
 class Queue(NamedTuple):
@@ -24,13 +24,13 @@ class Queue(NamedTuple):
         return cls(np.empty(n_items, np.int64), np.full(n_items, -1), np.empty(n_items), np.zeros(1, np.int64))
 
 
-@allocation_free
+@compiled
 def before(keys: Floats, a: int, b: int) -> bool:
     """Return whether item a leaves the queue before item b; equal keys go by number, for reproducible results."""
     return bool(keys[a] < keys[b] or (keys[a] == keys[b] and a < b))
 
 
-@allocation_free
+@compiled
 def push(queue: Queue, item: int, key: float) -> None:
     """Put an item into the queue, or move it forward if its key has become smaller."""
     items, places, keys, size = queue
@@ -50,7 +50,7 @@ def push(queue: Queue, item: int, key: float) -> None:
     items[place], places[item] = item, place
 
 
-@allocation_free
+@compiled
 def pop(queue: Queue) -> int:
     """Remove the item with the smallest key, and return it."""
     items, places, keys, size = queue

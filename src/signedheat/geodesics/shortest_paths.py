@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from ..arrays import Complexes, Floats, Ints
-from ..compiled import allocation_free, compiled
+from ..compiled import compiled
 from ..errors import SourceError
 from ..mesh.gluing import cross, following, preceding
 from ..mesh.intrinsic_mesh import IntrinsicMesh
@@ -225,7 +225,7 @@ def unfold(faces: Faces, left: Ints, entered: Ints) -> tuple[Complexes, Ints, Co
     return portals, over, placed
 
 
-@allocation_free
+@compiled
 def on_base(corners: Complexes, side: int, over: int, point: complex, a: complex, b: complex) -> complex:
     """Return where a point of a face is if one of its sides is placed from a to b, and it is turned over if `over`."""
     base = corners[(side + 1) % 3] - corners[side]
@@ -304,7 +304,7 @@ def other_way(
     return left[:0], entered[:0]
 
 
-@allocation_free
+@compiled
 def _point_in(places: Places, pair: int, face: int) -> complex:
     """Return the position of the point of a pair in the layout of a face that contains it."""
     for s in range(places.first[pair], places.first[pair + 1]):

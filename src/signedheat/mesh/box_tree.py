@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..compiled import allocation_free
+from ..compiled import compiled
 
 BOXES_PER_LEAF = 4
 """Boxes in each leaf."""
@@ -94,30 +94,20 @@ class BoxTree(NamedTuple):
         own = np.full(len(corners), -1) if groups is None else np.ascontiguousarray(groups, dtype=np.int64)
         first = np.zeros(len(corners), dtype=np.int64) if leaves is None else leaves
         starts, room = np.zeros(len(corners) + 1, dtype=np.int64), 64 * len(corners)  # faces of a mesh have about 40
-        stack, work = np.empty(64, dtype=np.int64), np.empty((10, 3))
         while True:
             near = np.empty(room, dtype=np.int64)
-            _meeting(self, corners, slacks, own, first, stack, work, starts, near)
+            _meeting(self, corners, slacks, own, first, starts, near)
             if starts[-1] <= room:
                 return starts, near[: starts[-1]]
             room = int(starts[-1])
 
 
-@allocation_free
-def _meeting(
-    tree: BoxTree,
-    corners: Floats,
-    slacks: Floats,
-    own: Ints,
-    first: Ints,
-    stack: Ints,
-    work: Floats,
-    starts: Ints,
-    out: Ints,
-) -> None:
+@compiled
+def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, first: Ints, starts: Ints, out: Ints) -> None:
     """Write the boxes near each triangle into `out`, as far as there is room, and where they begin into `starts`."""
     bounds, items, groups, slabs, triangles = tree
-    leaves, lower, upper, ways, ends = len(bounds) // 2, work[0], work[1], work[2:6], work[6:10]
+    leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
+    lower, upper, ways, ends = np.empty(3), np.empty(3), np.empty((4, 3)), np.empty((4, 2))
     for t in range(len(corners)):
         for d in range(3):
             p, q = (d + 1) % 3, (d + 2) % 3
@@ -194,7 +184,7 @@ def _meeting(
         starts[t + 1] = count
 
 
-@allocation_free
+@compiled
 def _is_beyond(triangle: Floats, lower: Floats, upper: Floats, ways: Floats, ends: Floats) -> bool:
     """Return whether a triangle lies outside a box, or outside the interval between two `ends` along any direction."""
     for d in range(3):

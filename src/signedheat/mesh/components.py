@@ -6,14 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, read_only
-from ..compiled import allocation_free
+from ..compiled import compiled
 
 
 def connected_components(n: int, tails: NDArray[np.integer], heads: NDArray[np.integer]) -> Ints:
     """Return (n,) the component of each node of a graph with edges tails to heads, numbered by first appearance."""
-    parents = np.arange(n)
-    _join(parents, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (tails, heads)))
-    return -1 - parents
+    return _labels(n, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (tails, heads)))
 
 
 def element_components(elements: Ints) -> Ints:
@@ -33,9 +31,10 @@ def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
     return number[ids], order
 
 
-@allocation_free
-def _join(parents: Ints, tails: Ints, heads: Ints) -> None:
-    """Write −1 − (n,) components by union-find: the root of each tree is its least node, and paths to it are halved."""
+@compiled
+def _labels(n: int, tails: Ints, heads: Ints) -> Ints:
+    """Return (n,) components by union-find: the root of each tree is its least node, and paths to it are halved."""
+    parents = np.arange(n)
     for k in range(len(tails)):
         a, b = tails[k], heads[k]
         while parents[a] != a:
@@ -46,19 +45,18 @@ def _join(parents: Ints, tails: Ints, heads: Ints) -> None:
             b = parents[b]
         parents[max(a, b)] = min(a, b)
     count = 0
-    for node in range(len(parents)):  # its ancestors already have numbers
+    for node in range(n):  # its ancestors already have numbers
         if parents[node] == node:
             parents[node] = -1 - count
             count += 1
         else:
             parents[node] = parents[parents[node]]
+    return -1 - parents
 
 
 def grouped(groups: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
     """Return (n + 1,) where the members of each of n groups begin, and the members, indices into `groups`, in order."""
-    starts, members = np.zeros(n + 1, dtype=np.int64), np.empty(len(groups), dtype=np.int64)
-    np.cumsum(np.bincount(groups, minlength=n), out=starts[1:])
-    _put_in_groups(read_only(np.ascontiguousarray(groups, dtype=np.int64)), starts[:-1].copy(), members)
+    starts, members = _grouped(read_only(np.ascontiguousarray(groups, dtype=np.int64)), n)
     return starts, members
 
 
@@ -103,10 +101,16 @@ def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -
     return np.asarray(sums.reshape(n, *values.shape[1:]), np.float64)
 
 
-@allocation_free
-def _put_in_groups(groups: Ints, places: Ints, members: Ints) -> None:
-    """Do the work of `grouped` by a counting sort, given (n,) where the groups begin."""
-    for member in range(len(groups)):
-        group = groups[member]
+@compiled
+def _grouped(groups: Ints, n: int) -> tuple[Ints, Ints]:
+    """Do the work of `grouped` by a counting sort."""
+    starts = np.zeros(n + 1, dtype=np.int64)
+    for group in groups:
+        starts[group + 1] += 1
+    for group in range(n):
+        starts[group + 1] += starts[group]
+    places, members = starts[:-1].copy(), np.empty(len(groups), dtype=np.int64)
+    for member, group in enumerate(groups):
         members[places[group]] = member
         places[group] += 1
+    return starts, members

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Frozen, Ints, mask_of, read_only
-from ..compiled import allocation_free
+from ..compiled import compiled
 from .components import connected_components, first_members, grouped
 
 CLEARANCE = 1e-3
@@ -164,39 +164,19 @@ def edge_keys(tails: NDArray[np.integer], heads: NDArray[np.integer]) -> Ints:
     return (np.minimum(tails, heads).astype(np.int64) << 32) | np.maximum(tails, heads)
 
 
+@compiled
 def find_edges(tails: Ints, heads: Ints, used: Bools, n_vertices: int) -> tuple[Ints, Bools, Ints, Ints, Ints]:
     """Find edges of the used halfedges (h,): the edge of each, or −1, and whether it runs as the first along it does.
 
     Also returns (e,) the number of halfedges of each edge, the first one, and the second one or −1.
     """
-    degrees, last, following = np.zeros(n_vertices, dtype=np.int64), np.full(n_vertices, -1), np.empty_like(tails)
-    edges, forward, counts = np.full(len(tails), -1), np.zeros(len(tails), dtype=np.bool_), np.zeros_like(tails)
-    first, second = np.empty_like(tails), np.full(len(tails), -1)
-    n = _find_edges(tails, heads, used, degrees, last, following, edges, forward, counts, first, second)
-    return edges, forward, counts[:n].copy(), first[:n].copy(), second[:n].copy()
-
-
-@allocation_free
-def _find_edges(
-    tails: Ints,
-    heads: Ints,
-    used: Bools,
-    degrees: Ints,
-    last: Ints,
-    following: Ints,
-    edges: Ints,
-    forward: Bools,
-    counts: Ints,
-    first: Ints,
-    second: Ints,
-) -> int:
-    """Write what `find_edges` returns; return the number of edges.
-
-    The `last` edge of each vertex (n,), and the one `following` each, list the edges of the end of smaller degree.
-    """
+    degrees, last = np.zeros(n_vertices, dtype=np.int64), np.full(n_vertices, -1)
     for h in range(len(tails)):
         degrees[tails[h]] += 1
         degrees[heads[h]] += 1
+    following, counts = np.empty(len(tails), dtype=np.int64), np.zeros(len(tails), dtype=np.int64)
+    first, second = np.empty(len(tails), dtype=np.int64), np.full(len(tails), -1)
+    edges, forward = np.full(len(tails), -1), np.zeros(len(tails), dtype=np.bool_)
     n_edges = 0
     for h in range(len(tails)):
         if not used[h]:
@@ -215,4 +195,4 @@ def _find_edges(
             second[edge] = h
         counts[edge] += 1
         edges[h], forward[h] = edge, tails[h] == tails[first[edge]]
-    return n_edges
+    return edges, forward, counts[:n_edges].copy(), first[:n_edges].copy(), second[:n_edges].copy()

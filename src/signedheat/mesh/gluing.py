@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints, Number
-from ..compiled import allocation_free
+from ..compiled import compiled
 from .components import next_in_groups
 from .edges import EdgeTable
 from .intrinsic_mesh import IntrinsicMesh
@@ -48,19 +48,19 @@ class Gluing(NamedTuple):
     unit: float  # unit of length
 
 
-@allocation_free
+@compiled
 def following(h: int) -> int:
     """Return the next halfedge around the face."""
     return h + 1 if h % 3 < 2 else h - 2
 
 
-@allocation_free
+@compiled
 def preceding(h: int) -> int:
     """Return the previous halfedge around the face."""
     return h - 1 if h % 3 else h + 2
 
 
-@allocation_free
+@compiled
 def half_tangent(a: float, b: float, c: float) -> tuple[float, float]:
     """Return numerator and denominator of tan²(α/2), α opposite side a (Kahan); their product is 16 area²."""
     if b < c:
@@ -71,32 +71,32 @@ def half_tangent(a: float, b: float, c: float) -> tuple[float, float]:
     return numerator, denominator
 
 
-@allocation_free
+@compiled
 def tangent_at(g: Gluing, h: int) -> tuple[float, float]:
     """Return the `half_tangent` of the corner at the tail of a halfedge."""
     n = following(h)
     return half_tangent(g.length[g.edge[n]], g.length[g.edge[h]], g.length[g.edge[preceding(h)]])
 
 
-@allocation_free
-def move(g: Gluing, count: int, old: tuple[int, int, int, int], new: tuple[int, int, int, int]) -> None:
-    """Renumber the first `count` halfedges, old[k] to new[k], all at once; tails stay where they are."""
+@compiled
+def move(g: Gluing, old: tuple[int, ...], new: tuple[int, ...]) -> None:
+    """Renumber halfedges old[k] to new[k], all at once; tails stay where they are."""
     successors, predecessors, edges, flags = g.scratch[0], g.scratch[1], g.scratch[2], g.scratch[3]
-    for k in range(count):
+    for k in range(len(old)):
         after = g.sibling[old[k]]
         before = after
         while g.sibling[before] != old[k]:
             before = g.sibling[before]
-        for l in range(count):
+        for l in range(len(old)):
             if before == old[l]:
                 before = -1
-        for l in range(count):
+        for l in range(len(old)):
             if after == old[l]:
                 after = new[l]
                 break
         successors[k], predecessors[k], edges[k] = after, before, g.edge[old[k]]
         flags[k] = 2 * g.forward[old[k]] + g.front[old[k]]
-    for k in range(count):
+    for k in range(len(old)):
         h = new[k]
         g.sibling[h], g.edge[h], g.forward[h], g.front[h] = successors[k], edges[k], flags[k] >= 2, flags[k] % 2 == 1
         g.start[edges[k]] = h
@@ -104,7 +104,7 @@ def move(g: Gluing, count: int, old: tuple[int, int, int, int], new: tuple[int, 
             g.sibling[predecessors[k]] = h
 
 
-@allocation_free
+@compiled
 def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float, b: float, c: float, d: float) -> None:
     """Write one step into the history."""
     n = g.counts[N_STEPS]
@@ -113,7 +113,7 @@ def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float,
     g.counts[N_STEPS] = n + 1
 
 
-@allocation_free
+@compiled
 def faces_around(steps: Ints, n: int, around: Ints, start: Ints) -> None:
     """Write the faces that step n changes or makes, or −1, and the corner of each at the first point of the step."""
     kind = steps[n, 0]
@@ -127,18 +127,18 @@ def faces_around(steps: Ints, n: int, around: Ints, start: Ints) -> None:
         around[1], start[1] = steps[n, 2] // 3, steps[n, 2] % 3
 
 
-@allocation_free
+@compiled
 def turn_over(g: Gluing, face: int) -> None:
     """Reverse a face: corners (0, 1, 2) become (0, 2, 1)."""
     h = 3 * face
-    move(g, 2, (h, h + 2, h, h), (h + 2, h, h, h))
+    move(g, (h, h + 2), (h + 2, h))
     g.tail[h + 1], g.tail[h + 2] = g.tail[h + 2], g.tail[h + 1]
     for k in range(3):
         g.forward[h + k] = not g.forward[h + k]
     record(g, TURN_STEP, face, -1, -1, 0.0, 0.0, 0.0, 0.0)
 
 
-@allocation_free
+@compiled
 def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
     """Unfold the two faces at an edge into one plane: ``h: i → j`` with apex a, its twin with apex b.
 
@@ -165,7 +165,7 @@ def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
     return area_jab, area_iab, 0.25 * np.sqrt(n2 * d2), 0.25 * np.sqrt(n1 * d1), length
 
 
-@allocation_free
+@compiled
 def flip(g: Gluing, h: int) -> bool:
     """Flip an edge, so that h is ``b → a``; return False unless the two faces form a strictly convex quadrilateral."""
     t = g.sibling[h]
@@ -178,7 +178,7 @@ def flip(g: Gluing, h: int) -> bool:
         return False
     record(g, FLIP_STEP, h, t, -1, area_jab, area_iab, area_g, area_f)
     i, j, a, b = g.tail[h], g.tail[t], g.tail[h2], g.tail[t2]
-    move(g, 4, (h1, h2, t1, t2), (t2, h1, h2, t1))
+    move(g, (h1, h2, t1, t2), (t2, h1, h2, t1))
     g.tail[h], g.tail[h1], g.tail[h2] = b, a, i
     g.tail[t], g.tail[t1], g.tail[t2] = a, b, j
     g.length[g.edge[h]] = length
@@ -187,7 +187,7 @@ def flip(g: Gluing, h: int) -> bool:
     return True
 
 
-@allocation_free
+@compiled
 def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
     """Flip stacked edges until all that are not fixed are Delaunay; return False if the history is full before."""
     while g.counts[N_STACKED] > 0:
@@ -211,7 +211,7 @@ def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
     return True
 
 
-@allocation_free
+@compiled
 def push_edge(g: Gluing, stack: Ints, stacked: Bools, e: int) -> None:
     """Push an edge on the stack of edges that may have to be flipped, unless it is there already."""
     if not stacked[e]:
@@ -220,7 +220,7 @@ def push_edge(g: Gluing, stack: Ints, stacked: Bools, e: int) -> None:
         g.counts[N_STACKED] += 1
 
 
-@allocation_free
+@compiled
 def new_edge(g: Gluing, length: float, fixed: bool) -> int:
     """Add an edge; return its id."""
     e: int = g.counts[N_EDGES]
@@ -229,7 +229,7 @@ def new_edge(g: Gluing, length: float, fixed: bool) -> int:
     return e
 
 
-@allocation_free
+@compiled
 def apex(g: Gluing, h: int) -> complex:
     """Return the face's third corner, above the halfedge, which runs along the positive real axis from the origin."""
     base, right, left = g.length[g.edge[h]], g.length[g.edge[following(h)]], g.length[g.edge[preceding(h)]]
@@ -237,13 +237,13 @@ def apex(g: Gluing, h: int) -> complex:
     return complex(0.5 * (base + (left - right) * (left + right) / base), 0.5 * np.sqrt(n * d) / base)
 
 
-@allocation_free
+@compiled
 def cross(a: complex, b: complex) -> float:
     """Return the cross product of plane vectors, which is positive where b is counter-clockwise of a."""
     return a.real * b.imag - a.imag * b.real
 
 
-@allocation_free
+@compiled
 def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
     """Insert a vertex x at (u, v, w) into a face (a, b, c), which becomes (a, b, x), (b, c, x), (c, a, x); return x."""
     h = 3 * f
@@ -261,7 +261,7 @@ def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
     )
     g.counts[N_VERTICES], g.counts[N_FACES] = x + 1, n + 2
     k, l = 3 * n, 3 * n + 3
-    move(g, 2, (h + 1, h + 2, h, h), (k, l, h, h))
+    move(g, (h + 1, h + 2), (k, l))
     g.tail[k], g.tail[l] = b, c
     pair(g, h + 2, x, l + 1, a, to_a)
     pair(g, k + 2, x, h + 1, b, to_b)
@@ -269,47 +269,49 @@ def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
     return x
 
 
-@allocation_free
+@compiled
 def split_edge(g: Gluing, h: int, fraction: float) -> int:
     """Insert a vertex on an edge, `fraction` of the way along halfedge h, and split all its faces; return the vertex.
 
     Face (tail, head, apex) becomes (tail, x, apex) and a new (x, head, apex). No face may have the edge twice.
     """
     count = sibling_count(g, h)
+    around, seconds = np.empty(count, np.int64), np.empty(count, np.int64)
+    y = h
+    for k in range(count):
+        around[k] = y
+        y = g.sibling[y]
     e: int = g.edge[h]
     x: int = g.counts[N_VERTICES]
-    n_faces: int = g.counts[N_FACES]
     g.counts[N_VERTICES] = x + 1
     along = fraction if g.forward[h] else 1.0 - fraction
     whole = g.length[e]
     far_edge = new_edge(g, (1.0 - along) * whole, g.fixed[e])
-    y = h
     for k in range(count):
-        n = n_faces + k
+        y, n = around[k], g.counts[N_FACES]
         g.counts[N_FACES] = n + 1
         share = along if g.forward[y] else 1.0 - along
         record(g, SPLIT_EDGE, y, n, x, 1.0 - share, share, 0.0, 1.0)
         cut = new_edge(g, abs(apex(g, y) - share * whole), False)
         second, first = 3 * n, following(y)
         head, opposite = g.tail[first], g.tail[preceding(y)]
-        move(g, 1, (first, y, y, y), (second + 1, y, y, y))
+        move(g, (first,), (second + 1,))
         g.tail[second], g.tail[second + 1] = x, head
         g.forward[second], g.front[second] = g.forward[y], g.front[y]
         pair(g, first, x, second + 2, opposite, cut)
-        y = g.sibling[y]
+        seconds[k] = second
     g.length[e] = along * whole
     for k in range(count):
-        second, next_y, next_second = 3 * (n_faces + k), g.sibling[y], 3 * (n_faces + (k + 1) % count)
-        near, far = (y, second) if g.forward[y] else (second, y)
-        next_near, next_far = (next_y, next_second) if g.forward[next_y] else (next_second, next_y)
+        l = (k + 1) % count
+        near, far = (around[k], seconds[k]) if g.forward[around[k]] else (seconds[k], around[k])
+        next_near, next_far = (around[l], seconds[l]) if g.forward[around[l]] else (seconds[l], around[l])
         g.edge[near], g.edge[far] = e, far_edge
         g.start[e], g.start[far_edge] = near, far
         g.sibling[near], g.sibling[far] = next_near, next_far
-        y = next_y
     return x
 
 
-@allocation_free
+@compiled
 def sibling_count(g: Gluing, h: int) -> int:
     """Return the number of halfedges of an edge."""
     count, y = 1, g.sibling[h]
@@ -319,7 +321,7 @@ def sibling_count(g: Gluing, h: int) -> int:
     return count
 
 
-@allocation_free
+@compiled
 def pair(g: Gluing, h: int, tail: int, t: int, head: int, e: int) -> None:
     """Glue two halfedges into a new edge."""
     g.tail[h], g.edge[h], g.forward[h], g.front[h], g.sibling[h] = tail, e, True, True, t

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints, mask_of
-from ..compiled import allocation_free
+from ..compiled import compiled
 from .components import element_components
 from .edges import EdgeTable, edge_keys, edge_table
 from .unit_vectors import unit
@@ -97,21 +97,14 @@ def gradients_along(sides: Floats, rises: Floats) -> Floats:
     return np.cross(across, normals) / np.where(square > 0, square, np.inf)[:, None]
 
 
+@compiled
 def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[Floats, Bools]:
     """Return (p,) areas, and which polygons are degenerate: without area, to roundoff, or with a repeated vertex."""
     n = len(offsets) - 1
     areas, degenerate = np.empty(n), np.zeros(n, dtype=np.bool_)
-    _measure_polygons(vertices, corners, offsets, np.full(len(vertices), -1), np.empty((4, 3)), areas, degenerate)
-    return areas, degenerate
-
-
-@allocation_free
-def _measure_polygons(
-    vertices: Floats, corners: Ints, offsets: Ints, seen: Ints, work: Floats, areas: Floats, degenerate: Bools
-) -> None:
-    """Write what `areas_of_polygons` returns; `seen` (n,) has the last polygon at each vertex, −1 to begin with."""
-    middle, away, after, normal = work[0], work[1], work[2], work[3]
-    for f in range(len(areas)):
+    seen = np.full(len(vertices), -1)
+    middle, away, after, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for f in range(n):
         middle[:], normal[:] = 0.0, 0.0
         largest, radius = 0.0, 0.0
         for c in range(offsets[f], offsets[f + 1]):
@@ -130,6 +123,7 @@ def _measure_polygons(
                 normal[d] += away[d - 2] * after[d - 1] - away[d - 1] * after[d - 2]  # a cross product, cyclically
         areas[f] = 0.5 * np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
         degenerate[f] |= areas[f] <= 4.0 * 2.0**-52 * radius * largest  # 4 units in the last place
+    return areas, degenerate
 
 
 def cut_into_ears(polygon: Floats, normal: Floats, allowed: Callable[[int, int], bool] | None = None) -> Ints:

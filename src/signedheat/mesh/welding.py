@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints, read_only
-from ..compiled import allocation_free
+from ..compiled import compiled
 from .edges import find_edges
 
 ONE_PLACE = 4.0
@@ -67,12 +67,7 @@ def welded(points: Floats, tolerance: float | Floats) -> Ints:
     Chains are not followed: a point is compared only with points that stand for themselves.
     """
     smallest = float(np.nextafter(np.abs(points).max(initial=0.0), np.inf)) * 2.0**-60
-    tolerances = np.maximum(np.broadcast_to(tolerance, 3), max(smallest, 1e-300))
-    n = len(points)
-    cells = np.full(max(16, 1 << (2 * n - 1).bit_length()), -1, dtype=np.int32)
-    owner, following = np.empty(n, dtype=np.int64), np.full(n, -1, dtype=np.int32)
-    _weld(np.ascontiguousarray(points), tolerances, cells, following, owner)
-    return owner
+    return _weld(np.ascontiguousarray(points), np.maximum(np.broadcast_to(tolerance, 3), max(smallest, 1e-300)))
 
 
 def same_positions(points: Floats) -> Ints:
@@ -90,11 +85,7 @@ def indexed(triangles: Floats) -> tuple[Floats, Ints]:
 def same_rows(rows: NDArray[np.integer]) -> Ints:
     """Return (n,) the first row that equals each of (n, k) rows, in O(n) time."""
     numbers = np.ascontiguousarray(rows)
-    count = len(numbers)
-    table = np.full(max(16, 1 << (2 * count - 1).bit_length()), -1, dtype=np.int32)
-    first = np.empty(count, dtype=np.int64)
-    _same_rows(numbers.view(np.int64) if numbers.itemsize == 8 else numbers.astype(np.int64), table, first)
-    return first
+    return _same_rows(numbers.view(np.int64) if numbers.itemsize == 8 else numbers.astype(np.int64))
 
 
 def distinct_rows(rows: NDArray[np.integer]) -> tuple[Ints, Ints]:
@@ -123,7 +114,7 @@ def coincident_faces(corners: Ints, offsets: Ints) -> tuple[Ints, Bools]:
     return first, reverse
 
 
-@allocation_free
+@compiled
 def mixed(a: int, b: int, c: int) -> int:
     """Return a nonnegative hash of three integers: 32-bit halves times odd numbers, so that products fit 64 bits."""
     x = ((a & _LOW) * 0x1E3779B1) ^ ((b & _LOW) * 0x2545F491) ^ ((c & _LOW) * 0x165667B1)
@@ -132,15 +123,18 @@ def mixed(a: int, b: int, c: int) -> int:
     return (x ^ (x >> 27)) & 0x7FFFFFFFFFFFFFFF
 
 
-@allocation_free
-def _weld(
-    points: Floats, tolerances: Floats, heads: NDArray[np.int32], following: NDArray[np.int32], owner: Ints
-) -> None:
-    """Do the work of `welded` with a hash table of cells 16 tolerances wide; their number is a power of two."""
-    mask = len(heads) - 1
-    near_x, near_y, near_z = tolerances[0], tolerances[1], tolerances[2]
-    side_x, side_y, side_z = 16.0 * near_x, 16.0 * near_y, 16.0 * near_z  # few points are near cell walls
-    for p in range(len(points)):
+@compiled
+def _weld(points: Floats, tolerances: Floats) -> Ints:
+    """Do the work of `welded` with a hash table of cells 16 tolerances wide."""
+    n = len(points)
+    bits = 4
+    while (1 << bits) < 2 * n:
+        bits += 1
+    mask = (1 << bits) - 1
+    heads, following = np.full(1 << bits, -1, dtype=np.int32), np.full(n, -1, dtype=np.int32)
+    owner = np.empty(n, dtype=np.int64)
+    (near_x, near_y, near_z), (side_x, side_y, side_z) = tolerances, 16.0 * tolerances  # few points are near cell walls
+    for p in range(n):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         low = (np.floor((x - near_x) / side_x), np.floor((y - near_y) / side_y), np.floor((z - near_z) / side_z))
         high = (np.floor((x + near_x) / side_x), np.floor((y + near_y) / side_y), np.floor((z + near_z) / side_z))
@@ -162,13 +156,19 @@ def _weld(
         home = mixed(i, j, k) & mask
         following[p] = heads[home]
         heads[home] = p
+    return owner
 
 
-@allocation_free
-def _same_rows(rows: Ints, table: NDArray[np.int32], result: Ints) -> None:
-    """Do the work of `same_rows` with a hash table of rows, whose length is a power of two."""
+@compiled
+def _same_rows(rows: Ints) -> Ints:
+    """Do the work of `same_rows` with a hash table of rows."""
     count, width = rows.shape
-    mask = np.uint64(len(table) - 1)
+    size = 16
+    while size < 2 * count:
+        size *= 2
+    mask = np.uint64(size - 1)
+    table = np.full(size, -1, dtype=np.int32)
+    result = np.empty(count, dtype=np.int64)
     for i in range(count):
         key = np.uint64(1469598103934665603)
         for d in range(width):
@@ -186,3 +186,4 @@ def _same_rows(rows: Ints, table: NDArray[np.int32], result: Ints) -> None:
         if row < 0:
             table[place] = row = i
         result[i] = row
+    return result

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints, read_only
-from ..compiled import allocation_free, compiled
+from ..compiled import compiled
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, boxes_around, morton_codes
 from ..mesh.components import by_first_use, connected_components, sums_of
 from ..mesh.edges import EdgeTable, edge_table
@@ -143,9 +143,7 @@ class FaceTree:
     @cached_property
     def discs(self) -> Floats:
         """(2 · leaves, 8) centre, normal, radius and half thickness of each node's disc; < 0 if faces are not flat."""
-        discs = np.full((len(self.tree.bounds), 8), -1.0)
-        _bound_by_discs(self.features.corners, self.tree, discs)
-        return discs
+        return _discs(self.features.corners, self.tree)
 
     def distances(self, points: Floats) -> Floats:
         """Return (n,) distances of (n, 3) points to the nearest face."""
@@ -184,11 +182,12 @@ class FaceTree:
         return nearest_faces(self.features.rows, self.tree, self.discs, points, 512)
 
 
-@allocation_free
-def _bound_by_discs(corners: Floats, tree: BoxTree, discs: Floats) -> None:
-    """Write `FaceTree.discs`. Discs are convex, so that it is enough that they contain the corners of the faces."""
+@compiled
+def _discs(corners: Floats, tree: BoxTree) -> Floats:
+    """Compute `FaceTree.discs`. Discs are convex, so that it is enough that they contain the corners of the faces."""
     bounds, items = tree.bounds, tree.items
     leaves = len(bounds) // 2
+    discs = np.full((2 * leaves, 8), -1.0)
     first = max(1, leaves >> 7)  # eight levels: higher nodes are not flat
     below = BOXES_PER_LEAF * leaves // first
     for node in range(first, 2 * leaves):
@@ -222,6 +221,7 @@ def _bound_by_discs(corners: Floats, tree: BoxTree, discs: Floats) -> None:
             discs[node, 0], discs[node, 1], discs[node, 2] = x + middle * nx, y + middle * ny, z + middle * nz
             discs[node, 3], discs[node, 4], discs[node, 5] = nx, ny, nz
             discs[node, 6], discs[node, 7] = radius * slack, thickness * slack + 1e-12 * radius
+    return discs
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,7 +259,7 @@ def _feet(
     return distances, places, kinds, cosines, regular
 
 
-@allocation_free
+@compiled
 def _facing(features: FaceFeatures, face: int, feature: int, dx: float, dy: float, dz: float) -> tuple[float, bool]:
     """Return the cosine between a feature's normal and (dx, dy, dz), and whether its sign decides the side."""
     normals, row, regular = features.face_normals, np.int64(face), True

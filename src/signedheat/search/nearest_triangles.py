@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, read_only
-from ..compiled import allocation_free
+from ..compiled import compiled
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..parallel import in_chunks
 
@@ -63,7 +63,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@allocation_free
+@compiled
 def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tuple[float, int, float, float, float]:
     """Return the squared distance to triangle f, and feature code and coordinates of the foot, its nearest point."""
     px, py, pz = x - rows[f, 0], y - rows[f, 1], z - rows[f, 2]
@@ -102,7 +102,7 @@ def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tupl
     return dx * dx + dy * dy + dz * dz, feature, x - dx, y - dy, z - dz
 
 
-@allocation_free
+@compiled
 def away_from_triangle(rows: Floats, f: int, places: Floats, at: int, out: Floats) -> None:
     """Write squared distances of (3, n) places to a triangle, and vectors from their feet, to ``out[at]`` (4, n).
 
@@ -150,16 +150,10 @@ def away_from_triangle(rows: Floats, f: int, places: Floats, at: int, out: Float
         out[at, 3, k] = up * nz + a * uz + b * vz
 
 
+@compiled
 def barycentric_on_triangles(rows: Floats, faces: NDArray[np.int32], points: Floats) -> Floats:
     """Return (n, 3) barycentric coordinates of the place on the k-th of (n,) faces nearest to the k-th point."""
     weights = np.zeros((len(points), 3))
-    _write_barycentric(rows, faces, points, weights)
-    return weights
-
-
-@allocation_free
-def _write_barycentric(rows: Floats, faces: NDArray[np.int32], points: Floats, weights: Floats) -> None:
-    """Write what `barycentric_on_triangles` returns."""
     for k in range(len(points)):
         f = np.int64(faces[k])
         _, feature, _, _, _ = foot_on_triangle(rows, f, points[k, 0], points[k, 1], points[k, 2])
@@ -181,6 +175,7 @@ def _write_barycentric(rows: Floats, faces: NDArray[np.int32], points: Floats, w
         t = min(max(t, 0.0), 1.0)
         s = min(max(s, 0.0), 1.0 - t)
         weights[k, 0], weights[k, 1], weights[k, 2] = max(1.0 - s - t, 0.0), s, t
+    return weights
 
 
 def weights_in(triangles: Floats, places: Floats) -> Floats:
@@ -217,32 +212,13 @@ def nearest_faces(
     rows: Floats, tree: BoxTree, discs: Floats, points: Floats, run: int
 ) -> tuple[NDArray[np.int32], Floats]:
     """Return (n,) the nearest face of each of (n, 3) points, and the squares of their distances: see `_descend`."""
-    together, faces, squares = (
-        min(max(len(points), 1), POINTS_TOGETHER),
-        np.empty(len(points), np.int32),
-        np.empty(len(points)),
-    )
-    stack, which = np.empty(66, dtype=np.int64), np.zeros(together, dtype=np.int64)
-    places, gaps, best = np.empty((3, together)), np.zeros((66, together)), np.empty(together)
-    _descend(rows, tree, discs, read_only(points), run, stack, which, places, gaps, best, faces, squares)
-    return faces, squares
+    return _descend(rows, tree, discs, read_only(points), run, np.empty(min(max(len(points), 1), POINTS_TOGETHER)))
 
 
-@allocation_free
+@compiled
 def _descend(
-    rows: Floats,
-    tree: BoxTree,
-    discs: Floats,
-    points: Floats,
-    run: int,
-    stack: Ints,
-    which: Ints,
-    places: Floats,
-    gaps: Floats,
-    best: Floats,
-    out_faces: NDArray[np.int32],
-    out_squares: Floats,
-) -> None:
+    rows: Floats, tree: BoxTree, discs: Floats, points: Floats, run: int, best: Floats
+) -> tuple[NDArray[np.int32], Floats]:
     """Find the nearest face of each point (n, 3), and the square of its distance, by descending a tree of boxes and
     discs.
 
@@ -250,7 +226,10 @@ def _descend(
     starts from the face found before; every `run` points it starts from none.
     """
     bounds, items = tree.bounds, tree.items
+    out_faces, out_squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
     leaves, together, middle = len(bounds) // 2, len(best), len(best) // 2
+    places, which = np.empty((3, together)), np.zeros(together, dtype=np.int64)
+    stack, gaps = np.empty(66, dtype=np.int64), np.zeros((66, together))
     for begin in range(0, len(points), together):
         last = which[together - 1]
         for k in range(together):
@@ -353,3 +332,4 @@ def _descend(
             begun = True
         for k in range(min(together, len(points) - begin)):
             out_faces[begin + k], out_squares[begin + k] = which[k], best[k]
+    return out_faces, out_squares

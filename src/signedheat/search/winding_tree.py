@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..compiled import allocation_free
+from ..compiled import compiled
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..mesh.triangles import area_vectors
 from ..mesh.unit_vectors import unit
@@ -46,13 +46,8 @@ class WindingTree:
         """Return (n,) winding numbers around (n, 3) points, to a few hundredths; on a face, those of one side."""
         corners = np.ascontiguousarray(self.triangles).reshape(-1, 9)
         points = np.ascontiguousarray(points)  # the kernel is compiled for one kind of array
-
-        def of_some(chunk: Floats) -> tuple[Floats]:
-            found = np.zeros(len(chunk))
-            _winding(corners, self.tree.items, self._moments, chunk, np.empty(64, dtype=np.int64), found)
-            return (found,)
-
-        return in_chunks(of_some, points)[0]
+        (numbers,) = in_chunks(lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk),), points)
+        return numbers
 
     def levels(self, places: Floats, normals: Floats, areas: Floats) -> Floats:
         """Return (n,) means of the numbers on both sides of places on faces with these unit normals and areas."""
@@ -90,10 +85,12 @@ def winding_sums(triangles: Floats, points: Floats) -> Floats:
     return numbers
 
 
-@allocation_free
-def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats, stack: Ints, out: Floats) -> None:
-    """Write (n,) winding numbers, by the solid angles of faces in near leaves and by the `_moments` of far nodes."""
+@compiled
+def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> Floats:
+    """Return (n,) winding numbers, by the solid angles of faces in near leaves and by the `_moments` of far nodes."""
     leaves = len(moments) // 2
+    stack = np.empty(64, dtype=np.int64)
+    result = np.zeros(len(points))
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         total, depth = 0.0, 1
@@ -130,10 +127,11 @@ def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats, stac
                             total += 2.0 * np.arctan2(volume, rest)
                 if imaginary != 0.0:
                     total += 2.0 * np.arctan2(imaginary, real)
-        out[p] = total / (4.0 * np.pi)
+        result[p] = total / (4.0 * np.pi)
+    return result
 
 
-@allocation_free
+@compiled
 def solid_angle(corners: Floats, face: int, x: float, y: float, z: float) -> tuple[float, float]:
     """Return the parts of a complex number whose argument is half a solid angle (van Oosterom & Strackee 1983)."""
     ax, ay, az = corners[face, 0] - x, corners[face, 1] - y, corners[face, 2] - z
@@ -148,7 +146,7 @@ def solid_angle(corners: Floats, face: int, x: float, y: float, z: float) -> tup
     return rest, volume
 
 
-@allocation_free
+@compiled
 def mean_angle(corners: Floats, face: int, x: float, y: float, z: float) -> float:
     """Return the signed solid angle of a triangle from a point; in its plane 0, the mean of those on both sides."""
     rest, volume = solid_angle(corners, face, x, y, z)

@@ -23,7 +23,7 @@ import scipy
 from scipy import sparse
 
 from ..arrays import Bools, Floats, Frozen, Ints
-from ..compiled import allocation_free, compiled
+from ..compiled import compiled
 from ..linear.conjugate_gradients import conjugate_gradients
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, morton_codes
 from ..mesh.components import numbered, sums_of
@@ -198,7 +198,7 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
     return faces, a + u[:, None] * (b - a) + v[:, None] * (c - a)
 
 
-@allocation_free
+@compiled
 def _small_pieces(
     corners: Floats, starts: Ints, vectors: Floats, balls: Floats, places: Floats, own: Ints, matrix: Floats
 ) -> None:

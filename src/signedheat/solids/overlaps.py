@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..arrays import Bools, Floats, Ints
-from ..compiled import allocation_free
+from ..compiled import compiled
 from ..mesh.box_tree import BoxTree
 from ..mesh.components import grouped
 from ..mesh.triangles import area_vectors, face_areas
@@ -44,9 +44,7 @@ def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) ->
     corners = np.ascontiguousarray(triangles[order]).reshape(-1, 9)
     wanted = np.bincount(labels[faces])[labels[faces]]
     levels, few = np.zeros(len(faces)), np.flatnonzero(wanted <= SUMMED_POINTS)
-    of_few = np.zeros(len(few))
-    _among_few(corners, starts, counts[order], rank[faces[few]], labels[faces[few]], of_few)
-    levels[few] = of_few
+    levels[few] = _among_few(corners, starts, counts[order], rank[faces[few]], labels[faces[few]])
     for group in np.unique(labels[faces][wanted > SUMMED_POINTS]):
         chosen = np.flatnonzero(labels[faces] == group)
         members = order[starts[group] : starts[group + 1]]
@@ -63,9 +61,10 @@ def levels_of_pieces(pieces: Pieces) -> Floats:
     return np.bincount(owners, levels, len(pieces.areas)) / np.bincount(owners, minlength=len(pieces.areas))
 
 
-@allocation_free
-def _among_few(corners: Floats, starts: Ints, counts: Ints, faces: Ints, groups: Ints, levels: Floats) -> None:
-    """Write (n,) levels at the centres of faces, summed over the triangles of their groups."""
+@compiled
+def _among_few(corners: Floats, starts: Ints, counts: Ints, faces: Ints, groups: Ints) -> Floats:
+    """(n,) levels at the centres of faces, summed over the triangles of their groups."""
+    levels = np.zeros(len(faces))
     for row in range(len(faces)):
         i, group = faces[row], groups[row]
         x = (corners[i, 0] + corners[i, 3] + corners[i, 6]) / 3
@@ -76,6 +75,7 @@ def _among_few(corners: Floats, starts: Ints, counts: Ints, faces: Ints, groups:
             if j != i:
                 total += counts[j] * mean_angle(corners, j, x, y, z)
         levels[row] = total / (4.0 * np.pi)
+    return levels
 
 
 Nesting = Literal["given", "cavities", "bodies"]

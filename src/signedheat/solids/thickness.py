@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Frozen, Ints
-from ..compiled import allocation_free
+from ..compiled import compiled
 from ..errors import SourceError
 from ..kinds import ShapeLike
 from ..memory import refuse_beyond_memory
@@ -291,8 +291,7 @@ def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) 
         """Measure at (k, 6) places and their normals."""
         diameters, touched = np.full(len(rays), extent), np.zeros(len(rays), dtype=np.int64)
         rows, boxes = tree.features.rows, tree.tree
-        stack = np.empty(66, dtype=np.int64)
-        _descend(rows, facing, boxes.bounds, tree.discs, ways, boxes.items, rays, least, stack, diameters, touched)
+        _descend(rows, facing, boxes.bounds, tree.discs, ways, boxes.items, rays, least, diameters, touched)
         return diameters, touched
 
     diameters, touched = in_chunks(measured, np.column_stack([places, normals]))
@@ -329,7 +328,7 @@ def _cut(triangles: Floats, longest: float) -> tuple[Floats, Ints]:
     return np.concatenate(kept)[order], np.concatenate(whose)[order]
 
 
-@allocation_free
+@compiled
 def _descend(
     rows: Floats,
     facing: Floats,
@@ -339,7 +338,6 @@ def _descend(
     items: Ints,
     places: Floats,
     least: float,
-    stack: Ints,
     out: Floats,
     touched: Ints,
 ) -> None:
@@ -348,7 +346,7 @@ def _descend(
     In the first round walls may reach in by `ROUND_WALL`, since a ball that fits a round wall touches all of it. In
     each further round, near the place that the ball touches, they may do so by `FINER` times as much.
     """
-    leaves = len(bounds) // 2
+    leaves, stack = len(bounds) // 2, np.empty(66, dtype=np.int64)
     for p in range(len(places)):
         x, y, z = places[p, 0], places[p, 1], places[p, 2]
         nx, ny, nz = places[p, 3], places[p, 4], places[p, 5]
@@ -407,7 +405,7 @@ def _descend(
         out[p] = diameter
 
 
-@allocation_free
+@compiled
 def _square(bounds: Floats, node: int, x: float, y: float, z: float) -> float:
     """Squared distance of a place to a box; infinite to an empty one."""
     dx = max(bounds[node, 0] - x, x - bounds[node, 3], 0.0)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Frozen, Ints
-from ..compiled import allocation_free
+from ..compiled import compiled
 from ..mesh.gluing import (
     FLIP_STEP,
     SPLIT_EDGE,
@@ -81,26 +81,20 @@ class History(Frozen):
     ) -> tuple[Ints, Floats, Floats]:
         """Carry points through the steps from `begin` on, by default through all that change their faces."""
         faces = np.array(faces, dtype=np.int64)
-        first = links.first[faces] if begin is None else begin
-        around, start = np.zeros((2, 3), dtype=np.int64)
-        transfer(self.steps, self.weights, links, first, around, start, np.empty(4), faces, rows)
+        transfer(self.steps, self.weights, links, links.first[faces] if begin is None else begin, faces, rows)
         return faces, rows[:, 0].copy(), rows[:, 1:].copy()
 
     @cached_property
     def _later(self) -> Links:
-        return self._linked(True)
+        return Links(True, *linked_steps(self.steps, self._most_faces, True))
 
     @cached_property
     def _earlier(self) -> Links:
-        return self._linked(False)
+        return Links(False, *linked_steps(self.steps, self._most_faces, False))
 
-    def _linked(self, forward: bool) -> Links:
-        most_faces = max(self.before.n_faces, self.after.n_faces)
-        first, following_step = np.full(most_faces, -1, np.int32), np.full((len(self.steps), 3), -1, np.int32)
-        links = Links(forward, first, following_step)
-        around, start = np.empty((2, 3), dtype=np.int64)
-        link_steps(self.steps, links, around, start)
-        return links
+    @property
+    def _most_faces(self) -> int:
+        return max(self.before.n_faces, self.after.n_faces)
 
     @cached_property
     def gluing_before(self) -> Gluing:
@@ -160,7 +154,7 @@ def straight_lines(gluing: Gluing, faces: Ints, barycentric: Floats, vectors: Fl
     while True:
         (owners, crossed), (starts, ends) = np.empty((2, room), np.int64), np.empty((2, room, 3))
         lines = Lines(owners, crossed, starts, ends, np.empty((room, vectors.shape[1], 3)))
-        count = trace_both_ways(gluing, faces, barycentric, halves, np.empty(3), np.empty(halves.shape[1:]), lines)
+        count = trace_both_ways(gluing, faces, barycentric, halves, lines)
         if count <= room:
             break
         room = count
@@ -197,10 +191,12 @@ SQUARE_LENGTH_ROUNDING = 1e-10
 """Rounding error of squared lengths, relative to the size of their terms."""
 
 
-@allocation_free
-def link_steps(steps: Ints, links: Links, around: Ints, start: Ints) -> None:
-    """Link the steps that change each face, see `Links`; `around` and `start` are work arrays (3,)."""
-    forward, first, following_step = links
+@compiled
+def linked_steps(steps: Ints, n_faces: int, forward: bool) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Link the steps that change each face: see `Links`."""
+    first = np.full(n_faces, -1, np.int32)
+    following_step = np.full((len(steps), 3), -1, np.int32)
+    around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     for m in range(len(steps)):
         n = len(steps) - 1 - m if forward else m
         faces_around(steps, n, around, start)
@@ -210,24 +206,13 @@ def link_steps(steps: Ints, links: Links, around: Ints, start: Ints) -> None:
         for k in range(3):
             if around[k] >= 0:
                 first[around[k]] = n
+    return first, following_step
 
 
-@allocation_free
-def transfer(
-    steps: Ints,
-    weights: Floats,
-    links: Links,
-    begin: NDArray[np.int32],
-    around: Ints,
-    start: Ints,
-    x: Floats,
-    faces: Ints,
-    rows: Floats,
-) -> None:
-    """Carry points and vectors (p, 1 + k, 3) through the steps that change their faces, from `begin` on, in place.
-
-    Work arrays are `around` and `start` (3,) and x (4,).
-    """
+@compiled
+def transfer(steps: Ints, weights: Floats, links: Links, begin: NDArray[np.int32], faces: Ints, rows: Floats) -> None:
+    """Carry points and vectors (p, 1 + k, 3) through the steps that change their faces, from `begin` on, in place."""
+    around, start = np.empty(3, np.int64), np.zeros(3, np.int64)
     for p in range(len(faces)):
         n = np.int64(begin[p])
         while n >= 0:
@@ -236,28 +221,21 @@ def transfer(
             while around[side] != faces[p]:
                 side += 1
             old, new = (BEFORE_STEP[kind], AFTER_STEP[kind]) if links.forward else (AFTER_STEP[kind], BEFORE_STEP[kind])
-            place = exchange(kind, weights[n], links.forward, old[side], start[side], new, start, x, rows[p])
+            place = exchange(kind, weights[n], links.forward, old[side], start[side], new, start, rows[p])
             faces[p] = around[place]
             n = np.int64(links.next_of_face[n, place])
 
 
-@allocation_free
+@compiled
 def exchange(
-    kind: int,
-    c: Floats,
-    forward: bool,
-    corners: Ints,
-    start: int,
-    new_corners: Ints,
-    new_start: Ints,
-    x: Floats,
-    rows: Floats,
+    kind: int, c: Floats, forward: bool, corners: Ints, start: int, new_corners: Ints, new_start: Ints, rows: Floats
 ) -> int:
     """Transfer a point, the first row, and vectors over one step; return which of the step's new faces contains it."""
     lead = 3 if kind == SPLIT_FACE else 2  # points with a smaller index are on one side of the dependency
+    x = np.zeros(4)
     gone, place = -1, 0
     for r in range(len(rows)):
-        x[0] = x[1] = x[2] = x[3] = 0.0
+        x[:] = 0.0
         for k in range(3):
             x[corners[k]] = rows[r, (start + k) % 3]
         if r == 0:
@@ -265,9 +243,8 @@ def exchange(
             for l in range(4):
                 if (l < lead) == forward and c[l] > 0.0 and x[l] / c[l] < least:
                     gone, least = l, x[l] / c[l]
-            k = 0
-            while gone >= 0 and k < 3:  # the new face that has not the point whose weight vanishes
-                place, k = (place + 1, 0) if new_corners[place, k] == gone else (place, k + 1)
+            while gone >= 0 and (new_corners[place] == gone).any():
+                place += 1
         if gone >= 0:  # no point is left out where a face is only turned over
             amount = x[gone] / c[gone] if forward else -x[gone] / c[gone]
             for l in range(4):
@@ -278,7 +255,7 @@ def exchange(
     return place
 
 
-@allocation_free
+@compiled
 def squared_length(g: Gluing, f: int, v: Floats) -> tuple[float, float]:
     """Squared length of a vector in a face, from differences of barycentric coordinates, and the sum of |terms|."""
     square, size = 0.0, 0.0
@@ -289,14 +266,15 @@ def squared_length(g: Gluing, f: int, v: Floats) -> tuple[float, float]:
     return square, size
 
 
-@allocation_free
-def trace_geodesic(g: Gluing, face: int, w: Floats, v: Floats, sign: float, out: Lines, n: int) -> int:
-    """Trace a geodesic from a point w along the first vector v, times ±1, over its length; carry the other vectors.
+@compiled
+def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, sign: float, out: Lines, n: int) -> int:
+    """Trace a geodesic from a point along its first vector, times ±1, over its length; carry the other vectors.
 
-    Write a row for each face crossed, from row n on, as far as there is room; return the next row. The point and the
-    vectors become those at the end. A line ends early where rounding in nearly flat faces has made it longer.
+    Write a row for each face crossed, from row n on, as far as there is room; return the next row. A line ends early
+    where rounding in nearly flat faces has made it longer.
     """
     f, left, slides = face, 1.0, 0
+    w, v = barycentric.copy(), vectors.copy()
     square, rounding = squared_length(g, f, v[0])
     longest = 4.0 * (abs(square) + SQUARE_LENGTH_ROUNDING * rounding)
     for _ in range(1000000):
@@ -358,22 +336,13 @@ def trace_geodesic(g: Gluing, face: int, w: Floats, v: Floats, sign: float, out:
     return n
 
 
-@allocation_free
-def trace_both_ways(
-    g: Gluing, faces: Ints, barycentric: Floats, vectors: Floats, w: Floats, v: Floats, out: Lines
-) -> int:
-    """Trace half of the first vector both ways from every point p; rows of the backward half have owner −1 − p.
-
-    Work arrays w and v are for one point and its vectors.
-    """
+@compiled
+def trace_both_ways(g: Gluing, faces: Ints, barycentric: Floats, vectors: Floats, out: Lines) -> int:
+    """Trace half of the first vector both ways from every point p; rows of the backward half have owner −1 − p."""
     n = 0
-    for line in range(2 * len(faces)):
-        p, begin = line // 2, n
-        for k in range(3):
-            w[k] = barycentric[p, k]
-            for m in range(len(v)):
-                v[m, k] = vectors[p, m, k]
-        n = trace_geodesic(g, faces[p], w, v, 1.0 if line % 2 == 0 else -1.0, out, n)
-        for row in range(begin, min(n, len(out.owners))):
-            out.owners[row] = p if line % 2 == 0 else -1 - p
+    for p in range(len(faces)):
+        for owner, sign in ((p, 1.0), (-1 - p, -1.0)):
+            begin = n
+            n = trace_geodesic(g, faces[p], barycentric[p], vectors[p], sign, out, n)
+            out.owners[begin : min(n, len(out.owners))] = owner
     return n

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import Bools, Complexes, Floats, Ints
-from ..compiled import allocation_free, compiled
+from ..compiled import compiled
 from ..jobs import Progress, within
 from ..mesh.gluing import (
     N_EDGES,
@@ -102,8 +102,6 @@ def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
     lengths = gluing.length[:n_edges]
     order = np.argsort(lengths, kind="stable")
     group, extent = coinciding(tail, head, lengths, order[counts[order] > 0], n_vertices)
-    narrow = np.zeros(n_vertices, dtype=bool)
-    mark_narrow(gluing, narrow)
     segments = np.flatnonzero(gluing.fixed[:n_edges])
     segment = np.full(n_edges, -1, dtype=np.int64)
     segment[segments] = np.arange(len(segments))
@@ -117,16 +115,12 @@ def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
         segment_ends=np.stack([tail[segments], head[segments]], axis=1),
         segment_length=gluing.length[segments],
         on_segment=np.full(n_vertices, -1, dtype=np.int64),
-        narrow=narrow,
+        narrow=narrow_vertices(gluing),
         group=group,
         extent=extent,
         seen=np.array([gluing.counts[N_STEPS], BAD_FACE_LISTS]),
         seen_sides=np.empty((4096, 2), dtype=np.complex128),
         halfedges=np.empty((4096, 2), dtype=np.int64),
-        corners=np.zeros(3, dtype=np.complex128),
-        weights=np.empty(3),
-        around=np.empty(3, dtype=np.int64),
-        starts=np.empty(3, dtype=np.int64),
     )
 
 
@@ -156,10 +150,6 @@ class Agenda(NamedTuple):
     seen: Ints  # number of steps of the history whose faces have been listed, and the bin that the last face came from
     seen_sides: Complexes  # work array of `encroached`: (k, 2) ends of the halfedges still to be visited
     halfedges: Ints  # work array of `encroached`: (k, 2) these halfedges, and their sides, 1 or −1
-    corners: Complexes  # work array: (3,) what `place_corners` writes
-    weights: Floats  # work array: (3,)
-    around: Ints  # work arrays: (3,) what `faces_around` writes
-    starts: Ints
 
 
 class Goal(NamedTuple):
@@ -170,16 +160,17 @@ class Goal(NamedTuple):
     max_vertices: int
 
 
-@allocation_free
+@compiled
 def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
     """Insert vertices until all faces meet the goal, if possible; pause after `patience`; return why it stopped."""
     pause = g.counts[N_VERTICES] + patience
+    around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     while flip_until_delaunay(g, agenda.stack, agenda.stacked):
         for n in range(agenda.seen[0], g.counts[N_STEPS]):
-            faces_around(g.steps, n, agenda.around, agenda.starts)
+            faces_around(g.steps, n, around, start)
             for k in range(3):
-                if agenda.around[k] >= 0:
-                    list_face(g, agenda, agenda.around[k], goal)
+                if around[k] >= 0:
+                    list_face(g, agenda, around[k], goal)
         agenda.seen[0] = g.counts[N_STEPS]
         f = next_bad(g, agenda, goal)
         if f < 0:
@@ -195,7 +186,7 @@ def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
     return ARRAYS_FULL
 
 
-@allocation_free
+@compiled
 def is_bad(g: Gluing, f: int, goal: Goal) -> tuple[bool, int]:
     """Tell whether a face is too thin or too large; return also its shortest side, opposite to its smallest angle."""
     h = 3 * f
@@ -206,7 +197,7 @@ def is_bad(g: Gluing, f: int, goal: Goal) -> tuple[bool, int]:
     return n < goal.angle * d or g.length[g.edge[h]] * (n + d) > 4.0 * goal.radius * np.sqrt(n * d), h
 
 
-@allocation_free
+@compiled
 def list_face(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> None:
     """Put a face on its list of bad faces, if it is bad and not listed yet."""
     bad, h = is_bad(g, f, goal)
@@ -220,14 +211,14 @@ def list_face(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> None:
     agenda.listed[f] = True
 
 
-@allocation_free
+@compiled
 def list_all(g: Gluing, agenda: Agenda, goal: Goal) -> None:
     """Put every bad face on the lists."""
     for f in range(g.counts[N_FACES]):
         list_face(g, agenda, f, goal)
 
 
-@allocation_free
+@compiled
 def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
     """Remove a bad face of (nearly) the largest circumradius from the lists and return it; −1 if there is none."""
     for place in range(BAD_FACE_LISTS - 1, -1, -1):
@@ -241,7 +232,7 @@ def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
     return -1
 
 
-@allocation_free
+@compiled
 def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     """Insert a vertex at the circumcentre of bad face f, or on a segment in the way; return False if arrays are full.
 
@@ -251,7 +242,7 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     close = coincide(g, agenda, h)
     if is_hopeless(g, agenda, h) or (close and not is_cap(g, agenda, f)):
         return True
-    outcome, place, center = find_circumcenter(g, agenda, f)  # the place is its face, or the halfedge in the way
+    outcome, place, center = find_circumcenter(g, f)  # the place is its face, or the halfedge in the way
     if outcome == CENTER_LOST:
         return True
     segment = place if outcome == CENTER_BLOCKED else encroached(g, agenda, place, center)
@@ -259,8 +250,7 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
         return close or coincide(g, agenda, segment) or split_segment(g, agenda, segment, f, goal)
     n, d = tangent_at(g, preceding(h))
     radius = 0.25 * g.length[g.edge[h]] * (n + d) / np.sqrt(n * d)
-    place_corners(g, place, agenda.corners)
-    if not distance_to_corner(agenda.corners, center) > 0.5 * radius:  # too near, which only rounding can do
+    if not np.abs(corners_of(g, place) - center).min() > 0.5 * radius:  # too near a corner, which only rounding can do
         return True
     if not has_room(g, agenda, 2):
         return False
@@ -268,19 +258,15 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     return True
 
 
-@allocation_free
-def place_corners(g: Gluing, f: int, corners: Complexes) -> None:
-    """Write the corners of a face in its frame, where its first halfedge runs along the real axis from the origin."""
-    corners[0], corners[1], corners[2] = 0.0, g.length[g.edge[3 * f]], apex(g, 3 * f)
+@compiled
+def corners_of(g: Gluing, f: int) -> Complexes:
+    """(3,) the corners of a face in its frame: its first halfedge runs along the positive real axis from the origin."""
+    corners = np.zeros(3, np.complex128)
+    corners[1], corners[2] = g.length[g.edge[3 * f]], apex(g, 3 * f)
+    return corners
 
 
-@allocation_free
-def distance_to_corner(corners: Complexes, p: complex) -> float:
-    """Return the distance of a place from the nearest of three corners."""
-    return min(abs(corners[0] - p), abs(corners[1] - p), abs(corners[2] - p))
-
-
-@allocation_free
+@compiled
 def coincide(g: Gluing, agenda: Agenda, h: int) -> bool:
     """Whether the two ends of a halfedge nearly coincide."""
     group: int = agenda.group[g.tail[h]]
@@ -289,7 +275,7 @@ def coincide(g: Gluing, agenda: Agenda, h: int) -> bool:
     return group >= 0 and group == other and is_short
 
 
-@allocation_free
+@compiled
 def is_cap(g: Gluing, agenda: Agenda, f: int) -> bool:
     """Whether an angle of the face exceeds 150°, opposite to a side whose ends do not nearly coincide."""
     for h in range(3 * f, 3 * f + 3):
@@ -299,7 +285,7 @@ def is_cap(g: Gluing, agenda: Agenda, f: int) -> bool:
     return False
 
 
-@allocation_free
+@compiled
 def is_hopeless(g: Gluing, agenda: Agenda, h: int) -> bool:
     """Whether the small angle opposite to h cannot be avoided: it is given by the surface or by its segments."""
     corner = preceding(h)
@@ -316,7 +302,7 @@ def is_hopeless(g: Gluing, agenda: Agenda, h: int) -> bool:
     return False
 
 
-@allocation_free
+@compiled
 def sector(g: Gluing, corner: int) -> float:
     """Angle at the tail of a halfedge between the segments on either side of it, or the total angle, summed up to π."""
     n, d = tangent_at(g, corner)
@@ -334,39 +320,43 @@ def sector(g: Gluing, corner: int) -> float:
     return total
 
 
-@allocation_free
-def mark_narrow(g: Gluing, narrow: Bools) -> None:
-    """Mark (n,) vertices at which two segments meet at less than 60°, or with a total angle of less than 60°."""
+@compiled
+def narrow_vertices(g: Gluing) -> Bools:
+    """(n,) vertices at which two segments meet at less than 60°, or with a total angle of less than 60°."""
+    narrow = np.zeros(g.counts[N_VERTICES], dtype=np.bool_)
     for corner in range(3 * g.counts[N_FACES]):
         if not narrow[g.tail[corner]]:
             narrow[g.tail[corner]] = sector(g, corner) < NARROW_ANGLE
+    return narrow
 
 
-@allocation_free
+@compiled
 def has_room(g: Gluing, agenda: Agenda, ring: int) -> bool:
     """Whether the arrays have room to split an edge with `ring` faces (splitting a face needs less)."""
     fits: bool = 3 * (g.counts[N_FACES] + ring + 2) <= len(g.tail) and g.counts[N_EDGES] + ring + 4 <= len(g.length)
     return fits and g.counts[N_VERTICES] + 1 <= len(agenda.on_segment) and g.counts[N_STEPS] + ring + 2 <= len(g.steps)
 
 
-@allocation_free
+@compiled
 def push_edges_of(g: Gluing, agenda: Agenda, step: int) -> None:
     """Push onto the stack the edges of all faces that steps of the history, from number `step` on, have changed."""
+    around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     for n in range(step, g.counts[N_STEPS]):
-        faces_around(g.steps, n, agenda.around, agenda.starts)
-        for k in range(9):
-            f: int = agenda.around[k // 3]
+        faces_around(g.steps, n, around, start)
+        for f in around:
             if f >= 0:
-                push_edge(g, agenda.stack, agenda.stacked, g.edge[3 * f + k % 3])
+                for k in range(3):
+                    push_edge(g, agenda.stack, agenda.stacked, g.edge[3 * f + k])
 
 
-@allocation_free
+@compiled
 def insert(g: Gluing, agenda: Agenda, f: int, p: complex) -> None:
     """Insert a vertex at p (in the frame of face f), or on the edge of the face that p nearly lies on."""
     step = g.counts[N_STEPS]
-    corners, weights = agenda.corners, agenda.weights
-    place_corners(g, f, corners)
-    area, nearest = corners[1].real * corners[2].imag, distance_to_corner(corners, p)
+    corners = corners_of(g, f)
+    area = corners[1].real * corners[2].imag
+    nearest = np.abs(corners - p).min()
+    weights = np.empty(3)
     on_edge, fraction = -1, 0.0
     for k in range(3):
         tail, head = corners[k], corners[(k + 1) % 3]
@@ -381,15 +371,15 @@ def insert(g: Gluing, agenda: Agenda, f: int, p: complex) -> None:
     if on_edge >= 0 and 0.0 < fraction < 1.0:
         split_edge(g, 3 * f + on_edge, fraction)
     else:
-        total = weights[0] + weights[1] + weights[2]
-        split_face(g, f, weights[0] / total, weights[1] / total, weights[2] / total)
+        weights /= weights.sum()
+        split_face(g, f, weights[0], weights[1], weights[2])
     new = g.counts[N_VERTICES] - 1
     agenda.on_segment[new] = agenda.group[new] = -1
     agenda.narrow[new] = False
     push_edges_of(g, agenda, step)
 
 
-@allocation_free
+@compiled
 def folded_face(g: Gluing, h: int) -> int:
     """Find a face two of whose sides are the edge of halfedge h, which `split_edge` cannot split; −1 if none is."""
     y = h
@@ -401,7 +391,7 @@ def folded_face(g: Gluing, h: int) -> int:
             return -1
 
 
-@allocation_free
+@compiled
 def vertex_near_edge(g: Gluing, h: int) -> tuple[int, float, float]:
     """Find a vertex opposite to an edge that nearly lies on it, its height and fraction along h; −1, ∞, ½ if none."""
     nearby, height, fraction, length, y = -1, np.inf, 0.5, g.length[g.edge[h]], h
@@ -415,7 +405,7 @@ def vertex_near_edge(g: Gluing, h: int) -> tuple[int, float, float]:
             return nearby, height, fraction
 
 
-@allocation_free
+@compiled
 def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
     """Distance of the nearest vertex opposite to an edge from the point at `fraction` along h."""
     nearest: float = np.inf
@@ -428,7 +418,7 @@ def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
             return nearest
 
 
-@allocation_free
+@compiled
 def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool:
     """Split a segment that keeps face f from being removed; return False if the arrays have no room for it.
 
@@ -473,7 +463,7 @@ CENTER_INSIDE, CENTER_BLOCKED, CENTER_LOST = 0, 1, 2
 """Outcomes of `find_circumcenter`."""
 
 
-@allocation_free
+@compiled
 def unfold(g: Gluing, h: int, side: int, tail: complex, head: complex) -> tuple[complex, int]:
     """Unfold the face beyond halfedge h; return its apex, and 1 if it is then counter-clockwise, else −1."""
     t = g.sibling[h]
@@ -487,18 +477,17 @@ def unfold(g: Gluing, h: int, side: int, tail: complex, head: complex) -> tuple[
     return place, side
 
 
-@allocation_free
-def find_circumcenter(g: Gluing, agenda: Agenda, f: int) -> tuple[int, int, complex]:
+@compiled
+def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, complex]:
     """Walk from a face's barycentre to its circumcentre; return outcome, face or halfedge reached, and place there."""
-    corners = agenda.corners
-    place_corners(g, f, corners)
+    corners = corners_of(g, f)
     base, x, y = corners[1].real, corners[2].real, corners[2].imag
     if not y > 0.0:
         return CENTER_LOST, f, 0j
     center = complex(0.5 * base, 0.5 * (x * (x - base) / y + y))
     if not np.isfinite(center.imag):
         return CENTER_LOST, f, 0j
-    start = (corners[0] + corners[1] + corners[2]) / 3.0
+    start = corners.sum() / 3.0
     side, entry = 1, -1
     for _ in range(100000):
         leaving, worst, outside = -1, 0.0, 0.0
@@ -528,11 +517,11 @@ def find_circumcenter(g: Gluing, agenda: Agenda, f: int) -> tuple[int, int, comp
     return CENTER_INSIDE, f, complex(place.real, side * place.imag)
 
 
-@allocation_free
+@compiled
 def encroached(g: Gluing, agenda: Agenda, f: int, p: complex) -> int:
     """Find a segment visible from p (in the frame of face f) whose diametral circle contains p; −1 if there is none."""
-    ends, halfedges, corners = agenda.seen_sides, agenda.halfedges, agenda.corners
-    place_corners(g, f, corners)
+    ends, halfedges = agenda.seen_sides, agenda.halfedges
+    corners = corners_of(g, f)
     for k in range(3):
         halfedges[k, 0], halfedges[k, 1] = 3 * f + k, 1
         ends[k, 0], ends[k, 1] = corners[k], corners[(k + 1) % 3]
@@ -567,7 +556,7 @@ NEAR_GROUP = 0.01
 """Vertices nearly coincide where the size of their group is less than this fraction of the distance to others."""
 
 
-@allocation_free
+@compiled
 def root(parent: Ints, a: int) -> int:
     """Find the representative of the group of a vertex (union–find with path halving)."""
     while parent[a] != a:
