@@ -78,7 +78,10 @@ def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float,
 
 def _hubs(faces: Ints, n_vertices: int) -> Ints:
     """Return (m,) the corner of each face at which most faces meet, if these are more than `CROWD`, else −1."""
-    valences = np.bincount(faces.ravel(), minlength=n_vertices)[faces]
+    valences = np.bincount(faces.ravel(), minlength=n_vertices)
+    if valences.max(initial=0) <= CROWD:
+        return np.full(len(faces), -1)
+    valences = valences[faces]
     hubs = np.take_along_axis(faces, valences.argmax(axis=1)[:, None], axis=1)[:, 0]
     return np.where(valences.max(axis=1) > CROWD, hubs, -1)
 

@@ -8,6 +8,7 @@ edges, has its diagonal along the crease.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
 from typing import Protocol
 
 import numpy as np
@@ -45,7 +46,8 @@ def area_vectors(triangles: Floats) -> Floats:
 
 def side_lengths(polygons: Floats) -> Floats:
     """Return (..., k) lengths of the sides that begin at each corner of (..., k, d) closed polygons."""
-    return np.linalg.norm(np.roll(polygons, -1, axis=-2) - polygons, axis=-1)
+    sides = np.roll(polygons, -1, axis=-2) - polygons
+    return np.sqrt(np.einsum("...i,...i->...", sides, sides))
 
 
 def face_areas(triangles: Floats) -> Floats:
@@ -56,7 +58,7 @@ def face_areas(triangles: Floats) -> Floats:
 
 def heights(triangles: Floats) -> Floats:
     """Return (m,) heights of (m, 3, 3) triangles above their longest sides."""
-    return 2.0 * face_areas(triangles) / np.maximum(side_lengths(triangles).max(axis=1), 1e-300)
+    return 2.0 * face_areas(triangles) / np.maximum(reduce(np.maximum, side_lengths(triangles).T), 1e-300)
 
 
 def corner_normals(triangles: Floats) -> Floats:

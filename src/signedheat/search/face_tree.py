@@ -98,11 +98,16 @@ class FaceFeatures(NamedTuple):
 
 def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: int) -> tuple[Bools, Bools]:
     """Return which edges and vertices are regular."""
-    edges = (table.face_counts == 2) & (table.balance == 0) & ((edge_normals**2).sum(axis=1) > FOLDED_EDGE**2)
+    edges = (
+        (table.face_counts == 2)
+        & (table.balance == 0)
+        & (np.einsum("ei,ei->e", edge_normals, edge_normals) > FOLDED_EDGE**2)
+    )
     mates = np.where(edges[table.face_edges].ravel(), table.mates, -1)
     mated = np.flatnonzero(mates >= 0)
-    following = np.roll(np.arange(len(mates)).reshape(-1, 3), -1, axis=1).ravel()
-    fans = connected_components(len(mates), mated, following[mates[mated]])  # both leave the same vertex
+    others = mates[mated]
+    following = np.where(others % 3 < 2, others + 1, others - 2)
+    fans = connected_components(len(mates), mated, following)  # both leave the same vertex
     corners, fan = faces.ravel(), np.empty(n_vertices, dtype=np.int64)
     fan[corners] = fans
     vertices = np.ones(n_vertices, dtype=bool)
