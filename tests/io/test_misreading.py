@@ -371,6 +371,8 @@ def test_dae_is_placed_by_its_nodes(tmp_path):
         ('<up_axis>Z_UP</up_axis><unit name="millimeter" meter="1e-3"/>', "mm"),
         ("<unit/>", "m"),
         ('<unit meter="0.7" name="ell"/>', None),
+        ('<unit meter="0,01" name="centimeter"/>', None),
+        ('<unit meter=""/>', None),
         ("", None),
     ],
 )

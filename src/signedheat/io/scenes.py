@@ -107,7 +107,10 @@ def _collada_unit(data: bytes) -> str | None:
     """Return the unit in the first ``<asset>`` of a COLLADA file: any name may stand beside its length in metres."""
     for _, element in ElementTree.iterparse(io.BytesIO(data)):
         if element.tag.endswith("}unit"):
-            metres = float(element.get("meter", 1))
+            try:
+                metres = float(element.get("meter", 1))
+            except ValueError:  # nothing else needs it
+                return None
             return next((unit for unit, length in METRES.items() if math.isclose(metres, length, rel_tol=1e-4)), None)
         if element.tag.endswith("}asset"):
             break
