@@ -28,8 +28,7 @@ from .tiles import Evaluated
 from .winding import Windings
 
 MISSING_FACE = 0.5
-"""Distance from the faces, in cells, above which a contour shows that faces are missing. Cut edges are nearer. Below
-it, the zero set of φ stands for the faces, too."""
+"""Distance from the faces, in cells, above which a contour shows that faces are missing. Cut edges are nearer."""
 WALL_SHIFT = np.array([0.37, 0.41, 0.43])
 """Shift of the walls of boxes, in cells, so that they do not lie in faces along the axes."""
 CELL_SQUARES = np.array([[[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [1, 1, 1], [1, 0, 1]]])
