@@ -21,7 +21,7 @@ from ..mesh.box_tree import BoxTree
 from ..mesh.components import connected_components, element_components, sums_of
 from ..mesh.edges import EdgeTable, edge_keys, edge_table
 from ..mesh.triangles import area_vectors, face_areas, side_lengths
-from ..mesh.unit_vectors import ANGLE_ROUNDING, SAME_WAY, unit
+from ..mesh.unit_vectors import ANGLE_ROUNDING, unit
 from . import lids, walls
 from .lids import Lid, running_mean, vertex_normals
 from .rims import boundary, corners_of, loops, open_edges
@@ -29,6 +29,9 @@ from .spanning import Frame, frame_of
 
 STRIP_WIDTH = 0.25
 """Width of the strip of surface around an opening that is sampled, relative to the opening's width."""
+SMOOTH_COSINE = 0.7
+"""Edges are sharp if the cosine between the normals of their faces is below this. With .75 lids of ducks that were cut
+in two bulge farther, by a tenth of what they differ from flat ones."""
 STRIP_SAMPLES = 16
 """Number of samples across the strip around an opening."""
 MOST_RIM_SAMPLES = 16384
@@ -338,7 +341,7 @@ class _Surface(Frozen):
     def patches(self) -> Ints:
         """(m,) component of each face; edges that are not sharp connect faces."""
         first, second = self.edges.pairs.T // 3
-        smooth = (self.normals[first] * self.normals[second]).sum(axis=1) > SAME_WAY
+        smooth = (self.normals[first] * self.normals[second]).sum(axis=1) > SMOOTH_COSINE
         return connected_components(len(self.faces), first[smooth], second[smooth])
 
     @cached_property
