@@ -230,3 +230,9 @@ def test_lines_there_and_back_are_closed_in_every_format(tmp_path, ending):
     sh.io.write_polylines(tmp_path / f"back.{ending}", back)
     [read] = sh.io.read_polylines(tmp_path / f"back.{ending}")
     assert read.closed and read.points.tolist() == back.points.tolist()
+
+
+def test_drawings_report_what_is_done():
+    fractions = []
+    sh.signed_distance(sides(0.1), resolution=24, progress=lambda fraction, _: fractions.append(fraction))
+    assert len(fractions) > 3 and fractions == sorted(fractions) and fractions[-1] == 1.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -21,7 +20,7 @@ from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_field import GridField
 from ..grids.polyline import Polyline
 from ..grids.solid_queries import Closest
-from ..jobs import Progress, within
+from ..jobs import Progress, Stopwatch, within
 from ..kinds import Sources
 from ..mesh.components import sums_of
 from ..mesh.polylines import FillRule, filled_outlines, without_seams
@@ -94,11 +93,10 @@ def distance_to_lines(
 
 def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics, progress: Progress | None) -> GridField:
     """Return the distance to a drawing at the nodes of a grid, as a field that holds the drawing."""
-    if progress is not None:
-        progress(0.8, "measure")
-    begin = time.perf_counter()
-    values = drawing.distance(grid.points.reshape(-1, 2)).reshape(grid.shape)
-    timings = {**diagnostics.timings, "measure": time.perf_counter() - begin}
+    watch = Stopwatch(within(progress, 0.8, 1.0), 1)
+    with watch("measure") as run:
+        values = run(lambda: drawing.distance(grid.points.reshape(-1, 2)).reshape(grid.shape))
+    timings = {**diagnostics.timings, **watch.seconds}
     return GridField(grid, values, replace(diagnostics, timings=timings), solid=drawing)
 
 
