@@ -205,13 +205,13 @@ class Combinable(Arithmetic):
         return self.with_values(rule(self.values, other.values))
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file, in the format given by its extension; `signedheat.load_field` reads it.
+        """Write to a file, in the format given by its extension; `signedheat.load_field` reads all but ``.vdb``.
 
         Parameters
         ----------
         path : str or path
-            On grids ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` or ``.vdb``, in a band ``.npz`` or ``.vdb``; on tets
-            ``.vtu``, ``.vtk`` or ``.msh``.
+            On grids ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` or ``.vdb``, in a band ``.npz``, ``.vdb`` or, with
+            all nodes of the grid, ``.vti``; on tets ``.vtu``, ``.vtk`` or ``.msh``.
 
         Raises
         ------

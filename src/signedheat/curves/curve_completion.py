@@ -146,17 +146,17 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
     """Return the zero set of a field as curves, without loops too short or too far away to complete the given ones."""
     if not isinstance(field.domain, TriangleMesh):
         return field.contour(0.0)
-    fine = field.finest
+    fine = field.finest  # its contours, too, are curves on the given mesh
     surface = discretize(fine.domain)
     assert isinstance(surface, SurfaceDiscretization)
     values = fine.values.copy()
-    beyond_the_rim(surface.triangles, values)
+    beyond_the_rim(surface.triangles, values)  # else contours may run along the rim, where φ only touches 0
     contour = replace(fine, values=values).contour(0.0)
     kept, _ = given_curves(field.domain, as_list(curves))
     given = [each for each in flattened(kept) if isinstance(each, Curve) and each.oriented]
     shortest = min(length(field.domain, each) for each in given)
     near = scipy.spatial.cKDTree(np.concatenate([field.domain.positions(each) for each in given]))
-    whole = [
+    completing = [  # open curves end at the rim, and are no stray loops
         curve
         for curve in contour
         if not curve.closed
@@ -165,11 +165,15 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
             and near.query(field.domain.positions(curve))[0].min() < LEAST_LOOP * shortest
         )
     ]
-    return whole or contour
+    return completing or contour  # at least one, if all of them are small
 
 
 def beyond_the_rim(triangles: IntrinsicMesh, values: Floats) -> None:
-    """Give zeros in a row along the rim the sign beyond both ends of it, or else the one that neighbours lack."""
+    """Replace zeros along the rim by tiny values, in place, so that no contour runs along the rim.
+
+    A row of zeros gets the sign that φ has on the rim beyond both of its ends, or else the one opposite to that of
+    its neighbours.
+    """
     least = 1e-7 * float(triangles.lengths_of_edges.mean())
     zero, ends = np.abs(values) <= least, triangles.edges.vertices
     rim = ends[triangles.edges.face_counts == 1]

@@ -151,7 +151,7 @@ def save(shape: Shape | ForeignShape, path: PathLike) -> None:
 
     Parameters
     ----------
-    shape : TriangleMesh, PolygonMesh, PointCloud, TetMesh or Solid
+    shape : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Solid
         The shape. A solid is written as its surface, or in ``.npz`` as itself (`Solid.save`).
     path : str or path
         The file.

@@ -237,7 +237,10 @@ def bytes_to_complete(shape: SurfaceShape, count: int) -> float:
 
 
 def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
-    """Make the solid of a mesh, given what its distinct triangles bound: heat completes torn bodies, lids others."""
+    """Make the solid of a mesh, given what its distinct triangles bound: heat completes torn bodies, lids others.
+
+    A body is torn if its loose triangles scatter, or if little of it is left. The option "heat" takes all faces as one.
+    """
     vertices = mesh.vertices
     counts = np.abs(decided.counts)
     faces = np.where((decided.counts < 0)[:, None], chain.faces[:, ::-1], chain.faces)
@@ -246,6 +249,7 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
     clusters = np.zeros(len(faces), dtype=np.int64) if by_heat else decided.loose
     for cluster in np.unique(clusters[(clusters >= 0) & (counts > 0)]):
         chosen = np.flatnonzero((clusters == cluster) & (counts > 0))
+        # φ replaces triangles that scatter; where heat is asked for, it only fills what they leave open
         scatter = 0.0 if by_heat else scatter_of(vertices[faces[chosen]], decided.pieces[chosen])
         if by_heat or scatter or decided.levels[chosen[0]] < TORN_LEVEL:
             torn[chosen] = True
@@ -256,7 +260,7 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
         surfaces.append(closed)
     sheets = np.flatnonzero(counts == 0)
     if len(sheets):
-        surfaces.append(TriangleGroup(vertices[faces[sheets]], faces[sheets], chain.firsts[sheets], False))
+        surfaces.append(TriangleGroup(vertices[faces[sheets]], faces[sheets], chain.firsts[sheets], closing=False))
     return united(surfaces, options.keep_overlaps, notes)
 
 

@@ -356,23 +356,26 @@ def _straight_sides(loop: Floats, normals: Floats) -> list[_Side]:
 
 
 def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
-    """Find the longest runs of two or more coplanar sides whose lids are not folded back, by area, largest first."""
+    """Find the maximal runs of two or more coplanar sides whose lids are not folded back, by area, largest first."""
     n = len(sides)
     starts = points[[side.points[0] for side in sides]]
     ways = unit(np.roll(starts, -1, axis=0) - starts)
+    # at corner i: the normal of the plane of sides i − 1 and i, and whether side i + 1 lies in it, too
     across = unit(np.cross(np.roll(ways, 1, axis=0), ways))
-    goes_on = np.abs((across * np.roll(ways, -1, axis=0)).sum(axis=1)) <= COPLANAR  # the side after next is coplanar
-    begins = np.flatnonzero(~np.roll(goes_on, 1))
+    goes_on = np.abs((across * np.roll(ways, -1, axis=0)).sum(axis=1)) <= COPLANAR
+    begins = np.flatnonzero(~np.roll(goes_on, 1))  # corners whose plane is a new one: a run begins a side earlier
     if not 0 < len(begins) <= MOST_PLANAR_RUNS:
         return []
     runs = []
     for corner, after in zip(begins, np.append(begins[1:], begins[0] + n), strict=True):
+        # neighbouring runs share a side; at least one side is left
         first, count = (int(corner) - 1) % n, min(int(after - corner) + 1, n - 1)
         chosen = [sides[(first + k) % n] for k in range(count)]
         places = np.concatenate([*(side.points for side in chosen), sides[(first + count) % n].points[:1]])
         opening = area_vector(points[places])
         surface = np.sum([side.normal for side in chosen], axis=0)
         folded = opening @ surface <= -SAME_WAY * np.linalg.norm(opening) * np.linalg.norm(surface)
+        # sides that are coplanar with their neighbours may still turn out of one plane, bit by bit
         if is_flat(points[places]) and not (folded and surface.any()):
             runs.append(_Run(first, count, places, opening))
     return sorted(runs, key=lambda run: -float(np.linalg.norm(run.opening)))

@@ -54,8 +54,10 @@ class History(Frozen):
 
     before: IntrinsicMesh
     after: IntrinsicMesh  # its first vertices are those of `before`
-    steps: Ints  # (n, 4) as `gluing.record` writes them
-    weights: Floats  # (n, 4) of the four points of each step
+    # (n, 4) kind; what it changes, a halfedge (flip, split of an edge) or a face; the other one; new vertex or −1
+    steps: Ints
+    # (n, 4) affine dependency of the step's four points; of a split, the new vertex in the old triangle, and 1
+    weights: Floats
 
     def forward(self, faces: Ints, barycentric: Floats, vectors: Floats | None = None) -> tuple[Ints, Floats, Floats]:
         """Transfer points of `before`, and vectors (p, k, 3) at them, to `after`."""
@@ -68,13 +70,16 @@ class History(Frozen):
     def inserted(self) -> tuple[Ints, Floats]:
         """Locate the inserted vertices, in order, on `before`; return faces and barycentric coordinates."""
         vertex = self.steps[:, 3]
-        rows = np.flatnonzero((vertex >= 0) & (np.diff(vertex, prepend=-1) != 0))  # several steps split one edge
+        # each face at an edge is split by a step of its own: the first of them is enough
+        rows = np.flatnonzero((vertex >= 0) & (np.diff(vertex, prepend=-1) != 0))
+        # the face that was split, and its corners from the tail of the split halfedge on
         is_edge = self.steps[rows, 0] == SPLIT_EDGE
         faces = np.where(is_edge, self.steps[rows, 1] // 3, self.steps[rows, 1])
         corners = (np.where(is_edge, self.steps[rows, 1] % 3, 0)[:, None] + np.arange(3)) % 3
         weights = np.empty((len(rows), 1, 3))
         np.put_along_axis(weights[:, 0], corners, self.weights[rows, :3], axis=1)
-        return self._transferred(self._earlier, faces, weights, self._earlier.next_of_face[rows, 0])[:2]
+        last_change = self._earlier.next_of_face[rows, 0]  # the step before the split that changed this face last
+        return self._transferred(self._earlier, faces, weights, last_change)[:2]
 
     def _transferred(
         self, links: Links, faces: Ints, rows: Floats, begin: NDArray[np.int32] | None = None
