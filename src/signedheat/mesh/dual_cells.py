@@ -137,7 +137,7 @@ def _crossed_faces(edges: Ints) -> Ints:
 def _pieces(edges: Ints, ways: Bools) -> Ints:
     """Return (c, 12) the piece of each crossed edge, over all cells, or −1: see `_pieces_of_cell`."""
     crossed = edges >= 0
-    codes = np.concatenate([crossed, ways], axis=1) @ (1 << np.arange(18))
+    codes = np.packbits(np.concatenate([crossed, ways], axis=1), axis=1) @ np.array([1 << 16, 1 << 8, 1])
     _, first, kinds = np.unique(codes, return_index=True, return_inverse=True)  # few cells differ in these
     pieces = _pieces_of_cell(crossed[first], ways[first])
     counts = (pieces.max(axis=1, initial=-1) + 1)[kinds]
