@@ -38,8 +38,9 @@ class FaceFeatures(NamedTuple):
     """Triangles with the normals of their features (Bærentzen & Aanæs 2005).
 
     An edge is regular if exactly two faces share it, run along it in opposite directions and do not lie on each other;
-    a vertex is regular if all its edges are and its faces make one fan. At these the sign of ``(x − y) · normal`` is
-    the side of a point x whose nearest place is y.
+    a vertex is regular if all its edges are and its faces make one fan. Faces are regular unless they bound nothing,
+    and then neither are their edges and vertices. At regular features the sign of ``(x − y) · normal`` is the side of a
+    point x whose nearest place is y.
     """
 
     corners: Floats  # (m, 9) corners of the faces, each face once, in the order of a space-filling curve
@@ -50,15 +51,25 @@ class FaceFeatures(NamedTuple):
     face_normals: Floats  # (m, 3) unit normals
     edge_normals: Floats  # (e, 3) sums of the unit normals of the faces at each edge
     vertex_normals: Floats  # (n, 3) sums of the unit normals of the faces at each vertex, weighted by angles
-    # (e,) and (n,) whether each edge and vertex is regular: the surface is closed and consistent there
+    # (m,), (e,) and (n,) whether each face, edge and vertex is regular: the surface is closed and consistent there
+    face_regular: Bools
     edge_regular: Bools
     vertex_regular: Bools
     trusted: NDArray[np.float32]  # (m,) confidence in each face: 1 for given faces, less for completed ones
     ids: Ints  # (m,) which of the given triangles each is
 
     @classmethod
-    def of(cls, vertices: Floats, faces: Ints, trusted: NDArray[np.float32] | None = None) -> FaceFeatures:
-        """Compute the features of (m, 3) faces: merge coincident vertices, drop faces without extent and copies."""
+    def of(
+        cls,
+        vertices: Floats,
+        faces: Ints,
+        trusted: NDArray[np.float32] | None = None,
+        bounding: Bools | None = None,
+    ) -> FaceFeatures:
+        """Compute the features of (m, 3) faces: merge coincident vertices, drop faces without extent and copies.
+
+        Faces have full confidence unless `trusted`, (m,), says otherwise, and bound the inside unless `bounding` does.
+        """
         faces = same_positions(vertices)[faces]
         trusted = np.ones(len(faces), dtype=np.float32) if trusted is None else trusted
         ids = np.arange(len(faces))
@@ -88,21 +99,22 @@ class FaceFeatures(NamedTuple):
         thrice = np.repeat(face_normals, 3, axis=0)
         edge_normals = sums_of(thrice, table.face_edges.ravel(), len(table.vertices))
         vertex_normals = sums_of(angles[:, None] * thrice, faces.ravel(), len(vertices))
+        bound = np.ones(len(ids), dtype=np.bool_) if bounding is None else bounding[ids]
         positions = corners, triangle_rows(corners), vertices
         ids_of_faces = faces.astype(np.int32), table.face_edges.astype(np.int32)
         normals = face_normals, edge_normals, vertex_normals
-        return cls(
-            *positions, *ids_of_faces, *normals, *_regular(faces, table, edge_normals, len(vertices)), trusted, ids
-        )
+        regular = _regular(faces, table, edge_normals, bound, len(vertices))
+        return cls(*positions, *ids_of_faces, *normals, bound, *regular, trusted, ids)
 
 
-def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, n_vertices: int) -> tuple[Bools, Bools]:
-    """Return which edges and vertices are regular."""
+def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, bound: Bools, n_vertices: int) -> tuple[Bools, Bools]:
+    """Return which edges and vertices are regular, given which faces are."""
     edges = (
         (table.face_counts == 2)
         & (table.balance == 0)
         & (np.einsum("ei,ei->e", edge_normals, edge_normals) > FOLDED_EDGE**2)
     )
+    edges[table.face_edges[~bound]] = False
     mates = np.where(edges[table.face_edges].ravel(), table.mates, -1)
     mated = np.flatnonzero(mates >= 0)
     others = mates[mated]
@@ -141,9 +153,12 @@ class FaceTree:
         return cls(features, BoxTree.in_order(*boxes_around(triangles), np.arange(len(triangles))))
 
     @classmethod
-    def of_triangles(cls, triangles: Floats, trusted: NDArray[np.float32] | None = None) -> FaceTree:
+    def of_triangles(
+        cls, triangles: Floats, trusted: NDArray[np.float32] | None = None, bounding: Bools | None = None
+    ) -> FaceTree:
         """Build the tree of (m, 3, 3) triangles, at least one with area; corners at one position are one vertex."""
-        return cls.of(FaceFeatures.of(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), trusted))
+        faces = np.arange(3 * len(triangles)).reshape(-1, 3)
+        return cls.of(FaceFeatures.of(triangles.reshape(-1, 3), faces, trusted, bounding))
 
     @cached_property
     def discs(self) -> Floats:
@@ -239,8 +254,7 @@ class NearestFaces:
     features: NDArray[np.int8]  # (n,) the feature that this place lies on, in the code of `foot_on_triangle`
     # (n,) cosine of the angle between the normal and the vector from place to point: positive in front of the face
     cosines: NDArray[np.float32]
-    # (n,) whether its sign decides the side: the nearest place is inside a face, or on a regular edge or vertex
-    regular: Bools
+    regular: Bools  # (n,) whether its sign decides the side: the place is on a regular feature
 
 
 def feet_on(features: FaceFeatures, faces: NDArray[np.int32], points: Floats) -> NearestFaces:
@@ -267,7 +281,8 @@ def _feet(
 @compiled
 def _facing(features: FaceFeatures, face: int, feature: int, dx: float, dy: float, dz: float) -> tuple[float, bool]:
     """Return the cosine between a feature's normal and (dx, dy, dz), and whether its sign decides the side."""
-    normals, row, regular = features.face_normals, np.int64(face), True
+    normals, row = features.face_normals, np.int64(face)
+    regular = features.face_regular[row]
     if feature > 3:
         normals, row = features.vertex_normals, np.int64(features.faces[face, feature - 4])
         regular = features.vertex_regular[row]

@@ -16,7 +16,7 @@ from ..compiled import compiled
 from ..grids.blocks import BLOCK
 from ..grids.grid import Grid
 from ..mesh.box_tree import BOXES_PER_LEAF, morton_codes
-from ..search.face_tree import FaceTree
+from ..search.face_tree import FaceTree, feet_on
 from ..search.nearest_triangles import away_from_triangle, foot_on_triangle
 from .winding import Windings
 
@@ -50,7 +50,7 @@ def distances_in(
         where = tuple((nodes - first).T)
         faces[where], squares[where] = tree.nearest(grid.origin + nodes * grid.spacing)
     values = np.sqrt(squares, out=squares)
-    inside = _inside(windings, grid, first, values)
+    inside = _inside(tree, windings, grid, first, values, faces)
     return np.negative(values, out=values, where=inside), tree.features.trusted[faces]
 
 
@@ -69,8 +69,13 @@ def solved(
     return values, confidence
 
 
-def _inside(windings: Windings, grid: Grid, first: Ints, values: Floats) -> Bools:
-    """Find the nodes inside; connected nodes farther than half a step from any surface share one test."""
+def _inside(
+    tree: FaceTree, windings: Windings, grid: Grid, first: Ints, values: Floats, faces: NDArray[np.int32]
+) -> Bools:
+    """Find the nodes inside, given their distances and nearest faces.
+
+    Connected nodes farther than half a step from any surface share one test.
+    """
     origin, steps = grid.origin + first * grid.spacing, grid.spacing
     inside = np.zeros(values.shape, dtype=bool)
     far = values > 0.5 * (1.0 + SQUARE_ROUNDING) * float(steps.max())
@@ -82,9 +87,10 @@ def _inside(windings: Windings, grid: Grid, first: Ints, values: Floats) -> Bool
         where = np.argwhere(farthest)[np.unique(groups[farthest], return_index=True)[1]]
         group_is_inside = np.concatenate([[False], windings.inside(origin + where * steps)])
         inside = group_is_inside[groups]
-    nodes = np.argwhere(~np.isnan(values) & ~far)
-    if len(nodes):
-        inside[tuple(nodes.T)] = windings.inside(origin + nodes * steps)
+    near = np.nonzero(~np.isnan(values) & ~far)
+    if len(near[0]):
+        points = origin + np.stack(near, axis=1) * steps
+        inside[near] = windings.inside_near(points, feet_on(tree.features, faces[near], points))
     return inside
 
 

@@ -26,7 +26,7 @@ from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.welding import indexed
 from ..packages import lazy_module
 from ..parallel import in_chunks
-from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
+from ..search.face_tree import FaceFeatures, FaceTree
 from ..search.nearest_triangles import weights_in
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import transformed
@@ -37,7 +37,7 @@ from .offsets import Offset, Reach
 from .sample_set import NOISE_WIDTHS, Samples
 from .simplification import simplified
 from .tiles import Scheduler, band_field, dense_field
-from .winding import Windings
+from .winding import ON_SURFACE, Windings
 
 files: Any = lazy_module("signedheat.io.shape_files", "files")
 morphology: Any = lazy_module("signedheat.morphology", "solids")
@@ -49,12 +49,6 @@ if TYPE_CHECKING:
 
 POINTS_SORTED = 1 << 18
 """Batch size for sorting points."""
-CLEAR_DISTANCE = 1e-9
-"""Distance from the surface above which the side of a point is reliable, relative to the largest coordinate."""
-CLEAR_COSINE = 1e-3
-"""Cosine between the normal and the direction from the surface above which the side is reliable."""
-ON_SURFACE = 1e-12
-"""Distance up to which a point is on the surface, relative to the largest coordinate: its gradient is the normal."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -110,14 +104,7 @@ class Solid(Displayed, Represented, Frozen):
     def features(self) -> FaceFeatures:
         """The triangles with their neighbourhoods; edges and vertices of those that bound nothing are not regular."""
         faces = np.arange(3 * len(self.triangles)).reshape(-1, 3)
-        features = FaceFeatures.of(self.triangles.reshape(-1, 3), faces, self.confidence)
-        bounds_nothing = ~self.bounding[features.ids]
-        if not bounds_nothing.any():
-            return features
-        edges, vertices = features.edge_regular.copy(), features.vertex_regular.copy()
-        edges[features.edges[bounds_nothing]] = False
-        vertices[features.faces[bounds_nothing]] = False
-        return features._replace(edge_regular=edges, vertex_regular=vertices)
+        return FaceFeatures.of(self.triangles.reshape(-1, 3), faces, self.confidence, self.bounding)
 
     @cached_property
     def tree(self) -> FaceTree:
@@ -203,7 +190,7 @@ class Solid(Displayed, Represented, Frozen):
 
         def measured(chunk: Floats) -> tuple[Floats]:
             nearest = self.tree.search(chunk)
-            inside = is_signed and self._inside(chunk, nearest)
+            inside = is_signed and self.windings.inside_near(chunk, nearest)
             return (np.where(inside, -nearest.distances, nearest.distances),)
 
         places, shape = query_points(points, 3)
@@ -602,20 +589,11 @@ class Solid(Displayed, Represented, Frozen):
         """
         files.save_solid(self, path)
 
-    def _inside(self, points: Floats, found: NearestFaces) -> Bools:
-        """(n,) whether points are inside: by the normal at the nearest place, or the winding number if in doubt."""
-        clear = found.regular & self.bounding[self.features.ids[found.faces]] & (np.abs(found.cosines) > CLEAR_COSINE)
-        clear &= found.distances > CLEAR_DISTANCE * float(np.abs(self.tree.tree.bounds[1]).max())
-        inside = found.cosines < 0
-        if not clear.all():
-            inside[~clear] = self.windings.inside(points[~clear])
-        return inside
-
     def _closest(self, points: Floats) -> tuple[NDArray[Any], ...]:
         """Return what `Closest` holds, field by field, for (n, 3) points."""
         nearest = self.tree.search(points)
         ids = self.features.ids[nearest.faces]  # of triangles of the solid; `origins` are faces of its source
-        signs = np.where(self._inside(points, nearest), -1.0, 1.0)
+        signs = np.where(self.windings.inside_near(points, nearest), -1.0, 1.0)
         away = points - nearest.places
         lengths = nearest.distances
         off = lengths > ON_SURFACE * np.abs(points).max(initial=1e-290)  # `initial` keeps this above 0 for points at 0

@@ -253,6 +253,7 @@ def in_store(
     plan: dict[str, NDArray[Any]] = {
         "corners": tree.features.vertices[tree.features.faces],
         "trusted": tree.features.trusted,
+        "bounding": tree.features.face_regular,
         "origin": np.array(grid.origin),
         "spacing": np.array(grid.spacing),
         "shape": np.array(grid.shape),
@@ -323,7 +324,7 @@ def _plan(folder: str, key: str) -> tuple[FaceTree, Windings, Grid, dict[str, In
     """Return the input of the tiles of a folder, read once per process."""
     with np.load(Path(folder) / "plan.npz", allow_pickle=False) as file:
         plan = dict(file)
-    tree = FaceTree.of_triangles(plan["corners"], plan["trusted"])
+    tree = FaceTree.of_triangles(plan["corners"], plan["trusted"], plan["bounding"])
     return tree, Windings(plan["closing"]), Grid(plan["origin"], plan["spacing"], plan["shape"]), plan
 
 

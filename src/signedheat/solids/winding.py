@@ -11,10 +11,17 @@ from ..arrays import Bools, Floats, Frozen
 from ..errors import GeometryError
 from ..mesh.edges import edge_table
 from ..mesh.welding import same_positions
+from ..search.face_tree import NearestFaces
 from ..search.winding_tree import OFF_FACE, WindingTree, steps_off, winding_sums
 
 INSIDE_WINDING = 0.5
 """Winding number above which a point is inside; exact winding numbers are integers."""
+CLEAR_DISTANCE = 1e-9
+"""Distance from the surface above which normals decide, relative to the largest coordinate: cuts are rounded."""
+CLEAR_COSINE = 1e-3
+"""Cosine between a normal and the direction from the surface above which its sign is the side of a point."""
+ON_SURFACE = 1e-12
+"""Distance up to which a point is on the surface, relative to the largest coordinate."""
 SUMMED_POINTS = 16
 """At this many points or fewer, sums over all triangles take less time and memory than a tree."""
 
@@ -41,6 +48,11 @@ class Windings(Frozen):
         """Search tree over the triangles, of which there is at least one."""
         return WindingTree.of(self.triangles)
 
+    @cached_property
+    def largest_coordinate(self) -> float:
+        """Largest absolute coordinate of the triangles."""
+        return float(np.abs(self.triangles).max(initial=0.0))
+
     def numbers(self, points: Floats) -> Floats:
         """(n,) winding numbers of points."""
         return self.tree.numbers(points) if len(self.triangles) and len(points) else np.zeros(len(points))
@@ -52,6 +64,19 @@ class Windings(Frozen):
     def inside(self, points: Floats) -> Bools:
         """(n,) whether points are inside."""
         return self.numbers(points) > INSIDE_WINDING
+
+    def inside_near(self, points: Floats, nearest: NearestFaces) -> Bools:
+        """(n,) whether points are inside, by the normals at their nearest places where these decide.
+
+        On the surface either side is right, and rounding may choose it.
+        """
+        inside: Bools = nearest.cosines < 0
+        distances = nearest.distances / max(self.largest_coordinate, 1e-290)
+        clear = (distances > CLEAR_DISTANCE) & (np.abs(nearest.cosines) > CLEAR_COSINE)
+        unclear = np.flatnonzero(~nearest.regular | ~(clear | (distances < ON_SURFACE)))
+        if len(unclear):
+            inside[unclear] = self.inside(points[unclear])
+        return inside
 
     def sides(self, triangles: Floats) -> tuple[Bools, Bools]:
         """(n,) whether places just behind (n, 3, 3) triangles are inside; and the same just in front of them."""
