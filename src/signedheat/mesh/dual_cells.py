@@ -26,8 +26,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
+from ..parallel import in_chunks
 from .components import connected_components
 from .self_intersections import self_intersections
 from .triangles import flipped_along_creases
@@ -42,8 +44,8 @@ AXES_AFTER = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
 class Crossings:
     """Edges of a grid that a level set crosses."""
 
-    nodes: Ints  # (e, 3) the first node of each
-    axes: Ints  # (e,) the axis that it runs along
+    nodes: NDArray[np.integer]  # (e, 3) the first node of each
+    axes: NDArray[np.integer]  # (e,) the axis that it runs along
     rising: Bools  # (e,) whether the first node is inside
     shares: Floats  # (e,) how far from the first node the crossing is, in cells
 
@@ -52,36 +54,34 @@ class Crossings:
 class DualCells:
     """Cells that a level set passes through."""
 
-    places: Ints  # (c, 3) first node of each
-    edges: Ints  # (c, 12) number of each crossed edge; −1 where an edge is not crossed
+    places: NDArray[np.int32]  # (c, 3) first node of each
+    edges: NDArray[np.int32]  # (c, 12) number of each crossed edge; −1 where an edge is not crossed
     # (c, 12) the piece of the level set to which each crossed edge belongs; −1 where an edge is not crossed
-    pieces: Ints
-    owners: Ints  # (v,) the cell of each piece
-    quads: Ints  # (e, 4) the pieces around each crossed edge, counter-clockwise as seen from its end
+    pieces: NDArray[np.int32]
+    owners: NDArray[np.int32]  # (v,) the cell of each piece, in order
+    quads: NDArray[np.int32]  # (e, 4) the pieces around each crossed edge, counter-clockwise as seen from its end
 
 
 class CrossedCells(NamedTuple):
     """Cells around crossed edges."""
 
-    places: Ints  # (c, 3) first node of each
-    edges: Ints  # (c, 12) number of each crossed edge; −1 where an edge is not crossed
-    rows: Ints  # (e, 4) the cells around each crossed edge, counter-clockwise as seen from its end
-    sides: Ints  # (e, 4) which of the 12 edges of each of these cells it is
+    places: NDArray[np.int32]  # (c, 3) first node of each
+    edges: NDArray[np.int32]  # (c, 12) number of each crossed edge; −1 where an edge is not crossed
+    rows: NDArray[np.int32]  # (e, 4) the cells around each crossed edge, counter-clockwise as seen from its end
+    sides: NDArray[np.int8]  # (e, 4) which of the 12 edges of each of these cells it is
 
 
 def crossed_cells(crossings: Crossings, shape: tuple[int, ...]) -> CrossedCells:
     """Find the cells of a grid around crossed edges."""
-    axes, crossed_edges = crossings.axes, np.arange(len(crossings.axes))[:, None]
-    around = np.repeat(crossings.nodes[:, None], 4, axis=1)
-    around[crossed_edges, np.arange(4), AXES_AFTER[axes, 1][:, None]] -= CELLS_AROUND[:, 0]
-    around[crossed_edges, np.arange(4), AXES_AFTER[axes, 2][:, None]] -= CELLS_AROUND[:, 1]
-    flat = np.ravel_multi_index(tuple(around.reshape(-1, 3).T), shape)
-    cells, rows = np.unique(flat, return_inverse=True)
-    rows = rows.reshape(-1, 4)
-    sides = 4 * axes[:, None] + 2 * CELLS_AROUND[:, 0] + CELLS_AROUND[:, 1]
-    edges = np.full((len(cells), 12), -1, dtype=np.int64)
-    edges[rows, sides] = crossed_edges
-    return CrossedCells(np.stack(np.unravel_index(cells, shape), axis=1).astype(np.int64), edges, rows, sides)
+    strides = np.array([shape[1] * shape[2], shape[2], 1])
+    back = strides[AXES_AFTER[:, 1:]] @ CELLS_AROUND.T
+    cells, numbers = np.unique((crossings.nodes @ strides)[:, None] - back[crossings.axes], return_inverse=True)
+    rows = numbers.reshape(-1, 4).astype(np.int32)
+    sides = (4 * np.arange(3)[:, None] + CELLS_AROUND @ [2, 1]).astype(np.int8)[crossings.axes]
+    edges = np.full((len(cells), 12), -1, dtype=np.int32)
+    edges[rows, sides] = np.arange(len(rows))[:, None]
+    places = np.stack(np.unravel_index(cells, shape), axis=1, dtype=np.int32, casting="same_kind")
+    return CrossedCells(places, edges, rows, sides)
 
 
 def dual_cells(
@@ -102,7 +102,7 @@ def dual_cells(
     way = inside(middles) == corner[order[:, 0]]
     while True:
         ways[cells[order], faces[order]] = way[:, None]
-        pieces = _pieces(edges, ways)
+        pieces, counts = _pieces(edges, ways)
         linked = pieces[cells[:, None], _face_edges(faces)]
         double = np.flatnonzero((linked == linked[:, :1]).all(axis=1)[order].all(axis=1))
         if not len(double):
@@ -111,13 +111,11 @@ def dual_cells(
         first_of = np.full(len(places), len(order))
         np.minimum.at(first_of, cells[order[double]], double[:, None])
         way[double[(first_of[cells[order[double]]] == double[:, None]).all(axis=1)]] ^= True
-    owners = np.empty(int(pieces.max(initial=-1)) + 1, dtype=np.int64)
-    crossed_cells, side = np.nonzero(edges >= 0)
-    owners[pieces[crossed_cells, side]] = crossed_cells
+    owners = np.repeat(np.arange(len(places), dtype=np.int32), counts)
     return DualCells(places, edges, pieces, owners, pieces[rows, sides])
 
 
-def open_cells(edges: Ints) -> Ints:
+def open_cells(edges: NDArray[np.int32]) -> Ints:
     """Return the cells with a face of which an odd number of edges is crossed: a node around them has no value."""
     return np.flatnonzero((_crossed_faces(edges) % 2 == 1).any(axis=1))
 
@@ -129,19 +127,31 @@ def _face_edges(faces: Ints) -> Ints:
     return np.stack([b + side, c + 1, b + 2 + side, c], axis=1)
 
 
-def _crossed_faces(edges: Ints) -> Ints:
+def _crossed_faces(edges: NDArray[np.int32]) -> NDArray[np.int8]:
     """Return (c, 6) the number of crossed edges of each face."""
-    return (edges[:, _face_edges(np.arange(6))] >= 0).sum(axis=2)
+    crossed, kinds = _kinds(edges >= 0)
+    return crossed[:, _face_edges(np.arange(6))].sum(axis=2, dtype=np.int8)[kinds]
 
 
-def _pieces(edges: Ints, ways: Bools) -> Ints:
-    """Return (c, 12) the piece of each crossed edge, over all cells, or −1: see `_pieces_of_cell`."""
-    crossed = edges >= 0
-    codes = np.packbits(np.concatenate([crossed, ways], axis=1), axis=1) @ np.array([1 << 16, 1 << 8, 1])
-    _, first, kinds = np.unique(codes, return_index=True, return_inverse=True)  # few cells differ in these
-    pieces = _pieces_of_cell(crossed[first], ways[first])
+def _pieces(edges: NDArray[np.int32], ways: Bools) -> tuple[NDArray[np.int32], Ints]:
+    """Return (c, 12) the piece of each crossed edge, over all cells, or −1; and (c,) how many pieces each cell has."""
+    flags, kinds = _kinds(np.concatenate([edges >= 0, ways], axis=1))
+    pieces = _pieces_of_cell(flags[:, :12], flags[:, 12:])
     counts = (pieces.max(axis=1, initial=-1) + 1)[kinds]
-    return np.where(crossed, pieces[kinds] + (np.cumsum(counts) - counts)[:, None], -1)
+    result = pieces.astype(np.int32)[kinds]
+    result += (np.cumsum(counts) - counts).astype(np.int32)[:, None]
+    result[edges < 0] = -1
+    return result, counts
+
+
+def _kinds(flags: Bools) -> tuple[Bools, Ints]:
+    """Return the distinct rows of (c, n) flags, of which there are few, and (c,) which of them each row is."""
+    size = flags.shape[1]
+    codes = np.packbits(flags, axis=1, bitorder="little") @ (1 << 8 * np.arange(-(-size // 8)))
+    present = np.flatnonzero(np.bincount(codes, minlength=1 << size))
+    numbers = np.empty(1 << size, dtype=np.int64)
+    numbers[present] = np.arange(len(present))
+    return (present[:, None] >> np.arange(size) & 1).astype(np.bool_), numbers[codes]
 
 
 def _pieces_of_cell(crossed: Bools, ways: Bools) -> Ints:
@@ -173,29 +183,39 @@ def dual_triangles(
     Where an edge is `fanned`, (e,), or has no possible diagonal, its crossing is a vertex; these edges are returned.
     """
     quads, axes, shares = cells.quads, crossings.axes, crossings.shares
-    around = vertices[quads] - crossings.nodes[:, None]
-    rows, corners = np.arange(len(quads))[:, None], np.arange(4)
-    height = around[rows, corners, axes[:, None]]
-    flat = np.stack([around[rows, corners, AXES_AFTER[axes, 1 + k][:, None]] for k in range(2)], axis=2)
-    safe, off, length = np.empty((2, len(quads)), dtype=bool), np.empty((2, len(quads))), np.empty((2, len(quads)))
-    for k in range(2):
-        turned = np.roll(flat, -k, axis=1), np.roll(height, -k, axis=1)
-        safe[k], crossed_at = _safe(*turned)
-        off[k] = np.abs(crossed_at - shares)
-        length[k] = np.linalg.norm(around[:, k] - around[:, k + 2], axis=1)
-    nearer = np.where(np.abs(off[0] - off[1]) > DIAGONAL_CLEARANCE, off[1] < off[0], length[1] < length[0])
-    second = safe[1] & (nearer | ~safe[0])
-    fan = fanned | ~safe.any(axis=0)
+
+    def chosen(edges: Ints) -> tuple[Bools, Bools]:
+        corners = vertices[quads[edges]] - crossings.nodes[edges, None]
+        return _better_diagonals(corners, axes[edges], shares[edges])
+
+    second, possible = in_chunks(chosen, np.arange(len(quads)))
+    fan = fanned | ~possible
     plain, fans = np.flatnonzero(~fan), np.flatnonzero(fan)
     turned_quads = np.where(second[plain, None], np.roll(quads[plain], -1, axis=1), quads[plain])
     added = crossings.nodes[fans].astype(np.float64)
     added[np.arange(len(fans)), axes[fans]] += shares[fans]
     tips = np.repeat(len(vertices) + np.arange(len(fans)), 4)
     ends = quads[fans].ravel(), np.roll(quads[fans], -1, axis=1).ravel()
-    faces = np.concatenate([turned_quads[:, [0, 1, 2]], turned_quads[:, [0, 2, 3]], np.stack([tips, *ends], axis=1)])
+    parts = turned_quads[:, [0, 1, 2]], turned_quads[:, [0, 2, 3]], np.stack([tips, *ends], axis=1)
+    faces = np.concatenate(parts, dtype=np.int64)
     falling = ~crossings.rising[np.concatenate([plain, plain, np.repeat(fans, 4)])]
     faces[falling] = faces[falling][:, ::-1]
     return np.concatenate([vertices, added]), faces, fans
+
+
+def _better_diagonals(around: Floats, axes: NDArray[np.integer], shares: Floats) -> tuple[Bools, Bools]:
+    """Return (n,) whether the second diagonal is the better one, given corners around edges; and whether one fits."""
+    rows, corners = np.arange(len(around))[:, None], np.arange(4)
+    height = around[rows, corners, axes[:, None]]
+    flat = np.stack([around[rows, corners, AXES_AFTER[axes, 1 + k][:, None]] for k in range(2)], axis=2)
+    safe, off, length = np.empty((2, len(axes)), dtype=bool), np.empty((2, len(axes))), np.empty((2, len(axes)))
+    for k in range(2):
+        turned = np.roll(flat, -k, axis=1), np.roll(height, -k, axis=1)
+        safe[k], crossed_at = _safe(*turned)
+        off[k] = np.abs(crossed_at - shares)
+        length[k] = np.linalg.norm(around[:, k] - around[:, k + 2], axis=1)
+    nearer = np.where(np.abs(off[0] - off[1]) > DIAGONAL_CLEARANCE, off[1] < off[0], length[1] < length[0])
+    return safe[1] & (nearer | ~safe[0]), safe.any(axis=0)
 
 
 def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) -> tuple[Floats, Ints]:
