@@ -73,6 +73,8 @@ def united(
     confidence = _confidence(triangles[kept], given[kept], whole, points)
     diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds)))
     bounding = (bounds & behind)[kept]
+    if not uncut:  # pieces may be moved a little where they meet: numbers must change across them
+        windings = Windings(triangles[closes])
     return Solid(
         triangles if kept.all() else triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics
     )

@@ -16,8 +16,6 @@ from ..search.winding_tree import OFF_FACE, WindingTree, steps_off, winding_sums
 
 INSIDE_WINDING = 0.5
 """Winding number above which a point is inside; exact winding numbers are integers."""
-CLEAR_DISTANCE = 1e-9
-"""Distance from the surface above which normals decide, relative to the largest coordinate: cuts are rounded."""
 CLEAR_COSINE = 1e-3
 """Cosine between a normal and the direction from the surface above which its sign is the side of a point."""
 ON_SURFACE = 1e-12
@@ -71,9 +69,8 @@ class Windings(Frozen):
         On the surface either side is right, and rounding may choose it.
         """
         inside: Bools = nearest.cosines < 0
-        distances = nearest.distances / max(self.largest_coordinate, 1e-290)
-        clear = (distances > CLEAR_DISTANCE) & (np.abs(nearest.cosines) > CLEAR_COSINE)
-        unclear = np.flatnonzero(~nearest.regular | ~(clear | (distances < ON_SURFACE)))
+        on_surface = nearest.distances < ON_SURFACE * self.largest_coordinate
+        unclear = np.flatnonzero(~(nearest.regular & ((np.abs(nearest.cosines) > CLEAR_COSINE) | on_surface)))
         if len(unclear):
             inside[unclear] = self.inside(points[unclear])
         return inside
