@@ -8,6 +8,7 @@ subtracted, across which such a sum passes ½; a box around both, turned inside 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
-from ..errors import SourceError
+from ..errors import GeometryError, SourceError
 from ..mesh.arrangement import Arrangement, arranged, meeting_faces
 from ..mesh.components import first_members
 from ..mesh.triangles import face_areas
@@ -73,8 +74,8 @@ def united(
     confidence = _confidence(triangles[kept], given[kept], whole, points)
     diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds)))
     bounding = (bounds & behind)[kept]
-    if not uncut:  # pieces may be moved a little where they meet: numbers must change across them
-        windings = Windings(triangles[closes])
+    with suppress(GeometryError):  # pieces are moved a little where they meet; they are open if no cut succeeded
+        windings = windings if uncut else Windings(triangles[closes])
     return Solid(
         triangles if kept.all() else triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics
     )
