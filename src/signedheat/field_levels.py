@@ -14,6 +14,8 @@ from .mesh.edges import CLEARANCE
 
 ON_LEVEL = 1e-3
 """Distance from a level, in cells, up to which a point counts as lying on it."""
+POINTS_AT_ONCE = 1 << 16
+"""Batch size for points that are moved."""
 
 
 class NodeValues(Protocol):
@@ -38,10 +40,18 @@ def refuse_beyond_walls(walls: Floats, distance: float, domain: str, remedy: str
 def on_level(
     distance: Callable[[Floats], Floats], points: Floats, values: NodeValues, grid: Grid, level: float
 ) -> Floats:
-    """Move (n, d) points, given in cells, along edges of a grid to the exact level; return their places in space.
+    """Move (n, d) points, given in cells, along edges of a grid to the exact level; return their places in space."""
+    places = np.empty(points.shape)
+    for begin in range(0, len(points), POINTS_AT_ONCE):
+        batch = slice(begin, begin + POINTS_AT_ONCE)
+        places[batch] = _moved(distance, points[batch], values, grid, level)
+    return places
 
-    This is regula falsi (Dowell & Jarratt 1971).
-    """
+
+def _moved(
+    distance: Callable[[Floats], Floats], points: Floats, values: NodeValues, grid: Grid, level: float
+) -> Floats:
+    """Do the work of `on_level` by regula falsi (Dowell & Jarratt 1971)."""
     base = np.floor(points).astype(np.int64)
     fraction = points - base
     axis = fraction.argmax(axis=1)

@@ -215,7 +215,7 @@ def _better_diagonals(around: Floats, axes: NDArray[np.integer], shares: Floats)
         off[k] = np.abs(crossed_at - shares)
         length[k] = np.linalg.norm(around[:, k] - around[:, k + 2], axis=1)
     nearer = np.where(np.abs(off[0] - off[1]) > DIAGONAL_CLEARANCE, off[1] < off[0], length[1] < length[0])
-    return safe[1] & (nearer | ~safe[0]), safe.any(axis=0)
+    return safe[1] & (nearer | ~safe[0]), safe[0] | safe[1]
 
 
 def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) -> tuple[Floats, Ints]:

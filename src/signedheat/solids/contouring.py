@@ -18,6 +18,7 @@ from typing import Protocol
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints, mask_of
 from ..diagnostics import SMALL_SHARE
@@ -27,7 +28,7 @@ from ..grids.blocks import BLOCK, WINDOW, Blocks, BlockValues
 from ..grids.grid import Grid
 from ..jobs import Progress
 from ..memory import available_memory, libraries
-from ..mesh.components import element_components, sums_of
+from ..mesh.components import element_components, places_among, sums_of
 from ..mesh.dual_cells import Crossings, DualCells, crossed_cells, dual_cells, open_cells, separate_triangles
 from ..mesh.edges import CLEARANCE
 from ..mesh.self_intersections import self_intersections
@@ -108,8 +109,8 @@ def _solved(values: Floats, vectors: Floats, sides: Floats, least: Floats) -> Fl
     return np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, sides, optimize=True)
 
 
-PIECES_AT_ONCE = 1 << 17
-"""Batch size for pieces of the level."""
+CELLS_AT_ONCE = 1 << 15
+"""Batch size for cells that the level passes through."""
 OUTSIDE_CELL = 0.6
 """Distance, in cells, by which a vertex may leave its cell."""
 VERTEX_SPACING = 0.2
@@ -143,26 +144,18 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats
     """Return (3, v, 3) candidates for each piece's vertex, in cells: the best, the best in its cell, and its middle."""
     count = len(cells.owners)
     vertices, middles, wider = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
-    rows, sides = np.nonzero(cells.edges >= 0)
-    pieces = cells.pieces[rows, sides]
-    order = np.argsort(pieces, kind="stable")
-    pieces, edges = pieces[order], cells.edges[rows, sides][order]
     alone = np.bincount(cells.owners)[cells.owners] == 1
-    for begin in range(0, count, PIECES_AT_ONCE):
-        stop = min(begin + PIECES_AT_ONCE, count)
-        batch = slice(*np.searchsorted(pieces, [begin, stop]))
-        used, crossed = np.unique(edges[batch], return_inverse=True)  # each edge is in four cells
-        parts = _vertices(
-            offset,
-            grid,
-            cells.places[cells.owners[begin:stop]],
-            alone[begin:stop],
-            pieces[batch] - begin,
-            crossed,
-            points[used],
-        )
+
+    def place(begin: int) -> None:
+        edges, pieces = (part[begin : begin + CELLS_AT_ONCE] for part in (cells.edges, cells.pieces))
+        first, stop = np.searchsorted(cells.owners, [begin, begin + CELLS_AT_ONCE])
+        used, crossed = np.unique(edges[edges >= 0], return_inverse=True)  # each edge is in four cells
+        places, owners = cells.places[cells.owners[first:stop]], pieces[edges >= 0] - first
+        parts = _vertices(offset, grid, places, alone[first:stop], owners, crossed, points[used])
         for whole, part in zip((vertices, middles, wider), parts, strict=True):
-            whole[begin:stop] = (part - grid.origin) / grid.spacing
+            whole[first:stop] = (part - grid.origin) / grid.spacing
+
+    list(in_threads(place, range(0, len(cells.places), CELLS_AT_ONCE)))
     chosen = _apart(cells, vertices, wider)
     return np.stack([np.where(chosen[:, None], wider, vertices), vertices, middles])
 
@@ -183,7 +176,13 @@ def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
 
 
 def _vertices(
-    offset: ImplicitSurface, grid: Grid, places: Ints, alone: Bools, owners: Ints, crossed: Ints, points: Floats
+    offset: ImplicitSurface,
+    grid: Grid,
+    places: NDArray[np.int32],
+    alone: Bools,
+    owners: Ints,
+    crossed: Ints,
+    points: Floats,
 ) -> tuple[Floats, Floats, Floats]:
     """Return the (p, 3) vertices of pieces in their cells, the middles of pieces, and wider candidates or NaN.
 
@@ -387,7 +386,8 @@ def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
     size = np.array(grid.shape) + 2
     filled = np.floor((vertices - grid.origin) / grid.spacing).astype(np.int64) + 1
     around = (cells[on_surface, None] + TOUCHING_CELLS + 1).reshape(-1, 3)
-    near = np.isin(*(np.ravel_multi_index(tuple(places.T), size, "clip") for places in (around, filled)))
+    keys, held = (np.ravel_multi_index(tuple(places.T), size, "clip") for places in (around, filled))
+    near = places_among(np.sort(held), keys) >= 0
     lost = np.asarray(~near.reshape(-1, len(TOUCHING_CELLS)).any(axis=1))
     return parts[on_surface], lost
 
@@ -442,19 +442,20 @@ def crossed_edges(band: BlockValues) -> Crossings:
     parts = []
     for window in np.unique(band.blocks.places // WINDOW, axis=0).astype(np.int64):
         first, size = window * WINDOW * BLOCK, WINDOW * BLOCK
-        parts += crossings_in(band.window(first, (size + 1,) * 3).astype(np.float64), first)
+        parts += crossings_in(band.window(first, (size + 1,) * 3), first)
     return joined_crossings(parts)
 
 
-def crossings_in(heights: Floats, first: Ints) -> list[Crossings]:
+def crossings_in(heights: NDArray[np.floating], first: Ints) -> list[Crossings]:
     """Find the crossed edges between the nodes of a window of a grid, along each axis; nodes at NaN have none."""
     below, held, parts = heights < 0, ~np.isnan(heights), []
     for axis in range(3):
         ahead = tuple(slice(1, None) if k == axis else slice(0, -1) for k in range(3))
         inner = (slice(0, -1),) * 3
         nodes = np.argwhere((below[inner] != below[ahead]) & held[inner] & held[ahead])
-        low, high = heights[inner][tuple(nodes.T)], heights[ahead][tuple(nodes.T)]
-        parts.append(Crossings(first + nodes, np.full(len(nodes), axis), low < 0, low / (low - high)))
+        low, high = (heights[ends][tuple(nodes.T)].astype(np.float64) for ends in (inner, ahead))
+        axes = np.full(len(nodes), axis, dtype=np.int8)
+        parts.append(Crossings((first + nodes).astype(np.int32), axes, low < 0, low / (low - high)))
     return parts
 
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from ..arrays import Bools, Floats, Ints
@@ -213,7 +213,7 @@ def _rooms(cells: DualCells, crossings: Crossings) -> tuple[Floats, Floats]:
     return middles, np.where(alone, LARGEST_MOVE, 0.0)
 
 
-def _relaxed(quads: Ints, middles: Floats, room: Floats) -> Floats:
+def _relaxed(quads: NDArray[np.int32], middles: Floats, room: Floats) -> Floats:
     """(v, 3) places where a net bends least, by accelerated gradients with restarts (O'Donoghue & Candès 2015)."""
     count = len(middles)
     tails, heads = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
