@@ -27,7 +27,7 @@ from ..field_levels import ON_LEVEL, NodeValues, on_level
 from ..grids.blocks import BLOCK, WINDOW, Blocks, BlockValues
 from ..grids.grid import Grid
 from ..jobs import Progress
-from ..memory import available_memory, libraries
+from ..memory import available_memory, libraries, refuse_beyond_memory
 from ..mesh.components import element_components, places_among, sums_of
 from ..mesh.dual_cells import Crossings, DualCells, crossed_cells, dual_cells, open_cells, separate_triangles
 from ..mesh.edges import CLEARANCE
@@ -109,7 +109,7 @@ def _solved(values: Floats, vectors: Floats, sides: Floats, least: Floats) -> Fl
     return np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, sides, optimize=True)
 
 
-CELLS_AT_ONCE = 1 << 15
+CELLS_AT_ONCE = 1 << 14
 """Batch size for cells that the level passes through."""
 OUTSIDE_CELL = 0.6
 """Distance, in cells, by which a vertex may leave its cell."""
@@ -292,8 +292,9 @@ def _divided(vertices: Floats, faces: Ints, edges: Ints, points: Floats) -> tupl
     return np.concatenate([vertices, points]), divided_at(faces, rows, corners, new)
 
 
-BYTES_PER_BLOCK = 170_000
-"""Measured peak memory of a contour, for each block of the grid near it."""
+BYTES_PER_BLOCK, BYTES_PER_CROSSING = 15_000, 1_200
+"""Measured memory of a contour: for each block of the grid near it, until the edges that it crosses are known; then in
+all, for each of these edges. On a smooth surface the first is a third, the second a half of this."""
 TOUCHING_CELLS = np.array(list(np.ndindex(3, 3, 3))) - 1
 """(27, 3) offsets of a cell and of those that touch it."""
 IN_BLOCK = np.array(list(np.ndindex(BLOCK, BLOCK, BLOCK)))
@@ -394,7 +395,14 @@ def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
 
 def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCells]:
     """Compute heights near a surface, the edges that it crosses and its pieces in cells, adding blocks as needed."""
-    places = blocks_at(offset, grid)
+    places, cell = blocks_at(offset, grid), float(grid.spacing.max())
+
+    def bytes_needed(count: int) -> float:
+        return BYTES_PER_CROSSING * count
+
+    def wider(count: int) -> str:
+        return f"use a spacing of {cell * math.sqrt(len(crossings.axes) / max(count, 1)):.3g}"
+
     done = BlockValues(Blocks.of(places[:0], grid.shape), np.empty((0, BLOCK, BLOCK, BLOCK), dtype=np.float32))
     while True:
         new = block_heights(offset, grid, Blocks.of(places, grid.shape))
@@ -404,6 +412,7 @@ def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCe
             merged[both.rows(part.blocks.places)] = part.values
         done = BlockValues(both, merged)
         crossings = crossed_edges(done)
+        refuse_beyond_memory(f"a surface in cells of {cell:.3g}", len(crossings.axes), bytes_needed, wider)
         cells = crossed_cells(crossings, grid.shape)
         around = cells.places[open_cells(cells.edges)][:, None] + np.array(list(np.ndindex(2, 2, 2)))
         places = np.unique(around.reshape(-1, 3) // BLOCK, axis=0)
