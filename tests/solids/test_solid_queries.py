@@ -38,6 +38,9 @@ SHAPES = {
     "noise": lambda: samples.with_noise(samples.torus(0.8, 0.3, 40, 20), 0.02),
     "two cones": two_cones,
     "points": lambda: samples.oriented_points(samples.sphere(3), 500),
+    "copies that rounding parts": lambda: samples.union(
+        samples.torus(0.8, 0.3, 20, 10), samples.with_noise(samples.torus(0.8, 0.3, 20, 10), 3e-7)
+    ),
 }
 
 
@@ -48,7 +51,15 @@ def points_around(solid):
     far = rng.uniform(lower - 0.3 * size, upper + 0.3 * size, (3000, 3))
     corners = solid.triangles.reshape(-1, 3)
     near = corners[rng.integers(0, len(corners), 3000)]
-    return np.concatenate([far, *(near + rng.normal(0, off * size, near.shape) for off in (1e-1, 1e-3, 1e-6))])
+    weights = rng.dirichlet([0.5] * 3, 3000)
+    on_faces = np.einsum("nk,nki->ni", weights, solid.triangles[rng.integers(0, len(solid.triangles), 3000)])
+    return np.concatenate(
+        [
+            far,
+            *(near + rng.normal(0, off * size, near.shape) for off in (1e-1, 1e-3, 1e-6)),
+            *(on_faces + rng.normal(0, off * size, near.shape) for off in (1e-4, 1e-7, 1e-8, 1e-9)),
+        ]
+    )
 
 
 @pytest.mark.parametrize(

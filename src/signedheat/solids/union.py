@@ -73,12 +73,11 @@ def united(
         kept[:] = True
     confidence = _confidence(triangles[kept], given[kept], whole, points)
     diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds)))
-    bounding = (bounds & behind)[kept]
-    with suppress(GeometryError):  # pieces are moved a little where they meet; they are open if no cut succeeded
-        windings = windings if uncut else Windings(triangles[closes])
-    return Solid(
-        triangles if kept.all() else triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics
-    )
+    bounding = bounds & behind
+    with suppress(GeometryError):  # what bounds the inside is closed unless no cut succeeded
+        windings = windings if uncut and bounding.all() else Windings(triangles[bounding])
+    triangles = triangles if kept.all() else triangles[kept]
+    return Solid(triangles, origins[kept], confidence, bounding[kept], windings, None, diagnostics)
 
 
 def _cut(whole: TriangleGroup, closing: Bools, touching: float) -> Arrangement:
