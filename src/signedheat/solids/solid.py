@@ -73,7 +73,7 @@ class Solid(Displayed, Represented, Frozen):
     bounding : (m,) bool
         Whether a triangle has the inside behind it and the outside in front.
     windings : Windings
-        Winding numbers, which decide what is inside.
+        Winding numbers of the triangles that bound the inside.
     source : TriangleMesh, optional
         Triangles of the input, which barycentric coordinates refer to.
     diagnostics : Diagnostics

@@ -8,7 +8,6 @@ subtracted, across which such a sum passes ½; a box around both, turned inside 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 
@@ -74,10 +73,18 @@ def united(
     confidence = _confidence(triangles[kept], given[kept], whole, points)
     diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds)))
     bounding = bounds & behind
-    with suppress(GeometryError):  # what bounds the inside is closed unless no cut succeeded
-        windings = windings if uncut and bounding.all() else Windings(triangles[bounding])
+    if not (uncut and bounding.all()):
+        windings = _windings_of(triangles[bounding], windings)
     triangles = triangles if kept.all() else triangles[kept]
     return Solid(triangles, origins[kept], confidence, bounding[kept], windings, None, diagnostics)
+
+
+def _windings_of(triangles: Floats, given: Windings) -> Windings:
+    """Return the winding numbers of what bounds the inside; those given if no cut succeeded, so that it is open."""
+    try:
+        return Windings(triangles)
+    except GeometryError:
+        return given
 
 
 def _cut(whole: TriangleGroup, closing: Bools, touching: float) -> Arrangement:
@@ -214,5 +221,5 @@ def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None)
     if a.source is not None and b.source is not None:
         source = TriangleMesh(*concatenated([(mesh.vertices, mesh.faces) for mesh in (a.source, b.source)]))
     notes = still_true((*a.diagnostics.notes, *b.diagnostics.notes), pieces, origins[parents] < 0)
-    bounding = np.ones(len(pieces), dtype=np.bool_)
+    bounding, windings = np.ones(len(pieces), dtype=np.bool_), _windings_of(pieces, windings)
     return Solid(pieces, origins[parents], confidence[parents], bounding, windings, source, Diagnostics(notes=notes))
