@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import scipy
@@ -25,12 +25,14 @@ from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..jobs import Progress, run_cancellable
 from ..memory import within_memory
 from ..packages import lazy_module
-from ..parallel import in_chunks
+from ..parallel import in_threads
 from ..search.face_tree import FaceFeatures, FaceTree
 from ..sharpening_methods import Method, Nearest, distance_to_nearest, nearest, sharpen_field, timed
 from ..validation import array_of, flag, numbers, positive_steps
+from .blocks import BLOCK
 from .grid import Grid
 from .grid_field import GridField
+from .nearest_nodes import Lattice, nearest_at_nodes
 from .solid_queries import Scaled
 from .stencil import padded_shape
 
@@ -141,7 +143,7 @@ def _(
 
 
 def _distances(values: Floats, spacing: Floats, pads: Ints) -> Floats:
-    """Return (n,) unsigned distances of the nodes that are not padding; every axis has at least two nodes."""
+    """Return unsigned distances of the nodes that are not padding; every axis has at least two nodes."""
     signs = values.ndim > 1 and bool((np.abs(values) == 1).all())
     if signs:
         values = smoothed_signs(values)
@@ -156,9 +158,9 @@ def _distances(values: Floats, spacing: Floats, pads: Ints) -> Floats:
         )
     if signs:  # signs say nothing about how the zero set bends
         contour = contour._replace(smooth=np.zeros_like(contour.smooth))
-    inner = [np.arange(pad, n - pad) * step for pad, n, step in zip(pads, values.shape, steps[unused:], strict=True)]
-    places = np.stack(np.meshgrid(*[np.zeros(1)] * unused, *inner, indexing="ij"), axis=-1)
-    return scale * distances_to(contour, places.reshape(-1, 4))
+    first, shape = np.zeros(4), np.ones(4, dtype=np.int64)
+    first[unused:], shape[unused:] = pads * steps[unused:], np.array(values.shape) - 2 * pads
+    return scale * distances_to(contour, first, steps, shape)
 
 
 measure: Any = lazy_module("skimage.measure", "contours")
@@ -176,6 +178,12 @@ cells' radius are wrong by at most .04 cells, with .1 by .01; those of clipped b
 FLAT_RADIUS = 0.25
 """Radius around a crossing, relative to a cell's diagonal, within which the zero set of signs with four axes is
 flat. Distances of balls and half spaces 13 to 17 nodes wide are best with .125 to .25, those of boxes with more."""
+
+
+Measured: TypeAlias = Callable[[Ints, Ints, Floats], Floats]
+"""A function of the first node of a tile, of that beyond its last, and of its (n, 4) nodes: returns (n,) distances."""
+TILE_NODES = (4 * BLOCK) ** 3
+"""Approximate number of nodes that a thread measures at a time."""
 
 
 class Crossings(NamedTuple):
@@ -242,25 +250,54 @@ def zero_contour(values: Floats, steps: Floats) -> Contour:
     return Contour(vertices, faces, numbers, zeros, curved, points, smooth, least, reach)
 
 
-def distances_to(contour: Contour, places: Floats) -> Floats:
-    """Return (n,) unsigned distances of (n, 4) places to the zero set."""
-    distances = np.full(len(places), np.inf)
-    if not len(contour.vertices) and len(contour.points):  # four axes
-        crossings = scipy.spatial.cKDTree(contour.points)
-        (distances,) = in_chunks(lambda chunk: (_around_crossings(contour, crossings.query(chunk)[1], chunk),), places)
-    elif len(contour.faces):
-        features = FaceFeatures.of(contour.vertices, contour.faces)
-        tree, corners = FaceTree.of(features), contour.numbers[contour.faces[features.ids]]
+def distances_to(contour: Contour, origin: Floats, steps: Floats, shape: Ints) -> Floats:
+    """Return unsigned distances to the zero set of the nodes of a grid with four axes, given its first node."""
+    distances, zeros = np.full(tuple(shape), np.inf), scipy.spatial.cKDTree(contour.zeros)
+    side = BLOCK * max(1, round(TILE_NODES ** (1 / max((shape > 1).sum(), 1)) / BLOCK))
+    measured = _to_triangles(contour, origin, steps, shape) if len(contour.faces) else _to_crossings(contour)
 
-        def measured(chunk: Floats) -> tuple[Floats]:
-            faces, squares = tree.nearest(np.ascontiguousarray(chunk[:, 1:]))
-            return (_around(contour, corners[faces], np.sqrt(squares), chunk),)
+    def measure(first: Ints) -> None:
+        stop = np.minimum(first + side, shape)
+        axes = [np.arange(*ends) for ends in zip(first, stop, strict=True)]
+        places = origin + np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 4) * steps
+        near = measured(first, stop, places)
+        if len(contour.zeros):
+            near = np.minimum(near, zeros.query(places)[0])
+        distances[np.ix_(*axes)] = near.reshape(stop - first)
 
-        (distances,) = in_chunks(measured, places)
-    if len(contour.zeros):
-        to_zeros = scipy.spatial.cKDTree(contour.zeros).query(places, workers=-1)[0]
-        distances = np.minimum(distances, to_zeros)
+    firsts = np.meshgrid(*(np.arange(0, n, side) for n in shape), indexing="ij")
+    list(in_threads(measure, np.stack(firsts, axis=-1).reshape(-1, 4)))
     return distances
+
+
+def _to_triangles(contour: Contour, origin: Floats, steps: Floats, shape: Ints) -> Measured:
+    """Return a function that measures the nodes of a grid with up to three axes to the contour."""
+    features = FaceFeatures.of(contour.vertices, contour.faces)
+    tree, corners = FaceTree.of(features), contour.numbers[contour.faces[features.ids]]
+    _ = tree.discs  # before threads compute them twice
+    lattice = Lattice(origin[1:], steps[1:], shape[1:])
+
+    def measured(first: Ints, stop: Ints, places: Floats) -> Floats:
+        if (shape[1:] > 1).all():
+            blocks = np.stack(np.meshgrid(*map(np.arange, (first // BLOCK)[1:], -(-stop // BLOCK)[1:])), axis=-1)
+            squares, faces = nearest_at_nodes(tree, lattice, first[1:], blocks.reshape(-1, 3))
+        else:  # blocks of a plane are nearly empty
+            faces, squares = tree.nearest(np.ascontiguousarray(places[:, 1:]))
+        return _around(contour, corners[faces.ravel()], np.sqrt(squares.ravel()), places)
+
+    return measured
+
+
+def _to_crossings(contour: Contour) -> Measured:
+    """Return a function that measures the nodes of a grid with four axes to the nearest crossings, if there are any."""
+    crossings = scipy.spatial.cKDTree(contour.points)
+
+    def measured(first: Ints, stop: Ints, places: Floats) -> Floats:
+        if not len(contour.points):
+            return np.full(len(places), np.inf)
+        return _around_crossings(contour, crossings.query(places)[1], places)
+
+    return measured
 
 
 def _around(contour: Contour, corners: Ints, distances: Floats, places: Floats) -> Floats:

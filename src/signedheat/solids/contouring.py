@@ -36,9 +36,8 @@ from ..mesh.triangles import MOST_CREASED_FACES, bent_edges, divided_at
 from ..parallel import in_threads
 from ..surfaces.triangle_mesh import TriangleMesh
 from .gauss import Pieces, sampled
-from .node_distances import solved
 from .offsets import Offset
-from .tiles import blocks_where, prepared, tiles_of
+from .tiles import blocks_where, prepared, solved, tiles_of
 
 CREASE_TANGENT = 0.05
 """Planes count as one if the tangent of half the angle between them is below this. Creases of 5.7° are cut off by a

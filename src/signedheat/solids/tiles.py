@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, Literal, Protocol, TypeAlias, cast
 
 import numpy as np
+import scipy
 from numpy.lib.format import open_memmap
 from numpy.typing import NDArray
 
@@ -30,15 +31,15 @@ from ..grids.blocks import BLOCK, BLOCK_NODES, Blocks
 from ..grids.grid import Grid
 from ..grids.grid_discretization import refuse_large_grid
 from ..grids.grid_field import GridField
+from ..grids.nearest_nodes import SQUARE_ROUNDING, Lattice, nearest_at_nodes
 from ..grids.solid_queries import SolidQueries
 from ..jobs import Progress
 from ..memory import available_memory, libraries
 from ..packages import lazy_module
 from ..parallel import connected, in_threads, n_threads
-from ..search.face_tree import FaceTree
+from ..search.face_tree import FaceTree, feet_on
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import positive_number
-from .node_distances import distances_in, solved
 from .winding import Windings
 
 TILE = 8
@@ -138,6 +139,57 @@ def band_field(
         diagnostics = diagnostics.noting(note)
     field = GridField(grid, values, diagnostics, confidence, solid=solid, blocks=blocks, coarse=coarse, width=width)
     return cast("GridField[Literal[3]]", field)
+
+
+def distances_in(
+    tree: FaceTree, windings: Windings, grid: Grid, first: Ints, places: Ints
+) -> tuple[Floats, NDArray[np.float32]]:
+    """Compute (a, b, c) signed distances from node `first` on, NaN at nodes that are in no block; and confidence."""
+    lattice = Lattice(np.array(grid.origin), np.array(grid.spacing), np.array(grid.shape))
+    squares, faces = nearest_at_nodes(tree, lattice, first, places)
+    values = np.sqrt(squares, out=squares)
+    inside = _inside(tree, windings, grid, first, values, faces)
+    return np.negative(values, out=values, where=inside), tree.features.trusted[faces]
+
+
+def solved(
+    tree: FaceTree, windings: Windings, grid: Grid, places: Ints
+) -> tuple[NDArray[np.float32], NDArray[np.float16]]:
+    """(n, 8, 8, 8) signed distances at the nodes of blocks near each other, NaN beyond the grid; and confidence."""
+    first = places.min(axis=0)
+    distances, trusted = distances_in(tree, windings, grid, BLOCK * first, places)
+    values = np.full((len(places), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
+    confidence = np.ones(values.shape, dtype=np.float16)
+    for row, place in enumerate(BLOCK * (places - first)):
+        a, b, c = (slice(p, p + BLOCK) for p in place)
+        i, j, k = distances[a, b, c].shape
+        values[row, :i, :j, :k], confidence[row, :i, :j, :k] = distances[a, b, c], trusted[a, b, c]
+    return values, confidence
+
+
+def _inside(
+    tree: FaceTree, windings: Windings, grid: Grid, first: Ints, values: Floats, faces: NDArray[np.int32]
+) -> Bools:
+    """Find the nodes inside, given their distances and nearest faces.
+
+    Connected nodes farther than half a step from any surface share one test.
+    """
+    origin, steps = grid.origin + first * grid.spacing, grid.spacing
+    inside = np.zeros(values.shape, dtype=bool)
+    far = values > 0.5 * (1.0 + SQUARE_ROUNDING) * float(steps.max())
+    groups, count = scipy.ndimage.label(far)
+    if count:
+        most = np.zeros(count + 1)
+        np.maximum.at(most, groups[far], values[far])
+        farthest = far & (values == most[groups])
+        where = np.argwhere(farthest)[np.unique(groups[farthest], return_index=True)[1]]
+        group_is_inside = np.concatenate([[False], windings.inside(origin + where * steps)])
+        inside = group_is_inside[groups]
+    near = np.nonzero(~np.isnan(values) & ~far)
+    if len(near[0]):
+        points = origin + np.stack(near, axis=1) * steps
+        inside[near] = windings.inside_near(points, feet_on(tree.features, faces[near], points))
+    return inside
 
 
 def tiles_of(blocks: Blocks) -> list[Ints]:

@@ -1,4 +1,4 @@
-"""Exact distance to faces at the nodes of blocks of a grid, with one search for each block.
+"""The nearest faces of the nodes of a grid, with one search for each block of nodes.
 
 For places q and y of the surface and nodes x of a box, ``|x − y|² − |x − q|²`` is linear in x: if it is positive at the
 corner of the box that favours y, no node of the box has y as its nearest place. Few faces remain for a block, and fewer
@@ -7,18 +7,26 @@ for each eighth of it, down to single nodes.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..grids.blocks import BLOCK
-from ..grids.grid import Grid
 from ..mesh.box_tree import BOXES_PER_LEAF, morton_codes
-from ..search.face_tree import FaceTree, feet_on
+from ..search.face_tree import FaceTree
 from ..search.nearest_triangles import away_from_triangle, foot_on_triangle
-from .winding import Windings
+from .blocks import BLOCK
+
+
+class Lattice(NamedTuple):
+    """Nodes in rows along three axes."""
+
+    origin: Floats  # (3,) position of the first node
+    steps: Floats  # (3,) distance between neighbouring nodes along each axis
+    shape: Ints  # (3,) number of nodes along each axis
+
 
 SQUARE_ROUNDING = 1e-12
 """Relative rounding error of squares."""
@@ -32,66 +40,25 @@ ALONG_A_CURVE = np.stack(
 """(512, 3) nodes of a block along a space-filling curve."""
 
 
-def distances_in(
-    tree: FaceTree, windings: Windings, grid: Grid, first: Ints, places: Ints
-) -> tuple[Floats, NDArray[np.float32]]:
-    """Compute (a, b, c) signed distances from node `first` on, NaN at nodes that are in no block; and confidence."""
-    shape = np.minimum((places.max(axis=0) + 1) * BLOCK, grid.shape) - first
-    squares, faces = np.full(tuple(shape), np.nan), np.full(tuple(shape), -1, dtype=np.int32)
+def nearest_at_nodes(tree: FaceTree, lattice: Lattice, first: Ints, places: Ints) -> tuple[Floats, NDArray[np.int32]]:
+    """Return (a, b, c) squared distances and nearest faces of the nodes from `first` on, in blocks at (n, 3) places.
+
+    At nodes that are in no block they are NaN and −1.
+    """
+    origin, steps, limits = lattice
+    shape = tuple(np.minimum((places.max(axis=0) + 1) * BLOCK, limits) - first)
+    squares, faces = np.full(shape, np.nan), np.full(shape, -1, dtype=np.int32)
     boxes = tree.features.rows, tree.tree.bounds, tree.discs, tree.tree.items
-    lattice = np.array(grid.origin), np.array(grid.spacing), np.array(grid.shape)
     firsts = BLOCK * places[np.argsort(morton_codes(places.astype(np.float64)), kind="stable")]
-    last = np.minimum(firsts + BLOCK, grid.shape) - 1
-    near, _ = tree.nearest(grid.origin + 0.5 * (firsts + last) * grid.spacing)
+    last = np.minimum(firsts + BLOCK, limits) - 1
+    near, _ = tree.nearest(origin + 0.5 * (firsts + last) * steps)
     crowded = _fill(*boxes, *lattice, firsts, near, first, EIGHTHS, squares, faces)
     if crowded.any():
         nodes = (firsts[crowded, None] + ALONG_A_CURVE).reshape(-1, 3)
-        nodes = nodes[(nodes < grid.shape).all(axis=1)]
+        nodes = nodes[(nodes < limits).all(axis=1)]
         where = tuple((nodes - first).T)
-        faces[where], squares[where] = tree.nearest(grid.origin + nodes * grid.spacing)
-    values = np.sqrt(squares, out=squares)
-    inside = _inside(tree, windings, grid, first, values, faces)
-    return np.negative(values, out=values, where=inside), tree.features.trusted[faces]
-
-
-def solved(
-    tree: FaceTree, windings: Windings, grid: Grid, places: Ints
-) -> tuple[NDArray[np.float32], NDArray[np.float16]]:
-    """(n, 8, 8, 8) signed distances at the nodes of blocks near each other, NaN beyond the grid; and confidence."""
-    first = places.min(axis=0)
-    distances, trusted = distances_in(tree, windings, grid, BLOCK * first, places)
-    values = np.full((len(places), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
-    confidence = np.ones(values.shape, dtype=np.float16)
-    for row, place in enumerate(BLOCK * (places - first)):
-        a, b, c = (slice(p, p + BLOCK) for p in place)
-        i, j, k = distances[a, b, c].shape
-        values[row, :i, :j, :k], confidence[row, :i, :j, :k] = distances[a, b, c], trusted[a, b, c]
-    return values, confidence
-
-
-def _inside(
-    tree: FaceTree, windings: Windings, grid: Grid, first: Ints, values: Floats, faces: NDArray[np.int32]
-) -> Bools:
-    """Find the nodes inside, given their distances and nearest faces.
-
-    Connected nodes farther than half a step from any surface share one test.
-    """
-    origin, steps = grid.origin + first * grid.spacing, grid.spacing
-    inside = np.zeros(values.shape, dtype=bool)
-    far = values > 0.5 * (1.0 + SQUARE_ROUNDING) * float(steps.max())
-    groups, count = scipy.ndimage.label(far)
-    if count:
-        most = np.zeros(count + 1)
-        np.maximum.at(most, groups[far], values[far])
-        farthest = far & (values == most[groups])
-        where = np.argwhere(farthest)[np.unique(groups[farthest], return_index=True)[1]]
-        group_is_inside = np.concatenate([[False], windings.inside(origin + where * steps)])
-        inside = group_is_inside[groups]
-    near = np.nonzero(~np.isnan(values) & ~far)
-    if len(near[0]):
-        points = origin + np.stack(near, axis=1) * steps
-        inside[near] = windings.inside_near(points, feet_on(tree.features, faces[near], points))
-    return inside
+        faces[where], squares[where] = tree.nearest(origin + nodes * steps)
+    return squares, faces
 
 
 @compiled
