@@ -15,6 +15,7 @@ For points: Lin et al., Surface reconstruction from point clouds without normals
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -291,11 +292,8 @@ class Dipoles:
         """(n,) winding numbers at the places, due to all other dipoles."""
         vectors = self.normals * (self.areas * signs[self.owners])[:, None]
         nodes = self._sums(vectors)
-        (sums,) = in_chunks(
-            lambda at: (_potentials(self.places, self.softening, vectors, self.tree.items, self.balls, nodes, at),),
-            np.arange(len(self.places)),
-        )
-        return sums / (4.0 * np.pi)
+        known = self.places, self.softening, vectors, self.tree.items, self.balls, nodes
+        return self._at_places(lambda at: _potentials(*known, at)) / (4.0 * np.pi)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
         """(n,) zeros, for the levels at the places due to their own group only: loose triangles have none."""
@@ -306,12 +304,18 @@ class Dipoles:
         away = self.places - self.balls[1, :3]
         nodes = self._sums(np.c_[charges, charges[:, None] * away])
         nodes[:, 1:] -= nodes[:, :1] * (self.balls[:, :3] - self.balls[1, :3])  # moments about the middles of nodes
-        (field,) = in_chunks(
-            lambda at: (_fields(self.places, self.softening, charges, self.tree.items, self.balls, nodes, at),),
-            np.arange(len(self.places)),
-        )
+        known = self.places, self.softening, charges, self.tree.items, self.balls, nodes
+        field = self._at_places(lambda at: _fields(*known, at))
         flux = self.areas * (field * self.normals).sum(axis=1) / (4.0 * np.pi)
         return np.bincount(self.owners, flux).astype(np.float64)
+
+    def _at_places(self, function: Callable[[Ints], Floats]) -> Floats:
+        """(n, ...) values of a function of ids of places, called in the order of the tree: neighbours use the same."""
+        order = self.tree.items[self.tree.items >= 0]
+        (found,) = in_chunks(lambda at: (function(at),), order)
+        values = np.empty_like(found)
+        values[order] = found
+        return values
 
     def _sums(self, values: Floats) -> Floats:
         """(2 · leaves, d) sums of (n, d) values below each node."""
