@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 import scipy
@@ -61,6 +63,18 @@ def test_a_turned_box_is_sharp(gradient):
     assert surface.to_trimesh().volume == pytest.approx(8 * HALVES.prod(), rel=1e-4)
     cut = sh.contour(box, CUBE, 0.08, sharp=False)
     assert cut.to_trimesh().volume < (1 - 1e-3) * 8 * HALVES.prod()
+
+
+def test_functions_are_called_in_the_thread_that_asks():
+    """They may hold state, or contexts of other libraries, that belong to one thread."""
+    threads = set()
+
+    def told(points):
+        threads.add(threading.get_ident())
+        return box(points)
+
+    assert sh.contour(told, CUBE, 0.08).n_faces > 1000
+    assert threads == {threading.get_ident()}
 
 
 def test_arrays_have_edges_too():

@@ -108,7 +108,7 @@ def _solved(values: Floats, vectors: Floats, sides: Floats, least: Floats) -> Fl
     return np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, sides, optimize=True)
 
 
-CELLS_AT_ONCE = 1 << 14
+CELLS_AT_ONCE = 1 << 16
 """Batch size for cells that the level passes through."""
 OUTSIDE_CELL = 0.6
 """Distance, in cells, by which a vertex may leave its cell."""
@@ -144,8 +144,7 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats
     count = len(cells.owners)
     vertices, middles, wider = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
     alone = np.bincount(cells.owners)[cells.owners] == 1
-
-    def place(begin: int) -> None:
+    for begin in range(0, len(cells.places), CELLS_AT_ONCE):  # in one thread: functions may be a caller's
         edges, pieces = (part[begin : begin + CELLS_AT_ONCE] for part in (cells.edges, cells.pieces))
         first, stop = np.searchsorted(cells.owners, [begin, begin + CELLS_AT_ONCE])
         used, crossed = np.unique(edges[edges >= 0], return_inverse=True)  # each edge is in four cells
@@ -153,8 +152,6 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats
         parts = _vertices(offset, grid, places, alone[first:stop], owners, crossed, points[used])
         for whole, part in zip((vertices, middles, wider), parts, strict=True):
             whole[first:stop] = (part - grid.origin) / grid.spacing
-
-    list(in_threads(place, range(0, len(cells.places), CELLS_AT_ONCE)))
     chosen = _apart(cells, vertices, wider)
     return np.stack([np.where(chosen[:, None], wider, vertices), vertices, middles])
 
@@ -293,7 +290,8 @@ def _divided(vertices: Floats, faces: Ints, edges: Ints, points: Floats) -> tupl
 
 BYTES_PER_BLOCK, BYTES_PER_CROSSING = 15_000, 1_200
 """Measured memory of a contour: for each block of the grid near it, until the edges that it crosses are known; then in
-all, for each of these edges. On a smooth surface the first is a third, the second a half of this."""
+all, for each of these edges. Smooth surfaces take a third of the first, and a half of the second if they have more
+faces than `MOST_CREASED_FACES`."""
 TOUCHING_CELLS = np.array(list(np.ndindex(3, 3, 3))) - 1
 """(27, 3) offsets of a cell and of those that touch it."""
 IN_BLOCK = np.array(list(np.ndindex(BLOCK, BLOCK, BLOCK)))

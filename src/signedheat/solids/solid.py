@@ -102,7 +102,7 @@ class Solid(Displayed, Represented, Frozen):
 
     @cached_property
     def features(self) -> FaceFeatures:
-        """The triangles with their neighbourhoods; edges and vertices of those that bound nothing are not regular."""
+        """The triangles with their neighbourhoods; those that bound nothing are not regular."""
         faces = np.arange(3 * len(self.triangles)).reshape(-1, 3)
         return FaceFeatures.of(self.triangles.reshape(-1, 3), faces, self.confidence, self.bounding)
 
