@@ -9,6 +9,7 @@ import pytest
 import scipy
 
 import signedheat as sh
+from signedheat import samples
 from signedheat.inspection import inspect
 from signedheat.mesh.self_intersections import self_intersections
 
@@ -65,7 +66,14 @@ def test_a_turned_box_is_sharp(gradient):
     assert cut.to_trimesh().volume < (1 - 1e-3) * 8 * HALVES.prod()
 
 
-def test_functions_are_called_in_the_thread_that_asks():
+@pytest.mark.parametrize(
+    "surface",
+    [
+        lambda f: sh.contour(f, CUBE, 0.08),
+        lambda f: sh.complete(samples.sphere(3)).offset(lambda places: 0.2 + 0.1 * f(places), resolution=64),
+    ],
+)
+def test_functions_are_called_in_the_thread_that_asks(surface):
     """They may hold state, or contexts of other libraries, that belong to one thread."""
     threads = set()
 
@@ -73,7 +81,7 @@ def test_functions_are_called_in_the_thread_that_asks():
         threads.add(threading.get_ident())
         return box(points)
 
-    assert sh.contour(told, CUBE, 0.08).n_faces > 1000
+    assert surface(told).n_faces > 1000
     assert threads == {threading.get_ident()}
 
 

@@ -320,7 +320,7 @@ def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
         values[rows] = heights.reshape(-1, BLOCK, BLOCK, BLOCK)
         return rows
 
-    for _ in in_threads(solve, tiles_of(blocks)):
+    for _ in (map if callable(offset.reach) else in_threads)(solve, tiles_of(blocks)):  # a caller's stays in its thread
         pass
     return BlockValues(blocks, values)
 
