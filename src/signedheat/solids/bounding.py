@@ -19,7 +19,7 @@ from ..mesh.triangles import area_vectors
 from ..mesh.unit_vectors import unit
 from ..search.winding_tree import WindingTree
 from .chain import Chain, inner_walls
-from .gauss import Dipoles, Matrix, Pieces, means, sampled, system_of, without_slender
+from .gauss import Matrix, Pieces, means, sampled, system_of, without_slender
 from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, directed, levels_of_pieces, levels_within
 from .rims import meeting_edges, open_edges
 
@@ -205,26 +205,27 @@ def open_bounding(
     shared = np.bincount(groups, minlength=n)[groups] > 1
     alone = np.abs(levels_of_pieces(pieces))
     clusters, whole = clusters_of(pieces), system_of(pieces)
-    alive, signs = np.ones(n, dtype=bool), np.ones(n)
+    alive, weights = np.ones(n, dtype=bool), np.ones(n)  # the signs of the weights are those of the pieces
     if not as_oriented:
-        signs = signs_of(whole)
-        within = bodies_around(whole, pieces, rims, groups, alone, signs, given, closed, nested)
+        weights = whole.weights()
+        within = bodies_around(whole, pieces, rims, groups, alone, signs_of(weights), given, closed, nested)
         if within.any():
             whole = replace(whole, within=within)
-            signs = signs_of(whole)
+            weights = whole.weights(weights)
     while alive.any():
         names, system = np.flatnonzero(alive), whole.chosen(alive)
-        values = system.levels(signs[names])
+        signs = signs_of(weights[names])
+        values = system.levels(signs)
         rows, levels = names[system.owners], np.zeros(n)
         levels[names] = means(values, system.owners, system.areas, len(names))
         # whether groups are bodies by themselves; loose pieces are judged cluster by cluster
-        together = means(system.levels_within(signs[names], groups[names]), groups[rows], system.areas, n)[groups]
+        together = means(system.levels_within(signs, groups[names]), groups[rows], system.areas, n)[groups]
         by_itself = np.where(shared, together, alone)
         own = by_itself >= SHEET
         loose = alive & ~own
-        weights = np.where(loose[rows], system.areas, 0.0)
-        mean = means(values, clusters[rows], weights, n)
-        square = means(values**2, clusters[rows], weights, n)
+        shares = np.where(loose[rows], system.areas, 0.0)
+        mean = means(values, clusters[rows], shares, n)
+        square = means(values**2, clusters[rows], shares, n)
         amount = _counted(areas * loose, groups, clusters)
         body = (mean * np.sqrt(amount + 1) >= CHANCE_LEVEL) & (mean**2 >= COHERENT_LEVELS * square)
         thresholds = np.minimum(SHEET, 2 * SHEET * mean) if isinstance(system, Matrix) else -np.inf  # dipoles are noisy
@@ -235,15 +236,15 @@ def open_bounding(
             break
         alive &= ~(wrong & (unexplained >= 0.5 * unexplained.max()))
         if not as_oriented and alive.any():
-            signs[alive] = signs_of(whole.chosen(alive))
+            weights[alive] = whole.chosen(alive).weights(weights[alive])
     of_loose, of_bodies = (np.bincount(clusters, areas * (alive & mask), n) for mask in (~own, own))
     mostly = alive & (of_loose > of_bodies)[clusters]
-    return signs, alive, np.where(mostly, clusters, -1), np.where(mostly, mean[clusters], 0.5)
+    return signs_of(weights), alive, np.where(mostly, clusters, -1), np.where(mostly, mean[clusters], 0.5)
 
 
-def signs_of(system: Matrix | Dipoles) -> Floats:
+def signs_of(weights: Floats) -> Floats:
     """(k,) signs of the weights of pieces."""
-    return np.where(system.weights() >= 0, 1.0, -1.0)
+    return np.where(weights >= 0, 1.0, -1.0)
 
 
 def _counted(areas: Floats, groups: Ints, clusters: Ints) -> Floats:

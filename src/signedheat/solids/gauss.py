@@ -54,6 +54,10 @@ SLENDER_TRIANGLE = 12.0
 dipole must not stand for a strip. An equilateral triangle has 2.3, a strip six times as long as wide 12."""
 MOST_DIPOLES = 200_000
 """Largest number of dipoles; of more faces, this many are drawn evenly."""
+PLACES_TOGETHER = 16
+"""Number of places for which dipoles are summed together."""
+WEIGHT_TOLERANCE = 0.01
+"""Relative residual of the weights of dipoles, by which all but a few signs are those of the exact weights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +139,8 @@ class Matrix:
         matrix = self.matrix[rows][:, kept]
         return Matrix(matrix, self.places[rows], self.normals[rows], owners, self.areas[rows], self.within[rows])
 
-    def weights(self) -> Floats:
-        """(k,) least-squares weights, whose signs orient the pieces."""
+    def weights(self, start: Floats | None = None) -> Floats:
+        """(k,) least-squares weights, whose signs orient the pieces, found at once without a start."""
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
         weighted = self.matrix * shares[:, None]
         normal = weighted.T @ self.matrix
@@ -270,8 +274,8 @@ class Dipoles:
         places, normals, areas, softening, within = (array[rows] for array in values)
         return Dipoles(places, normals, areas, owners, softening, within)
 
-    def weights(self) -> Floats:
-        """(k,) weights after a fixed number of steps of conjugate gradients."""
+    def weights(self, start: Floats | None = None) -> Floats:
+        """(k,) weights, by conjugate gradients from weights near them, or from zero."""
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
         smooth = agreement(self.places, self.normals, shares, self.owners)
         held = WEIGHT_DAMPING * np.bincount(self.owners, shares)
@@ -281,8 +285,7 @@ class Dipoles:
 
         inverse = 1.0 / np.maximum(smooth.diagonal() + held, np.finfo(float).tiny)
         wanted = self._adjoint((0.5 + self.within) * shares)
-        # ten steps give the signs of the direct solution
-        return conjugate_gradients(system, wanted, lambda rest: inverse * rest, tolerance=0.0, limit=10)
+        return conjugate_gradients(system, wanted, lambda rest: inverse * rest, start, WEIGHT_TOLERANCE, limit=100)
 
     def levels(self, signs: Floats) -> Floats:
         """(n,) levels at the places, without the bodies ignored there."""
@@ -293,7 +296,7 @@ class Dipoles:
         vectors = self.normals * (self.areas * signs[self.owners])[:, None]
         nodes = self._sums(vectors)
         known = self.places, self.softening, vectors, self.tree.items, self.balls, nodes
-        return self._at_places(lambda at: _potentials(*known, at)) / (4.0 * np.pi)
+        return self._at_places(lambda at: _potentials(*known, at, PLACES_TOGETHER)) / (4.0 * np.pi)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
         """(n,) zeros, for the levels at the places due to their own group only: loose triangles have none."""
@@ -305,7 +308,7 @@ class Dipoles:
         nodes = self._sums(np.c_[charges, charges[:, None] * away])
         nodes[:, 1:] -= nodes[:, :1] * (self.balls[:, :3] - self.balls[1, :3])  # moments about the middles of nodes
         known = self.places, self.softening, charges, self.tree.items, self.balls, nodes
-        field = self._at_places(lambda at: _fields(*known, at))
+        field = self._at_places(lambda at: _fields(*known, at, PLACES_TOGETHER))
         flux = self.areas * (field * self.normals).sum(axis=1) / (4.0 * np.pi)
         return np.bincount(self.owners, flux).astype(np.float64)
 
@@ -361,72 +364,118 @@ def spacing(places: Floats) -> Floats:
 
 @compiled
 def _potentials(
-    places: Floats, softening: Floats, vectors: Floats, items: Ints, balls: Floats, nodes: Floats, at: Ints
+    places: Floats,
+    softening: Floats,
+    vectors: Floats,
+    items: Ints,
+    balls: Floats,
+    nodes: Floats,
+    at: Ints,
+    together: int,
 ) -> Floats:
-    """Sum ``v · d / (|d|² + ε²)^(3/2)`` at places over all other dipoles v, where d points from the place to v."""
-    leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.zeros(len(at))
-    for row in range(len(at)):
-        p = at[row]
-        x, y, z, total, depth = places[p, 0], places[p, 1], places[p, 2], 0.0, 1
-        stack[0] = 1
+    """Sum ``v · d / (|d|² + ε²)^(3/2)`` at places over all other dipoles v, where d points from the place to v.
+
+    Consecutive places descend the tree together, as many as `together` says.
+    """
+    leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.empty(len(at))
+    x, y, z, sums = np.empty(together), np.empty(together), np.empty(together), np.empty(together)
+    for begin in range(0, len(at), together):
+        for k in range(together):
+            p = at[min(begin + k, len(at) - 1)]
+            x[k], y[k], z[k], sums[k] = places[p, 0], places[p, 1], places[p, 2], 0.0
+        stack[0], depth = 1, 1
         while depth > 0:
             depth -= 1
             node = stack[depth]
-            dx, dy, dz = balls[node, 0] - x, balls[node, 1] - y, balls[node, 2] - z
-            square = dx * dx + dy * dy + dz * dz
-            if square > balls[node, 3]:
-                flux = dx * nodes[node, 0] + dy * nodes[node, 1] + dz * nodes[node, 2]
-                total += flux / (square * np.sqrt(square))
+            ax, ay, az, beyond = balls[node, 0], balls[node, 1], balls[node, 2], balls[node, 3]
+            if _all_beyond(ax, ay, az, beyond, x, y, z):
+                vx, vy, vz = nodes[node, 0], nodes[node, 1], nodes[node, 2]
+                for k in range(together):
+                    dx, dy, dz = ax - x[k], ay - y[k], az - z[k]
+                    square = dx * dx + dy * dy + dz * dz
+                    sums[k] += (dx * vx + dy * vy + dz * vz) / (square * np.sqrt(square))
             elif node < leaves:
                 stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
                 depth += 2
             else:
-                for k in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
-                    e = items[k]
-                    if e >= 0 and e != p:
-                        dx, dy, dz = places[e, 0] - x, places[e, 1] - y, places[e, 2] - z
-                        square = dx * dx + dy * dy + dz * dz + softening[e] ** 2
-                        if square > 0.0:
-                            flux = dx * vectors[e, 0] + dy * vectors[e, 1] + dz * vectors[e, 2]
-                            total += flux / (square * np.sqrt(square))
-        result[row] = total
+                for item in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
+                    e = items[item]
+                    if e < 0:
+                        continue
+                    ax, ay, az, soft = places[e, 0], places[e, 1], places[e, 2], softening[e] ** 2
+                    vx, vy, vz = vectors[e, 0], vectors[e, 1], vectors[e, 2]
+                    for k in range(together):  # a dipole adds nothing at its own place, where d = 0
+                        dx, dy, dz = ax - x[k], ay - y[k], az - z[k]
+                        square = dx * dx + dy * dy + dz * dz + soft
+                        square = square if square > 0.0 else 1.0
+                        sums[k] += (dx * vx + dy * vy + dz * vz) / (square * np.sqrt(square))
+        for k in range(min(together, len(at) - begin)):
+            result[begin + k] = sums[k]
     return result
 
 
 @compiled
+def _all_beyond(ax: float, ay: float, az: float, square: float, x: Floats, y: Floats, z: Floats) -> bool:
+    """Say whether all points are farther from a centre than a distance, given its square."""
+    near = 0
+    for k in range(len(x)):
+        dx, dy, dz = ax - x[k], ay - y[k], az - z[k]
+        near += 1 if dx * dx + dy * dy + dz * dz <= square else 0
+    return near == 0
+
+
+@compiled
 def _fields(
-    places: Floats, softening: Floats, charges: Floats, items: Ints, balls: Floats, nodes: Floats, at: Ints
+    places: Floats,
+    softening: Floats,
+    charges: Floats,
+    items: Ints,
+    balls: Floats,
+    nodes: Floats,
+    at: Ints,
+    together: int,
 ) -> Floats:
     """Sum ``c d / (|d|² + ε²)^(3/2)`` at places over all other charges c; d points from c to the place, which has ε."""
-    leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.zeros((len(at), 3))
-    for row in range(len(at)):
-        p = at[row]
-        x, y, z, soft, depth = places[p, 0], places[p, 1], places[p, 2], softening[p] ** 2, 1
-        stack[0] = 1
+    leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.empty((len(at), 3))
+    x, y, z, soft = np.empty(together), np.empty(together), np.empty(together), np.empty(together)
+    fx, fy, fz = np.empty(together), np.empty(together), np.empty(together)
+    for begin in range(0, len(at), together):
+        for k in range(together):
+            p = at[min(begin + k, len(at) - 1)]
+            x[k], y[k], z[k], soft[k] = places[p, 0], places[p, 1], places[p, 2], softening[p] ** 2
+            fx[k], fy[k], fz[k] = 0.0, 0.0, 0.0
+        stack[0], depth = 1, 1
         while depth > 0:
             depth -= 1
             node = stack[depth]
-            dx, dy, dz = x - balls[node, 0], y - balls[node, 1], z - balls[node, 2]
-            square = dx * dx + dy * dy + dz * dz
-            if square > balls[node, 3]:
-                cube = square * np.sqrt(square)
-                lean = dx * nodes[node, 1] + dy * nodes[node, 2] + dz * nodes[node, 3]
-                straight = (nodes[node, 0] + 3.0 * lean / square) / cube
-                result[row, 0] += straight * dx - nodes[node, 1] / cube
-                result[row, 1] += straight * dy - nodes[node, 2] / cube
-                result[row, 2] += straight * dz - nodes[node, 3] / cube
+            ax, ay, az, beyond = balls[node, 0], balls[node, 1], balls[node, 2], balls[node, 3]
+            if _all_beyond(ax, ay, az, beyond, x, y, z):
+                charge, mx, my, mz = nodes[node, 0], nodes[node, 1], nodes[node, 2], nodes[node, 3]
+                for k in range(together):
+                    dx, dy, dz = x[k] - ax, y[k] - ay, z[k] - az
+                    square = dx * dx + dy * dy + dz * dz
+                    cube = 1.0 / (square * np.sqrt(square))
+                    straight = (charge + 3.0 * (dx * mx + dy * my + dz * mz) / square) * cube
+                    fx[k] += straight * dx - mx * cube
+                    fy[k] += straight * dy - my * cube
+                    fz[k] += straight * dz - mz * cube
             elif node < leaves:
                 stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
                 depth += 2
             else:
-                for k in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
-                    e = items[k]
-                    if e >= 0 and e != p:
-                        dx, dy, dz = x - places[e, 0], y - places[e, 1], z - places[e, 2]
-                        square = dx * dx + dy * dy + dz * dz + soft
-                        if square > 0.0:
-                            share = charges[e] / (square * np.sqrt(square))
-                            result[row, 0] += share * dx
-                            result[row, 1] += share * dy
-                            result[row, 2] += share * dz
+                for item in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
+                    e = items[item]
+                    if e < 0:
+                        continue
+                    ax, ay, az, charge = places[e, 0], places[e, 1], places[e, 2], charges[e]
+                    for k in range(together):
+                        dx, dy, dz = x[k] - ax, y[k] - ay, z[k] - az
+                        square = dx * dx + dy * dy + dz * dz + soft[k]
+                        square = square if square > 0.0 else 1.0
+                        share = charge / (square * np.sqrt(square))
+                        fx[k] += share * dx
+                        fy[k] += share * dy
+                        fz[k] += share * dz
+        for k in range(min(together, len(at) - begin)):
+            result[begin + k, 0], result[begin + k, 1], result[begin + k, 2] = fx[k], fy[k], fz[k]
     return result
