@@ -231,16 +231,21 @@ def divided_along_creases(
         if not len(edges):
             break
         away, _ = scipy.spatial.cKDTree(points).query(vertices, distance_upper_bound=CROSS_REACH * float(spacing.max()))
+        divided, made = _divided(vertices, faces, edges, points)
+        new = asked = np.any(made >= len(vertices), axis=1)
         while len(edges):
-            divided, made = _divided(vertices, faces, edges, points)
-            new = np.any(made >= len(vertices), axis=1)
             near = np.flatnonzero(np.append(np.isfinite(away), np.ones(len(points), dtype=bool))[made].any(axis=1))
-            meeting = made[near][self_intersections(divided, made[near], new[near])]
+            meeting = near[self_intersections(divided, made[near], asked[near])]
+            meeting = meeting[new[meeting].any(axis=1)]
             if not len(meeting):
                 break
-            wrong = np.unique(meeting[meeting >= len(vertices)]) - len(vertices)
-            kept = np.delete(np.arange(len(edges)), wrong if len(wrong) else slice(None))
-            edges, points = edges[kept], points[kept]
+            wrong = mask_of(len(divided), made[meeting])[len(vertices) :]
+            whole = mask_of(len(faces), edges[wrong] // 3)  # faces that are not divided after all
+            edges, points = edges[~wrong], points[~wrong]
+            divided, made = _divided(vertices, faces, edges, points)
+            new = np.any(made >= len(vertices), axis=1)
+            # the others were checked before
+            asked = np.append(np.delete(whole, edges // 3), np.zeros(int(new.sum()), dtype=bool))
         if not len(edges):
             break
         vertices, faces = divided, made
