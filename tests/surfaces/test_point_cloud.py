@@ -13,8 +13,9 @@ from signedheat.diagnostics import PointsLeftOut
 from signedheat.field_kinds import spread
 from signedheat.samples import sphere
 from signedheat.solids.point_orientation import orient_points
+from signedheat.surfaces import point_cloud
 from signedheat.surfaces.local_triangulations import hole_fillings, local_triangulations
-from signedheat.surfaces.point_cloud import spread_out
+from signedheat.surfaces.point_cloud import neighbors_agree, spread_out
 
 
 def sphere_with_circle(n, height=0.3, seed=0):
@@ -300,6 +301,34 @@ def test_left_on_a_thin_plate_is_that_of_its_normals_wherever_curves_start_and_i
         assert np.isfinite(values).all(), name
         values = values[np.argsort(order)] if positions is not points else values
         assert (np.sign(values) == sign * np.sign(points[:, 0]))[far].all(), name
+
+
+@pytest.mark.parametrize("name", [*CASES, "noisy sphere", "sphere and one inside out"])
+def test_given_normals_that_agree_everywhere_are_taken_without_a_search_for_inverted_ones(name, monkeypatch):
+    kind = next(kind for kind in CASES if kind in name)
+    points, _, _ = CASES[kind](1500)
+    normals = outward(kind, points)
+    if "noisy" in name:
+        points = points + np.random.default_rng(0).normal(scale=0.02, size=points.shape)
+    if "inside out" in name:
+        points, normals = np.concatenate([points, points + 3]), np.concatenate([normals, -normals])
+    assert neighbors_agree(points, normals)
+    wrong = normals.copy()
+    wrong[len(wrong) // 2] *= -1
+    assert not neighbors_agree(points, wrong)
+    taken = sh.PointCloud(points, normals)
+    faces, directions = taken.triangulation.faces, taken.surface_normals
+    monkeypatch.setattr(point_cloud, "neighbors_agree", lambda points, normals: False)
+    searched = sh.PointCloud(points, normals)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that half of the normals face inwards, where one sphere is inside out
+        np.testing.assert_array_equal(searched.triangulation.faces, faces)
+    np.testing.assert_allclose(searched.surface_normals, directions, atol=1e-12)
+    assert ((directions * normals).sum(axis=1) > 0.5).all()
+
+
+def test_normals_on_both_sides_of_a_thin_wall_do_not_agree():
+    assert not neighbors_agree(*both_sides(0.3 * 0.058))
 
 
 @pytest.mark.parametrize("thickness", [0.5, 1.0])

@@ -128,13 +128,12 @@ class TangentPlanes:
         nearest = min(POINT_NEIGHBORS, many)
         tree = scipy.spatial.cKDTree(points)
 
-        def fitted(rows: Floats) -> tuple[NDArray[Any], ...]:
-            centers, own = rows[:, :3], rows[:, 3:]
+        def fitted(ids: Ints) -> tuple[NDArray[Any], ...]:
+            centers, own = points[ids], normals[ids]
             distances, near = tree.query(centers, k=many + 1)
             spacing = point_spacing(distances[:, nearest], nearest)
             flat = SAME_SIDE_HEIGHT * spacing
-            others, opposed = turned_alike(points[near] - centers[:, None], own[:, None], normals[near], flat[:, None])
-            apart = np.linalg.norm(others - own[:, None], axis=2)
+            apart, opposed = _normals_apart(points, normals, flat, near)
             distances = np.hypot(distances, NORMAL_DISTANCE * spacing[:, None] * apart)
             order = np.argsort(distances, axis=1, kind="stable")[:, : k + 1]
             near, distances, opposed = (np.take_along_axis(a, order, axis=1) for a in (near, distances, opposed))
@@ -143,7 +142,7 @@ class TangentPlanes:
             away = -(weights[..., None] * offsets).sum(axis=1)
             return principal_axes(offsets, weights, own, reach), away, near[:, 1:], reach, flat
 
-        axes, away, neighbors, reach, flat = in_chunks(fitted, np.column_stack([points, normals]))
+        axes, away, neighbors, reach, flat = in_chunks(fitted, np.arange(len(points)))
         axis = axes[:, 2] * np.where((axes[:, 2] * normals).sum(axis=1) < 0, -1.0, 1.0)[:, None]
         outward = unit(away - (away * axis).sum(axis=1)[:, None] * axis)
         return cls(points, axis, axes[:, :2], outward, neighbors, reach, flat)
@@ -152,9 +151,7 @@ class TangentPlanes:
         """(m, k) whether the points `there` (m, k) lie on the other side of a plate than the points `here` (m,)."""
 
         def found(ids: Ints) -> tuple[Bools]:
-            first, rest = ids[:, :1], ids[:, 1:]
-            offsets = self.points[rest] - self.points[first]
-            return (turned_alike(offsets, self.normals[first], self.normals[rest], self.flat[first])[1],)
+            return (opposed_normals(self.points, self.normals, self.flat[ids[:, 0]], ids)[:, 1:],)
 
         return in_chunks(found, np.column_stack([here, there]))[0]
 
@@ -163,19 +160,8 @@ class TangentPlanes:
 
         For points on the other side of a plate, the directions in which both sides end replace the normals.
         """
-
-        def places(pairs: Ints) -> tuple[Floats]:
-            here, there = pairs.T
-            offset, normal = self.points[there] - self.points[here], self.normals[here]
-            other, opposed = turned_alike(offset, normal, self.normals[there], self.flat[here])
-            middle = unit(np.where(opposed[:, None], self.outward[here] + self.outward[there], normal + other))
-            height, cosine = dot(offset, middle), dot(normal, middle)
-            seen = offset - height[:, None] * middle
-            seen -= (dot(normal, seen) / np.maximum(1 + cosine, 1e-9))[:, None] * (normal + middle)
-            seen += (opposed * np.abs(height))[:, None] * middle
-            return (np.einsum("nd,nad->na", seen, self.axes[here]),)
-
-        return in_chunks(places, np.column_stack([here, there]))[0]
+        known = self.points, self.normals, self.axes, self.outward, self.flat
+        return in_chunks(lambda pairs: (_unfolded(*known, pairs),), np.column_stack([here, there]))[0]
 
     def unfolded_sides(self, triangles: Ints) -> Iterator[tuple[Floats, Floats]]:
         """Yield, for each corner, the vectors (m, 2) to the next one and to the one after, in the corner's plane."""
@@ -184,20 +170,73 @@ class TangentPlanes:
             yield self.unfolded(corners, right), self.unfolded(corners, left)
 
 
-def turned_alike(offsets: Floats, normal: Floats, others: Floats, flat: Floats) -> tuple[Floats, Bools]:
-    """Invert mistaken normals among `others` (…, 3); return also which points lie on the other side of a plate.
+ALIKE, MISTAKEN, OPPOSED = 0, 1, 2
+"""How the normals of two points differ: hardly; because one is inverted by mistake; as on two sides of a plate."""
 
-    A contrary normal is a mistake if its point lies in the tangent plane, or if only one point is above the other.
+
+@compiled
+def _difference(points: Floats, normals: Floats, flat: float, p: int, q: int) -> int:
+    """Tell how the normals of points p and q differ.
+
+    Contrary normals are a mistake if q lies in the tangent plane of p, to a height, or if only one is above the other.
     """
-    contrary = dot(normal, others) < OPPOSITE_SIDES
-    over, under = dot(offsets, normal), -dot(offsets, others)
-    same = contrary & ((np.abs(over) < flat) | (over * under < 0))
-    return np.where(same[..., None], -others, others), contrary & ~same
+    cosine, over, under = 0.0, 0.0, 0.0
+    for d in range(3):
+        offset = points[q, d] - points[p, d]
+        cosine += normals[p, d] * normals[q, d]
+        over += offset * normals[p, d]
+        under -= offset * normals[q, d]
+    if not cosine < OPPOSITE_SIDES:
+        return ALIKE
+    return MISTAKEN if abs(over) < flat or over * under < 0.0 else OPPOSED
 
 
-def dot(a: Floats, b: Floats) -> Floats:
-    """Scalar products of vectors (…, 3)."""
-    return np.asarray(np.einsum("...d,...d->...", a, b))
+@compiled
+def _normals_apart(points: Floats, normals: Floats, flat: Floats, ids: Ints) -> tuple[Floats, Bools]:
+    """(m, k) distances of normals from those of the first of each row of ids, mistakes mended; and the opposed ones."""
+    apart, opposed = np.empty(ids.shape), np.empty(ids.shape, dtype=np.bool_)
+    for row in range(len(ids)):
+        p = ids[row, 0]
+        for column in range(ids.shape[1]):
+            q = ids[row, column]
+            difference = _difference(points, normals, flat[row], p, q)
+            sign, square = -1.0 if difference == MISTAKEN else 1.0, 0.0
+            for d in range(3):
+                square += (sign * normals[q, d] - normals[p, d]) ** 2
+            apart[row, column], opposed[row, column] = np.sqrt(square), difference == OPPOSED
+    return apart, opposed
+
+
+def opposed_normals(points: Floats, normals: Floats, flat: Floats, ids: Ints) -> Bools:
+    """(m, k) which points lie on the other side of a plate than the first of each row, with heights (m,) of planes."""
+    return _normals_apart(points, normals, flat, ids)[1]
+
+
+@compiled
+def _unfolded(points: Floats, normals: Floats, axes: Floats, outward: Floats, flat: Floats, pairs: Ints) -> Floats:
+    """(m, 2) places in the plane of the first point of each pair (m, 2) of the second: see `TangentPlanes.unfolded`."""
+    result, middle, seen = np.empty((len(pairs), 2)), np.empty(3), np.empty(3)
+    for row in range(len(pairs)):
+        p, q = pairs[row]
+        difference = _difference(points, normals, flat[p], p, q)
+        sign, square = -1.0 if difference == MISTAKEN else 1.0, 0.0
+        for d in range(3):
+            both = outward[p, d] + outward[q, d] if difference == OPPOSED else normals[p, d] + sign * normals[q, d]
+            middle[d], square = both, square + both * both
+        height, cosine, lean = 0.0, 0.0, 0.0
+        for d in range(3):
+            middle[d] = middle[d] / np.sqrt(square) if square > 0.0 else 0.0
+            height += (points[q, d] - points[p, d]) * middle[d]
+            cosine += normals[p, d] * middle[d]
+        for d in range(3):
+            seen[d] = points[q, d] - points[p, d] - height * middle[d]
+            lean += normals[p, d] * seen[d]
+        for d in range(3):
+            seen[d] -= lean / max(1.0 + cosine, 1e-9) * (normals[p, d] + middle[d])
+            seen[d] += abs(height) * middle[d] if difference == OPPOSED else 0.0
+        for a in range(2):
+            result[row, a] = seen[0] * axes[p, a, 0] + seen[1] * axes[p, a, 1] + seen[2] * axes[p, a, 2]
+    return result
 
 
 def principal_axes(offsets: Floats, weights: Floats, normals: Floats, reach: Floats) -> Floats:

@@ -27,7 +27,7 @@ from ..mesh.signed_graph import Links, signs_of
 from ..mesh.unit_vectors import SAME_WAY, unit
 from ..mesh.welding import same_rows
 from ..validation import coordinates, finite_rows, frozen, numbers, whole_number
-from .local_triangulations import SAME_SIDE_HEIGHT, LocalTriangulations, local_triangulations, turned_alike
+from .local_triangulations import SAME_SIDE_HEIGHT, LocalTriangulations, local_triangulations, opposed_normals
 from .plane_fits import (
     CLEAN_NEIGHBORS,
     MERGED_SHARE,
@@ -174,7 +174,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
             raise GeometryError(
                 f"the point cloud has {len(ids)} distinct points, and a surface needs at least 3", element="points"
             )
-        normals, _, _ = outward_normals(points, given)
+        normals = given if given is not None and neighbors_agree(points, given) else outward_normals(points, given)[0]
         triangulated = local_triangulations(points, normals, self.n_neighbors, given)
         if len(triangulated.faces) == 0:
             raise GeometryError(
@@ -298,9 +298,9 @@ def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
     """
     k = min(POINT_NEIGHBORS, len(points) - 1)
     distances, near = scipy.spatial.cKDTree(points).query(points, k=k + 1)
-    flat = SAME_SIDE_HEIGHT * point_spacing(distances[:, k:], k)
+    flat = SAME_SIDE_HEIGHT * point_spacing(distances[:, k], k)
     offsets = points[near] - points[:, None]
-    opposed = turned_alike(offsets, given[:, None], given[near], flat)[1]
+    opposed = opposed_normals(points, given, flat, near)
     below = -np.sign((offsets * given[:, None]).sum(axis=2))[opposed]
     if len(below) == 0 or abs(below.mean()) < MUTUALLY_BELOW:
         return signs
@@ -416,6 +416,18 @@ def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> L
     outward *= np.sign((outward * (a - places.mean(axis=0))).sum(axis=1))[:, None]
     weights = _confidence(np.einsum("fj,fkj->fk", outward, axes[faces]))
     return Links(faces.ravel(), np.full(faces.size, len(places)), weights.ravel())
+
+
+def neighbors_agree(points: Floats, normals: Floats) -> bool:
+    """Say whether nowhere among (n, 3) points the normals of neighbours contradict each other.
+
+    Then components may face the wrong way, but no points within them, and balls would tell no more. Normals that point
+    the same way contradict each other nowhere, also where one point lies above the other, as with noise.
+    """
+    links = _neighbor_links(points, normals, 1.0)
+    against = links.weights < 0
+    first, second = normals[links.tails[against]], normals[links.heads[against]]
+    return bool((np.einsum("nd,nd->n", first, second) > BALL_COSINE).all())
 
 
 def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
