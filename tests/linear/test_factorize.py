@@ -191,6 +191,22 @@ def test_libraries_that_cannot_make_a_factor_anew_are_not_asked_to(surface, monk
     assert pardiso.PardisoFactor(first).like_this(first * 2.0) is None
 
 
+def test_how_long_threads_of_mkl_wait_elsewhere_is_left_as_it_was():
+    if not pardiso.is_available():
+        pytest.skip("MKL is not installed")
+    factor = pardiso.PardisoFactor(upper_triangle(sparse.csr_matrix(np.eye(3))))
+    openmp = pardiso._openmp()
+    if openmp is None:
+        pytest.skip("the threads of MKL are not Intel's")
+    before = openmp.kmp_get_blocktime()
+    try:
+        openmp.kmp_set_blocktime(37)
+        np.testing.assert_array_equal(factor.solve(np.ones(3)), np.ones(3))
+        assert openmp.kmp_get_blocktime() == 37
+    finally:
+        openmp.kmp_set_blocktime(before)
+
+
 def test_where_pardiso_would_pay_it_is_named_once(monkeypatch):
     class Terminal(io.StringIO):
         def isatty(self):

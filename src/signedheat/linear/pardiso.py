@@ -15,11 +15,14 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from threadpoolctl import threadpool_info
 
 from ..errors import FactorizationError, UnsupportedTypeError
 
 _ANALYZE, _FACTORIZE, _SOLVE, _RELEASE = 11, 22, 33, -1
 _POSITIVE_DEFINITE = {np.dtype(np.float64): 2, np.dtype(np.complex128): 4}
+LONGEST_WAIT = 1
+"""Milliseconds for which MKL's threads wait busily for more work; by default 200, in which others could compute."""
 _CAUSES = {
     -1: "inconsistent input",
     -2: "not enough memory",
@@ -127,6 +130,7 @@ class _Call:
         status = integer(0)
         n_columns = integer(1 if rhs is None or rhs.ndim == 1 else rhs.shape[1])
         empty = np.zeros(1, dtype=self.values.dtype)
+        waits = _wait_at_most(LONGEST_WAIT)
         # a two-level factor made on several threads gives wrong solutions on one, without an error, and vice versa
         others = _library().MKL_Set_Num_Threads_Local(self._threads)
         self._function(
@@ -146,6 +150,7 @@ class _Call:
             ctypes.byref(status),
         )
         _library().MKL_Set_Num_Threads_Local(others)
+        _wait_at_most(waits)
         if status.value != 0:
             cause = _CAUSES.get(status.value, "see the PARDISO manual")
             raise FactorizationError(
@@ -173,6 +178,23 @@ def _library() -> ctypes.CDLL:
         except OSError:
             continue
     raise ImportError("the library mkl_rt was not found: install the package mkl")
+
+
+def _wait_at_most(milliseconds: int) -> int:
+    """Limit how long the threads that this one starts wait for more work; return how long they did before."""
+    openmp = _openmp()
+    if openmp is None:
+        return 0
+    before = int(openmp.kmp_get_blocktime())
+    openmp.kmp_set_blocktime(milliseconds)
+    return before
+
+
+@cache
+def _openmp() -> ctypes.CDLL | None:
+    """Find the OpenMP library of Intel that MKL has loaded, if its threads are those of this library."""
+    paths = [library["filepath"] for library in threadpool_info() if library["prefix"] == "libiomp"]
+    return ctypes.CDLL(paths[0]) if paths else None
 
 
 @cache
