@@ -24,7 +24,7 @@ from ..mesh.triangles import area_vectors, face_areas, side_lengths
 from ..mesh.unit_vectors import ANGLE_ROUNDING, unit
 from . import lids, walls
 from .lids import Lid, running_mean, vertex_normals
-from .rims import boundary, corners_of, loops, open_edges
+from .rims import boundary, corners_of, following_in_loops, loops, open_edges, turning
 from .spanning import Frame, frame_of
 
 STRIP_WIDTH = 0.25
@@ -358,28 +358,32 @@ class _Surface(Frozen):
         order = np.lexsort((-np.repeat(self.areas, 3), np.repeat(closed, 3), keys))
         return keys[order], order
 
-    def behind(self, loop: Ints) -> tuple[Ints, Ints]:
-        """Return the (n,) faces behind the edges of a loop, of open pieces if possible, and their third vertices."""
+    def behind(self, tails: Ints, heads: Ints) -> tuple[Ints, Ints]:
+        """Return the (n,) faces behind edges of loops, of open pieces if possible, and their third vertices."""
         keys, order = self._sides
-        face, side = np.divmod(order[np.searchsorted(keys, np.roll(loop, -1) * len(self.vertices) + loop)], 3)
+        face, side = np.divmod(order[np.searchsorted(keys, heads * len(self.vertices) + tails)], 3)
         return face, self.faces[face, (side + 2) % 3]
 
 
 def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints:
     """Fill small holes, and gaps without area, by (k, 3) triangles between their vertices."""
     surface = _Surface(vertices, faces, outlines)
-    triangles, chosen, corners = [np.empty((0, 3), dtype=np.int64)], [], []
-    for loop in surface.loops:
-        places = corners_of(surface.vertices[loop])
+    triangles, chosen, corners, normals = [np.empty((0, 3), dtype=np.int64)], [], [], []
+    sizes = np.array([len(loop) for loop in surface.loops], dtype=np.int64)
+    tails, following = np.concatenate([*surface.loops, sizes[:0]]), following_in_loops(sizes)
+    of_loops = turning(surface.vertices[tails], following), surface.behind(tails, tails[following])[0]
+    turns, behind = (np.split(values, np.cumsum(sizes)[:-1]) for values in of_loops)
+    for loop, turn, near in zip(surface.loops, turns, behind, strict=False):  # np.split makes one part of nothing
+        places = np.flatnonzero(turn)
         if len(places) < 3:
             triangles.append(fan(loop))
         elif len(places) <= LOST_FACE_SIDES:
             chosen.append(loop)
             corners.append(places)
+            normals.append(surface.normals[near[places]])
     if not chosen:
         return np.concatenate(triangles)
     rims = [loop[places] for loop, places in zip(chosen, corners, strict=True)]
-    normals = [surface.normals[surface.behind(loop)[0][places]] for loop, places in zip(chosen, corners, strict=True)]
     touching = np.zeros(len(surface.vertices), dtype=bool)
     touching[np.concatenate(rims)] = True
     edges = surface.edges.vertices
@@ -430,7 +434,7 @@ def _rims(surface: _Surface) -> list[walls.Rim]:
     counts = np.bincount(surface.parts)
     rims = []
     for loop in surface.loops:
-        face, third = surface.behind(loop)
+        face, third = surface.behind(loop, np.roll(loop, -1))
         parts = surface.parts[face]
         if (counts[parts] > 1).all():
             rims.append(walls.Rim.of(loop, surface.vertices[loop], surface.vertices[third], parts))
@@ -452,7 +456,7 @@ def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
 
 def _spanned(surface: _Surface, loop: Ints, frame: Frame | None, bent: bool) -> tuple[Floats, Ints] | None:
     """Make the lid of a loop, triangulated in a plane or in a disc; None if the loop crosses itself there."""
-    corners, behind = surface.vertices[loop], surface.behind(loop)[0]
+    corners, behind = surface.vertices[loop], surface.behind(loop, np.roll(loop, -1))[0]
     rim = lids.SmoothRim.of(corners)
     smooth = lids.pattern(rim, frame)
     if smooth is None:

@@ -26,7 +26,7 @@ from ..mesh.components import grouped
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import unit
 from ..search.winding_tree import WindingTree, mean_angle
-from .gauss import Dipoles, Matrix, Pieces, sampled
+from .gauss import TREE_FACES, Dipoles, Matrix, Pieces, sampled
 from .winding import INSIDE_WINDING, SUMMED_POINTS
 
 
@@ -42,11 +42,12 @@ def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) ->
     starts, order = grouped(labels, len(names))
     rank = np.argsort(order)
     corners = np.ascontiguousarray(triangles[order]).reshape(-1, 9)
-    wanted = np.bincount(labels[faces])[labels[faces]]
-    levels, few = np.zeros(len(faces)), np.flatnonzero(wanted <= SUMMED_POINTS)
-    levels[few] = _among_few(corners, starts, counts[order], rank[faces[few]], labels[faces[few]])
-    for group in np.unique(labels[faces][wanted > SUMMED_POINTS]):
-        chosen = np.flatnonzero(labels[faces] == group)
+    owners = labels[faces]
+    summed = (np.bincount(owners)[owners] <= SUMMED_POINTS) | (np.diff(starts)[owners] <= TREE_FACES)
+    levels, few = np.zeros(len(faces)), np.flatnonzero(summed)
+    levels[few] = _among_few(corners, starts, counts[order], rank[faces[few]], owners[few])
+    for group in np.unique(owners[~summed]):
+        chosen = np.flatnonzero(owners == group)
         members = order[starts[group] : starts[group + 1]]
         tree, some = WindingTree.of(directed(triangles[members], counts[members])), triangles[faces[chosen]]
         levels[chosen] = tree.levels(some.mean(axis=1), unit(area_vectors(some)), face_areas(some))

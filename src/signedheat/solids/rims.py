@@ -119,10 +119,24 @@ def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) ->
     return edges, stops[:n_loops].copy()
 
 
+def following_in_loops(sizes: Ints) -> Ints:
+    """(n,) the point after each one of closed loops, which are listed one after another, given their (k,) sizes."""
+    ends = np.cumsum(sizes)
+    following = np.arange(1, int(sizes.sum()) + 1)
+    following[ends - 1] = ends - sizes
+    return following
+
+
+def turning(points: Floats, following: Ints) -> Bools:
+    """(n,) whether closed loops do not go straight on at their points, given the point after each one."""
+    ways, turns = unit(points[following] - points), np.empty(points.shape)
+    turns[following] = ways[following] - ways
+    return np.asarray(np.linalg.norm(turns, axis=1) > STRAIGHT_RIM)
+
+
 def corners_of(points: Floats) -> Ints:
     """(k,) corners of a closed loop: points where it does not go straight on."""
-    ahead = unit(np.roll(points, -1, axis=0) - points)
-    return np.flatnonzero(np.linalg.norm(ahead - np.roll(ahead, 1, axis=0), axis=1) > STRAIGHT_RIM)
+    return np.flatnonzero(turning(points, following_in_loops(np.array([len(points)]))))
 
 
 def meeting_edges(ends: Floats) -> tuple[Ints, Ints, Bools]:
@@ -134,10 +148,9 @@ def meeting_edges(ends: Floats) -> tuple[Ints, Ints, Bools]:
     places = (ends[:, :1] + shares[:, None] * along[:, None]).reshape(-1, 3)
     owners = np.repeat(np.arange(len(ends)), EDGE_PLACES)
     tree, reach = scipy.spatial.cKDTree(places), ALONG_EDGE * lengths[owners]
-    counts = tree.query_ball_point(places, reach, return_length=True)
-    crowded = np.flatnonzero(counts > 1)  # each place finds itself
+    crowded = np.flatnonzero(tree.query(places, 2)[0][:, 1] <= reach)  # each place finds itself, too
     near = tree.query_ball_point(places[crowded], reach[crowded]) if len(crowded) else []
-    first = np.repeat(crowded, counts[crowded])
+    first = np.repeat(crowded, [len(ids) for ids in near])
     second = np.fromiter(itertools.chain.from_iterable(near), dtype=np.int64, count=len(first))
     # each place with the edges that it lies along, whichever of the two is the longer
     beside = np.unique(np.concatenate([first, second]) * len(ends) + owners[np.concatenate([second, first])])
