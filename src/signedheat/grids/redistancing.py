@@ -305,13 +305,9 @@ def _around(contour: Contour, corners: Ints, distances: Floats, places: Floats) 
 
     Where the nearest corner is smooth, its circle takes the place of the triangle, up to `uneven` nearer or farther.
     """
-    squares = np.empty(corners.shape)
-    for k in range(3):
-        away = places - contour.points[corners[:, k]]
-        squares[:, k] = np.where(corners[:, k] >= 0, np.einsum("ni,ni->n", away, away), np.inf)
-    crossings = corners[np.arange(len(corners)), squares.argmin(axis=1)]
+    crossings = _nearest_corners(contour.points, corners, places)
     rows = np.flatnonzero((crossings >= 0) & contour.smooth[crossings])
-    curved = circle_distances(contour, crossings[rows], places[rows] - contour.curved.places[crossings[rows]])
+    curved = circle_distances(contour, crossings[rows], places[rows])
     low, high = distances[rows] - contour.uneven, distances[rows] + contour.uneven
     distances[rows] = np.minimum(np.maximum(curved, low), high)
     return distances
@@ -323,21 +319,54 @@ def _around_crossings(contour: Contour, crossings: Ints, places: Floats) -> Floa
     heights = contour.curved.heights(crossings, away)
     across = np.sqrt(np.maximum((away**2).sum(axis=1) - heights**2, 0.0))
     flat = np.hypot(heights, np.maximum(across - FLAT_RADIUS * contour.reach, 0.0))
-    return np.where(contour.smooth[crossings], circle_distances(contour, crossings, away), flat)
+    return np.where(contour.smooth[crossings], circle_distances(contour, crossings, places), flat)
 
 
-def circle_distances(contour: Contour, crossings: Ints, away: Floats) -> Floats:
-    """Return (n,) distances to circles that touch the zero set at crossings, of places (n, 4) away from those."""
-    heights, squares = contour.curved.heights(crossings, away), np.einsum("ni,ni->n", away, away)
-    across = away - heights[:, None] * contour.curved.normals[crossings]
-    sides, distances = np.einsum("ni,ni->n", across, across), np.sqrt(squares)
-    aside = sides > 1e-12 * squares
-    bend = contour.curved.bend_along(crossings, across) / np.where(aside, sides, 1.0)
-    root = np.sqrt(np.maximum(1.0 + 2.0 * bend * heights + bend * bend * squares, 0.0))
-    circle = np.abs(2.0 * heights + bend * squares) / (1.0 + root)
-    before_center = 1.0 + bend * heights > 0.0  # beyond it the other side of the circle is nearer, which is no surface
-    nearer = np.minimum(distances, np.maximum(circle, distances - contour.reach))
-    return np.where(aside & before_center, nearer, distances)
+def circle_distances(contour: Contour, crossings: Ints, places: Floats) -> Floats:
+    """Return (n,) distances of (n, 4) places to circles that touch the zero set at (n,) crossings."""
+    return _circle_distances(*contour.curved, contour.reach, crossings, places)
+
+
+@compiled
+def _nearest_corners(points: Floats, corners: Ints, places: Floats) -> Ints:
+    """Return (n,) which point in each row of corners, where −1 is none, is nearest to each of (n, 4) places, or −1."""
+    chosen = np.full(len(places), -1)
+    for row in range(len(places)):
+        least = np.inf
+        for k in range(corners.shape[1]):
+            c, square = corners[row, k], 0.0
+            for d in range(4):
+                square += (places[row, d] - points[c, d]) ** 2
+            if c >= 0 and square < least:
+                least, chosen[row] = square, c
+    return chosen
+
+
+@compiled
+def _circle_distances(
+    points: Floats, normals: Floats, bends: Floats, reach: float, crossings: Ints, places: Floats
+) -> Floats:
+    distances, away, across = np.empty(len(places)), np.empty(4), np.empty(4)
+    for row in range(len(places)):
+        c = crossings[row]
+        height, square, aside, bend = 0.0, 0.0, 0.0, 0.0
+        for d in range(4):
+            away[d] = places[row, d] - points[c, d]
+            height += away[d] * normals[c, d]
+            square += away[d] * away[d]
+        for d in range(4):
+            across[d] = away[d] - height * normals[c, d]
+            aside += across[d] * across[d]
+        for d in range(4):
+            for e in range(4):
+                bend += across[d] * bends[c, d, e] * across[e]
+        bend = bend / aside if aside > 1e-12 * square else 0.0
+        distances[row] = np.sqrt(square)
+        if aside > 1e-12 * square and 1.0 + bend * height > 0.0:  # else no surface is on the nearer side of the circle
+            root = np.sqrt(max(1.0 + 2.0 * bend * height + bend * bend * square, 0.0))
+            circle = abs(2.0 * height + bend * square) / (1.0 + root)
+            distances[row] = min(distances[row], max(circle, distances[row] - reach))
+    return distances
 
 
 def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Ints]:
