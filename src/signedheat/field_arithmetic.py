@@ -49,8 +49,8 @@ class HasFields(Protocol):
     def field_on(self, field: Any) -> Any:
         """Compute distance at the nodes of a field."""
 
-    def _surface_on(self, grid: Grid[Any], level: float) -> Any:
-        """Extract the surface at a distance in the cells of a grid, with its edges and corners."""
+    def _surface_on(self, field: Any, level: float) -> Any:
+        """Extract the surface at a level of the field of this, with its edges and corners."""
 
 
 AnyField = TypeVar("AnyField", bound=HasValues)

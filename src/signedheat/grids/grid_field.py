@@ -412,7 +412,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         walls = values_at_walls(self.whole.values)
         if isinstance(self.solid, HasFields) and self.blocks is None:
             if np.nanmin(self.values) < distance < np.nanmin(walls):
-                return self.solid._surface_on(self.grid, distance)
+                return self.solid._surface_on(self, distance)
         refuse_beyond_walls(walls, distance, "grid", padding)
         return self.contour(distance)
 

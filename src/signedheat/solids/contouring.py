@@ -29,7 +29,15 @@ from ..grids.grid import Grid
 from ..jobs import Progress
 from ..memory import available_memory, libraries, refuse_beyond_memory
 from ..mesh.components import element_components, places_among, sums_of
-from ..mesh.dual_cells import Crossings, DualCells, crossed_cells, dual_cells, open_cells, separate_triangles
+from ..mesh.dual_cells import (
+    CrossedCells,
+    Crossings,
+    DualCells,
+    crossed_cells,
+    dual_cells,
+    open_cells,
+    separate_triangles,
+)
 from ..mesh.edges import CLEARANCE
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import MOST_CREASED_FACES, bent_edges, divided_at
@@ -330,20 +338,39 @@ def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
     return BlockValues(blocks, values)
 
 
-def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) -> TriangleMesh:
-    """Extract the closed, manifold surface at a distance from a solid, with sharp edges and corners."""
+def sharp_surface(
+    offset: Offset, grid: Grid, progress: Progress | None = None, heights: Floats | None = None
+) -> TriangleMesh:
+    """Extract the closed, manifold surface at a distance from a solid, with sharp edges and corners.
+
+    Heights above it at all nodes are computed, but only near it, unless they are given.
+    """
     report = progress or (lambda fraction, step: None)
-    values, crossings, cells = _crossed(offset, grid)
-    vertices, faces = traced(offset, grid, values, crossings, cells, report)
+    values: NodeValues
+    if heights is None:
+        values, crossings, around = _crossed_near(offset, grid)
+    else:
+        values, (crossings, around) = heights, crossed_between(heights, grid)
+    vertices, faces = traced(offset, grid, values, crossings, around, report)
     announce_lost(offset, grid, vertices)
     report(1.0, "faces")
     return TriangleMesh(vertices, faces)
 
 
 def traced(
-    offset: ImplicitSurface, grid: Grid, values: NodeValues, crossings: Crossings, cells: DualCells, report: Progress
+    offset: ImplicitSurface,
+    grid: Grid,
+    values: NodeValues,
+    crossings: Crossings,
+    around: CrossedCells,
+    report: Progress,
 ) -> tuple[Floats, Ints]:
-    """Return the vertices and faces of a surface, given the edges of a grid that it crosses and its pieces in cells."""
+    """Return the vertices and faces of a surface, given the edges of a grid that it crosses and the cells around."""
+
+    def inside(nodes: Floats) -> Bools:
+        return offset.distance(grid.origin + nodes * grid.spacing) < 0
+
+    cells = dual_cells(crossings, around, grid.shape, inside)
     report(0.4, "edges")
     nodes, axes = crossings.nodes, crossings.axes
     guesses = nodes.astype(np.float64)
@@ -395,18 +422,11 @@ def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
     return parts[on_surface], lost
 
 
-def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCells]:
-    """Compute heights near a surface, the edges that it crosses and its pieces in cells, adding blocks as needed."""
-    places, cell = blocks_at(offset, grid), float(grid.spacing.max())
-
-    def bytes_needed(count: int) -> float:
-        return BYTES_PER_CROSSING * count
-
-    def wider(count: int) -> str:
-        return f"use a spacing of {cell * math.sqrt(len(crossings.axes) / max(count, 1)):.3g}"
-
+def _crossed_near(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, CrossedCells]:
+    """Compute heights near a surface, the edges that it crosses and the cells around, adding blocks as needed."""
+    places = blocks_at(offset, grid)
     done = BlockValues(Blocks.of(places[:0], grid.shape), np.empty((0, BLOCK, BLOCK, BLOCK), dtype=np.float32))
-    while True:
+    while len(places):
         new = block_heights(offset, grid, Blocks.of(places, grid.shape))
         both = Blocks.of(np.concatenate([done.blocks.places, new.blocks.places]), grid.shape)
         merged = np.empty((len(both), BLOCK, BLOCK, BLOCK), dtype=np.float32)
@@ -414,18 +434,34 @@ def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCe
             merged[both.rows(part.blocks.places)] = part.values
         done = BlockValues(both, merged)
         crossings = crossed_edges(done)
-        refuse_beyond_memory(f"a surface in cells of {cell:.3g}", len(crossings.axes), bytes_needed, wider)
+        refuse_large_contour(crossings, grid)
         cells = crossed_cells(crossings, grid.shape)
         around = cells.places[open_cells(cells.edges)][:, None] + np.array(list(np.ndindex(2, 2, 2)))
         places = np.unique(around.reshape(-1, 3) // BLOCK, axis=0)
         places = places[both.rows(places) < 0]
-        if not len(places):
-            break
+    return done, crossings, cells
 
-    def inside(nodes: Floats) -> Bools:
-        return offset.distance(grid.origin + nodes * grid.spacing) < 0
 
-    return done, crossings, dual_cells(crossings, cells, grid.shape, inside)
+def crossed_between(heights: Floats, grid: Grid) -> tuple[Crossings, CrossedCells]:
+    """Find the edges between nodes above and below a surface, and the cells around them."""
+    side = WINDOW * BLOCK
+    parts: list[Crossings] = []
+    for begin in range(0, len(heights) - 1, side):  # slab by slab, to save memory
+        parts += crossings_in(heights[begin : begin + side + 1], np.array([begin, 0, 0]))
+    crossings = joined_crossings(parts)
+    refuse_large_contour(crossings, grid)
+    return crossings, crossed_cells(crossings, grid.shape)
+
+
+def refuse_large_contour(crossings: Crossings, grid: Grid) -> None:
+    """Raise `MemoryLimitError` if the contour across these edges does not fit."""
+    cell, count = float(grid.spacing.max()), len(crossings.axes)
+    refuse_beyond_memory(
+        f"a surface in cells of {cell:.3g}",
+        count,
+        lambda edges: BYTES_PER_CROSSING * edges,
+        lambda edges: f"use a spacing of {cell * math.sqrt(count / max(edges, 1)):.3g}",
+    )
 
 
 def blocks_at(offset: Offset, grid: Grid) -> Ints:

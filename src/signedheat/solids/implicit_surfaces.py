@@ -16,11 +16,10 @@ from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_discretization import refuse_large_grid
 from ..grids.marching import CAP, closed_surface
 from ..memory import within_memory
-from ..mesh.dual_cells import crossed_cells, dual_cells
 from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import array_of, finite_number, flag, positive_steps, refuse_beside, whole_number
-from .contouring import crossings_in, joined_crossings, traced
+from .contouring import crossed_between, traced
 
 Function: TypeAlias = Callable[[Floats], ArrayLike]
 """A function that returns one number for each of (n, 3) points; a gradient returns three."""
@@ -213,10 +212,7 @@ def contour(
     if not is_sharp:
         points, faces = closed_surface(values, grid.spacing, 0.0)
         return TriangleMesh(on_level(surface.distance, points, values, grid, 0.0), faces)
-    crossings = joined_crossings(crossings_in(values, np.zeros(3, dtype=np.int64)))
-    around = crossed_cells(crossings, grid.shape)
-    pieces = dual_cells(crossings, around, grid.shape, lambda at: surface.distance(grid.origin + at * grid.spacing) < 0)
-    return TriangleMesh(*traced(surface, grid, values, crossings, pieces, lambda fraction, step: None))
+    return TriangleMesh(*traced(surface, grid, values, *crossed_between(values, grid), lambda fraction, step: None))
 
 
 def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats, grid: Grid, level: float) -> Implicit:

@@ -543,8 +543,8 @@ class Solid(Displayed, Represented, Frozen):
         """
         return self.field(grid=field.grid, band=None if field.blocks is None else field.width)
 
-    def _surface_on(self, grid: Grid[Literal[3]], level: float) -> TriangleMesh:
-        return sharp_surface(Offset(self, level), grid)
+    def _surface_on(self, field: GridField[Literal[3]], level: float) -> TriangleMesh:
+        return sharp_surface(Offset(self, level), field.grid, heights=field.values - level)
 
     def to_pyvista(self) -> pyvista.PolyData:
         return self.boundary.to_pyvista()
