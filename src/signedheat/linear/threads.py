@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
+from threading import Lock
+from typing import Any
 
 from threadpoolctl import ThreadpoolController
 
 from . import pardiso
 
+_lock, _users = Lock(), 0
+_limit: Any = None
+"""What the first thread within `one_blas_thread` has limited, and the last one to leave it restores."""
 
-def one_blas_thread() -> AbstractContextManager[object]:
-    """Limit BLAS to one thread within a ``with`` block, that of MKL too."""
-    return _libraries(pardiso.is_loaded()).limit(limits=1, user_api="blas")
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Limit BLAS to one thread, that of MKL too, while any thread of this process is within such a ``with`` block."""
+    global _users, _limit
+    with _lock:
+        _users += 1
+        if _users == 1:
+            _limit = _libraries(pardiso.is_loaded()).limit(limits=1, user_api="blas")
+    try:
+        yield
+    finally:
+        with _lock:
+            _users -= 1
+            if _users == 0:
+                _limit.restore_original_limits()
 
 
 @cache

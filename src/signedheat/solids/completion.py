@@ -20,6 +20,7 @@ from ..errors import ConstraintError, SourceError
 from ..foreign import SurfaceShape
 from ..jobs import Progress, Stopwatch
 from ..kinds import ShapeLike
+from ..linear.threads import one_blas_thread
 from ..memory import refuse_beyond_memory, within_memory
 from ..mesh.components import numbered
 from ..mesh.triangles import face_areas
@@ -180,6 +181,7 @@ def complete(
     return completed(shape, options, Heat(constraint, diffusion), progress)
 
 
+@one_blas_thread()  # the others would wait busily for long after each of many small products
 def completed(
     shape: ShapeLike | Sequence[ShapeLike], options: Completion, method: Heat, progress: Progress | None = None
 ) -> Solid:
