@@ -13,12 +13,13 @@ from functools import cached_property
 
 import numpy as np
 import scipy
+from scipy import sparse
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..compiled import compiled
 from ..linear.threads import one_blas_thread
 from ..mesh.box_tree import BoxTree
-from ..mesh.components import connected_components, element_components, sums_of
+from ..mesh.components import connected_components, element_components
 from ..mesh.edges import EdgeTable, edge_keys, edge_table
 from ..mesh.triangles import area_vectors, face_areas, side_lengths
 from ..mesh.unit_vectors import ANGLE_ROUNDING, unit
@@ -104,25 +105,25 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     steps = side_lengths(loop)
     m = max(1, min(n // 4, round(reach / steps.mean())))
     along = unit(np.roll(loop, -m, axis=0) - np.roll(loop, m, axis=0))
-    rows, near = _within(samples, loop, patches, reach)
-
-    def means(values: Floats) -> Floats:
-        """Average over the samples near each place."""
-        return sums_of(np.einsum("k,k...->k...", weights, values), rows, n)
-
-    x, normals, areas = samples.positions[near] - loop[rows], samples.normals[near], samples.areas[near]
-    weights = areas * (1.0 - (x * x).sum(axis=1) / reach**2)  # falls to 0 at the reach
+    rows, near, distances = _within(samples, loop, patches, reach)
+    weights = samples.areas[near] * (1.0 - (distances / reach) ** 2)  # falls to 0 at the reach
     weights /= np.maximum(np.bincount(rows, weights, n), 1e-300)[rows]
-    middle = means(normals)
+    means = sparse.csr_array((weights, (rows, near)), shape=(n, len(samples.areas)))  # over samples near each place
+    positions, corners = samples.positions - loop[0], loop - loop[0]
+    middle, places = means @ samples.normals, means @ positions
+
+    def covariance(values: Floats) -> Floats:
+        """(n, 3, 3) mean products of positions and values near each place, less the products of their means."""
+        products = means @ (positions[:, :, None] * values[:, None]).reshape(-1, 9)
+        return products.reshape(-1, 3, 3) - places[:, :, None] * (means @ values)[:, None]
+
     way = np.cross(middle, along)
     enough = (np.bincount(rows, minlength=n) >= 3) & (np.linalg.norm(way, axis=1) > 1e-6)
     way = unit(way)
     frame = np.stack([way, unit(np.cross(middle, way))], axis=1)
-    coordinates = np.einsum("kij,kj->ki", frame[rows], x)
-    mean = means(coordinates)
-    coordinates = coordinates - mean[rows]
-    spread = means(coordinates[:, :, None] * coordinates[:, None, :]) + (HALF_BENDING_DEPTH * reach) ** 2 * np.eye(2)
-    slopes = np.linalg.solve(spread, means(coordinates[:, :, None] * (normals - middle[rows])[:, None, :]))
+    mean = np.einsum("nij,nj->ni", frame, places - corners)
+    spread = frame @ covariance(positions) @ frame.transpose(0, 2, 1) + (HALF_BENDING_DEPTH * reach) ** 2 * np.eye(2)
+    slopes = np.linalg.solve(spread, frame @ covariance(samples.normals))
     at_rim = unit(middle - np.einsum("ni,nij->nj", mean, slopes)) * enough[:, None]
     outwards = unit(np.cross(at_rim, along))
     bends, must = width * (slopes[:, 0] * outwards).sum(axis=1), 2.0 * (outwards * vertex_normals(lid)[:n]).sum(axis=1)
@@ -135,15 +136,12 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(held, m), 0.0)
 
 
-def _within(samples: RimSamples, loop: Floats, patches: Ints, reach: float) -> tuple[Ints, Ints]:
-    """Pair each place of a rim with the samples within reach that belong to the patch ending there."""
-    if not len(samples.positions):
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    neighbours = scipy.spatial.cKDTree(samples.positions).query_ball_point(loop, reach, return_sorted=True)
-    rows = np.repeat(np.arange(len(loop)), [len(ids) for ids in neighbours])
-    near = np.concatenate([np.asarray(ids, dtype=np.int64) for ids in neighbours])
-    own = samples.patches[near] == patches[rows]
-    return rows[own], near[own]
+def _within(samples: RimSamples, loop: Floats, patches: Ints, reach: float) -> tuple[Ints, Ints, Floats]:
+    """Pair each place of a rim with the samples within reach that belong to the patch ending there; and distances."""
+    rim, near = scipy.spatial.cKDTree(loop), scipy.spatial.cKDTree(samples.positions)
+    pairs = rim.sparse_distance_matrix(near, reach, output_type="ndarray")
+    pairs = pairs[samples.patches[pairs["j"]] == patches[pairs["i"]]]
+    return pairs["i"], pairs["j"], pairs["v"]
 
 
 LOST_FACE_SIDES = 16
