@@ -50,7 +50,7 @@ class HasFields(Protocol):
         """Compute distance at the nodes of a field."""
 
     def _surface_on(self, field: Any, level: float) -> Any:
-        """Extract the surface at a level of the field of this, with its edges and corners."""
+        """Extract the surface at a level of its field, with edges and corners, in the cells of the field's grid."""
 
 
 AnyField = TypeVar("AnyField", bound=HasValues)

@@ -346,6 +346,7 @@ def _nearest_corners(points: Floats, corners: Ints, places: Floats) -> Ints:
 def _circle_distances(
     points: Floats, normals: Floats, bends: Floats, reach: float, crossings: Ints, places: Floats
 ) -> Floats:
+    """Do the work of `circle_distances`."""
     distances, away, across = np.empty(len(places)), np.empty(4), np.empty(4)
     for row in range(len(places)):
         c = crossings[row]
@@ -362,7 +363,8 @@ def _circle_distances(
                 bend += across[d] * bends[c, d, e] * across[e]
         bend = bend / aside if aside > 1e-12 * square else 0.0
         distances[row] = np.sqrt(square)
-        if aside > 1e-12 * square and 1.0 + bend * height > 0.0:  # else no surface is on the nearer side of the circle
+        # beyond the centre the other side of the circle is nearer, which is no surface
+        if aside > 1e-12 * square and 1.0 + bend * height > 0.0:
             root = np.sqrt(max(1.0 + 2.0 * bend * height + bend * bend * square, 0.0))
             circle = abs(2.0 * height + bend * square) / (1.0 + root)
             distances[row] = min(distances[row], max(circle, distances[row] - reach))

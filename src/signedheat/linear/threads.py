@@ -14,7 +14,7 @@ from . import pardiso
 
 _lock, _users = Lock(), 0
 _limit: Any = None
-"""What the first thread within `one_blas_thread` has limited, and the last one to leave it restores."""
+"""The limit that the first thread to enter `one_blas_thread` sets, and that the last one to leave removes."""
 
 
 @contextmanager

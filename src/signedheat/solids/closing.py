@@ -19,13 +19,13 @@ from ..arrays import Bools, Floats, Frozen, Ints
 from ..compiled import compiled
 from ..linear.threads import one_blas_thread
 from ..mesh.box_tree import BoxTree
-from ..mesh.components import connected_components, element_components
+from ..mesh.components import connected_components, element_components, next_in_groups
 from ..mesh.edges import EdgeTable, edge_keys, edge_table
 from ..mesh.triangles import area_vectors, face_areas, side_lengths
 from ..mesh.unit_vectors import ANGLE_ROUNDING, unit
 from . import lids, walls
 from .lids import Lid, running_mean, vertex_normals
-from .rims import boundary, corners_of, following_in_loops, loops, open_edges, turning
+from .rims import boundary, corners_of, loops, open_edges, turning
 from .spanning import Frame, frame_of
 
 STRIP_WIDTH = 0.25
@@ -367,10 +367,10 @@ def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints
     """Fill small holes, and gaps without area, by (k, 3) triangles between their vertices."""
     surface = _Surface(vertices, faces, outlines)
     triangles, chosen, corners, normals = [np.empty((0, 3), dtype=np.int64)], [], [], []
-    sizes = np.array([len(loop) for loop in surface.loops], dtype=np.int64)
-    tails, following = np.concatenate([*surface.loops, sizes[:0]]), following_in_loops(sizes)
+    starts = np.cumsum([0, *map(len, surface.loops)])
+    tails, following = np.concatenate([*surface.loops, starts[:0]]), next_in_groups(starts)
     of_loops = turning(surface.vertices[tails], following), surface.behind(tails, tails[following])[0]
-    turns, behind = (np.split(values, np.cumsum(sizes)[:-1]) for values in of_loops)
+    turns, behind = (np.split(values, starts[1:-1]) for values in of_loops)
     for loop, turn, near in zip(surface.loops, turns, behind, strict=False):  # np.split makes one part of nothing
         places = np.flatnonzero(turn)
         if len(places) < 3:

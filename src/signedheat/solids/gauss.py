@@ -55,7 +55,7 @@ dipole must not stand for a strip. An equilateral triangle has 2.3, a strip six 
 MOST_DIPOLES = 200_000
 """Largest number of dipoles; of more faces, this many are drawn evenly."""
 PLACES_TOGETHER = 16
-"""Number of places for which dipoles are summed together."""
+"""Number of places for which dipoles are summed together. Eight take a fifth longer, 32 as long."""
 WEIGHT_TOLERANCE = 0.02
 """Relative residual up to which the weights of dipoles are solved for. With half of it noisy loose faces take a quarter
 longer, and are no better; with .05 a torus with much noise is a quarter worse."""
@@ -141,7 +141,7 @@ class Matrix:
         return Matrix(matrix, self.places[rows], self.normals[rows], owners, self.areas[rows], self.within[rows])
 
     def weights(self, start: Floats | None = None) -> Floats:
-        """(k,) least-squares weights, whose signs orient the pieces, found at once without a start."""
+        """(k,) least-squares weights, whose signs orient the pieces; the direct solution needs no start."""
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
         weighted = self.matrix * shares[:, None]
         normal = weighted.T @ self.matrix
@@ -286,7 +286,7 @@ class Dipoles:
 
         inverse = 1.0 / np.maximum(smooth.diagonal() + held, np.finfo(float).tiny)
         wanted = self._adjoint((0.5 + self.within) * shares)
-        return conjugate_gradients(system, wanted, lambda rest: inverse * rest, start, WEIGHT_TOLERANCE, limit=100)
+        return conjugate_gradients(system, wanted, lambda rest: inverse * rest, start, WEIGHT_TOLERANCE)
 
     def levels(self, signs: Floats) -> Floats:
         """(n,) levels at the places, without the bodies ignored there."""

@@ -9,7 +9,7 @@ import scipy
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..mesh.components import grouped, sums_of
+from ..mesh.components import grouped, next_in_groups, sums_of
 from ..mesh.edges import edge_table
 from ..mesh.triangles import corner_normals
 from ..mesh.unit_vectors import SAME_WAY, angles_around, unit
@@ -119,14 +119,6 @@ def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) ->
     return edges, stops[:n_loops].copy()
 
 
-def following_in_loops(sizes: Ints) -> Ints:
-    """(n,) the point after each one of closed loops, which are listed one after another, given their (k,) sizes."""
-    ends = np.cumsum(sizes)
-    following = np.arange(1, int(sizes.sum()) + 1)
-    following[ends - 1] = ends - sizes
-    return following
-
-
 def turning(points: Floats, following: Ints) -> Bools:
     """(n,) whether closed loops do not go straight on at their points, given the point after each one."""
     ways, turns = unit(points[following] - points), np.empty(points.shape)
@@ -136,7 +128,7 @@ def turning(points: Floats, following: Ints) -> Bools:
 
 def corners_of(points: Floats) -> Ints:
     """(k,) corners of a closed loop: points where it does not go straight on."""
-    return np.flatnonzero(turning(points, following_in_loops(np.array([len(points)]))))
+    return np.flatnonzero(turning(points, next_in_groups(np.array([0, len(points)]))))
 
 
 def meeting_edges(ends: Floats) -> tuple[Ints, Ints, Bools]:

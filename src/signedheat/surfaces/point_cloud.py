@@ -421,13 +421,13 @@ def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> L
 def neighbors_agree(points: Floats, normals: Floats) -> bool:
     """Say whether nowhere among (n, 3) points the normals of neighbours contradict each other.
 
-    Then components may face the wrong way, but no points within them, and balls would tell no more. Normals that point
-    the same way contradict each other nowhere, also where one point lies above the other, as with noise.
+    Then whole components may face the wrong way, but no single points, for which balls would be needed. Normals that
+    point the same way never contradict each other, even where noise puts one point above the other.
     """
     links = _neighbor_links(points, normals, 1.0)
     against = links.weights < 0
     first, second = normals[links.tails[against]], normals[links.heads[against]]
-    return bool((np.einsum("nd,nd->n", first, second) > BALL_COSINE).all())
+    return bool(((first * second).sum(axis=1) > SAME_WAY).all())
 
 
 def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
