@@ -13,6 +13,8 @@ from signedheat.errors import InexactWarning, OutsideError
 from signedheat.mesh.self_intersections import self_intersections
 from signedheat.solids import contouring, simplification
 from signedheat.solids.completion import complete
+from signedheat.solids.contouring import sharp_surface
+from signedheat.solids.offsets import Offset
 from signedheat.solids.simplification import is_within
 
 
@@ -108,6 +110,14 @@ def test_edges_that_cut_creases_off_are_divided(monkeypatch):
             middles = surface.vertices[surface.faces] + surface.vertices[np.roll(surface.faces, 1, axis=1)]
             largest[-1] += np.abs(solid.distance(0.5 * middles.reshape(-1, 3))).max() / 0.1
     assert largest[0] < 0.85 * largest[1]
+
+
+def test_the_offset_of_a_field_is_the_surface_in_its_cells_to_the_last_bit():
+    solid = sh.complete(samples.with_noise(samples.torus(n_around=48, n_across=24), 0.01, seed=1))
+    field = solid.field(resolution=80)
+    offset, surface = field.offset(0.05), sharp_surface(Offset(solid, 0.05), field.grid)
+    np.testing.assert_array_equal(offset.vertices, surface.vertices)
+    np.testing.assert_array_equal(offset.faces, surface.faces)
 
 
 def test_inner_offsets_have_edges_and_outer_ones_are_round():

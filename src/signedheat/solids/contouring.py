@@ -446,8 +446,9 @@ def crossed_between(heights: Floats, grid: Grid) -> tuple[Crossings, CrossedCell
     """Find the edges between nodes above and below a surface, and the cells around them."""
     side = WINDOW * BLOCK
     parts: list[Crossings] = []
-    for begin in range(0, len(heights) - 1, side):  # slab by slab, to save memory
-        parts += crossings_in(heights[begin : begin + side + 1], np.array([begin, 0, 0]))
+    for window in np.ndindex(*(-(-(n - 1) // side) for n in heights.shape)):  # in the order of `crossed_edges`
+        first = side * np.array(window)
+        parts += crossings_in(heights[tuple(slice(begin, begin + side + 1) for begin in first)], first)
     crossings = joined_crossings(parts)
     refuse_large_contour(crossings, grid)
     return crossings, crossed_cells(crossings, grid.shape)

@@ -544,7 +544,10 @@ class Solid(Displayed, Represented, Frozen):
         return self.field(grid=field.grid, band=None if field.blocks is None else field.width)
 
     def _surface_on(self, field: GridField[Literal[3]], level: float) -> TriangleMesh:
-        return sharp_surface(Offset(self, level), field.grid, heights=field.values - level)
+        # as blocks of the grid hold them, so that both ways give the same mesh
+        heights = field.values.astype(np.float32).astype(np.float64) - level
+        rounded = heights.astype(np.float32).astype(np.float64)
+        return sharp_surface(Offset(self, level), field.grid, heights=rounded)
 
     def to_pyvista(self) -> pyvista.PolyData:
         return self.boundary.to_pyvista()
