@@ -19,10 +19,10 @@ from .edges import EdgeTable, edge_table
 from .planar_triangulation import triangulate_faces
 from .self_intersections import overlapping_faces
 from .triangles import face_areas, heights
-from .welding import distinct_rows, welded
+from .welding import distinct_rows, tolerances, welded_within
 
 SAME_POINT = 1e-8
-"""Distance, relative to the size of a shape, below which points are one, since coordinates are rounded."""
+"""Distance below which points are one, since coordinates are rounded, relative to the size of the parts that meet."""
 ON_LINE = 4.0
 """Distance from a line within which the common points of two faces count as lying on it, in multiples of the distance
 below which points are one."""
@@ -80,33 +80,36 @@ class Incidence(NamedTuple):
         return Incidence(self.owners, self.points[order])
 
 
-def meeting_faces(points: Floats, faces: Ints, touching: float = SAME_POINT) -> Ints:
+def meeting_faces(points: Floats, faces: Ints, slacks: Floats | None = None) -> Ints:
     """Return (k, 2) pairs of faces that cross, cover each other in one plane, or touch without a common vertex."""
-    slack = touching * float(np.ptp(points, axis=0).max())
-    return overlapping_faces(points, faces, slack, -slack)
+    return overlapping_faces(points, faces, tolerances(points, faces, SAME_POINT) if slacks is None else slacks)
 
 
-def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, touching: float = SAME_POINT) -> Arrangement:
+def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, slacks: Floats | None = None) -> Arrangement:
     """Divide faces where pairs of them, (k, 2), by default all, meet, and where unbalanced edges end on others.
 
-    Points are merged if closer than `touching`, relative to the size of the shape; thinner triangles are dropped.
+    Points are merged if closer than the slacks, (m,), of the faces that they lie on; thinner triangles are dropped.
     """
-    slack = touching * float(np.ptp(points, axis=0).max())
-    pairs = meeting_faces(points, faces, touching) if pairs is None else pairs
+    slacks = tolerances(points, faces, SAME_POINT) if slacks is None else slacks
+    pairs = meeting_faces(points, faces, slacks) if pairs is None else pairs
     busy = np.unique(faces[pairs.ravel()])
-    faces = _welded(points, busy, slack)[faces]
+    reaches = _reaches(len(points), faces, slacks)
+    faces = _welded(points, busy, reaches)[faces]
     proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
-    proper = proper[heights(points[faces[proper]]) > slack]
+    proper = proper[heights(points[faces[proper]]) > slacks[proper]]
     number = np.full(int(faces.size), -1)
     number[proper] = np.arange(len(proper))
-    faces, pairs = faces[proper], number[pairs]
+    faces, slacks, pairs = faces[proper], slacks[proper], number[pairs]
     pairs = pairs[(pairs >= 0).all(axis=1)]
     table = edge_table(faces)
-    on_open = _on_open_edges(points, table, slack)
+    on_open = _on_open_edges(points, table, reaches)
 
-    meetings, places = _meet(np.ascontiguousarray(points), faces, table.vertices, table.face_edges, pairs, slack)
+    meetings, places, meeting = _meet(
+        np.ascontiguousarray(points), faces, table.vertices, table.face_edges, pairs, slacks
+    )
     kinds, owners, others = meetings.T
-    points, ids = _with_new(points, meetings, places, kinds >= TWO_EDGES, others)
+    new = kinds >= TWO_EDGES
+    points, reaches, ids = _with_new(points, reaches, meetings, places, meeting, new, others)
     on_edge, edges, pierced, in_face = kinds == ON_EDGE, kinds == TWO_EDGES, kinds == EDGE_AND_FACE, kinds == IN_FACE
     along = on_edge | edges | pierced
     lines = Lines(
@@ -114,10 +117,18 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, touching: f
         Incidence.of(on_open, (owners[along], ids[along]), (others[edges], ids[edges])),
         Incidence.of((owners[in_face], ids[in_face]), (others[pierced], ids[pierced])),
     )
-    lines = lines.renamed(_welded(points, np.concatenate([busy, np.unique(ids)]), slack))
-    lines, records = _with_segments(points, faces, table, pairs, lines, slack)
-    points, lines, records = _with_crossings(points, lines, records, slack, busy)
+    lines = lines.renamed(_welded(points, np.concatenate([busy, np.unique(ids)]), reaches))
+    lines, records = _with_segments(points, faces, table, pairs, lines, slacks)
+    points, lines, records = _with_crossings(points, lines, records, reaches, slacks, busy)
     return _with_copies_alike(_divided(points, faces, proper, table, lines, records))
+
+
+def _reaches(n: int, faces: Ints, slacks: Floats) -> Floats:
+    """Return (n,) the least slack of the faces at each point."""
+    reaches = np.full(n, np.inf)
+    for corners in faces.T:
+        np.minimum.at(reaches, corners, slacks)
+    return reaches
 
 
 class Lines(NamedTuple):
@@ -136,23 +147,25 @@ class Lines(NamedTuple):
         return self._replace(ends=ends, on=on, within=Incidence.of((self.within.owners, rename[self.within.points])))
 
 
-def _welded(points: Floats, chosen: Ints, slack: float) -> Ints:
+def _welded(points: Floats, chosen: Ints, reaches: Floats) -> Ints:
     """Return (n,) the point that each is merged into: of chosen points the first one at its place, else itself."""
     rename = np.arange(len(points))
     chosen = np.unique(chosen)
-    rename[chosen] = chosen[welded(points[chosen], slack)]
+    rename[chosen] = chosen[welded_within(points[chosen], reaches[chosen])]
     return rename
 
 
-def _with_new(points: Floats, names: Ints, places: Floats, new: Bools, ids: Ints) -> tuple[Floats, Ints]:
-    """Append a point for each distinct `new` row of `names`; return all points, and `ids` with the new numbers."""
+def _with_new(
+    points: Floats, reaches: Floats, names: Ints, places: Floats, slacks: Floats, new: Bools, ids: Ints
+) -> tuple[Floats, Floats, Ints]:
+    """Append a point, and its reach, for each distinct `new` row of `names`; and return `ids` with the new numbers."""
     numbers, first = distinct_rows(names[new])
     ids = ids.copy()
     ids[new] = len(points) + numbers
-    return np.concatenate([points, places[new][first]]), ids
+    return np.concatenate([points, places[new][first]]), np.concatenate([reaches, slacks[new][first]]), ids
 
 
-def _on_open_edges(points: Floats, table: EdgeTable, slack: float) -> tuple[Ints, Ints]:
+def _on_open_edges(points: Floats, table: EdgeTable, reaches: Floats) -> tuple[Ints, Ints]:
     """Return pairs of an unbalanced edge and a vertex that lies on it and is an end of another unbalanced edge."""
     edges = np.flatnonzero(table.balance != 0)
     if not len(edges):
@@ -161,11 +174,12 @@ def _on_open_edges(points: Floats, table: EdgeTable, slack: float) -> tuple[Ints
     tails, heads = points[ends].swapaxes(0, 1)
     tree = BoxTree.of(np.minimum(tails, heads), np.maximum(tails, heads))
     rim = np.unique(ends)
-    starts, near = tree.meeting(np.repeat(points[rim][:, None], 3, axis=1), slack)
+    starts, near = tree.meeting(np.repeat(points[rim][:, None], 3, axis=1), reaches[rim])
     vertex = np.repeat(rim, np.diff(starts))
     away, way = points[vertex] - tails[near], (heads - tails)[near]
     share = (away * way).sum(axis=1) / np.maximum((way * way).sum(axis=1), 1e-300)
-    on = (np.linalg.norm(away - share[:, None] * way, axis=1) <= slack) & (share > 0) & (share < 1)
+    slacks = np.minimum(reaches[vertex], reaches[ends[near]].min(axis=1))
+    on = (np.linalg.norm(away - share[:, None] * way, axis=1) <= slacks) & (share > 0) & (share < 1)
     on &= (vertex[:, None] != ends[near]).all(axis=1)
     return edges[near[on]], vertex[on]
 
@@ -186,13 +200,13 @@ class Records(NamedTuple):
 
 
 def _with_segments(
-    points: Floats, faces: Ints, table: EdgeTable, pairs: Ints, lines: Lines, slack: float
+    points: Floats, faces: Ints, table: EdgeTable, pairs: Ints, lines: Lines, slacks: Floats
 ) -> tuple[Lines, Records]:
     """Add the segments along which pairs of faces meet, from the points that they have in common."""
     members = _members(faces, table, lines, np.unique(pairs))
     chains = Chains(lines.ends, lines.on.starts(len(lines.ends)), lines.on.points)
     starts = members.starts(len(faces))
-    rows, sides = _segments(points, starts, members.points, table.face_edges, chains, pairs, ON_LINE * slack)
+    rows, sides = _segments(points, starts, members.points, table.face_edges, chains, pairs, ON_LINE * slacks)
     own = rows[:, 1] >= len(lines.ends)
     ends = np.zeros((len(sides), 2), dtype=np.int64)
     ends[rows[own, 1] - len(lines.ends)] = rows[own, 2:]
@@ -200,7 +214,7 @@ def _with_segments(
 
 
 def _with_crossings(
-    points: Floats, lines: Lines, records: Records, slack: float, busy: Ints
+    points: Floats, lines: Lines, records: Records, reaches: Floats, slacks: Floats, busy: Ints
 ) -> tuple[Floats, Lines, Records]:
     """Add the points where lines meet within faces."""
     if not len(records.faces):
@@ -208,8 +222,10 @@ def _with_crossings(
     ends = np.stack([records.tails, records.heads], axis=1)
     corners = points[ends[:, [0, 1, 1]]]
     tree = BoxTree.around(corners)
-    starts, near = tree.meeting(corners, slack)
-    touching, crossing, places = _cross(points, records.faces, records.lines, ends, starts, near, slack)
+    within = slacks[records.faces]
+    starts, near = tree.meeting(corners, within)
+    touching, crossing, places = _cross(points, records.faces, records.lines, ends, starts, near, within)
+    within = within[crossing[:, 0]]
     first, second = records.lines[crossing].T
     n_edges = len(lines.ends) - len(lines.sides)
     names = np.stack([np.minimum(first, second), np.maximum(first, second), np.full(len(first), -1)], axis=1)
@@ -218,9 +234,10 @@ def _with_crossings(
     twice = np.append(of_faces[:, 1:] == of_faces[:, :-1], np.zeros((len(of_faces), 1), dtype=bool), axis=1)
     single = twice.sum(axis=1) == 1
     names[np.flatnonzero(three)[single]] = of_faces[single][~twice[single]].reshape(-1, 3) + len(lines.ends)
-    points, ids = _with_new(points, names, places, np.ones(len(names), dtype=bool), first)
+    every = np.ones(len(names), dtype=bool)
+    points, reaches, ids = _with_new(points, reaches, names, places, within, every, first)
     lines = lines._replace(on=Incidence.of(lines.on, tuple(touching.T), (first, ids), (second, ids)))
-    rename = _welded(points, np.concatenate([busy, lines.on.points, lines.within.points, lines.ends.ravel()]), slack)
+    rename = _welded(points, np.concatenate([busy, lines.on.points, lines.within.points, lines.ends.ravel()]), reaches)
     records = records._replace(tails=rename[records.tails], heads=rename[records.heads])
     return points, lines.renamed(rename), records
 
@@ -419,13 +436,16 @@ def _is_over(points: Floats, x: Floats, face: Ints, n: Floats) -> bool:
 
 
 @compiled
-def _meet(points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Ints, slack: float) -> tuple[Ints, Floats]:
-    """Return (e, 3) meetings of faces, as kind and the two elements that meet, and (e, 3) places of new points."""
-    meetings, places = [(0, 0, 0)], [(0.0, 0.0, 0.0)]
+def _meet(
+    points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Ints, slacks: Floats
+) -> tuple[Ints, Floats, Floats]:
+    """Return (e, 3) meetings of faces, as kind and the two elements that meet, (e, 3) new points, and (e,) slacks."""
+    meetings, places, within = [(0, 0, 0)], [(0.0, 0.0, 0.0)], [0.0]
     touch = np.empty((2, 3, 3), np.bool_)  # whether a corner of one lies on an edge of the other
     on, hit, heights = np.empty((2, 3), np.bool_), np.empty((2, 3), np.bool_), np.empty((2, 3))
     normals, place = np.empty((2, 3)), np.empty(3)
     for r in range(len(pairs)):
+        slack = min(slacks[pairs[r, 0]], slacks[pairs[r, 1]])
         touch[:], on[:], hit[:], heights[:] = False, False, False, 0.0
         for s in range(2):
             normals[s, 0], normals[s, 1], normals[s, 2] = _normal(points, faces[pairs[r, s]])
@@ -477,7 +497,9 @@ def _meet(points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Int
                 if _is_over(points, place, faces[g], normals[1 - s]):
                     meetings.append((EDGE_AND_FACE, face_edges[pairs[r, s], i], g))
                     places.append((place[0], place[1], place[2]))
-    return np.array(meetings)[1:], np.array(places)[1:]
+        for _ in range(len(meetings) - len(within)):
+            within.append(slack)
+    return np.array(meetings)[1:], np.array(places)[1:], np.array(within)[1:]
 
 
 class Chains(NamedTuple):
@@ -511,7 +533,7 @@ def _is_along(chains: Chains, line: int, p: int) -> bool:
 
 @compiled
 def _segments(
-    points: Floats, starts: Ints, members: Ints, face_edges: Ints, chains: Chains, pairs: Ints, straight: float
+    points: Floats, starts: Ints, members: Ints, face_edges: Ints, chains: Chains, pairs: Ints, straight: Floats
 ) -> tuple[Ints, Ints]:
     """Return (r, 4) parts of lines in faces, as rows of face, line and two ends, and (s, 2) the faces of new lines."""
     records, sides = [(0, 0, 0, 0)], [(0, 0)]
@@ -548,7 +570,7 @@ def _segments(
             away = points[common[c]] - points[p]
             shares[c] = (away * way).sum() / square
             widest = max(widest, np.sqrt(((away - shares[c] * way) ** 2).sum()))
-        if widest <= straight:
+        if widest <= min(straight[f], straight[g]):
             order = np.argsort(shares)
             for c in range(len(order) - 1):
                 a, b = common[order[c]], common[order[c + 1]]
@@ -588,7 +610,7 @@ def _segments(
 
 @compiled
 def _cross(
-    points: Floats, faces: Ints, lines: Ints, ends: Ints, starts: Ints, near: Ints, slack: float
+    points: Floats, faces: Ints, lines: Ints, ends: Ints, starts: Ints, near: Ints, slacks: Floats
 ) -> tuple[Ints, Ints, Floats]:
     """Return (t, 2) pairs of a line and a point on it, (c, 2) pairs of parts that cross within a face, and where."""
     touching, crossing, places = [(0, 0)], [(0, 0)], [(0.0, 0.0, 0.0)]
@@ -603,7 +625,7 @@ def _cross(
                     v, a, b = ends[first, k], ends[second, 0], ends[second, 1]
                     if v == a or v == b:
                         met = True
-                    elif _is_on(points, v, a, b, slack):
+                    elif _is_on(points, v, a, b, slacks[r]):
                         touching.append((lines[second], v))
                         met = True
             if not met and _closest(points, ends[r, 0], ends[r, 1], ends[s, 0], ends[s, 1], place) < np.inf:

@@ -88,9 +88,10 @@ class BoxTree(NamedTuple):
     ) -> tuple[Ints, Ints]:
         """Find boxes within `slack` of (n, 3, 3) triangles: (n + 1,) where those of each begin, and (k,) the boxes.
 
+        The slack is one number, or (n,) one for each triangle.
         Nodes with only boxes of a triangle's own group, (n,), are skipped, and so are leaves before its own one, (n,).
         """
-        corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(3, slack)
+        corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(len(triangles), slack)
         own = np.full(len(corners), -1) if groups is None else np.ascontiguousarray(groups, dtype=np.int64)
         first = np.zeros(len(corners), dtype=np.int64) if leaves is None else leaves
         starts, room = np.zeros(len(corners) + 1, dtype=np.int64), 64 * len(corners)  # faces of a mesh have about 40
@@ -112,7 +113,7 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, first: I
         for d in range(3):
             p, q = (d + 1) % 3, (d + 2) % 3
             a, b, c = corners[t, d], corners[t, 3 + d], corners[t, 6 + d]
-            lower[d], upper[d] = min(a, b, c) - slacks[d], max(a, b, c) + slacks[d]
+            lower[d], upper[d] = min(a, b, c) - slacks[t], max(a, b, c) + slacks[t]
             ways[3, d] = (corners[t, 3 + p] - corners[t, p]) * (corners[t, 6 + q] - corners[t, q])
             ways[3, d] -= (corners[t, 3 + q] - corners[t, q]) * (corners[t, 6 + p] - corners[t, p])
         for k in range(3):  # perpendicular to each side, in the plane
@@ -128,7 +129,7 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, first: I
                 along = ways[k, 0] * corners[t, i] + ways[k, 1] * corners[t, i + 1] + ways[k, 2] * corners[t, i + 2]
                 ends[k, 0], ends[k, 1] = min(ends[k, 0], along), max(ends[k, 1], along)
             for d in range(3):
-                give += abs(ways[k, d]) * slacks[d]
+                give += abs(ways[k, d]) * slacks[t]
             ends[k, 0], ends[k, 1] = ends[k, 0] - give, ends[k, 1] + give
         stack[0], depth, count = 1, 1, starts[t]
         if first[t] > 0:
@@ -166,7 +167,7 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, first: I
                         along += slabs[node, s + d] * corners[t, k + d]
                     least, most = min(least, along), max(most, along)
                 for d in range(3):
-                    give += abs(slabs[node, s + d]) * slacks[d]
+                    give += abs(slabs[node, s + d]) * slacks[t]
                 apart |= least > slabs[node, s + 4] + give or most < slabs[node, s + 3] - give
             if apart:
                 continue

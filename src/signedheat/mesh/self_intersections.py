@@ -9,10 +9,10 @@ from ..compiled import compiled
 from ..parallel import ROWS_PER_TASK, in_threads
 from .box_tree import BOXES_PER_LEAF, BoxTree, boxes_around, morton_codes
 from .unit_vectors import unit
-from .welding import same_positions
+from .welding import same_positions, tolerances
 
 TOUCHING_DEPTH = 1e-10
-"""Depth, relative to the size of the mesh, up to which triangles only touch."""
+"""Depth up to which triangles only touch, relative to the size of the smaller of their parts."""
 COVERING_FOLD = 1e-10
 """One minus the cosine of the angle between two faces at their common edge, up to which one covers the other."""
 CROWD = 64
@@ -21,45 +21,46 @@ CROWD = 64
 
 def self_intersections(vertices: Floats, faces: Ints, asked: Bools | None = None) -> Ints:
     """Return (k, 2) pairs of faces, one of them `asked` for, that intersect, overlap or touch without common vertex."""
-    slack = TOUCHING_DEPTH * float(np.ptp(vertices, axis=0).max(initial=0.0))
-    return overlapping_faces(vertices, same_positions(vertices)[faces], slack, -slack, asked)
+    faces = same_positions(vertices)[faces]
+    return overlapping_faces(vertices, faces, tolerances(vertices, faces, TOUCHING_DEPTH), asked)
 
 
-def overlapping_faces(vertices: Floats, faces: Ints, slack: float, depth: float, asked: Bools | None = None) -> Ints:
-    """Return (k, 2) pairs of faces that overlap by more than `depth`, or `slack` if they have a common vertex.
+def overlapping_faces(vertices: Floats, faces: Ints, slacks: Floats, asked: Bools | None = None) -> Ints:
+    """Return (k, 2) pairs of faces that overlap, or touch if they have no common vertex.
 
-    Along normals they may be `slack` apart. Faces with a common edge overlap if one is folded onto the other.
+    What is nearer than the (m,) slack of both faces touches. Faces with a common edge overlap if one is folded onto
+    the other.
     """
     proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
     if len(proper) < len(faces):
         asked_proper = None if asked is None else asked[proper]
-        return proper[overlapping_faces(vertices, faces[proper], slack, depth, asked_proper)]
+        return proper[overlapping_faces(vertices, faces[proper], slacks[proper], asked_proper)]
     count = len(faces) if asked is None else int(asked.sum())
     if not count:
         return np.zeros((0, 2), dtype=np.int64)
-    centred = np.ascontiguousarray(vertices - vertices.mean(axis=0), dtype=np.float64)
+    vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     hubs = _hubs(faces, len(vertices))
     if asked is None:
-        order = _order(centred.take(faces, axis=0), centred, hubs)
+        order = _order(vertices.take(faces, axis=0), vertices, hubs)
     else:  # all faces search among those asked for, which come first
         order = np.flatnonzero(asked)
-        order = np.append(order[_order(centred[faces[order]], centred, hubs[order])], np.flatnonzero(~asked))
-    ids, hubs = np.ascontiguousarray(faces[order], dtype=np.int64), hubs[order]
-    corners = centred.take(ids, axis=0)
+        order = np.append(order[_order(vertices[faces[order]], vertices, hubs[order])], np.flatnonzero(~asked))
+    ids, hubs, slacks = np.ascontiguousarray(faces[order], dtype=np.int64), hubs[order], slacks[order]
+    corners = vertices.take(ids, axis=0)
     flat = corners.reshape(-1, 9)
     fans = np.flatnonzero(hubs >= 0)
     places = np.arange(len(ids))
     from_leaf = np.where(places < count, places // BOXES_PER_LEAF, 0)
     tree = BoxTree.over(corners[:count], places[:count], hubs[:count])
-    arcs = _arcs(centred, ids[fans], hubs[fans]) if len(fans) else corners[:0]
+    arcs = _arcs(vertices, ids[fans], hubs[fans]) if len(fans) else corners[:0]
     around = BoxTree.around(arcs) if len(fans) else tree
 
     def overlapping(first: Ints, second: Ints) -> Ints:
-        return np.stack([first, second], axis=1)[_overlapping(flat, ids, first, second, slack, depth)]
+        return np.stack([first, second], axis=1)[_overlapping(flat, ids, first, second, slacks)]
 
     def of_tree(start: int) -> Ints:
         batch = slice(start, start + ROWS_PER_TASK)
-        starts, near = tree.meeting(corners[batch], slack, hubs[batch], from_leaf[batch])
+        starts, near = tree.meeting(corners[batch], slacks[batch], hubs[batch], from_leaf[batch])
         owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         chosen = ((near > owners) | (owners >= count)) & ((hubs[owners] < 0) | (hubs[owners] != hubs[near]))
         return overlapping(owners[chosen], near[chosen])
@@ -109,7 +110,7 @@ def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:
 
 
 @compiled
-def _overlapping(corners: Floats, ids: Ints, first: Ints, second: Ints, slack: float, depth: float) -> Bools:
+def _overlapping(corners: Floats, ids: Ints, first: Ints, second: Ints, slacks: Floats) -> Bools:
     """Return (k,) whether pairs of triangles overlap, or, if they have a common edge, are folded along it."""
     result, ways = np.empty(len(first), dtype=np.bool_), np.empty((10, 3))
     for k in range(len(first)):
@@ -122,7 +123,8 @@ def _overlapping(corners: Floats, ids: Ints, first: Ints, second: Ints, slack: f
         if shared == 2:
             result[k] = _is_folded(corners[f], corners[g], apex, beyond)
         else:
-            result[k] = shared > 2 or overlap(corners[f], corners[g], slack, slack if shared else depth, ways)
+            slack = min(slacks[f], slacks[g])
+            result[k] = shared > 2 or overlap(corners[f], corners[g], slack, slack if shared else -slack, ways)
     return result
 
 
@@ -148,6 +150,7 @@ def _is_folded(p: Floats, q: Floats, apex: int, beyond: int) -> bool:
 @compiled
 def overlap(p: Floats, q: Floats, slack: float, depth: float, ways: Floats) -> bool:
     """Return whether triangles (9,) overlap by `depth` along all axes, −`slack` along normals; `ways` is scratch."""
+    ox, oy, oz = p[0], p[1], p[2]  # rounding of products belongs to these triangles, not to where they are
     for d in range(3):
         if min(p[d], p[3 + d], p[6 + d]) > max(q[d], q[3 + d], q[6 + d]) + slack:
             return False
@@ -189,9 +192,9 @@ def overlap(p: Floats, q: Floats, slack: float, depth: float, ways: Floats) -> b
         p0 = q0 = np.inf
         p1 = q1 = -np.inf
         for c in range(0, 9, 3):
-            s = p[c] * x + p[c + 1] * y + p[c + 2] * z
+            s = (p[c] - ox) * x + (p[c + 1] - oy) * y + (p[c + 2] - oz) * z
             p0, p1 = min(p0, s), max(p1, s)
-            s = q[c] * x + q[c + 1] * y + q[c + 2] * z
+            s = (q[c] - ox) * x + (q[c + 1] - oy) * y + (q[c + 2] - oz) * z
             q0, q1 = min(q0, s), max(q1, s)
         if a < 2:
             if p0 > q1 + slack or q0 > p1 + slack:

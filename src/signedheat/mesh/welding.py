@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints, read_only
 from ..compiled import compiled
+from .components import connected_components
 from .edges import find_edges
 
 ONE_PLACE = 4.0
-"""Largest difference between coordinates that count as one place, in units of single precision of the size of a shape,
+"""Largest difference between coordinates that count as one place, in units of single precision of the size of a part,
 or in last places of its coordinates."""
 SEAM_UNITS, GAP_UNITS = 64.0, 1024.0
 """Largest difference between coordinates of vertices that are joined along a seam, and of those that are reported as a
@@ -22,12 +25,44 @@ _LOW = 0xFFFFFFFF
 """Mask of the low 32 bits."""
 
 
+def part_sizes(points: Floats, labels: Ints, tails: Ints, heads: Ints) -> Floats:
+    """Return (p,) the size of each connected part, given the (n,) part of each point and the (h,) halfedges.
+
+    The size is the longest side of the part's box, but at most √m times the geometric mean length of its edges if it
+    has m faces: a single face that reaches far beyond all others does not count.
+    """
+    n = int(labels.max(initial=-1)) + 1
+    low, high = np.full((3, n), np.inf), np.full((3, n), -np.inf)
+    for axis in range(3):
+        np.minimum.at(low[axis], labels, points[:, axis])
+        np.maximum.at(high[axis], labels, points[:, axis])
+    lengths = np.abs(points[heads] - points[tails]).max(axis=1)
+    proper = lengths > 0
+    owners = labels[tails[proper]]
+    counts = np.bincount(owners, minlength=n)
+    logs = np.bincount(owners, np.log(lengths[proper]), n) / np.maximum(counts, 1)
+    return np.where(counts > 0, np.minimum((high - low).max(axis=0), np.sqrt(counts / 3.0) * np.exp(logs)), 0.0)
+
+
+def tolerances(points: Floats, faces: Ints, units: float) -> Floats:
+    """Return (m,) the distance below which places on faces are one: `units` of the size of the part of each face.
+
+    It is never less than `ONE_PLACE` last places of the coordinates of the face.
+    """
+    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    labels = connected_components(len(points), tails, heads)
+    sizes = part_sizes(points, labels, tails, heads)
+    last_places = ONE_PLACE * 2.0**-53 * np.abs(points).max(axis=1, initial=0.0)[faces].max(axis=1, initial=0.0)
+    return np.maximum(units * sizes[labels[faces[:, 0]]], last_places)
+
+
 def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:
     """Return (n,) the vertex that each is joined to, as along seams: on rims the first at its place, else itself.
 
     Rims are edges with an odd number of halfedges (h,). Two vertices are at one place if they differ by `units` of
-    single precision of the size of the shape, or by `ONE_PLACE` last places where coordinates use all digits, but never
-    so that an edge collapses. So vertices that single precision separated are joined even if moved in double precision.
+    single precision of the size of both their parts, or by `ONE_PLACE` last places where coordinates use all digits,
+    but never so that an edge collapses. So vertices that single precision separated are joined even if moved in double
+    precision.
     """
     edges, _, counts, _, _ = find_edges(read_only(tails), read_only(heads), tails != heads, len(points))
     is_open = (edges >= 0) & (np.append(counts, 0)[edges] % 2 == 1)
@@ -35,18 +70,23 @@ def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:
     places = np.arange(len(points))
     if not len(rims):
         return places
-    first, used = rims[same_positions(points[rims])], points[tails]
+    first = rims[same_positions(points[rims])]
     places[rims] = first
     lengths, shortest = np.abs(points[heads] - points[tails]).max(axis=1), np.full(len(points), np.inf)
     for ends in (tails, heads):
         np.minimum.at(shortest, places[ends], np.where(lengths > 0, lengths, np.inf))
-    digits = 24 if _is_single(used) else 53
-    last_places = np.where(_is_rounded(used, digits), ONE_PLACE * np.abs(used).max() * 2.0**-digits, 0.0)
-    tolerances = np.maximum(units * 2.0**-24 * np.ptp(used, axis=0).max(), last_places)
-    near = first[np.searchsorted(rims, rims[welded(points[rims], tolerances)])]
-    apart = np.abs(points[first] - points[near]).max(axis=1)
-    places[rims] = np.where(apart <= SEAM_WIDTH * np.minimum(shortest[first], shortest[near]), near, first)
-    return places
+    digits = 24 if _is_single(points[tails]) else 53
+    while True:  # what is joined is a larger part
+        parts = connected_components(len(points), places[tails], places[heads])[places]
+        sizes = part_sizes(points, parts, tails, heads)
+        last_places = _rounding(points[tails], parts[tails], len(sizes), digits)
+        reaches = np.maximum(units * 2.0**-24 * sizes[:, None], ONE_PLACE * last_places)[parts[rims]]
+        near = first[np.searchsorted(rims, rims[welded_within(points[rims], reaches)])]
+        apart = np.abs(points[first] - points[near]).max(axis=1)
+        joined = np.where(apart <= SEAM_WIDTH * np.minimum(shortest[first], shortest[near]), near, first)
+        if (joined == places[rims]).all():
+            return places
+        places[rims] = joined
 
 
 def _is_single(points: Floats) -> bool:
@@ -55,10 +95,34 @@ def _is_single(points: Floats) -> bool:
         return bool((points.astype(np.float32) == points).all())
 
 
-def _is_rounded(points: Floats, digits: int) -> Bools:
-    """Return (3,) whether coordinates along an axis make use of the last place of the largest of them."""
-    last_places = np.ldexp(1.0, np.frexp(np.abs(points).max(axis=0))[1] - digits)
-    return (np.fmod(points, 2.0 * last_places) != 0).any(axis=0)
+def _rounding(points: Floats, parts: Ints, n: int, digits: int) -> Floats:
+    """Return (n, 3) the last place of the largest coordinate of each part; 0 along axes where no part uses it."""
+    result = np.zeros((n, 3))
+    for axis, coordinates in enumerate(points.T):
+        largest = np.zeros(n)
+        np.maximum.at(largest, parts, np.abs(coordinates))
+        last_places = np.ldexp(1.0, np.frexp(largest)[1] - digits)
+        if (np.fmod(coordinates, 2.0 * last_places[parts]) != 0).any():
+            result[:, axis] = largest * 2.0**-digits
+    return result
+
+
+def welded_within(points: Floats, reaches: Floats) -> Ints:
+    """Return (n,) the point that each is joined to, or itself, given its own reach along each axis, (n,) or (n, 3).
+
+    Two points are joined if both reach the other. Reaches are rounded to powers of four times the largest one.
+    """
+    reaches = np.broadcast_to(np.reshape(reaches, (len(points), -1)), points.shape)
+    largest = reaches.max(axis=0, initial=0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        levels = np.where(reaches > 0, np.rint(0.5 * np.log2(largest / reaches)), 512).astype(np.int64)
+    rows = np.array(list(product(*(np.unique(axis)[::-1] for axis in levels.T))), dtype=np.int64)
+    owners = np.arange(len(points))
+    for row in rows:  # the least reaches come first
+        chosen, joined = np.flatnonzero((levels <= row).all(axis=1)), np.arange(len(points))
+        joined[chosen] = chosen[welded(points[chosen], np.ldexp(largest, -2 * row))]
+        owners = joined[owners]
+    return owners
 
 
 def welded(points: Floats, tolerance: float | Floats) -> Ints:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..mesh.arrangement import SAME_POINT, Arrangement
+from ..mesh.arrangement import Arrangement
 from ..mesh.components import next_in_groups, sums_of
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.triangles import area_vectors, face_areas, heights
@@ -23,8 +23,8 @@ from ..mesh.welding import coincident_faces
 from ..search.winding_tree import OFF_FACE
 from .winding import INSIDE_WINDING, Windings
 
-TOLERANCES: tuple[float, ...] = (SAME_POINT, 10 * SAME_POINT, 100 * SAME_POINT, 1000 * SAME_POINT)
-"""Distances below which points are one, relative to the size of a shape, tried until what bounds the inside is closed.
+TOLERANCES: tuple[float, ...] = (1.0, 10.0, 100.0, 1000.0)
+"""Multiples of the distance below which points are one that are tried until what bounds the inside is closed.
 Of touching boxes with corners moved by 1e-11 to 1e-5 of their size, none is wrong; without the last distance up to a
 seventh are, with the first alone nine tenths (`benchmarks/deciding_numbers.py`)."""
 PROBED_FACES = 3
@@ -48,10 +48,10 @@ class Regions:
         return self.behind & ~self.ahead & ~self.doubled
 
     @classmethod
-    def of(cls, pieces: Arrangement, windings: Windings, touching: float) -> Regions:
+    def of(cls, pieces: Arrangement, windings: Windings, slacks: Floats) -> Regions:
         """Find the regions of pieces that meet in whole edges and contain the cycle with these winding numbers.
 
-        Points within `touching` of each other are one, relative to the size of the shape.
+        Points on faces are one within the (m,) slacks of the faces that were cut.
         """
         first, reverse = coincident_faces(pieces.faces.ravel(), np.arange(0, pieces.faces.size + 1, 3))
         first = np.where(first < 0, np.arange(len(first)), first)  # triangles on fewer than three points
@@ -60,8 +60,8 @@ class Regions:
         vectors = area_vectors(pieces.points.take(pieces.faces, axis=0))
         parents = unit(sums_of(vectors, pieces.origins, int(pieces.origins.max(initial=-1)) + 1))
         normals = parents[pieces.origins[distinct]]
-        step = PROBE_DISTANCE * touching * float(np.ptp(pieces.points, axis=0).max())
-        numbers, contradictions = _windings(pieces.points, pieces.faces[distinct], normals, times, windings, step)
+        steps = PROBE_DISTANCE * slacks[pieces.origins[distinct]]
+        numbers, contradictions = _windings(pieces.points, pieces.faces[distinct], normals, times, windings, steps)
         behind, ahead = (numbers > INSIDE_WINDING).T
         behind, ahead = (
             np.where(reverse, *pair) for pair in ((ahead[groups], behind[groups]), (behind[groups], ahead[groups]))
@@ -74,19 +74,19 @@ class Regions:
 
 
 def cut_and_sided(
-    cut: Callable[[float], Arrangement], closing: Bools, windings: Windings
+    cut: Callable[[Floats], Arrangement], slacks: Floats, closing: Bools, windings: Windings
 ) -> tuple[Arrangement, Regions]:
     """Cut faces with the first tolerance for which those that bound the inside are closed, and find their regions.
 
     If corners that should coincide are about a tolerance apart, edges stay open or sides contradict each other. Then
-    larger tolerances are tried; if none works, that with the fewest faults is taken. `closing` tells which of the given
-    faces count in the winding numbers.
+    larger multiples of the (m,) `slacks` of faces are tried; if none works, that with the fewest faults is taken.
+    `closing` tells which of the given faces count in the winding numbers.
     """
     tried: list[tuple[Arrangement, Regions]] = []
     faults: list[int] = []
     for touching in TOLERANCES:
-        pieces = cut(touching)
-        tried.append((pieces, Regions.of(pieces, windings, touching)))
+        pieces = cut(touching * slacks)
+        tried.append((pieces, Regions.of(pieces, windings, touching * slacks)))
         faults.append(_faults(*tried[-1], closing))
         if not faults[-1]:
             break
@@ -102,11 +102,11 @@ def _faults(pieces: Arrangement, regions: Regions, closing: Bools) -> int:
 
 
 def _windings(
-    points: Floats, faces: Ints, normals: Floats, times: Ints, windings: Windings, step: float
+    points: Floats, faces: Ints, normals: Floats, times: Ints, windings: Windings, steps: Floats
 ) -> tuple[Floats, int]:
     """(m, 2) winding numbers behind and in front of each distinct face, given its multiplicity; and contradictions.
 
-    Sides of wide faces are probed at least a step away.
+    Sides of wide faces are probed at least their (m,) steps away.
     """
     n = len(faces)
     sides, facing_sides = _around_edges(points, faces, normals, times)
@@ -118,7 +118,7 @@ def _windings(
     starts = np.searchsorted(labels[order], np.arange(int(labels.max(initial=-1)) + 1))
     chosen = order[np.arange(n) - starts[labels[order]] < PROBED_FACES]
     corners = points[faces[chosen]]
-    away = np.minimum(np.maximum(OFF_FACE * np.sqrt(face_areas(corners)), step), 0.05 * thickness[chosen])
+    away = np.minimum(np.maximum(OFF_FACE * np.sqrt(face_areas(corners)), steps[chosen]), 0.05 * thickness[chosen])
     away, centres = away[:, None] * normals[chosen], corners.mean(axis=1)
     sampled = windings.numbers_once(np.concatenate([centres - away, centres + away]))
     offsets, owners = sampled - levels[chosen].T.ravel(), np.tile(labels[chosen], 2)

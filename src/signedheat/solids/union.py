@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints
 from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
 from ..errors import GeometryError, SourceError
-from ..mesh.arrangement import Arrangement, arranged, meeting_faces
+from ..mesh.arrangement import SAME_POINT, Arrangement, arranged, meeting_faces
 from ..mesh.components import first_members
 from ..mesh.triangles import face_areas
-from ..mesh.welding import indexed, same_positions
+from ..mesh.welding import indexed, same_positions, tolerances
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import concatenated
 from .regions import cut_and_sided
@@ -55,7 +55,9 @@ def united(
     whole = joined_surfaces(surfaces)
     closing = np.concatenate([np.full(len(surface.triangles), surface.closing) for surface in surfaces])
     windings = Windings(whole.triangles if closing.all() else whole.triangles[closing])
-    pieces, regions = cut_and_sided(partial(_cut, whole, closing), closing, windings)
+    points, faces = _connected(whole)
+    slacks = tolerances(points, faces, SAME_POINT)
+    pieces, regions = cut_and_sided(partial(_cut, points, faces, closing), slacks, closing, windings)
     uncut = np.array_equal(pieces.origins, np.arange(len(whole.triangles)))
     triangles = whole.triangles if uncut else pieces.points[pieces.faces]
     behind, ahead = regions.behind.copy(), regions.ahead.copy()
@@ -87,16 +89,19 @@ def _windings_of(triangles: Floats, given: Windings) -> Windings:
         return given
 
 
-def _cut(whole: TriangleGroup, closing: Bools, touching: float) -> Arrangement:
+def _connected(whole: TriangleGroup) -> tuple[Floats, Ints]:
+    """Return points, and faces between the first point at each position."""
+    points = whole.triangles.reshape(-1, 3)[first_members(whole.ids.ravel(), int(whole.ids.max()) + 1)]
+    return points, same_positions(points)[whole.ids]
+
+
+def _cut(points: Floats, faces: Ints, closing: Bools, slacks: Floats) -> Arrangement:
     """Divide faces where they meet: closing faces where they meet each other, all others where they meet these."""
-    ids = whole.ids
-    points = whole.triangles.reshape(-1, 3)[first_members(ids.ravel(), int(ids.max()) + 1)]
-    faces = same_positions(points)[ids]
-    pairs = meeting_faces(points, faces, touching)
+    pairs = meeting_faces(points, faces, slacks)
     both = closing[pairs].all(axis=1)
     closed = np.flatnonzero(closing)
     number = np.cumsum(closing) - 1
-    pieces = _arranged(points, faces, closed, number[pairs[both]], touching)
+    pieces = _arranged(points, faces, closed, number[pairs[both]], slacks)
     if closing.all():
         return pieces
     across = pairs[closing[pairs].any(axis=1) & ~both]
@@ -105,7 +110,7 @@ def _cut(whole: TriangleGroup, closing: Bools, touching: float) -> Arrangement:
     used = np.flatnonzero(asked)
     number = np.full(len(faces), -1)
     number[used] = np.arange(len(used))
-    others = _arranged(points, faces, used, number[across], touching)
+    others = _arranged(points, faces, used, number[across], slacks)
     sheets = ~closing[others.origins]
     return Arrangement(
         np.concatenate([pieces.points, others.points]),
@@ -115,11 +120,11 @@ def _cut(whole: TriangleGroup, closing: Bools, touching: float) -> Arrangement:
     )
 
 
-def _arranged(points: Floats, faces: Ints, chosen: Ints, pairs: Ints, touching: float) -> Arrangement:
+def _arranged(points: Floats, faces: Ints, chosen: Ints, pairs: Ints, slacks: Floats) -> Arrangement:
     """Return some faces, divided where pairs of them meet."""
     if not len(pairs):
         return Arrangement(points, faces[chosen], chosen, np.arange(len(chosen)))
-    pieces = arranged(points, faces[chosen], pairs, touching)
+    pieces = arranged(points, faces[chosen], pairs, slacks[chosen])
     return pieces._replace(origins=chosen[pieces.origins])
 
 
@@ -205,9 +210,9 @@ def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None)
         raise SourceError("neither shape encloses anything", remedy="combine solids, not sheets", element="solid")
     chain = triangles if around is None else np.concatenate([triangles, around])
     windings = Windings(chain)
-    cut, regions = cut_and_sided(
-        partial(arranged, *indexed(triangles), None), np.ones(len(triangles), dtype=bool), windings
-    )
+    points, faces = indexed(triangles)
+    slacks, every = tolerances(points, faces, SAME_POINT), np.ones(len(triangles), dtype=bool)
+    cut, regions = cut_and_sided(partial(arranged, points, faces, None), slacks, every, windings)
     kept = regions.bounds
     if not kept.any():
         raise SourceError("nothing is inside the result", remedy="check that the solids overlap", element="solid")

@@ -19,7 +19,7 @@ INSIDE_WINDING = 0.5
 CLEAR_COSINE = 1e-3
 """Cosine between a normal and the direction from the surface above which its sign is the side of a point."""
 ON_SURFACE = 1e-12
-"""Distance up to which a point is on the surface, relative to the largest coordinate."""
+"""Distance up to which a point is on the surface, relative to its own largest coordinate."""
 SUMMED_POINTS = 16
 """At this many points or fewer, sums over all triangles take less time and memory than a tree."""
 
@@ -46,11 +46,6 @@ class Windings(Frozen):
         """Search tree over the triangles, of which there is at least one."""
         return WindingTree.of(self.triangles)
 
-    @cached_property
-    def largest_coordinate(self) -> float:
-        """Largest absolute coordinate of the triangles."""
-        return float(np.abs(self.triangles).max(initial=0.0))
-
     def numbers(self, points: Floats) -> Floats:
         """(n,) winding numbers of points."""
         return self.tree.numbers(points) if len(self.triangles) and len(points) else np.zeros(len(points))
@@ -69,7 +64,7 @@ class Windings(Frozen):
         On the surface either side is right, and rounding may choose it.
         """
         inside: Bools = nearest.cosines < 0
-        on_surface = nearest.distances < ON_SURFACE * self.largest_coordinate
+        on_surface = nearest.distances < ON_SURFACE * np.abs(points).max(axis=1, initial=0.0)
         unclear = np.flatnonzero(~(nearest.regular & ((np.abs(nearest.cosines) > CLEAR_COSINE) | on_surface)))
         if len(unclear):
             inside[unclear] = self.inside(points[unclear])

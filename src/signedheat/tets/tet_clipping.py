@@ -101,10 +101,10 @@ def containing_tets(mesh: TetShapes, planes: Planes, points: Floats) -> Ints:
     return in_chunks(located, points)[0]
 
 
-def _slack(mesh: TetShapes) -> Floats:
-    """Return (3,) by how much boxes of tets are enlarged in a search, since rounding may put a point outside."""
+def _slack(mesh: TetShapes) -> float:
+    """Return by how much boxes of tets are enlarged in a search, since rounding may put a point outside."""
     lower, upper = mesh.search_tree.bounds[1].reshape(2, 3)
-    return 1e-9 * (upper - lower)
+    return 1e-9 * float((upper - lower).max())
 
 
 def barycentric(mesh: TetShapes, tets: Ints, points: Floats) -> Floats:
