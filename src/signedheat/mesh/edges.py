@@ -64,11 +64,16 @@ def orient_faces(faces: Ints, weights: Floats, n_vertices: int, used: Bools | No
     )
     two = pairs.counts == 2
     first, second = pairs.first[two], pairs.second[two]
-    (f, g), n, disagree = (owners[first], owners[second]), len(weights), tails[first] == tails[second]
-    parts = connected_components(n, f, g)
+    return agreeing(owners[first], owners[second], tails[first] == tails[second], weights)
+
+
+def agreeing(first: Ints, second: Ints, disagree: Bools, weights: Floats) -> FaceOrientation:
+    """Find which faces to turn so that pairs of faces agree; in each part, the larger weight stays as it is."""
+    n = len(weights)
+    parts = connected_components(n, first, second)
     # the graph has each face f twice, as it is, f, and turned over, f + n: faces that agree are connected
-    ways = np.concatenate([f, f + n]), np.concatenate([np.where(disagree, g + n, g), np.where(disagree, g, g + n)])
-    cover = connected_components(2 * n, *ways)
+    over = np.where(disagree, second + n, second), np.where(disagree, second, second + n)
+    cover = connected_components(2 * n, np.concatenate([first, first + n]), np.concatenate(over))
     orientable = ~mask_of(int(parts.max(initial=-1)) + 1, parts[cover[:n] == cover[n:]])
     turned = cover[:n] != cover[first_members(parts, len(orientable))[parts]]
     balance = np.bincount(parts, np.where(turned, -weights, weights), len(orientable))

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints, mask_of
 from ..compiled import compiled
-from .components import element_components
+from .components import element_components, sums_of
 from .edges import EdgeTable, edge_keys, edge_table
 from .unit_vectors import unit
 
@@ -66,6 +66,15 @@ def corner_normals(triangles: Floats) -> Floats:
     sides = unit(np.roll(triangles, -1, axis=1) - triangles)
     angles = np.arccos(np.clip(-np.einsum("mki,mki->mk", sides, np.roll(sides, 1, axis=1)), -1.0, 1.0))
     return angles.reshape(-1, 1) * np.repeat(unit(area_vectors(triangles)), 3, axis=0)
+
+
+def cone_volumes(triangles: Floats, counts: Ints, groups: Ints, n: int) -> Floats:
+    """Return (n,) signed volumes between the triangles of groups, times their counts, and their centres of area."""
+    middles, areas = triangles.mean(axis=1), face_areas(triangles)
+    centres = sums_of(middles * areas[:, None], groups, n)
+    centres /= np.maximum(np.bincount(groups, areas, n), np.finfo(float).tiny)[:, None]
+    heights = ((middles - centres[groups]) * area_vectors(triangles)).sum(axis=1)
+    return np.bincount(groups, counts * heights / 3.0, n)
 
 
 def part_volumes(vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:

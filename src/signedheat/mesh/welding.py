@@ -112,7 +112,7 @@ def welded_within(points: Floats, reaches: Floats) -> Ints:
 
     Two points are joined if both reach the other. Reaches are rounded to powers of four times the largest one.
     """
-    reaches = np.broadcast_to(np.reshape(reaches, (len(points), -1)), points.shape)
+    reaches = np.broadcast_to(reaches[:, None] if reaches.ndim == 1 else reaches, points.shape)
     largest = reaches.max(axis=0, initial=0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         levels = np.where(reaches > 0, np.rint(0.5 * np.log2(largest / reaches)), 512).astype(np.int64)

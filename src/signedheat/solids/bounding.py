@@ -1,9 +1,12 @@
 """Which triangles of a shape bound a solid, and which way they face.
 
-Closed parts are kept whole: complexes whose directed edges cancel as given, and pieces whose edges cancel once their
-faces agree. Each is turned outwards as a whole; within another body it keeps the orientation it was given relative to
-that body. All other pieces are open, and Gauss's formula (`gauss`) decides for all of them together; it takes bodies
-that overlap into account (`overlaps`).
+The shape is read as it was given first. Each connected part that this leaves unexplained is read in other ways, too
+(`readings`), and the reading that leaves the least area unexplained is taken; as given wins ties.
+
+Closed pieces are kept whole, and turned outwards as a whole; within another body each keeps the orientation it was
+given relative to that body. All other pieces are open, and Gauss's formula (`gauss`) decides for all of them together
+which of them bound something, and which way they face if that is not given; it takes bodies that overlap into account
+(`overlaps`).
 """
 
 from __future__ import annotations
@@ -15,14 +18,17 @@ import scipy
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..mesh.components import connected_components, first_members, sums_of
-from ..mesh.triangles import area_vectors
+from ..mesh.triangles import area_vectors, cone_volumes
 from ..mesh.unit_vectors import unit
 from ..search.winding_tree import WindingTree
-from .chain import Chain, inner_walls
+from .chain import Chain
 from .gauss import Matrix, Pieces, means, sampled, system_of, without_slender
-from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, directed, levels_of_pieces, levels_within
+from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, directed, levels_of_pieces
+from .readings import Reading, as_given, mixed, odd, once, unexplained
 from .rims import meeting_edges, open_edges
 
+LEAST_GAIN = 0.02
+"""Another reading of a part must explain at least this share of its area more than that as given."""
 COHERENT_LEVELS = 0.7
 """Loose pieces are the remains of a body if the squared mean of their levels over the mean square is at least this.
 Bodies have .81 to 1, however little is left; leaves, cards and strips have .3 to .6, however many there are."""
@@ -48,12 +54,13 @@ class Bounding(Frozen):
     loose: Ints
     # (m,) mean level of the cluster, which is half of the share of the body that is left; ½ for all other triangles
     levels: Floats
-    as_given: Bools  # (m,) which are in complexes that close as given, with all copies
+    as_given: Bools  # (m,) which count as often as they were given, with all copies
     inner: Bools  # (m,) walls between closed cells
     orientable: Bools  # (p,) pieces whose faces can be oriented consistently
-    disagreeing: int  # number of edges across which two faces disagreed
+    disagreeing: int  # number of pairs of neighbours that disagreed
     bodies: int  # number of closed pieces within others that face outwards
     cavities: int  # number of those that face inwards
+    overlapping: bool  # whether there are open bodies that ignore others, since they overlap or lie within them
 
     def to_turn(self, chain: Chain) -> Bools:
         """(k,) whether each given triangle must turn; triangles on fewer than three places need not."""
@@ -63,22 +70,74 @@ class Bounding(Frozen):
 
 def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False) -> Bounding:
     """Decide which triangles bound something and which way they face, or take them as oriented."""
-    counts, whole = whole_complexes(chain)
-    inner = inner_walls(chain) & ~whole
-    agreed = chain.pieces_as_given() if as_oriented else chain.pieces(~inner)
-    # a whole complex is one piece; other complexes are divided into pieces
-    pieces = np.where(whole, len(agreed.orientable) + chain.complexes, agreed.parts)
-    pieces = np.unique(pieces, return_inverse=True)[1]
-    orientable = np.ones(int(pieces.max(initial=-1)) + 1, dtype=bool)
-    orientable[pieces[~whole]] = agreed.orientable[agreed.parts[~whole]]
-    turned = (chain.multiplicities < 0) if as_oriented else np.where(whole, False, agreed.turned)
-    counts = np.where(whole, counts, np.where(turned, -1, 1) * (orientable[pieces] & ~inner))
-    open_pieces = chain.unbalanced(counts, pieces)
-    open_pieces[pieces[inner]] = True
-    n = len(open_pieces)
+    given, whole = as_given(chain)
+    decided = _decided(chain, given, whole, ~whole, nested, as_oriented)
+    if as_oriented or whole.all():
+        return decided
+    # loose triangles tell little one by one: they are read together
+    alone = np.bincount(chain.complexes)[chain.complexes] == 1
+    parts = np.where(whole, -1, np.where(alone, 0, 1 + chain.complexes))
+    parts[~whole] = np.unique(parts[~whole], return_inverse=True)[1]
+    missing = unexplained(chain, decided.counts, parts)
+    areas = np.bincount(parts[~whole], chain.areas[~whole], len(missing))
+    readings, chosen = [given], np.zeros(len(parts), dtype=np.int64)
+    if cone_volumes(chain.triangles, given.counts, np.maximum(parts, -1) + 1, len(areas) + 1).sum() < 0:
+        inside_out = _reversed(given, whole)
+        other = _decided(chain, inside_out, whole, ~whole, nested)
+        left = unexplained(chain, other.counts, parts)
+        if areas @ left < areas @ missing - LEAST_GAIN * areas.sum():
+            readings, decided, missing = [inside_out], other, left
+    if not (missing >= LEAST_GAIN).any():
+        return decided
+    by_odd, by_once = odd(chain), once(chain)
+    differ = np.bincount(parts[~whole], (by_odd.counts != by_once.counts)[~whole], len(missing)) > 0
+    every, overlapping = np.ones(len(missing), dtype=bool), False
+    for reading, tell, cavities in ((by_odd, differ, False), (by_once, every, False), (by_once, every, True)):
+        todo = (missing >= LEAST_GAIN) & tell
+        if not todo.any() or (cavities and not overlapping):
+            continue
+        readings.append(reading)
+        for _ in range(2):  # first for all of these parts, then for those only that it explains better
+            tried = np.where(~whole & todo[parts], len(readings) - 1, chosen)
+            fixed = ~whole & (tried == 0)
+            other = _decided(chain, mixed(chain, readings, tried), whole, fixed, nested, cavities=cavities)
+            overlapping = other.overlapping
+            left = unexplained(chain, other.counts, parts)
+            better = todo & (left < missing - LEAST_GAIN)
+            if (better == todo).all() or not better.any():
+                break
+            todo = better
+        # what one part gains, others must not lose
+        if better.any() and areas @ left < areas @ missing - LEAST_GAIN * areas[todo].sum():
+            chosen, missing, decided = tried, left, other
+    return decided
+
+
+def _reversed(reading: Reading, whole: Bools) -> Reading:
+    """Turn all triangles that are not in whole complexes, which are turned anyway if they face inwards."""
+    return replace(reading, counts=np.where(whole, 1, -1) * reading.counts, turned=reading.turned != ~whole)
+
+
+def _decided(
+    chain: Chain,
+    reading: Reading,
+    whole: Bools,
+    fixed: Bools,
+    nested: Nesting,
+    as_oriented: bool = False,
+    cavities: bool = False,
+) -> Bounding:
+    """Decide which pieces of a reading bound something and which way they face; those that are `fixed` do not turn.
+
+    Open bodies within others are `cavities` of these, or they are what `nested` says.
+    """
+    counts, pieces, orientable = reading.counts, reading.pieces, reading.orientable
+    n = len(orientable)
+    idle = np.bincount(pieces, counts == 0, n) > 0
+    open_pieces = (chain.open_edges(counts, pieces) > 0) | (idle & (np.bincount(pieces, whole, n) == 0))
     closed = ~open_pieces & orientable
     flips, levels, loose, bounds = np.ones(n), np.full(n, 0.5), np.full(n, -1), closed.copy()
-    rest = np.flatnonzero((open_pieces & orientable)[pieces] & ~inner)
+    rest, overlapping = np.flatnonzero((open_pieces & orientable)[pieces] & (counts != 0)), False
     if len(rest):
         names, labels = np.unique(pieces[rest], return_inverse=True)
         triangles = directed(chain.triangles[rest], np.sign(counts[rest]))
@@ -91,59 +150,36 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
             facing = _nested(chain, pieces, counts * closed[pieces], closed, flips, nested)[0]
             around = directed(chain.triangles, counts * (closed * facing)[pieces])
         given = sums_of(np.sign(counts[rest] * chain.multiplicities[rest]) * chain.areas[rest], labels, len(names))
-        signs, bounds[names], loose[names], levels[names] = open_bounding(
-            Pieces(triangles, labels), groups, rims, given, around, nested, as_oriented
+        held = np.bincount(labels, fixed[rest]) > 0
+        signs, bounds[names], loose[names], levels[names], overlapping = open_bounding(
+            Pieces(triangles, labels), groups, rims, given, around, held, "cavities" if cavities else nested
         )
         flips[names] = np.where(bounds[names], signs, 1.0)
-    bodies = cavities = 0
+    bodies = inwards = 0
     if closed.any() and not as_oriented:
-        flips, bodies, cavities = _nested(chain, pieces, counts * bounds[pieces], closed, flips, nested)
+        flips, bodies, inwards = _nested(chain, pieces, counts * bounds[pieces], closed, flips, nested)
     if (loose >= 0).any() and closed.any():
         along = _along(chain, pieces, loose, counts * flips[pieces] * closed[pieces])
         bounds &= ~along
         loose[along] = -1
-    turned = np.where(whole, False, turned) != (flips[pieces] < 0)
-    as_given = whole & (np.abs(counts) == np.abs(chain.multiplicities))
-    counts = (counts * flips[pieces] * bounds[pieces]).astype(np.int64)
+    turned = reading.turned != (flips[pieces] < 0)
+    with_copies = (whole | fixed) & (np.abs(counts) == np.abs(chain.multiplicities)) & ((counts == 0) | bounds[pieces])
+    inner = (counts == 0) & orientable[pieces] & ~whole & ~fixed
     return Bounding(
         pieces=pieces,
         turned=turned & ~inner,
-        counts=counts,
+        counts=(counts * flips[pieces] * bounds[pieces]).astype(np.int64),
         closed=closed[pieces],
         loose=loose[pieces],
         levels=levels[pieces],
-        as_given=as_given,
+        as_given=with_copies,
         inner=inner,
         orientable=orientable,
-        disagreeing=agreed.disagreeing,
+        disagreeing=reading.disagreeing,
         bodies=bodies,
-        cavities=cavities,
+        cavities=inwards,
+        overlapping=overlapping,
     )
-
-
-def whole_complexes(chain: Chain) -> tuple[Ints, Bools]:
-    """Find complexes that close as given and face one way; return how often triangles count, and which are in them.
-
-    If the directed edges of a complex cancel only without copies, its triangles count once. Both results are (m,).
-    """
-    counts, complexes = chain.multiplicities, chain.complexes
-    once = np.sign(counts)
-    off = chain.unbalanced(counts, complexes)
-    single = off & ~chain.unbalanced(once, complexes)
-    counts = np.where(single[complexes], once, counts)
-    filled = np.bincount(complexes, counts != 0) > 0
-    balanced = (~off | single) & filled
-    if not balanced.any():
-        return counts, np.zeros(len(counts), dtype=bool)
-    chosen = np.flatnonzero(balanced[complexes] & (counts != 0))
-    # the largest triangle of each piece
-    parts = chain.pieces(counts != 0).parts[chosen]
-    order = np.lexsort((-chain.areas[chosen], parts))
-    largest = order[np.unique(parts[order], return_index=True)[1]]
-    levels = levels_within(chain.triangles[chosen], complexes[chosen], counts[chosen], largest)
-    owners = complexes[chosen[largest]]
-    ahead, back = (np.bincount(owners, sign * levels < 0.25, len(balanced)) == 0 for sign in (1, -1))
-    return counts, (balanced & (ahead | back))[complexes]
 
 
 def _nested(
@@ -157,9 +193,8 @@ def _nested(
     n = len(closed)
     counted = np.flatnonzero(counts != 0)
     triangles, owners = chain.triangles[counted], pieces[counted]
-    a, b, c = triangles.transpose(1, 0, 2)
-    cones = counts[counted] * np.einsum("ij,ij->i", a, np.cross(b, c))
-    outward = np.where(closed, np.where(np.bincount(owners, cones, n) >= 0, 1.0, -1.0), flips)
+    volumes = cone_volumes(triangles, counts[counted], owners, n)
+    outward = np.where(closed, np.where(volumes >= 0, 1.0, -1.0), flips)
     if len(np.unique(owners)) == 1:
         return outward, 0, 0
     names, labels = np.unique(owners, return_inverse=True)
@@ -193,25 +228,34 @@ def open_bounding(
     rims: Rims,
     given: Floats,
     closed: Floats,
+    fixed: Bools,
     nested: Nesting = "given",
-    as_oriented: bool = False,
-) -> tuple[Floats, Bools, Ints, Floats]:
+) -> tuple[Floats, Bools, Ints, Floats, bool]:
     """Find for open pieces, (p,) each: signs, whether they bound something, clusters of loose ones or −1, and levels.
 
-    A piece is loose if neither it nor its group is a body by itself. In each round, pieces whose level is too low are
-    left out if they leave at least half as much unexplained as the worst one.
+    Also say whether bodies were found that ignore others.
+
+    A piece is loose if neither it nor its group is a body by itself. Pieces that are `fixed`, (p,), have the sign 1. In
+    each round, pieces whose level is too low are left out if they leave at least half as much unexplained as the worst
+    one.
     """
     n, areas = len(pieces.areas), pieces.areas
     shared = np.bincount(groups, minlength=n)[groups] > 1
     alone = np.abs(levels_of_pieces(pieces))
     clusters, whole = clusters_of(pieces), system_of(pieces)
+    members = _counted(areas, np.arange(n), groups)[groups]
+    overlapping = False
     alive, weights = np.ones(n, dtype=bool), np.ones(n)  # the signs of the weights are those of the pieces
-    if not as_oriented:
-        weights = whole.weights()
+    if not fixed.all():
+        weights = whole.weights(fixed)
         within = bodies_around(whole, pieces, rims, groups, alone, signs_of(weights), given, closed, nested)
-        if within.any():
+        overlapping = bool(within.any())
+        if overlapping:
             whole = replace(whole, within=within)
-            weights = whole.weights(weights)
+            weights = whole.weights(fixed, weights)
+    elif len(closed):
+        around = WindingTree.of(closed).levels(whole.places, whole.normals, whole.areas)
+        whole = replace(whole, within=-around)
     while alive.any():
         names, system = np.flatnonzero(alive), whole.chosen(alive)
         signs = signs_of(weights[names])
@@ -221,7 +265,7 @@ def open_bounding(
         # whether groups are bodies by themselves; loose pieces are judged cluster by cluster
         together = means(system.levels_within(signs, groups[names]), groups[rows], system.areas, n)[groups]
         by_itself = np.where(shared, together, alone)
-        own = by_itself >= SHEET
+        own = (by_itself >= SHEET) & (~shared | (together * np.sqrt(members + 1) >= CHANCE_LEVEL))
         loose = alive & ~own
         shares = np.where(loose[rows], system.areas, 0.0)
         mean = means(values, clusters[rows], shares, n)
@@ -235,11 +279,12 @@ def open_bounding(
         if not wrong.any():
             break
         alive &= ~(wrong & (unexplained >= 0.5 * unexplained.max()))
-        if not as_oriented and alive.any():
-            weights[alive] = whole.chosen(alive).weights(weights[alive])
+        if alive.any() and not fixed[alive].all():
+            weights[alive] = whole.chosen(alive).weights(fixed[alive], weights[alive])
     of_loose, of_bodies = (np.bincount(clusters, areas * (alive & mask), n) for mask in (~own, own))
     mostly = alive & (of_loose > of_bodies)[clusters]
-    return signs_of(weights), alive, np.where(mostly, clusters, -1), np.where(mostly, mean[clusters], 0.5)
+    levels = np.where(mostly, mean[clusters], 0.5)
+    return signs_of(weights), alive, np.where(mostly, clusters, -1), levels, overlapping
 
 
 def signs_of(weights: Floats) -> Floats:
@@ -261,7 +306,7 @@ def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owner
     n = int(labels.max()) + 1
     hubs = np.unique(chain.complexes[faces[first_members(labels, n)]], return_inverse=True)[1]
     several = np.bincount(labels)[owners] > 1
-    owners, (left, right, _) = owners[several], meeting_edges(chain.positions[edges[several]])
+    owners, (left, right) = owners[several], meeting_edges(chain.positions[edges[several]])
     return connected_components(
         n + int(hubs.max()) + 1,
         *(np.concatenate(ends) for ends in ((np.arange(n), owners[left]), (n + hubs, owners[right]))),

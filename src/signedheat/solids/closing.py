@@ -129,7 +129,10 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     bends, must = width * (slopes[:, 0] * outwards).sum(axis=1), 2.0 * (outwards * vertex_normals(lid)[:n]).sum(axis=1)
     least, most = np.minimum(np.abs(bends), np.abs(must)), np.maximum(np.abs(bends), np.abs(must))
     ratio = np.sign(bends * must) * least / np.maximum(most, ANGLE_ROUNDING)
-    held = enough * np.clip(ratio / BEND_RATIO - 1.0, 0.0, 1.0)
+    ratio *= enough
+    # 0 on threads, which bend both ways
+    one_way = max(float(ratio.sum()), 0.0) / max(float(np.abs(ratio).sum()), 1e-300)
+    held = one_way * np.clip(ratio / BEND_RATIO - 1.0, 0.0, 1.0)
     # no more curvature than the lid needs to cross the opening
     fits = np.minimum(1.0, np.abs(must) / np.maximum(np.abs(bends), ANGLE_ROUNDING))
     curvatures = np.where(enough, fits * (slopes * frame).sum(axis=(1, 2)), 0.0)
@@ -276,7 +279,7 @@ def closed_by(vertices: Floats, faces: Ints, *, bent: bool = True, outlines: Int
         return vertices, np.empty((0, 3), dtype=np.int64)
     centre = vertices[np.unique(faces)].mean(axis=0)
     positions = vertices - centre
-    chain = np.concatenate([faces, small_lids(positions, faces, outlines)])
+    chain = np.concatenate([faces, small_lids(positions, faces, bent, outlines)])
     chain = np.concatenate([chain, strips(positions, chain, outlines)])
     surface = _Surface(positions, chain, outlines)
     with one_blas_thread():  # systems of a few hundred unknowns: threads would only wait
@@ -327,8 +330,17 @@ class _Surface(Frozen):
 
     @cached_property
     def normals(self) -> Floats:
-        """(m, 3) unit normals."""
-        return unit(area_vectors(self.triangles))
+        """(m, 3) unit normals; triangles without area, up to rounding, have that of a neighbour, of the largest one."""
+        normals = unit(area_vectors(self.triangles))
+        normals[self.areas <= ANGLE_ROUNDING * side_lengths(self.triangles).max(axis=1) ** 2] = 0.0
+        first, second = np.concatenate([self.edges.pairs, self.edges.pairs[:, ::-1]]).T // 3
+        ascending = np.argsort(self.areas[second], kind="stable")
+        first, second = first[ascending], second[ascending]
+        while True:
+            fills = ~normals[first].any(axis=1) & normals[second].any(axis=1)
+            if not fills.any():
+                return normals
+            normals[first[fills]] = normals[second[fills]]
 
     @cached_property
     def parts(self) -> Ints:
@@ -363,8 +375,8 @@ class _Surface(Frozen):
         return face, self.faces[face, (side + 2) % 3]
 
 
-def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints:
-    """Fill small holes, and gaps without area, by (k, 3) triangles between their vertices."""
+def small_lids(vertices: Floats, faces: Ints, bent: bool = True, outlines: Ints = NO_EDGES) -> Ints:
+    """Fill small holes if lids are `bent`, and gaps without area, by (k, 3) triangles between their vertices."""
     surface = _Surface(vertices, faces, outlines)
     triangles, chosen, corners, normals = [np.empty((0, 3), dtype=np.int64)], [], [], []
     starts = np.cumsum([0, *map(len, surface.loops)])
@@ -375,7 +387,7 @@ def small_lids(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints
         places = np.flatnonzero(turn)
         if len(places) < 3:
             triangles.append(fan(loop))
-        elif len(places) <= LOST_FACE_SIDES:
+        elif bent and len(places) <= LOST_FACE_SIDES:
             chosen.append(loop)
             corners.append(places)
             normals.append(surface.normals[near[places]])
@@ -477,7 +489,7 @@ def _spanned(surface: _Surface, loop: Ints, frame: Frame | None, bent: bool) -> 
         places = corners_of(corners)
         if len(places) < 3:
             return np.empty((0, 3)), fan(np.arange(len(loop)))
-        if len(places) <= LOST_FACE_SIDES:
+        if bent and len(places) <= LOST_FACE_SIDES:
             triangles = least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[0]
             return np.empty((0, 3)), _with_sides(np.arange(len(loop)), places, triangles)
     return lids.draped(corners, rim.starts, frame, plate or flat)

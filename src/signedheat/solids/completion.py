@@ -38,7 +38,7 @@ from .heat_surfaces import Heat, heat_surface
 from .mesh_orientation import oriented_as, owners_of
 from .overlaps import Nesting
 from .point_orientation import mean_gap, orient_points
-from .rims import boundary, loops
+from .rims import boundary, divided_at_rims, loops
 from .solid import Solid
 from .union import TriangleGroup, united
 
@@ -213,15 +213,16 @@ def completed(
             solid = run(partial(_from_points, cloud, method))
     else:
         with stopwatch("orient") as run:
-            chain = run(lambda: Chain.of(joined.triangulation))
+            triangles, parts = divided_at_rims(joined.triangulation)
+            owners = owners_of(joined)[parts]
+            chain = run(lambda: Chain.of(triangles))
             decided = bounding(chain, options.nested, options.as_oriented)
-            notes = [] if options.as_oriented else [oriented_as(joined, chain, decided).note]
+            notes = [] if options.as_oriented else [oriented_as(joined, owners, chain, decided).note]
         if not chain.areas.any():
             raise SourceError("all faces of the shape have zero area", element="shape")
         chain = replace(chain)  # drops the cached properties that only `bounding` needs
         with stopwatch("complete") as run:
-            solid = run(partial(_from_mesh, joined.triangulation, chain, decided, options, method))
-            owners = owners_of(joined)
+            solid = run(partial(_from_mesh, triangles, chain, decided, options, method))
             solid = replace(solid, origins=np.where(solid.origins >= 0, owners[solid.origins], -1))
     source = joined if isinstance(joined, TriangleMesh) else None
     diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
@@ -268,7 +269,7 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
 
 def _closed_by_lids(vertices: Floats, faces: Ints, origins: Ints, bent: bool) -> tuple[TriangleGroup, list[Note]]:
     """Close (m, 3) faces with (m,) origins by lids; note how many lost faces between given vertices were restored."""
-    lost = small_lids(vertices, faces)
+    lost = small_lids(vertices, faces, bent)
     restored = np.concatenate([faces, lost])
     places, added = closed_by(vertices, restored, bent=bent)
     surface = _made_from(places, restored, added, origins)

@@ -140,15 +140,18 @@ class Matrix:
         matrix = self.matrix[rows][:, kept]
         return Matrix(matrix, self.places[rows], self.normals[rows], owners, self.areas[rows], self.within[rows])
 
-    def weights(self, start: Floats | None = None) -> Floats:
-        """(k,) least-squares weights, whose signs orient the pieces; the direct solution needs no start."""
+    def weights(self, fixed: Bools, start: Floats | None = None) -> Floats:
+        """(k,) least-squares weights, 1 if `fixed`, whose signs orient the pieces; the solution needs no start."""
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
         weighted = self.matrix * shares[:, None]
         normal = weighted.T @ self.matrix
         normal += agreement(self.places, self.normals, shares, self.owners).toarray()
         held = np.bincount(self.owners, shares, self.matrix.shape[1])
         normal[np.diag_indices_from(normal)] += WEIGHT_DAMPING * np.maximum(held, LEAST_AREA_SHARE)
-        return np.asarray(scipy.linalg.solve(normal, weighted.T @ (0.5 + self.within), assume_a="pos"))
+        weights, free = np.ones(len(fixed)), ~fixed
+        wanted = (weighted.T @ (0.5 + self.within))[free] - normal[free][:, fixed].sum(axis=1)
+        weights[free] = scipy.linalg.solve(normal[free][:, free], wanted, assume_a="pos")
+        return weights
 
     def levels(self, signs: Floats) -> Floats:
         """(n,) levels at the samples, without the bodies ignored there."""
@@ -275,18 +278,25 @@ class Dipoles:
         places, normals, areas, softening, within = (array[rows] for array in values)
         return Dipoles(places, normals, areas, owners, softening, within)
 
-    def weights(self, start: Floats | None = None) -> Floats:
-        """(k,) weights, by conjugate gradients from weights near them, or from zero."""
+    def weights(self, fixed: Bools, start: Floats | None = None) -> Floats:
+        """(k,) weights, 1 if `fixed`, by conjugate gradients from weights near them, or from zero."""
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
         smooth = agreement(self.places, self.normals, shares, self.owners)
         held = WEIGHT_DAMPING * np.bincount(self.owners, shares)
 
-        def system(weights: Floats) -> Floats:
+        def every(weights: Floats) -> Floats:
             return self._adjoint(shares * self._numbers(weights)) + smooth @ weights + held * weights
+
+        def system(weights: Floats) -> Floats:
+            return np.where(fixed, 0.0, every(np.where(fixed, 0.0, weights)))
 
         inverse = 1.0 / np.maximum(smooth.diagonal() + held, np.finfo(float).tiny)
         wanted = self._adjoint((0.5 + self.within) * shares)
-        return conjugate_gradients(system, wanted, lambda rest: inverse * rest, start, WEIGHT_TOLERANCE)
+        if fixed.any():
+            wanted = np.where(fixed, 0.0, wanted - every(fixed.astype(np.float64)))
+            start = None if start is None else np.where(fixed, 0.0, start)
+        weights = conjugate_gradients(system, wanted, lambda rest: inverse * rest, start, WEIGHT_TOLERANCE)
+        return np.where(fixed, 1.0, weights)
 
     def levels(self, signs: Floats) -> Floats:
         """(n,) levels at the places, without the bodies ignored there."""

@@ -14,13 +14,13 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError
-from ..mesh.arrangement import arranged, meeting_faces
+from ..mesh.arrangement import SAME_POINT, arranged, meeting_faces
 from ..mesh.components import by_first_use, connected_components, element_components, numbered, sums_of
 from ..mesh.edges import edge_table
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import divided_at, part_volumes
 from ..mesh.unit_vectors import angles_around
-from ..mesh.welding import coincident_faces, indexed
+from ..mesh.welding import coincident_faces, indexed, tolerances
 from ..search.face_tree import FaceTree
 from ..surfaces.triangle_mesh import TriangleMesh
 from .regions import cut_and_sided, widest
@@ -98,7 +98,8 @@ def given_surface(solid: Evaluated, contour: Callable[[], TriangleMesh], cell: f
 def _conforming(whole: Joined, windings: Windings) -> Joined:
     """Divide triangles where they cross or end on each other, and drop parts that lie inside or cancel in pairs."""
     cut = partial(arranged, whole.points, whole.faces, None)
-    pieces, regions = cut_and_sided(cut, np.ones(len(whole.faces), dtype=bool), windings)
+    slacks = tolerances(whole.points, whole.faces, SAME_POINT)
+    pieces, regions = cut_and_sided(cut, slacks, np.ones(len(whole.faces), dtype=bool), windings)
     return Joined.of(pieces.points, _without_doubles(pieces.faces[regions.bounds]))
 
 

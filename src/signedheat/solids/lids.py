@@ -278,7 +278,7 @@ def running_mean(values: Floats, reach: int) -> Floats:
     return np.convolve(np.concatenate([values[len(values) - reach :], values, values[:reach]]), window, mode="valid")
 
 
-COPLANAR = 0.01
+COPLANAR = 1e-3
 """Height over a plane, relative to the length of what rises over it, up to which something lies in it: points, relative
 to their size, a unit vector along a side, and one of three unit normals, whose planes then meet in no point."""
 FLAT_LID_CORNERS = 256

@@ -143,12 +143,11 @@ def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Ori
         kind = type(shape).__name__
         raise GeometryError(f"a {kind} has no faces to orient", remedy="pass a TriangleMesh or PolygonMesh")
     chain = Chain.of(shape.triangulation)
-    return oriented_as(shape, chain, bounding(chain, nested))
+    return oriented_as(shape, owners_of(shape), chain, bounding(chain, nested))
 
 
-def oriented_as(shape: Mesh, chain: Chain, decided: Bounding) -> Orientation:
-    """Apply a decision about the chain of a mesh to the mesh."""
-    owners = owners_of(shape)
+def oriented_as(shape: Mesh, owners: Ints, chain: Chain, decided: Bounding) -> Orientation:
+    """Apply a decision about the chain of a mesh to the mesh, given the face that each triangle is part of."""
     n = int(owners.max()) + 1
     proper = chain.numbers >= 0
 
@@ -273,7 +272,7 @@ def orient(
 def agreeing_faces(mesh: TriangleMesh) -> Ints:
     """(m, 3) faces, on the first vertex at each place, turned to agree in components where all faces can."""
     chain, faces = Chain.of(mesh), mesh.faces.copy()
-    turned = chain.pieces(np.ones(len(chain.faces), dtype=bool)).turned
+    turned = chain.agreeing(np.ones(len(chain.faces), dtype=bool)).turned
     proper = chain.numbers >= 0
     faces[proper] = np.where(turned[:, None], chain.faces[:, ::-1], chain.faces)[chain.numbers[proper]]
     return faces

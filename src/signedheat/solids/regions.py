@@ -20,7 +20,6 @@ from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.triangles import area_vectors, face_areas, heights
 from ..mesh.unit_vectors import angles_around, unit
 from ..mesh.welding import coincident_faces
-from ..search.winding_tree import OFF_FACE
 from .winding import INSIDE_WINDING, Windings
 
 TOLERANCES: tuple[float, ...] = (1.0, 10.0, 100.0, 1000.0)
@@ -118,13 +117,15 @@ def _windings(
     starts = np.searchsorted(labels[order], np.arange(int(labels.max(initial=-1)) + 1))
     chosen = order[np.arange(n) - starts[labels[order]] < PROBED_FACES]
     corners = points[faces[chosen]]
-    away = np.minimum(np.maximum(OFF_FACE * np.sqrt(face_areas(corners)), steps[chosen]), 0.05 * thickness[chosen])
+    away = np.minimum(steps[chosen], 0.05 * thickness[chosen])
     away, centres = away[:, None] * normals[chosen], corners.mean(axis=1)
     sampled = windings.numbers_once(np.concatenate([centres - away, centres + away]))
-    offsets, owners = sampled - levels[chosen].T.ravel(), np.tile(labels[chosen], 2)
-    order = np.lexsort((offsets, owners))
+    offsets, owners = sampled.reshape(2, -1) - levels[chosen].T, labels[chosen]
+    # where the two sides disagree, another face lies between
+    order = np.lexsort((offsets[0], np.abs(offsets[0] - offsets[1]) > 0.5, owners))
     counts = np.bincount(owners)
-    medians = offsets[order[np.cumsum(counts) - counts + counts // 2]]
+    agree = np.bincount(owners, np.abs(offsets[0] - offsets[1]) <= 0.5).astype(np.int64)
+    medians = offsets[0][order[np.cumsum(counts) - counts + np.where(agree > 0, agree, counts) // 2]]
     return levels + np.round(medians)[labels, None], contradictions
 
 

@@ -9,10 +9,14 @@ import scipy
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
+from ..mesh.arrangement import SAME_POINT, arranged
+from ..mesh.box_tree import BoxTree
 from ..mesh.components import grouped, next_in_groups, sums_of
 from ..mesh.edges import edge_table
-from ..mesh.triangles import corner_normals
-from ..mesh.unit_vectors import SAME_WAY, angles_around, unit
+from ..mesh.triangles import area_vectors, corner_normals
+from ..mesh.unit_vectors import ANGLE_ROUNDING, SAME_WAY, angles_around, unit
+from ..mesh.welding import same_positions, tolerances
+from ..surfaces.triangle_mesh import TriangleMesh
 
 EDGE_PLACES = 8
 """Number of places on an edge from which edges that run along it are searched for, nearer together than
@@ -61,6 +65,9 @@ def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
         normals = sums_of(corner_normals(vertices[beside]), beside.ravel(), n)
         angles[around] = angles_around(unit(normals)[ends[around]], directions)
     order = np.lexsort((angles, ends))
+    # a slit has no width: where an edge leaves along one that arrives, the gap between them is nothing
+    apart = (np.diff(ends[order], prepend=-1) != 0) | (np.diff(angles[order], prepend=0.0) > ANGLE_ROUNDING)
+    order = order[np.lexsort((order >= n_edges, np.cumsum(apart)))]
     names = np.concatenate([np.arange(n_edges), -1 - np.arange(n_edges)])[order]
     following = _across_gaps(grouped(ends, n)[0], names)
     middles, lengths = vertices[edges].mean(axis=1), np.linalg.norm(vertices[heads] - vertices[tails], axis=1)
@@ -131,14 +138,12 @@ def corners_of(points: Floats) -> Ints:
     return np.flatnonzero(turning(points, next_in_groups(np.array([0, len(points)]))))
 
 
-def meeting_edges(ends: Floats) -> tuple[Ints, Ints, Bools]:
-    """Find pairs of edges, not with the same ends, that run along each other, and whether in opposite directions."""
+def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
+    """Find pairs of edges, not with the same ends, that run along each other, in one direction or the other."""
     along = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(along, axis=1)
     ways = along / np.maximum(lengths, 1e-300)[:, None]
-    shares = (np.arange(EDGE_PLACES) + 0.5) / EDGE_PLACES
-    places = (ends[:, :1] + shares[:, None] * along[:, None]).reshape(-1, 3)
-    owners = np.repeat(np.arange(len(ends)), EDGE_PLACES)
+    places, owners = _places_on(ends)
     tree, reach = scipy.spatial.cKDTree(places), ALONG_EDGE * lengths[owners]
     crowded = np.flatnonzero(tree.query(places, 2)[0][:, 1] <= reach)  # each place finds itself, too
     near = tree.query_ball_point(places[crowded], reach[crowded]) if len(crowded) else []
@@ -152,4 +157,88 @@ def meeting_edges(ends: Floats) -> tuple[Ints, Ints, Bools]:
     cosines = (ways[first] * ways[second]).sum(axis=1)
     alike = np.where((cosines < 0)[:, None, None], ends[second, ::-1], ends[second])
     meeting = (np.abs(cosines) > SAME_WAY) & (ends[first] != alike).any(axis=(1, 2))
-    return first[meeting], second[meeting], cosines[meeting] < 0
+    return first[meeting], second[meeting]
+
+
+def opposite_edges(ends: Floats, reaches: Floats) -> tuple[Ints, Ints]:
+    """Find pairs of directed edges that run along each other in opposite directions, within (n,) reaches of both.
+
+    Each place on an edge has one partner: the nearest place, direction included. The time is O(n log n).
+    """
+    ways, (places, owners) = unit(ends[:, 1] - ends[:, 0]), _places_on(ends)
+    partners = np.full(len(places), -1)
+    sizes = np.exp2(np.ceil(np.log2(np.maximum(reaches, 1e-300))))[owners]
+    for size in np.unique(sizes):
+        asking = np.flatnonzero(sizes == size)
+        tree = scipy.spatial.cKDTree(np.concatenate([places / size, 2.0 * ways[owners]], axis=1))
+        back = np.concatenate([places[asking] / size, -2.0 * ways[owners[asking]]], axis=1)
+        near = tree.query(back, distance_upper_bound=2.0)[1]
+        partners[asking[near < len(places)]] = near[near < len(places)]
+    first = np.flatnonzero(partners >= 0)
+    edge, other = owners[first], owners[partners[first]]
+    away = places[first] - ends[other, 0]
+    lengths = np.linalg.norm(ends[other, 1] - ends[other, 0], axis=1)
+    ahead = np.clip((away * ways[other]).sum(axis=1), 0.0, lengths)
+    gaps = np.linalg.norm(away - ahead[:, None] * ways[other], axis=1)
+    kept = (gaps <= np.minimum(reaches[edge], reaches[other])) & ((ways[edge] * ways[other]).sum(axis=1) < -SAME_WAY)
+    kept &= (ends[edge] != ends[other, ::-1]).any(axis=(1, 2))
+    pairs, shared = np.unique(edge[kept] * len(ends) + other[kept], return_counts=True)
+    pairs = pairs[shared >= SHARED_PLACES]
+    pairs = np.stack([pairs // max(len(ends), 1), pairs % max(len(ends), 1)], axis=1)
+    one, another = np.unique(np.sort(pairs, axis=1), axis=0).T
+    return one, another
+
+
+def _places_on(ends: Floats) -> tuple[Floats, Ints]:
+    """Return places on edges, `EDGE_PLACES` on each, and the edge of each."""
+    shares = (np.arange(EDGE_PLACES) + 0.5) / EDGE_PLACES
+    places = ends[:, :1] + shares[:, None] * (ends[:, 1:] - ends[:, :1])
+    return places.reshape(-1, 3), np.repeat(np.arange(len(ends)), EDGE_PLACES)
+
+
+def divided_at_rims(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints]:
+    """Divide faces along the open edges of others that lie in them, as a roof above walls; return origins, too.
+
+    So what a face bounds can end in the middle of it.
+    """
+    points, faces = mesh.vertices, same_positions(mesh.vertices)[mesh.faces]
+    table = edge_table(faces)
+    is_open = np.flatnonzero(table.face_counts == 1)
+    if not len(is_open):
+        return mesh, np.arange(mesh.n_faces)
+    slacks = tolerances(points, faces, SAME_POINT)
+    corners, ends = points[faces], table.vertices[is_open]
+    owners = np.empty(len(table.vertices), dtype=np.int64)
+    owners[table.face_edges.ravel()] = np.repeat(np.arange(len(faces)), 3)
+    own = owners[is_open]
+    starts, near = BoxTree.around(corners).meeting(points[ends[:, [0, 1, 1]]], slacks[own])
+    edge = np.repeat(np.arange(len(ends)), np.diff(starts))
+    apart = (near != own[edge]) & ~(faces[near][:, :, None] == ends[edge][:, None]).any(axis=1).all(axis=1)
+    edge, near = edge[apart], near[apart]
+    slack = np.minimum(slacks[own[edge]], slacks[near])
+    a, b = points[ends[edge]].swapaxes(0, 1)
+    normals = unit(area_vectors(corners[near]))
+    flat = normals.any(axis=1)
+    for end in (a, b):
+        flat &= np.abs(((end - corners[near, 0]) * normals).sum(axis=1)) <= slack
+    edge, near, slack, a, b, normals = (values[flat] for values in (edge, near, slack, a, b, normals))
+    # the part of the edge that lies in the face, and how far its middle is from the face's sides
+    low, high = np.zeros(len(edge)), np.ones(len(edge))
+    triangles, depth = corners[near], np.full(len(edge), np.inf)
+    inwards = [np.cross(normals, unit(triangles[:, (k + 1) % 3] - triangles[:, k])) for k in range(3)]
+    for k in range(3):
+        begin, end = (((at - triangles[:, k]) * inwards[k]).sum(axis=1) for at in (a, b))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            crossing = begin / (begin - end)
+        low = np.where((begin < -slack) & (end > begin), np.maximum(low, crossing), low)
+        high = np.where((end < -slack) & (begin > end), np.minimum(high, crossing), high)
+        low = np.where((begin < -slack) & (end < -slack), 1.0, low)
+    middle = a + (0.5 * (low + high))[:, None] * (b - a)
+    for k in range(3):
+        depth = np.minimum(depth, ((middle - triangles[:, k]) * inwards[k]).sum(axis=1))
+    lies = (np.linalg.norm(b - a, axis=1) * (high - low) > slack) & (depth > slack)
+    if not lies.any():
+        return mesh, np.arange(mesh.n_faces)
+    pairs = np.unique(np.sort(np.stack([own[edge[lies]], near[lies]], axis=1), axis=1), axis=0)
+    pieces = arranged(points, faces, pairs, slacks)
+    return TriangleMesh(pieces.points, pieces.faces), pieces.origins

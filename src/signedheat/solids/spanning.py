@@ -51,18 +51,20 @@ class Spanned:
 
 
 def frame_of(rim: Floats) -> Frame | None:
-    """Return the plane of a loop's area vector, with axes in which it is counterclockwise; None if its area is 0."""
+    """Return the plane of a loop's area through its centre, with axes for which it is counterclockwise; or None."""
     normal = area_vector(rim)
     length = np.linalg.norm(normal)
     if not length > 1e-6 * np.linalg.norm(np.ptp(rim, axis=0)) ** 2:
         return None
     normal /= length
-    around = rim - rim.mean(axis=0)
+    lengths, middles = side_lengths(rim), 0.5 * (rim + np.roll(rim, -1, axis=0))
+    centre = rim[0] + (lengths[:, None] * (middles - rim[0])).sum(axis=0) / lengths.sum()
+    around = rim - centre
     around -= np.outer(around @ normal, normal)
     reach = np.linalg.norm(around, axis=1)
     first = around[farthest(rim, reach)]  # this axis turns with the rim
     first = first / np.linalg.norm(first)
-    return rim[0], np.stack([first, np.cross(normal, first)], axis=1)
+    return centre, np.stack([first, np.cross(normal, first)], axis=1)
 
 
 def farthest(loop: Floats, away: Floats) -> int:

@@ -11,7 +11,7 @@ from ..arrays import Floats, Ints
 from ..mesh.components import connected_components, next_in_groups
 from ..mesh.unit_vectors import unit
 from .lids import cut_to_pieces
-from .rims import corners_of, meeting_edges
+from .rims import corners_of, opposite_edges
 from .spanning import area_vector
 
 NARROW = 0.3
@@ -35,16 +35,20 @@ class Rim:
     centre: Floats  # (3,) centre of a ball around it
     radius: float  # radius of the ball
     opening: Floats  # (3,) area vector of a lid
+    reach: float  # largest width of a gap to another rim that is narrow: a strip there is smaller than half of the lid
 
     @classmethod
     def of(cls, ids: Ints, corners: Floats, behind: Floats, parts: Ints) -> Rim:
         """Return the rim of a loop of vertices; `behind` is the third corner of the face at each edge."""
         along = np.roll(corners, -1, axis=0) - corners
+        length = float(np.linalg.norm(along, axis=1).sum())
         away = corners - behind
         away -= ((away * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-300))[:, None] * along
         centre = corners.mean(axis=0)
         radius = float(np.linalg.norm(corners - centre, axis=1).max())
-        return cls(ids, corners, unit(away), parts, centre, radius, area_vector(corners))
+        opening = area_vector(corners)
+        reach = NARROW * 2.0 * float(np.linalg.norm(opening)) / max(length, 1e-300)
+        return cls(ids, corners, unit(away), parts, centre, radius, opening, reach)
 
 
 def seams(rims: list[Rim]) -> list[Ints]:
@@ -60,13 +64,13 @@ def seams(rims: list[Rim]) -> list[Ints]:
     onward = np.concatenate([rim.onward[places] for rim, places in zip(rims, corners, strict=True)])
     parts = np.concatenate([rim.parts[places] for rim, places in zip(rims, corners, strict=True)])
     ends = np.stack([starts, starts[following]], axis=1)
-    first_sides, second_sides, opposite = meeting_edges(ends)
+    first_sides, second_sides = opposite_edges(ends, np.array([rim.reach for rim in rims])[owners])
     middles = ends.mean(axis=1)
     across = middles[second_sides] - middles[first_sides]
     gap = (parts[first_sides] != parts[second_sides]) | (
         ((across * onward[first_sides]).sum(axis=1) >= 0) & ((across * onward[second_sides]).sum(axis=1) <= 0)
     )
-    first_sides, second_sides = first_sides[gap & opposite], second_sides[gap & opposite]
+    first_sides, second_sides = first_sides[gap], second_sides[gap]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     strips, used = [], np.zeros(n, dtype=bool)
     for pairs in _stretches(

@@ -1,0 +1,157 @@
+"""Readings of a shape: which of its triangles count, how often, and which way they run.
+
+A broken shape can be read in more than one way. *As given* changes nothing: triangles count as often as they are
+there, and what is there once each way cancels. *Odd* takes triangles that are there an odd number of times, and turns
+them to agree: around an edge of two, four, ... triangles the winding number returns, so that neighbours run opposite
+ways. *Once* takes each triangle once, but for walls between closed cells.
+
+A reading is judged by the share of the area that it leaves unexplained. The winding number is a whole number on both
+sides of a face that bounds a solid, and at least 1 behind it; a face that does not count lies inside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..mesh.components import connected_components
+from ..mesh.triangles import cone_volumes
+from ..search.winding_tree import OFF_FACE, WindingTree, steps_off
+from .chain import Chain
+from .gauss import Pieces, means, sampled
+from .overlaps import directed, levels_within
+
+LEVEL_SAMPLES = 10_000
+"""Number of places at which a reading is judged, besides one for each part."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """Triangles of a chain that count, in pieces that face one way as a whole."""
+
+    counts: Ints  # (m,) how often each triangle counts, negative if reversed; 0 for those that cancel, and for walls
+    turned: Bools  # (m,) which run the other way than they were given first
+    pieces: Ints  # (m,) piece of each triangle
+    orientable: Bools  # (p,) pieces whose triangles can agree
+    disagreeing: int  # number of pairs of neighbours that disagreed
+
+
+def as_given(chain: Chain) -> tuple[Reading, Bools]:
+    """Read a chain as it was given, and find the (m,) triangles of complexes that close as given and face one way.
+
+    Copies count as often as they are there, or once if that leaves fewer edges open.
+    """
+    complexes, often = chain.complexes, chain.multiplicities
+    left_open, left_once = (chain.open_edges(counts, complexes) for counts in (often, np.sign(often)))
+    counts = np.where((left_once < left_open)[complexes], np.sign(often), often)
+    closes = (np.minimum(left_open, left_once) == 0) & (np.bincount(complexes, counts != 0) > 0)
+    whole = _one_way(chain, counts, closes)
+    turned = np.zeros(len(counts), dtype=bool)
+    if whole.all():
+        every = np.ones(int(complexes.max(initial=-1)) + 1, dtype=bool)
+        return Reading(counts, turned, complexes, every, 0), whole
+    used = (counts != 0) & ~whole
+    one, other = chain.neighbors(used)
+    forward = chain.edges.forward.ravel() != np.repeat(counts < 0, 3)
+    opposite = forward[one] != forward[other]
+    parts = connected_components(len(counts), one[opposite] // 3, other[opposite] // 3)
+    pieces = np.unique(np.where(whole, len(parts) + complexes, parts), return_inverse=True)[1]
+    every = np.ones(int(pieces.max()) + 1, dtype=bool)
+    return Reading(counts, ~whole & (counts < 0), pieces, every, 0), whole
+
+
+def _one_way(chain: Chain, counts: Ints, closes: Bools) -> Bools:
+    """(m,) whether each triangle is in one of the complexes that close and that face outwards, or inwards, as a whole.
+
+    The winding numbers of a cycle are the same all over a piece, so that one triangle of each is enough.
+    """
+    if not closes.any():
+        return np.zeros(len(counts), dtype=bool)
+    chosen = np.flatnonzero(closes[chain.complexes] & (counts != 0))
+    parts = chain.joined(counts != 0)[chosen]
+    order = np.lexsort((-chain.areas[chosen], parts))
+    largest = order[np.unique(parts[order], return_index=True)[1]]
+    levels = levels_within(chain.triangles[chosen], chain.complexes[chosen], counts[chosen], largest)
+    owners = chain.complexes[chosen[largest]]
+    ahead, back = (np.bincount(owners, sign * levels < 0.25, len(closes)) == 0 for sign in (1, -1))
+    return np.asarray((closes & (ahead | back))[chain.complexes])
+
+
+def odd(chain: Chain) -> Reading:
+    """Read a chain by its triangles that are there an odd number of times, turned to agree."""
+    return _turned(chain, chain.copies % 2 == 1)
+
+
+def once(chain: Chain) -> Reading:
+    """Read each triangle of a chain once, turned to agree, without walls between closed cells."""
+    return _turned(chain, ~walls(chain))
+
+
+def _turned(chain: Chain, used: Bools) -> Reading:
+    """Read the used triangles of a chain, turned to agree."""
+    agreed = chain.agreeing(used)
+    counts = np.where(agreed.turned, -1, 1) * (agreed.orientable[agreed.parts] & used)
+    return Reading(counts, agreed.turned & used, agreed.parts, agreed.orientable, agreed.disagreeing)
+
+
+def walls(chain: Chain) -> Bools:
+    """(m,) whether a closed cell lies on both sides of each triangle, where some edges have three or more triangles.
+
+    Around an edge, in order of angle, the sides of neighbouring triangles that look at each other bound the same
+    region of space; so all sides fall into shells, each the whole boundary of a region. Which way the triangles run
+    does not matter. A cell that lacks a wall is part of the outside.
+    """
+    n = len(chain.faces)
+    crowded = (chain.edges.face_counts > 2)[chain.edges.face_edges].any(axis=1)
+    chosen = np.bincount(chain.complexes, crowded)[chain.complexes] > 0
+    if not chosen.any():
+        return chosen
+    one, other, _ = chain.around_edges(chosen)
+    unclear = np.repeat(chosen, 3)
+    unclear[one] = False
+    chosen &= np.bincount(chain.complexes, unclear.reshape(n, 3).any(axis=1))[chain.complexes] == 0
+    # side 2 f is where the normal points to, 2 f + 1 the other one
+    forward = (chain.faces < np.roll(chain.faces, -1, axis=1)).ravel()
+    shells = connected_components(2 * n, 2 * (one // 3) + ~forward[one], 2 * (other // 3) + forward[other])
+    front, back = shells.reshape(n, 2).T
+    ways = np.where(front != back, np.array([[-1], [1]]), 0).ravel()  # an open surface has one shell around it
+    inside = cone_volumes(np.concatenate([chain.triangles] * 2), ways, np.concatenate([front, back]), 2 * n) > 0
+    return chosen & inside[front] & inside[back]
+
+
+def mixed(chain: Chain, readings: Sequence[Reading], chosen: Ints) -> Reading:
+    """Read each triangle of a chain by one of several readings, (m,) their indices."""
+    if (chosen == chosen[:1]).all():
+        return readings[int(chosen[0])] if len(chosen) else readings[0]
+    rows = np.arange(len(chosen))
+    counts, turned = (
+        np.stack([getattr(reading, name) for reading in readings])[chosen, rows] for name in ("counts", "turned")
+    )
+    firsts = np.cumsum([0, *(len(reading.orientable) for reading in readings)])
+    pieces = np.stack([reading.pieces + first for reading, first in zip(readings, firsts[:-1], strict=True)])
+    used, labels = np.unique(pieces[chosen, rows], return_inverse=True)
+    orientable = np.concatenate([reading.orientable for reading in readings])[used]
+    return Reading(counts, turned, labels, orientable, max(reading.disagreeing for reading in readings))
+
+
+def unexplained(chain: Chain, counts: Ints, parts: Ints) -> Floats:
+    """(p,) share of the area of each part that triangles with these counts leave unexplained; parts of −1 are left out.
+
+    The winding number is whole on both sides of a triangle that is explained, and at least 1 behind it; a triangle that
+    does not count has it, too, at least 1. The square of what is missing is averaged.
+    """
+    rows = np.flatnonzero(parts >= 0)
+    faces, places = sampled(Pieces(chain.triangles[rows], parts[rows]), LEVEL_SAMPLES)
+    faces, count = rows[faces], int(parts.max(initial=-1)) + 1
+    own, counting = counts[faces], directed(chain.triangles, counts)
+    if not len(counting):
+        return np.ones(count)
+    steps = steps_off(chain.triangles[faces], OFF_FACE) * np.where(own < 0, -1.0, 1.0)[:, None]
+    tree = WindingTree.of(counting)
+    behind, ahead = tree.numbers(places - steps), tree.numbers(places + steps)
+    off = [numbers - np.maximum(np.round(numbers), least) for numbers, least in ((behind, 1.0), (ahead, 0.0))]
+    missing = np.where(own != 0, 4.0 * np.maximum(*np.square(off)), np.minimum(behind - 1.0, 0.0) ** 2)
+    return means(np.minimum(missing, 1.0), parts[faces], np.ones(len(faces)), count)
