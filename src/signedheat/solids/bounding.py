@@ -74,41 +74,53 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     decided = _decided(chain, given, whole, ~whole, nested, as_oriented)
     if as_oriented or whole.all():
         return decided
-    # loose triangles tell little one by one: they are read together
-    alone = np.bincount(chain.complexes)[chain.complexes] == 1
-    parts = np.where(whole, -1, np.where(alone, 0, 1 + chain.complexes))
-    parts[~whole] = np.unique(parts[~whole], return_inverse=True)[1]
-    missing = unexplained(chain, decided.counts, parts)
-    areas = np.bincount(parts[~whole], chain.areas[~whole], len(missing))
-    readings, chosen = [given], np.zeros(len(parts), dtype=np.int64)
-    if cone_volumes(chain.triangles, given.counts, np.maximum(parts, -1) + 1, len(areas) + 1).sum() < 0:
+    # pieces as given, and the parts that they are in; loose triangles tell little one by one: they are read together
+    pieces = np.full(len(whole), -1)
+    names, pieces[~whole] = np.unique(given.pieces[~whole], return_inverse=True)
+    loose = np.bincount(chain.complexes)[chain.complexes] == 1
+    parts = np.where(loose, -1, chain.complexes)[first_members(given.pieces, len(given.orientable))[names]]
+    parts = np.unique(parts, return_inverse=True)[1]
+    part_of = np.where(whole, -1, parts[pieces])
+    areas = np.bincount(pieces[~whole], chain.areas[~whole])
+    part_areas = np.bincount(parts, areas)
+
+    def missing_of(counts: Ints) -> tuple[Floats, Floats]:
+        """Share of each piece that is unexplained, and of each part."""
+        by_piece = unexplained(chain, counts, pieces)
+        return by_piece, means(by_piece, parts, areas, len(part_areas))
+
+    by_piece, missing = missing_of(decided.counts)
+    readings, chosen = [given], np.zeros(len(whole), dtype=np.int64)
+    if cone_volumes(chain.triangles, given.counts, part_of + 1, len(part_areas) + 1).sum() < 0:
         inside_out = _reversed(given, whole)
         other = _decided(chain, inside_out, whole, ~whole, nested)
-        left = unexplained(chain, other.counts, parts)
-        if areas @ left < areas @ missing - LEAST_GAIN * areas.sum():
-            readings, decided, missing = [inside_out], other, left
-    if not (missing >= LEAST_GAIN).any():
+        other_pieces, left = missing_of(other.counts)
+        if part_areas @ left < part_areas @ missing - LEAST_GAIN * part_areas.sum():
+            readings, decided, by_piece, missing = [inside_out], other, other_pieces, left
+    # where no piece is more wrong than right, nothing is read in another way
+    doubtful = np.bincount(parts, by_piece > 0.5, len(missing)) > 0
+    if not (doubtful & (missing >= LEAST_GAIN)).any():
         return decided
     by_odd, by_once = odd(chain), once(chain)
-    differ = np.bincount(parts[~whole], (by_odd.counts != by_once.counts)[~whole], len(missing)) > 0
-    every, overlapping = np.ones(len(missing), dtype=bool), False
-    for reading, tell, cavities in ((by_odd, differ, False), (by_once, every, False), (by_once, every, True)):
-        todo = (missing >= LEAST_GAIN) & tell
+    differ = np.bincount(part_of[~whole], (by_odd.counts != by_once.counts)[~whole], len(missing)) > 0
+    overlapping = False
+    for reading, told, cavities in ((by_odd, differ, False), (by_once, doubtful, False), (by_once, doubtful, True)):
+        todo = doubtful & told & (missing >= LEAST_GAIN)
         if not todo.any() or (cavities and not overlapping):
             continue
         readings.append(reading)
         for _ in range(2):  # first for all of these parts, then for those only that it explains better
-            tried = np.where(~whole & todo[parts], len(readings) - 1, chosen)
+            tried = np.where(~whole & todo[part_of], len(readings) - 1, chosen)
             fixed = ~whole & (tried == 0)
             other = _decided(chain, mixed(chain, readings, tried), whole, fixed, nested, cavities=cavities)
             overlapping = other.overlapping
-            left = unexplained(chain, other.counts, parts)
+            left = missing_of(other.counts)[1]
             better = todo & (left < missing - LEAST_GAIN)
             if (better == todo).all() or not better.any():
                 break
             todo = better
         # what one part gains, others must not lose
-        if better.any() and areas @ left < areas @ missing - LEAST_GAIN * areas[todo].sum():
+        if better.any() and part_areas @ left < part_areas @ missing - LEAST_GAIN * part_areas[todo].sum():
             chosen, missing, decided = tried, left, other
     return decided
 
@@ -263,15 +275,16 @@ def open_bounding(
         rows, levels = names[system.owners], np.zeros(n)
         levels[names] = means(values, system.owners, system.areas, len(names))
         # whether groups are bodies by themselves; loose pieces are judged cluster by cluster
-        together = means(system.levels_within(signs, groups[names]), groups[rows], system.areas, n)[groups]
+        within = system.levels_within(signs, groups[names])
+        together, spread = (means(each, groups[rows], system.areas, n)[groups] for each in (within, within**2))
         by_itself = np.where(shared, together, alone)
-        own = (by_itself >= SHEET) & (~shared | (together * np.sqrt(members + 1) >= CHANCE_LEVEL))
+        own = (by_itself >= SHEET) & (~shared | _is_body(together, spread, members))
         loose = alive & ~own
         shares = np.where(loose[rows], system.areas, 0.0)
         mean = means(values, clusters[rows], shares, n)
         square = means(values**2, clusters[rows], shares, n)
         amount = _counted(areas * loose, groups, clusters)
-        body = (mean * np.sqrt(amount + 1) >= CHANCE_LEVEL) & (mean**2 >= COHERENT_LEVELS * square)
+        body = _is_body(mean, square, amount)
         thresholds = np.minimum(SHEET, 2 * SHEET * mean) if isinstance(system, Matrix) else -np.inf  # dipoles are noisy
         least = np.where(body, thresholds, np.inf)[clusters]
         wrong = alive & (levels < np.where(loose, least, SHEET * np.minimum(1.0, 2.0 * by_itself)))
@@ -285,6 +298,11 @@ def open_bounding(
     mostly = alive & (of_loose > of_bodies)[clusters]
     levels = np.where(mostly, mean[clusters], 0.5)
     return signs_of(weights), alive, np.where(mostly, clusters, -1), levels, overlapping
+
+
+def _is_body(mean: Floats, square: Floats, pieces: Floats) -> Bools:
+    """Whether levels, given their means, their mean squares and the number of pieces, are those of a body."""
+    return (mean * np.sqrt(pieces + 1) >= CHANCE_LEVEL) & (mean**2 >= COHERENT_LEVELS * square)
 
 
 def signs_of(weights: Floats) -> Floats:

@@ -15,11 +15,11 @@ import numpy as np
 import scipy
 from scipy import sparse
 
-from ..arrays import Bools, Floats, Frozen, Ints
+from ..arrays import Bools, Floats, Frozen, Ints, mask_of
 from ..compiled import compiled
 from ..linear.threads import one_blas_thread
 from ..mesh.box_tree import BoxTree
-from ..mesh.components import connected_components, element_components, next_in_groups
+from ..mesh.components import connected_components, element_components, first_members, next_in_groups
 from ..mesh.edges import EdgeTable, edge_keys, edge_table
 from ..mesh.triangles import area_vectors, face_areas, side_lengths
 from ..mesh.unit_vectors import ANGLE_ROUNDING, unit
@@ -355,6 +355,13 @@ class _Surface(Frozen):
         return connected_components(len(self.faces), first[smooth], second[smooth])
 
     @cached_property
+    def bends(self) -> Bools:
+        """(p,) whether the normals in each patch differ by more than rounding."""
+        first = self.normals[first_members(self.patches, int(self.patches.max()) + 1)]
+        off = np.abs(self.normals - first[self.patches]).max(axis=1) > ANGLE_ROUNDING
+        return mask_of(len(first), self.patches[off])
+
+    @cached_property
     def tree(self) -> BoxTree:
         """Tree of the faces' boxes."""
         return BoxTree.around(self.triangles)
@@ -456,24 +463,42 @@ def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
     corners = surface.vertices[loop]
     if len(loop) == 3:
         return np.empty((0, 3)), np.array([[0, 1, 2]])
-    if not bent and lids.is_flat(corners) and (flat := lids.flat_lid(corners)):
-        return flat
+    behind = surface.behind(loop, np.roll(loop, -1))[0]
+    bends = bent and bool(surface.bends[surface.patches[behind]].any())
+    if not bends and (lid := _of_flat_faces(corners, surface.normals[behind], bent)):
+        return lid
     for frame in (frame_of(corners), None):  # in the plane of the loop, else in a disc
-        if lid := _spanned(surface, loop, frame, bent):
+        if lid := _spanned(surface, loop, behind, frame, bends):
             return lid
     raise AssertionError("a disc has room for every loop")
 
 
-def _spanned(surface: _Surface, loop: Ints, frame: Frame | None, bent: bool) -> tuple[Floats, Ints] | None:
+def _of_flat_faces(corners: Floats, normals: Floats, bent: bool) -> tuple[Floats, Ints] | None:
+    """Make the lid of a loop of flat faces, or of its corners alone if these are few and lids may be bent."""
+    lid = lids.creased(corners, normals)
+    if lid is not None:
+        return lid
+    places = corners_of(corners)
+    if len(places) < 3:
+        return np.empty((0, 3)), fan(np.arange(len(corners)))
+    if bent and len(places) <= LOST_FACE_SIDES:
+        triangles = least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[0]
+        return np.empty((0, 3)), _with_sides(np.arange(len(corners)), places, triangles)
+    return None
+
+
+def _spanned(
+    surface: _Surface, loop: Ints, behind: Ints, frame: Frame | None, bends: bool
+) -> tuple[Floats, Ints] | None:
     """Make the lid of a loop, triangulated in a plane or in a disc; None if the loop crosses itself there."""
-    corners, behind = surface.vertices[loop], surface.behind(loop, np.roll(loop, -1))[0]
+    corners = surface.vertices[loop]
     rim = lids.SmoothRim.of(corners)
     smooth = lids.pattern(rim, frame)
     if smooth is None:
         return None
     flat = lids.film(smooth)
     plate = None
-    if bent:
+    if bends:
         width, points = width_of(flat), flat.vertices[: flat.n_rim]
         near = samples_near(
             surface.triangles, surface.tree, surface.patches, scipy.spatial.cKDTree(points), STRIP_WIDTH * width
@@ -481,15 +506,6 @@ def _spanned(surface: _Surface, loop: Ints, frame: Frame | None, bent: bool) -> 
         ends = surface.patches[behind[rim.edges_at(flat.places)]]
         normals, curvatures, held = continuation(flat, near, ends, width)
         plate = lids.plate(flat, normals, curvatures, held, width) if held.any() else None
-    if plate is None:
-        normals = surface.normals[behind]
-        lid = lids.creased(corners, normals)
-        if lid is not None:
-            return lid
-        places = corners_of(corners)
-        if len(places) < 3:
-            return np.empty((0, 3)), fan(np.arange(len(loop)))
-        if bent and len(places) <= LOST_FACE_SIDES:
-            triangles = least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[0]
-            return np.empty((0, 3)), _with_sides(np.arange(len(loop)), places, triangles)
+    if bends and plate is None and (lid := _of_flat_faces(corners, surface.normals[behind], True)):
+        return lid
     return lids.draped(corners, rim.starts, frame, plate or flat)

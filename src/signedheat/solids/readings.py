@@ -137,15 +137,15 @@ def mixed(chain: Chain, readings: Sequence[Reading], chosen: Ints) -> Reading:
     return Reading(counts, turned, labels, orientable, max(reading.disagreeing for reading in readings))
 
 
-def unexplained(chain: Chain, counts: Ints, parts: Ints) -> Floats:
-    """(p,) share of the area of each part that triangles with these counts leave unexplained; parts of −1 are left out.
+def unexplained(chain: Chain, counts: Ints, pieces: Ints) -> Floats:
+    """(p,) share of the area of each piece that triangles with these counts leave unexplained; −1 is left out.
 
     The winding number is whole on both sides of a triangle that is explained, and at least 1 behind it; a triangle that
     does not count has it, too, at least 1. The square of what is missing is averaged.
     """
-    rows = np.flatnonzero(parts >= 0)
-    faces, places = sampled(Pieces(chain.triangles[rows], parts[rows]), LEVEL_SAMPLES)
-    faces, count = rows[faces], int(parts.max(initial=-1)) + 1
+    rows = np.flatnonzero(pieces >= 0)
+    faces, places = sampled(Pieces(chain.triangles[rows], pieces[rows]), LEVEL_SAMPLES)
+    faces, count = rows[faces], int(pieces.max(initial=-1)) + 1
     own, counting = counts[faces], directed(chain.triangles, counts)
     if not len(counting):
         return np.ones(count)
@@ -154,4 +154,4 @@ def unexplained(chain: Chain, counts: Ints, parts: Ints) -> Floats:
     behind, ahead = tree.numbers(places - steps), tree.numbers(places + steps)
     off = [numbers - np.maximum(np.round(numbers), least) for numbers, least in ((behind, 1.0), (ahead, 0.0))]
     missing = np.where(own != 0, 4.0 * np.maximum(*np.square(off)), np.minimum(behind - 1.0, 0.0) ** 2)
-    return means(np.minimum(missing, 1.0), parts[faces], np.ones(len(faces)), count)
+    return means(np.minimum(missing, 1.0), pieces[faces], np.ones(len(faces)), count)

@@ -203,7 +203,10 @@ def divided_at_rims(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints]:
     """
     points, faces = mesh.vertices, same_positions(mesh.vertices)[mesh.faces]
     table = edge_table(faces)
-    is_open = np.flatnonzero(table.face_counts == 1)
+    loose = (table.face_counts[table.face_edges] == 1).all(axis=1)  # loose triangles end nowhere
+    in_surface = np.zeros(len(table.vertices), dtype=bool)
+    in_surface[table.face_edges[~loose]] = True
+    is_open = np.flatnonzero((table.face_counts == 1) & in_surface)
     if not len(is_open):
         return mesh, np.arange(mesh.n_faces)
     slacks = tolerances(points, faces, SAME_POINT)
