@@ -186,6 +186,15 @@ class OrientedPoints(Note):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class StrayPoints(Note):
+    """Points far from all others, which were left out of a point cloud."""
+
+    stray_points: int
+    limits: ClassVar[Mapping[str, float]] = {"stray_points": 0}
+    text: ClassVar[str] = "stray points left out: {0.stray_points}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class LeftOut(Note):
     """Faces that a union leaves out of a shape."""
 

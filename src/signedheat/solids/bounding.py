@@ -17,6 +17,7 @@ import numpy as np
 import scipy
 
 from ..arrays import Bools, Floats, Frozen, Ints
+from ..mesh.box_tree import BoxTree
 from ..mesh.components import connected_components, first_members, sums_of
 from ..mesh.triangles import area_vectors, cone_volumes
 from ..mesh.unit_vectors import unit
@@ -71,7 +72,8 @@ class Bounding(Frozen):
 def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False) -> Bounding:
     """Decide which triangles bound something and which way they face, or take them as oriented."""
     given, whole = as_given(chain)
-    decided = _decided(chain, given, whole, ~whole, nested, as_oriented)
+    held = ~whole & (as_oriented or nested == "given")  # what does not turn if it is read as given
+    decided = _decided(chain, given, whole, held, nested, as_oriented)
     if as_oriented or whole.all():
         return decided
     # pieces as given, and the parts that they are in; loose triangles tell little one by one: they are read together
@@ -84,21 +86,20 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     areas = np.bincount(pieces[~whole], chain.areas[~whole])
     part_areas = np.bincount(parts, areas)
 
-    def missing_of(counts: Ints) -> tuple[Floats, Floats]:
-        """Share of each piece that is unexplained, and of each part."""
-        by_piece = unexplained(chain, counts, pieces)
-        return by_piece, means(by_piece, parts, areas, len(part_areas))
+    def missing_of(counts: Ints) -> Floats:
+        """Share of the area of each part that is unexplained."""
+        return means(unexplained(chain, counts, pieces), parts, areas, len(part_areas))
 
-    by_piece, missing = missing_of(decided.counts)
+    missing = missing_of(decided.counts)
     readings, chosen = [given], np.zeros(len(whole), dtype=np.int64)
     if cone_volumes(chain.triangles, given.counts, part_of + 1, len(part_areas) + 1).sum() < 0:
         inside_out = _reversed(given, whole)
-        other = _decided(chain, inside_out, whole, ~whole, nested)
-        other_pieces, left = missing_of(other.counts)
+        other = _decided(chain, inside_out, whole, held, nested)
+        left = missing_of(other.counts)
         if part_areas @ left < part_areas @ missing - LEAST_GAIN * part_areas.sum():
-            readings, decided, by_piece, missing = [inside_out], other, other_pieces, left
-    # where no piece is more wrong than right, nothing is read in another way
-    doubtful = np.bincount(parts, by_piece > 0.5, len(missing)) > 0
+            readings, decided, missing = [inside_out], other, left
+    # a single piece with nothing near it can only be turned, which is wrong where it is more right than wrong
+    doubtful = (np.bincount(parts) > 1) | (missing > 0.5) | _entangled(chain, part_of)
     if not (doubtful & (missing >= LEAST_GAIN)).any():
         return decided
     by_odd, by_once = odd(chain), once(chain)
@@ -111,10 +112,10 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
         readings.append(reading)
         for _ in range(2):  # first for all of these parts, then for those only that it explains better
             tried = np.where(~whole & todo[part_of], len(readings) - 1, chosen)
-            fixed = ~whole & (tried == 0)
+            fixed = held & (tried == 0)
             other = _decided(chain, mixed(chain, readings, tried), whole, fixed, nested, cavities=cavities)
             overlapping = other.overlapping
-            left = missing_of(other.counts)[1]
+            left = missing_of(other.counts)
             better = todo & (left < missing - LEAST_GAIN)
             if (better == todo).all() or not better.any():
                 break
@@ -123,6 +124,16 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
         if better.any() and part_areas @ left < part_areas @ missing - LEAST_GAIN * part_areas[todo].sum():
             chosen, missing, decided = tried, left, other
     return decided
+
+
+def _entangled(chain: Chain, parts: Ints) -> Bools:
+    """(p,) whether the box around each part meets that of another part; the last one has −1, or none."""
+    low, high = (np.full((int(parts.max(initial=-1)) + 2, 3), end) for end in (np.inf, -np.inf))
+    np.minimum.at(low, parts, chain.triangles.min(axis=1))
+    np.maximum.at(high, parts, chain.triangles.max(axis=1))
+    low, high = low[:-1], high[:-1]
+    starts, _ = BoxTree.of(low, high).meeting(np.stack([low, high, high], axis=1))
+    return np.asarray(np.diff(starts) > 1)
 
 
 def _reversed(reading: Reading, whole: Bools) -> Reading:

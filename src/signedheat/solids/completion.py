@@ -15,8 +15,8 @@ import scipy
 
 from ..arrays import Floats, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
-from ..diagnostics import Diagnostics, FacesRestored, Note
-from ..errors import ConstraintError, SourceError
+from ..diagnostics import CompletedArea, Diagnostics, FacesRestored, Note
+from ..errors import ConstraintError, InexactWarning, SourceError, warn_user
 from ..foreign import SurfaceShape
 from ..jobs import Progress, Stopwatch
 from ..kinds import ShapeLike
@@ -37,7 +37,7 @@ from .closing import LOST_FACE_SIDES, closed_by, fan, small_lids
 from .heat_surfaces import Heat, heat_surface
 from .mesh_orientation import oriented_as, owners_of
 from .overlaps import Nesting
-from .point_orientation import mean_gap, orient_points
+from .point_orientation import mean_gap, orient_points, without_strays
 from .rims import boundary, divided_at_rims, loops
 from .solid import Solid
 from .union import TriangleGroup, united
@@ -90,6 +90,9 @@ heat .3 % too much; without 65 %, lids miss 1 to 12 % and heat 1 %."""
 ZERO_SET_FACES = 0.75
 """Triangles of the zero set of φ are left out within this distance of faces, in cells: they stand for these faces. With
 0.5 distance to balls, tori and ducks without three tenths of their triangles is 5 to 10 % worse."""
+
+MOSTLY_GIVEN = 0.25
+"""Where more than this share of the surface is completed, a warning says so."""
 
 Completing = Literal["lids", "heat"]
 Lids = Literal["bent", "flat"]
@@ -169,6 +172,11 @@ def complete(
     MemoryLimitError
         If completing does not fit in memory. Raised before anything is allocated.
 
+    Warns
+    -----
+    InexactWarning
+        If more than a quarter of the surface of a mesh is completed: what is missing is a guess.
+
     Examples
     --------
     >>> from signedheat import samples
@@ -205,10 +213,11 @@ def completed(
     stopwatch = Stopwatch(progress, 2)
     if isinstance(joined, PointCloud):
         with stopwatch("orient") as run:
-            cloud, notes = joined, list[Note]()
+            cloud, strays = without_strays(joined)
+            notes = list[Note](strays)
             if not options.as_oriented:
-                cloud, note = run(partial(orient_points, joined))
-                notes = [note]
+                cloud, note = run(partial(orient_points, cloud))
+                notes.append(note)
         with stopwatch("complete") as run:
             solid = run(partial(_from_points, cloud, method))
     else:
@@ -225,6 +234,9 @@ def completed(
             solid = run(partial(_from_mesh, triangles, chain, decided, options, method))
             solid = replace(solid, origins=np.where(solid.origins >= 0, owners[solid.origins], -1))
     source = joined if isinstance(joined, TriangleMesh) else None
+    for note in solid.diagnostics.notes if not isinstance(joined, PointCloud) else ():
+        if isinstance(note, CompletedArea) and note.completed_share > MOSTLY_GIVEN:
+            warn_user(f"{note}: where so much is missing, the result is a guess", InexactWarning)
     diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
     return replace(solid, source=source, diagnostics=diagnostics)
 

@@ -6,11 +6,34 @@ import numpy as np
 import scipy
 
 from ..arrays import Floats, Ints
-from ..diagnostics import OrientedPoints
+from ..diagnostics import OrientedPoints, StrayPoints
 from ..errors import GeometryError
 from ..mesh.unit_vectors import unit
 from ..parallel import in_chunks
 from ..surfaces.point_cloud import PointCloud, outward_normals
+
+STRAY_DISTANCE = 3.0
+"""A point is a stray if its distance to the nearest points is this many times that of the points around it."""
+STRAY_NEIGHBORS = 4, 64
+"""Number of nearest points whose mean distance counts, and of points around with which it is compared: so many that
+most of them lie on the surface, though strays may have other strays near them."""
+
+
+def without_strays(cloud: PointCloud) -> tuple[PointCloud, list[StrayPoints]]:
+    """Leave out points that lie far from all others, compared with the points around them."""
+    ids, owners = np.unique(cloud.representatives, return_inverse=True)
+    few, many = STRAY_NEIGHBORS
+    many = min(many, len(ids) // 4)
+    if many <= few:
+        return cloud, []
+    points = cloud.points[ids]
+    away, near = scipy.spatial.cKDTree(points).query(points, many + 1, workers=-1)
+    gaps = away[:, 1 : few + 1].mean(axis=1)
+    strays = (gaps > STRAY_DISTANCE * np.median(gaps[near[:, 1:]], axis=1))[owners.ravel()]
+    if not strays.any():
+        return cloud, []
+    kept = [None if each is None else each[~strays] for each in (cloud.normals, cloud.areas)]
+    return PointCloud(cloud.points[~strays], *kept, cloud.n_neighbors), [StrayPoints(int(strays.sum()))]
 
 
 def orient_points(cloud: PointCloud) -> tuple[PointCloud, OrientedPoints]:

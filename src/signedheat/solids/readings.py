@@ -140,8 +140,8 @@ def mixed(chain: Chain, readings: Sequence[Reading], chosen: Ints) -> Reading:
 def unexplained(chain: Chain, counts: Ints, pieces: Ints) -> Floats:
     """(p,) share of the area of each piece that triangles with these counts leave unexplained; −1 is left out.
 
-    The winding number is whole on both sides of a triangle that is explained, and at least 1 behind it; a triangle that
-    does not count has it, too, at least 1. The square of what is missing is averaged.
+    The winding number is whole on both sides of a triangle that is explained: at least 1 behind it, and if it does not
+    count also in front of it. The square of what is missing is averaged, up to half a turn.
     """
     rows = np.flatnonzero(pieces >= 0)
     faces, places = sampled(Pieces(chain.triangles[rows], pieces[rows]), LEVEL_SAMPLES)
@@ -152,6 +152,6 @@ def unexplained(chain: Chain, counts: Ints, pieces: Ints) -> Floats:
     steps = steps_off(chain.triangles[faces], OFF_FACE) * np.where(own < 0, -1.0, 1.0)[:, None]
     tree = WindingTree.of(counting)
     behind, ahead = tree.numbers(places - steps), tree.numbers(places + steps)
-    off = [numbers - np.maximum(np.round(numbers), least) for numbers, least in ((behind, 1.0), (ahead, 0.0))]
-    missing = np.where(own != 0, 4.0 * np.maximum(*np.square(off)), np.minimum(behind - 1.0, 0.0) ** 2)
+    off = behind - np.maximum(np.round(behind), 1.0), ahead - np.maximum(np.round(ahead), np.where(own != 0, 0.0, 1.0))
+    missing = 4.0 * np.maximum(*np.square(off))
     return means(np.minimum(missing, 1.0), pieces[faces], np.ones(len(faces)), count)

@@ -221,7 +221,8 @@ def divided_at_rims(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints]:
     slack = np.minimum(slacks[own[edge]], slacks[near])
     a, b = points[ends[edge]].swapaxes(0, 1)
     normals = unit(area_vectors(corners[near]))
-    flat = normals.any(axis=1)
+    rises = np.abs(np.einsum("kcd,kd->kc", corners[own[edge]] - corners[near, :1], normals))
+    flat = normals.any(axis=1) & (rises.max(axis=1) > slack)  # and the face itself does not lie in the other one
     for end in (a, b):
         flat &= np.abs(((end - corners[near, 0]) * normals).sum(axis=1)) <= slack
     edge, near, slack, a, b, normals = (values[flat] for values in (edge, near, slack, a, b, normals))

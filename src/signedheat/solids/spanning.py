@@ -59,7 +59,7 @@ def frame_of(rim: Floats) -> Frame | None:
     normal /= length
     lengths, middles = side_lengths(rim), 0.5 * (rim + np.roll(rim, -1, axis=0))
     centre = rim[0] + (lengths[:, None] * (middles - rim[0])).sum(axis=0) / lengths.sum()
-    around = rim - centre
+    around = rim - rim.mean(axis=0)
     around -= np.outer(around @ normal, normal)
     reach = np.linalg.norm(around, axis=1)
     first = around[farthest(rim, reach)]  # this axis turns with the rim

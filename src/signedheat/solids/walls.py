@@ -9,9 +9,9 @@ import scipy
 
 from ..arrays import Floats, Ints
 from ..mesh.components import connected_components, next_in_groups
-from ..mesh.unit_vectors import unit
+from ..mesh.unit_vectors import SAME_WAY, unit
 from .lids import cut_to_pieces
-from .rims import corners_of, opposite_edges
+from .rims import ALONG_EDGE, corners_of, opposite_edges
 from .spanning import area_vector
 
 NARROW = 0.3
@@ -64,14 +64,22 @@ def seams(rims: list[Rim]) -> list[Ints]:
     onward = np.concatenate([rim.onward[places] for rim, places in zip(rims, corners, strict=True)])
     parts = np.concatenate([rim.parts[places] for rim, places in zip(rims, corners, strict=True)])
     ends = np.stack([starts, starts[following]], axis=1)
-    first_sides, second_sides = opposite_edges(ends, np.array([rim.reach for rim in rims])[owners])
-    middles = ends.mean(axis=1)
-    across = middles[second_sides] - middles[first_sides]
-    gap = (parts[first_sides] != parts[second_sides]) | (
-        ((across * onward[first_sides]).sum(axis=1) >= 0) & ((across * onward[second_sides]).sum(axis=1) <= 0)
+    lengths, ways = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), unit(ends[:, 1] - ends[:, 0])
+    longest = np.maximum.reduceat(lengths, first)
+    reaches = np.maximum([rim.reach for rim in rims], ALONG_EDGE * longest)
+    first_sides, second_sides = opposite_edges(ends, reaches[owners])
+    across = ends.mean(axis=1)[second_sides] - ends.mean(axis=1)[first_sides]
+    across -= (across * ways[first_sides]).sum(axis=1)[:, None] * ways[first_sides]
+    width, ahead, back = (
+        np.linalg.norm(across, axis=1),
+        (across * onward[first_sides]).sum(axis=1),
+        -(across * onward[second_sides]).sum(axis=1),
     )
+    # a crack is narrower than the chords of arcs are apart; across a gap the surface goes on
+    crack = width <= ALONG_EDGE * np.maximum(lengths[first_sides], lengths[second_sides])
+    crack &= (parts[first_sides] != parts[second_sides]) | ((ahead >= 0) & (back >= 0))
+    gap = crack | (np.minimum(ahead, back) >= SAME_WAY * width)
     first_sides, second_sides = first_sides[gap], second_sides[gap]
-    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     strips, used = [], np.zeros(n, dtype=bool)
     for pairs in _stretches(
         np.concatenate([first_sides, second_sides]), np.concatenate([second_sides, first_sides]), following, lengths
